@@ -1,0 +1,1 @@
+"""MAVLink wire and links (ground floor), and the emulated autopilot with its SITL runner (upper floor)."""

@@ -1,0 +1,1 @@
+"""Onboard estimators and the logs they can be fed from."""
