@@ -1,0 +1,92 @@
+"""What the MAVLink microservices stand on: channels, message sources and the shape of a service.
+
+A service is sans-IO: the autopilot hands it decoded messages and the time, it answers through channels. Message
+fields are untrusted: whatever they hold, a service neither raises nor stores half of it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+MavlinkMessage = Any
+"""A message object of `pymavlink.dialects.v20.all` (pymavlink carries no types)."""
+
+Announce = Callable[[int, str], None]
+"""Sends a STATUSTEXT: (MAV_SEVERITY, text)."""
+
+
+class Channel(Protocol):
+    """One MAVLink link as the autopilot sees it. `send` never blocks and never raises on a slow or lost peer."""
+
+    @property
+    def name(self) -> str: ...
+
+    def send(self, message: MavlinkMessage, /) -> None: ...
+
+
+class Broadcast(Protocol):
+    """Every open channel of an autopilot; the sequence may change as links come and go."""
+
+    @property
+    def channels(self) -> Sequence[Channel]: ...
+
+
+class Source(NamedTuple):
+    """Who sent a message, and by which channel it came: replies go there and nowhere else."""
+
+    channel: Channel
+    system_id: int
+    component_id: int
+
+
+class Service(Protocol):
+    """One MAVLink microservice of an autopilot."""
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Take one message; True when it belonged to this service. Never raises on message contents."""
+        ...
+
+    def tick(self, time_us: int) -> None:
+        """Advance timers and queues; called at 50 Hz of vehicle time."""
+        ...
+
+
+def send_to_all(broadcast: Broadcast, message: MavlinkMessage) -> None:
+    """Send one message on every channel of the autopilot."""
+    for channel in broadcast.channels:
+        channel.send(message)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AddressRule:
+    """Which target ids of a message an autopilot takes for its own.
+
+    Attributes:
+        system_id: the vehicle's own system id.
+        component_ids: component ids answered besides 0 (all); None: any component id (ArduPilot).
+        any_system: also answer target system 0 (ArduPilot; PX4 stays silent).
+    """
+
+    system_id: int
+    component_ids: frozenset[int] | None
+    any_system: bool
+
+    def accepts(self, message: MavlinkMessage) -> bool:
+        """True when the message is for this autopilot; a message without target fields is for everybody."""
+        system = getattr(message, "target_system", None)
+        if system is None:
+            return True
+        if system != self.system_id and not (system == 0 and self.any_system):
+            return False
+        component = getattr(message, "target_component", 0)
+        return component == 0 or self.component_ids is None or component in self.component_ids
+
+
+def px4_address_rule(system_id: int) -> AddressRule:
+    """PX4: own system id only; component 1, 190 (the historical mission planner) or 0 (reference section 7)."""
+    return AddressRule(system_id=system_id, component_ids=frozenset((1, 190)), any_system=False)
+
+
+def ardupilot_address_rule(system_id: int) -> AddressRule:
+    """ArduPilot: own system id or 0, any component id (reference section 3)."""
+    return AddressRule(system_id=system_id, component_ids=None, any_system=True)
