@@ -61,9 +61,7 @@ class RandomStreams:
             if isinstance(part, bool) or not isinstance(part, str | int):
                 raise ValueError(f"stream key part {part!r} is not a string or an integer")
             text = f"{'s' if isinstance(part, str) else 'i'}{part}".encode()
-            digest.update(
-                len(text).to_bytes(4, "little")
-            )  # length prefix: no two keys join to the same bytes
+            digest.update(len(text).to_bytes(4, "little"))  # length prefix: keys can't join
             digest.update(text)
         words = np.frombuffer(digest.digest(), dtype="<u4")
         return np.random.SeedSequence(entropy=self._seed, spawn_key=tuple(int(word) for word in words))
