@@ -1,0 +1,77 @@
+"""Frames to pymavlink's message objects."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+from pymavlink.dialects.v20 import all as dialect
+
+from autopilot_bridge.mavlink.definitions import MAVLinkMessage, definition
+from autopilot_bridge.mavlink.frame import CHECKSUM_SIZE, HEADER_SIZE_V1, HEADER_SIZE_V2, Frame
+
+
+def decode(frame: Frame) -> MAVLinkMessage:
+    """The message in a frame, as pymavlink would give it: fields as attributes, header filled in.
+
+    Strings end at their first zero; bytes that are not ASCII become U+FFFD. Never raises for a frame of the parser.
+    """
+    message = _constructor(frame.message_id)(frame.payload)
+    raw = frame.raw
+    length = raw[1]
+    if frame.version == 2:
+        start = HEADER_SIZE_V2
+        message._header = dialect.MAVLink_header(
+            frame.message_id, raw[2], raw[3], length, frame.sequence, frame.system_id, frame.component_id
+        )
+    else:
+        start = HEADER_SIZE_V1
+        message._header = dialect.MAVLink_header(
+            frame.message_id, 0, 0, length, frame.sequence, frame.system_id, frame.component_id
+        )
+    end = start + length
+    message._msgbuf = raw
+    message._payload = raw[start:end]
+    message._crc = int.from_bytes(raw[end : end + CHECKSUM_SIZE], "little")
+    return message
+
+
+@lru_cache(maxsize=None)
+def _constructor(message_id: int) -> Callable[[bytes], Any]:
+    """A function that makes the message object from its full-size payload."""
+    found = definition(message_id)
+    make = found.message_class
+    unpack = found.wire.unpack
+    positions: dict[str, slice | int] = {}
+    strings = set()
+    at = 0
+    for field in found.wire_fields:
+        if field.code == "s":
+            strings.add(field.name)
+        is_array = field.length and field.code != "s"
+        positions[field.name] = slice(at, at + field.length) if is_array else at
+        at += field.length if is_array else 1
+    plan = [(positions[name], name in strings) for name in found.field_names]
+    if not any(isinstance(position, slice) or is_string for position, is_string in plan):
+        order = [position for position, _ in plan]
+        if order == list(range(len(order))):
+            return lambda payload: make(*unpack(payload))
+
+        def construct_scalars(payload: bytes) -> Any:
+            values = unpack(payload)
+            return make(*[values[position] for position in order])  # type: ignore[index]
+
+        return construct_scalars
+
+    def construct(payload: bytes) -> Any:
+        values = unpack(payload)
+        arguments: list[Any] = []
+        for position, is_string in plan:
+            if isinstance(position, slice):
+                arguments.append(list(values[position]))
+            elif is_string:
+                arguments.append(values[position].rstrip(b"\0"))
+            else:
+                arguments.append(values[position])
+        return make(*arguments)
+
+    return construct

@@ -1,0 +1,91 @@
+"""One checked MAVLink frame, as it was on the wire."""
+
+from typing import Final
+
+from autopilot_bridge.mavlink.definitions import DEFINITIONS, MessageDefinition
+
+MAGIC_V1: Final = 0xFE
+MAGIC_V2: Final = 0xFD
+HEADER_SIZE_V1: Final = 6
+HEADER_SIZE_V2: Final = 10
+CHECKSUM_SIZE: Final = 2
+SIGNATURE_SIZE: Final = 13
+INCOMPAT_SIGNED: Final = 0x01
+MAX_FRAME_SIZE: Final = HEADER_SIZE_V2 + 255 + CHECKSUM_SIZE + SIGNATURE_SIZE
+
+
+class Frame:
+    """A frame whose checksum is right and whose message the dialect knows (MAVLink guide, "Serialization").
+
+    Attributes:
+        raw: all bytes of the frame, magic to checksum (or signature).
+        message_id: id of the message.
+        system_id, component_id: who sent it.
+        sequence: the sender's frame counter, 0..255.
+        version: 1 or 2.
+        signed: the frame carries a signature (which the parser does not verify).
+    """
+
+    __slots__ = ("component_id", "message_id", "raw", "sequence", "signed", "system_id", "version")
+
+    def __init__(
+        self,
+        raw: bytes,
+        message_id: int,
+        system_id: int,
+        component_id: int,
+        sequence: int,
+        version: int = 2,
+        signed: bool = False,
+    ) -> None:
+        self.raw = raw
+        self.message_id = message_id
+        self.system_id = system_id
+        self.component_id = component_id
+        self.sequence = sequence
+        self.version = version
+        self.signed = signed
+
+    def __repr__(self) -> str:
+        return (
+            f"Frame({self.definition.name}, from {self.system_id}/{self.component_id}, "
+            f"sequence {self.sequence}, {len(self.raw)} bytes)"
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Frame) and self.raw == other.raw
+
+    def __hash__(self) -> int:
+        return hash(self.raw)
+
+    @property
+    def definition(self) -> MessageDefinition:
+        """Definition of the message."""
+        return DEFINITIONS[self.message_id]
+
+    @property
+    def payload(self) -> bytes:
+        """Payload at its full size: truncated zeros restored, bytes of a newer definition cut off."""
+        raw = self.raw
+        start = HEADER_SIZE_V2 if self.version == 2 else HEADER_SIZE_V1
+        size = DEFINITIONS[self.message_id].size
+        length = raw[1]
+        if length >= size:
+            return raw[start : start + size]
+        return raw[start : start + length].ljust(size, b"\0")
+
+    @property
+    def target_system(self) -> int:
+        """System the message is addressed to; 0 for all of them and for messages without a target."""
+        return self._target(DEFINITIONS[self.message_id].target_system_offset)
+
+    @property
+    def target_component(self) -> int:
+        """Component the message is addressed to; 0 for all of them and for messages without a target."""
+        return self._target(DEFINITIONS[self.message_id].target_component_offset)
+
+    def _target(self, offset: int | None) -> int:
+        raw = self.raw
+        if offset is None or offset >= raw[1]:  # a truncated target is zero
+            return 0
+        return raw[(HEADER_SIZE_V2 if self.version == 2 else HEADER_SIZE_V1) + offset]

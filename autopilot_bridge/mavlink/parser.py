@@ -1,0 +1,222 @@
+"""Bytes in, frames out: finds MAVLink 1 and 2 frames in anything, never raises, accounts for every byte."""
+
+from dataclasses import dataclass, field
+from typing import Final
+
+from fastcrc.crc16 import mcrf4xx
+
+from autopilot_bridge.mavlink.definitions import DEFINITIONS
+from autopilot_bridge.mavlink.frame import (
+    CHECKSUM_SIZE,
+    HEADER_SIZE_V1,
+    HEADER_SIZE_V2,
+    INCOMPAT_SIGNED,
+    MAGIC_V1,
+    MAGIC_V2,
+    SIGNATURE_SIZE,
+    Frame,
+)
+
+_CRC_EXTRA: Final = {key: bytes([item.crc_extra]) for key, item in DEFINITIONS.items()}
+_MAGIC_V1_BYTE: Final = bytes([MAGIC_V1])
+_MAGIC_V2_BYTE: Final = bytes([MAGIC_V2])
+_OVERHEAD_V1: Final = HEADER_SIZE_V1 + CHECKSUM_SIZE
+_OVERHEAD_V2: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
+_MAX_LATE: Final = 16  # frames; a larger step back is a sender that started anew
+
+
+@dataclass(slots=True)
+class SourceCounters:
+    """What was heard from one component.
+
+    Attributes:
+        frames: good frames.
+        lost: frames missing from the sequence.
+        late: frames that arrived after a later one (each was counted as lost first) or twice.
+        last_sequence: newest sequence number.
+    """
+
+    frames: int = 0
+    lost: int = 0
+    late: int = 0
+    last_sequence: int = -1
+
+
+@dataclass(slots=True)
+class ParserCounters:
+    """Where every byte went: `bytes_in == bytes_framed + bytes_dropped +` the parser's `pending_bytes`.
+
+    Attributes:
+        bytes_in: bytes fed.
+        bytes_framed: bytes of good frames.
+        bytes_junk: bytes between frames, those left over from damaged frames included.
+        bytes_bad_crc: first bytes of what looked like a frame with a wrong checksum (the search goes on behind it).
+        bytes_unsupported: first bytes of what looked like a MAVLink 2 frame with unknown incompatibility flags.
+        bytes_unknown_message: whole frames of messages the dialect does not know; their checksum can't be verified.
+        frames: good frames; `frames_v1` and `frames_signed` are those in MAVLink 1 and with a signature.
+        bad_crc, unsupported_flags, unknown_message: how often each happened.
+        sources: counters by (system id, component id).
+    """
+
+    bytes_in: int = 0
+    bytes_framed: int = 0
+    bytes_junk: int = 0
+    bytes_bad_crc: int = 0
+    bytes_unsupported: int = 0
+    bytes_unknown_message: int = 0
+    frames: int = 0
+    frames_v1: int = 0
+    frames_signed: int = 0
+    bad_crc: int = 0
+    unsupported_flags: int = 0
+    unknown_message: int = 0
+    sources: dict[tuple[int, int], SourceCounters] = field(default_factory=dict)
+
+    @property
+    def bytes_dropped(self) -> int:
+        """All bytes that are not in a good frame."""
+        return self.bytes_junk + self.bytes_bad_crc + self.bytes_unsupported + self.bytes_unknown_message
+
+    @property
+    def frames_lost(self) -> int:
+        """Frames missing from the sequences of all sources, those that came late taken off."""
+        return sum(max(0, source.lost - source.late) for source in self.sources.values())
+
+
+class FrameParser:
+    """Frames from one byte stream: one parser for each peer of a link.
+
+    A byte that can't begin a good frame is dropped and the search goes on behind it, so damage costs no more than the
+    damaged frame. A frame of an unknown message is skipped whole when another frame or the end of the data follows it;
+    otherwise it is taken for junk. Frames with incompatibility flags other than "signed" are dropped, as the MAVLink
+    guide demands ("Incompatibility Flags"). Signatures are passed over unverified.
+    """
+
+    __slots__ = ("_pending", "counters")
+
+    def __init__(self) -> None:
+        self.counters = ParserCounters()
+        self._pending = b""
+
+    @property
+    def pending_bytes(self) -> int:
+        """Bytes of a frame that is not complete yet."""
+        return len(self._pending)
+
+    def feed(self, data: bytes) -> list[Frame]:
+        """All frames completed by `data`, in order."""
+        size = len(data)
+        self.counters.bytes_in += size
+        if not self._pending:
+            # What most links deliver: exactly one unsigned MAVLink 2 frame.
+            if (
+                size >= _OVERHEAD_V2
+                and data[0] == MAGIC_V2
+                and data[2] == 0
+                and data[1] + _OVERHEAD_V2 == size
+            ):
+                message_id = data[7] | data[8] << 8 | data[9] << 16
+                extra = _CRC_EXTRA.get(message_id)
+                if extra is not None and mcrf4xx(data[1:-2] + extra) == data[-2] | data[-1] << 8:
+                    frame = Frame(bytes(data), message_id, data[5], data[6], data[4])
+                    self._count(frame)
+                    return [frame]
+            return self._search(bytes(data))
+        return self._search(self._pending + data)
+
+    def flush(self) -> None:
+        """The stream has ended or was interrupted: what is pending will not be completed and is counted as junk."""
+        self.counters.bytes_junk += len(self._pending)
+        self._pending = b""
+
+    def _search(self, buffer: bytes) -> list[Frame]:
+        counters = self.counters
+        frames: list[Frame] = []
+        size = len(buffer)
+        next_v1 = next_v2 = -1  # next magic bytes at or behind `start`
+        start = 0
+        while start < size:
+            if next_v2 < start:
+                next_v2 = buffer.find(_MAGIC_V2_BYTE, start)
+                if next_v2 < 0:
+                    next_v2 = size
+            if next_v1 < start:
+                next_v1 = buffer.find(_MAGIC_V1_BYTE, start)
+                if next_v1 < 0:
+                    next_v1 = size
+            found = min(next_v1, next_v2)
+            counters.bytes_junk += found - start
+            start = found
+            if start == size:
+                break
+            if found == next_v2:
+                if size - start < 3:
+                    break
+                flags = buffer[start + 2]
+                if flags & ~INCOMPAT_SIGNED:
+                    counters.unsupported_flags += 1
+                    counters.bytes_unsupported += 1
+                    start += 1
+                    continue
+                crc_end = start + _OVERHEAD_V2 + buffer[start + 1]
+                end = crc_end + SIGNATURE_SIZE if flags else crc_end
+                if end > size:
+                    break
+                message_id = buffer[start + 7] | buffer[start + 8] << 8 | buffer[start + 9] << 16
+            else:
+                if size - start < 2:
+                    break
+                flags = 0
+                crc_end = end = start + _OVERHEAD_V1 + buffer[start + 1]
+                if end > size:
+                    break
+                message_id = buffer[start + 5]
+            extra = _CRC_EXTRA.get(message_id)
+            if extra is None:
+                if end == size or buffer[end] in (MAGIC_V1, MAGIC_V2):
+                    counters.unknown_message += 1
+                    counters.bytes_unknown_message += end - start
+                    start = end
+                else:
+                    counters.bytes_junk += 1
+                    start += 1
+                continue
+            if (
+                mcrf4xx(buffer[start + 1 : crc_end - 2] + extra)
+                != buffer[crc_end - 2] | buffer[crc_end - 1] << 8
+            ):
+                counters.bad_crc += 1
+                counters.bytes_bad_crc += 1
+                start += 1
+                continue
+            raw = buffer[start:end]
+            if found == next_v2:
+                frame = Frame(raw, message_id, raw[5], raw[6], raw[4], 2, flags != 0)
+            else:
+                frame = Frame(raw, message_id, raw[3], raw[4], raw[2], 1, False)
+            self._count(frame)
+            frames.append(frame)
+            start = end
+        self._pending = buffer[start:]
+        return frames
+
+    def _count(self, frame: Frame) -> None:
+        counters = self.counters
+        counters.frames += 1
+        counters.bytes_framed += len(frame.raw)
+        if frame.version == 1:
+            counters.frames_v1 += 1
+        elif frame.signed:
+            counters.frames_signed += 1
+        key = (frame.system_id, frame.component_id)
+        source = counters.sources.get(key)
+        if source is None:
+            source = counters.sources[key] = SourceCounters()
+            source.last_sequence = (frame.sequence - 1) & 0xFF
+        source.frames += 1
+        missed = (frame.sequence - source.last_sequence - 1) & 0xFF
+        if missed < 256 - _MAX_LATE:
+            source.lost += missed
+            source.last_sequence = frame.sequence
+        else:
+            source.late += 1
