@@ -1,0 +1,208 @@
+"""What happened to the vehicle, as typed events. Flavours turn them into the texts a ground station shows."""
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum, auto
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.geodesy import GeodeticPosition
+
+
+class DisarmReason(Enum):
+    """Why the motors stopped."""
+
+    COMMAND = auto()
+    FORCED = auto()  # a command with the override number, also in the air
+    PREFLIGHT_TIMEOUT = auto()  # armed, never took off
+    LANDED = auto()
+    FAILSAFE = auto()
+    TERMINATION = auto()
+
+
+class FailsafeKind(Enum):
+    """Conditions with a failsafe of their own."""
+
+    OFFBOARD_LOST = auto()
+    GCS_LOST = auto()
+    MANUAL_LOST = auto()
+    BATTERY_LOW = auto()
+    BATTERY_CRITICAL = auto()
+    BATTERY_EMERGENCY = auto()
+    POSITION_LOST = auto()
+    GEOFENCE = auto()
+
+
+class FailsafeAction(IntEnum):
+    """What a failsafe does. The order is the precedence: the greatest of all active actions is flown."""
+
+    NONE = 0
+    WARN = 1
+    POSITION = 2  # fall back to position, altitude or stabilised flight by stick
+    ALTITUDE = 3
+    STABILIZED = 4
+    HOLD = 5
+    BRAKE = 6
+    RETURN = 7
+    LAND = 8
+    DESCEND = 9
+    TERMINATE = 10
+    DISARM = 11
+
+
+class BatteryLevel(IntEnum):
+    """Battery warning level, as MAV_BATTERY_CHARGE_STATE: 1 ok, 2 low, 3 critical, 4 emergency."""
+
+    OK = 1
+    LOW = 2
+    CRITICAL = 3
+    EMERGENCY = 4
+
+
+class LandedState(IntEnum):
+    """MAVLink MAV_LANDED_STATE."""
+
+    UNDEFINED = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class SystemStatus(IntEnum):
+    """MAVLink MAV_STATE."""
+
+    UNINIT = 0
+    BOOT = 1
+    CALIBRATING = 2
+    STANDBY = 3
+    ACTIVE = 4
+    CRITICAL = 5
+    EMERGENCY = 6
+    POWEROFF = 7
+    FLIGHT_TERMINATION = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something that happened, and when (microseconds since boot)."""
+
+    time_us: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Booted(Event):
+    """The boot sequence is over; the vehicle may not be ready to fly yet."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NavigationReady(Event):
+    """The navigation filter has a position for the first time, or again."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeChanged(Event):
+    """The mode being flown changed, by command or by failsafe."""
+
+    mode: FlightMode
+    previous: FlightMode
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeDenied(Event):
+    """A mode was asked for that cannot be entered."""
+
+    mode: FlightMode | None
+    reason: Reason
+    custom_mode: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Armed(Event):
+    """Motors may turn."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disarmed(Event):
+    """Motors are stopped."""
+
+    reason: DisarmReason
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArmingDenied(Event):
+    """Somebody asked to arm; these checks failed."""
+
+    mode: FlightMode
+    reasons: tuple[Reason, ...]
+    check_only: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DisarmingDenied(Event):
+    """Somebody asked to disarm in the air."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandDenied(Event):
+    """A command was refused with a reason worth a text."""
+
+    command: int
+    reason: Reason
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FailsafeActivated(Event):
+    """A failsafe condition came up and its action is taken."""
+
+    kind: FailsafeKind
+    action: FailsafeAction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FailsafeCleared(Event):
+    """The condition of a failsafe went away."""
+
+    kind: FailsafeKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TakeoffDetected(Event):
+    """The vehicle left the ground."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandingDetected(Event):
+    """The vehicle stands on the ground."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionItemReached(Event):
+    """An item of the mission is done; `index` counts as the stored plan does."""
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionFinished(Event):
+    """The last item of the mission is done."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HomeSet(Event):
+    """Home has a new place."""
+
+    home: GeodeticPosition
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatteryWarning(Event):
+    """The battery's warning level rose."""
+
+    level: BatteryLevel
+    voltage_v: float
+    used_ah: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RebootRequested(Event):
+    """A client asked for a reboot and it may happen (disarmed)."""

@@ -1,0 +1,165 @@
+"""Which sensors and which parts of the navigation solution may be trusted right now.
+
+The commander's checks, failsafes and SYS_STATUS all read one `VehicleHealth`. `HealthMonitor` fills it from the
+newest sensor readings (late, frozen or impossible samples count as broken) and from what the navigation filter says
+of itself.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim import interface
+from flightsim.interface import Reading, SensorReadings
+
+_STALE_US: Final = {
+    "imu": 100_000,
+    "barometer": 500_000,
+    "magnetometer": 500_000,
+    "gps": 1_000_000,
+    "battery": 3_000_000,
+}
+_FROZEN_SAMPLES: Final = 100  # PX4's DataValidator calls a sensor stale after 100 equal values
+_MAX_RATE_RAD_S: Final = 40.0
+_MAX_ACCEL_M_S2: Final = 250.0
+_PRESSURE_PA: Final = (10_000.0, 120_000.0)
+_FIELD_GAUSS: Final = (0.1, 1.2)
+_GPS_MIN_SATELLITES: Final = 6
+_GPS_MAX_EPH_M: Final = 5.0
+_FIX_3D: Final = 3
+
+
+class NavigationStatus(Protocol):
+    """What the commander asks the navigation filter about itself."""
+
+    @property
+    def attitude_valid(self) -> bool: ...
+    @property
+    def altitude_valid(self) -> bool: ...
+    @property
+    def velocity_valid(self) -> bool: ...
+    @property
+    def position_valid(self) -> bool: ...
+
+
+@dataclass(slots=True)
+class VehicleHealth:
+    """Health of one vehicle; every flag is False until proven."""
+
+    gyro: bool = False
+    accelerometer: bool = False
+    barometer: bool = False
+    magnetometer: bool = False
+    gps: bool = False
+    rangefinder: bool = False
+    attitude: bool = False
+    altitude: bool = False
+    velocity: bool = False
+    position: bool = False
+    battery: bool = False
+    battery_voltage_v: float = math.nan
+    battery_used_ah: float = math.nan
+    battery_remaining: float = math.nan
+
+    @property
+    def imu(self) -> bool:
+        """Both inertial sensors."""
+        return self.gyro and self.accelerometer
+
+
+class _Watch:
+    """Freshness of one sensor: late samples and values that never change."""
+
+    __slots__ = ("_equal", "_last", "_last_time_us", "_reading", "_stale_us")
+
+    def __init__(self, reading: Reading, stale_us: int) -> None:
+        self._reading = reading
+        self._stale_us = stale_us
+        self._last = reading.values.copy()
+        self._last_time_us = -1
+        self._equal = 0
+
+    def alive(self, time_us: int) -> bool:
+        reading = self._reading
+        if reading.time_us < 0 or time_us - reading.time_us > self._stale_us:
+            return False
+        if reading.time_us != self._last_time_us:
+            self._last_time_us = reading.time_us
+            if bool((reading.values == self._last).all()):
+                self._equal += 1
+            else:
+                self._equal = 0
+                self._last[:] = reading.values
+        return self._equal < _FROZEN_SAMPLES
+
+
+class HealthMonitor:
+    """Keeps a `VehicleHealth` up to date.
+
+    Args:
+        readings: the vehicle's newest sensor samples.
+        navigation: the filter's own judgement.
+    """
+
+    __slots__ = (
+        "_barometer",
+        "_battery",
+        "_gps",
+        "_imu",
+        "_magnetometer",
+        "_navigation",
+        "_rangefinder",
+        "_readings",
+        "health",
+    )
+
+    def __init__(self, readings: SensorReadings, navigation: NavigationStatus) -> None:
+        self.health = VehicleHealth()
+        self._readings = readings
+        self._navigation = navigation
+        self._imu = _Watch(readings.imu, _STALE_US["imu"])
+        self._barometer = _Watch(readings.barometer, _STALE_US["barometer"])
+        self._magnetometer = _Watch(readings.magnetometer, _STALE_US["magnetometer"])
+        self._gps = _Watch(readings.gps, _STALE_US["gps"])
+        self._battery = _Watch(readings.battery, _STALE_US["battery"])
+        self._rangefinder = _Watch(readings.rangefinder, _STALE_US["barometer"])
+
+    def update(self, time_us: int) -> None:
+        """Judge every source; called by the commander at 50 Hz."""
+        health, readings, navigation = self.health, self._readings, self._navigation
+        imu_alive = self._imu.alive(time_us)
+        values = readings.imu.values
+        health.gyro = imu_alive and _within(values[interface.IMU_GYRO_FRD_RAD_S], _MAX_RATE_RAD_S)
+        health.accelerometer = imu_alive and _within(values[interface.IMU_ACCEL_FRD_M_S2], _MAX_ACCEL_M_S2)
+        pressure_pa = float(readings.barometer.values[interface.BARO_PRESSURE_PA])
+        health.barometer = self._barometer.alive(time_us) and _PRESSURE_PA[0] < pressure_pa < _PRESSURE_PA[1]
+        field = readings.magnetometer.values[interface.MAG_FRD_GAUSS]
+        strength = math.sqrt(float(field[0]) ** 2 + float(field[1]) ** 2 + float(field[2]) ** 2)
+        health.magnetometer = (
+            self._magnetometer.alive(time_us) and _FIELD_GAUSS[0] < strength < _FIELD_GAUSS[1]
+        )
+        gps = readings.gps.values
+        health.gps = (
+            self._gps.alive(time_us)
+            and bool(gps[interface.GPS_FIX_TYPE] >= _FIX_3D)
+            and bool(gps[interface.GPS_SATELLITES] >= _GPS_MIN_SATELLITES)
+            and bool(gps[interface.GPS_EPH_M] <= _GPS_MAX_EPH_M)
+        )
+        health.rangefinder = self._rangefinder.alive(time_us)
+        health.attitude = navigation.attitude_valid
+        health.altitude = navigation.altitude_valid
+        health.velocity = navigation.velocity_valid
+        health.position = navigation.position_valid
+        battery = readings.battery.values
+        health.battery = self._battery.alive(time_us) and bool(battery[interface.BATTERY_VOLTAGE_V] > 0.0)
+        health.battery_voltage_v = float(battery[interface.BATTERY_VOLTAGE_V])
+        health.battery_used_ah = float(battery[interface.BATTERY_USED_AH])
+        health.battery_remaining = float(battery[interface.BATTERY_REMAINING])
+
+
+def _within(vector: NDArray[np.float64], limit: float) -> bool:
+    """True when every component is finite and below `limit` in magnitude (NaN compares false)."""
+    return bool(abs(vector[0]) < limit and abs(vector[1]) < limit and abs(vector[2]) < limit)

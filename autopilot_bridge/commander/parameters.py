@@ -1,0 +1,55 @@
+"""What a pilot may tune in the commander, in flavour-neutral names; flavours fill it from their own parameters."""
+
+import math
+from dataclasses import dataclass, fields
+
+from autopilot_bridge.commander.events import FailsafeAction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommanderParameters:
+    """Time-outs, thresholds and actions of arming and failsafes.
+
+    Attributes:
+        offboard_loss_s: age of the last setpoint at which a streamed-setpoint mode counts as lost; 0 switches it off.
+        gcs_loss_s, manual_loss_s: age of the last ground-station heartbeat, of the last stick input.
+        action_delay_s: hold this long before a link failsafe acts, so that a person can step in (PX4 COM_FAIL_ACT_T).
+        battery_*_remaining: remaining fraction below which the level is reached; 0 switches it off.
+        battery_*_v: voltage below which the level is reached after `battery_timer_s`; 0 switches it off.
+        position_loss_s: how long the filter may be without a position before the failsafe acts.
+        fence_radius_m, fence_height_max_m: cylinder around home; 0 switches that wall off.
+        disarm_preflight_s, disarm_landed_s: automatic disarming; 0 or less switches it off.
+        takeoff_height_m: height over home of a takeoff that names none.
+    """
+
+    offboard_loss_s: float
+    offboard_loss_action: FailsafeAction
+    gcs_loss_s: float
+    gcs_loss_action: FailsafeAction
+    manual_loss_s: float
+    manual_loss_action: FailsafeAction
+    action_delay_s: float
+    battery_low_remaining: float
+    battery_critical_remaining: float
+    battery_emergency_remaining: float
+    battery_low_v: float
+    battery_critical_v: float
+    battery_timer_s: float
+    battery_low_action: FailsafeAction
+    battery_critical_action: FailsafeAction
+    battery_emergency_action: FailsafeAction
+    position_loss_s: float
+    position_loss_action: FailsafeAction
+    fence_radius_m: float
+    fence_height_max_m: float
+    fence_action: FailsafeAction
+    disarm_preflight_s: float
+    disarm_landed_s: float
+    takeoff_height_m: float
+    check_arming: bool
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise ValueError(f"{field.name} = {value} is not a finite number")

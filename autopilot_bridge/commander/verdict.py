@@ -1,0 +1,89 @@
+"""The commander's answer to a request, and why."""
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum, auto
+from typing import Final
+
+
+class Result(IntEnum):
+    """Outcome of a request; the values are MAVLink's MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+    IN_PROGRESS = 5
+    CANCELLED = 6
+
+
+class Reason(Enum):
+    """Why something is not possible now; each flavour words it its own way."""
+
+    BOOTING = auto()
+    GYRO = auto()
+    ACCELEROMETER = auto()
+    BAROMETER = auto()
+    COMPASS = auto()
+    GPS = auto()
+    ATTITUDE = auto()  # no attitude estimate
+    ALTITUDE = auto()  # no height estimate
+    POSITION = auto()  # no horizontal position estimate
+    HOME = auto()
+    BATTERY_LOW = auto()
+    BATTERY_FAILSAFE = auto()
+    MANUAL_CONTROL = auto()  # no sticks or radio
+    GCS_LOST = auto()
+    MISSION_MISSING = auto()
+    MISSION_INVALID = auto()
+    NO_SETPOINTS = auto()  # offboard without a setpoint stream
+    MODE_NOT_ARMABLE = auto()
+    MODE_UNKNOWN = auto()
+    MODE_UNAVAILABLE = auto()
+    OUTSIDE_FENCE = auto()
+    TERMINATED = auto()
+    LEANING = auto()  # standing too far from level
+    THROTTLE_HIGH = auto()
+    NOT_LANDED = auto()
+    NOT_ARMED = auto()
+    ALREADY_FLYING = auto()
+    BAD_ALTITUDE = auto()
+    BAD_POSITION = auto()
+    BAD_PARAMETER = auto()
+    WRONG_MODE = auto()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """Result of a request to the commander, with every reason against it."""
+
+    result: Result
+    reasons: tuple[Reason, ...] = ()
+
+    @property
+    def accepted(self) -> bool:
+        """True when the request is being done."""
+        return self.result is Result.ACCEPTED
+
+
+ACCEPTED: Final = Verdict(result=Result.ACCEPTED)
+
+
+def rejected(*reasons: Reason) -> Verdict:
+    """MAV_RESULT_TEMPORARILY_REJECTED: valid, but not now."""
+    return Verdict(result=Result.TEMPORARILY_REJECTED, reasons=reasons)
+
+
+def denied(*reasons: Reason) -> Verdict:
+    """MAV_RESULT_DENIED: the request itself is not acceptable."""
+    return Verdict(result=Result.DENIED, reasons=reasons)
+
+
+def failed(*reasons: Reason) -> Verdict:
+    """MAV_RESULT_FAILED: valid, tried, and not done."""
+    return Verdict(result=Result.FAILED, reasons=reasons)
+
+
+def unsupported() -> Verdict:
+    """MAV_RESULT_UNSUPPORTED."""
+    return Verdict(result=Result.UNSUPPORTED)
