@@ -1,7 +1,7 @@
 """What the MAVLink microservices stand on: channels, message sources and the shape of a service.
 
-A service is sans-IO: the autopilot hands it decoded messages and the time, it answers through channels. Message
-fields are untrusted: whatever they hold, a service neither raises nor stores half of it.
+A service is sans-IO: the autopilot hands it decoded messages and the time, it answers through channels.
+Message fields are untrusted: whatever they hold, a service neither raises nor stores half of it.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,7 +16,11 @@ Announce = Callable[[int, str], None]
 
 
 class Channel(Protocol):
-    """One MAVLink link as the autopilot sees it. `send` never blocks and never raises on a slow or lost peer."""
+    """One MAVLink link as the autopilot sees it.
+
+    `send` never blocks and never raises on a slow or lost peer. A channel may also have a boolean
+    `congested`: while it is True, long answers (parameter lists) wait.
+    """
 
     @property
     def name(self) -> str: ...
@@ -57,6 +61,11 @@ def send_to_all(broadcast: Broadcast, message: MavlinkMessage) -> None:
         channel.send(message)
 
 
+def is_congested(channel: Channel) -> bool:
+    """True when a channel that knows its backlog asks for a pause."""
+    return bool(getattr(channel, "congested", False))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AddressRule:
     """Which target ids of a message an autopilot takes for its own.
@@ -83,10 +92,10 @@ class AddressRule:
 
 
 def px4_address_rule(system_id: int) -> AddressRule:
-    """PX4: own system id only; component 1, 190 (the historical mission planner) or 0 (reference section 7)."""
+    """PX4: own system id only; component 1, 190 (once the mission planner's) or 0."""
     return AddressRule(system_id=system_id, component_ids=frozenset((1, 190)), any_system=False)
 
 
 def ardupilot_address_rule(system_id: int) -> AddressRule:
-    """ArduPilot: own system id or 0, any component id (reference section 3)."""
+    """ArduPilot: own system id or 0, any component id."""
     return AddressRule(system_id=system_id, component_ids=None, any_system=True)

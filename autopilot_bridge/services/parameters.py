@@ -1,0 +1,277 @@
+"""The MAVLink parameter protocol, autopilot side, as PX4 and ArduPilot speak it.
+
+Source: MAVLink parameter protocol (mavlink.io/en/services/parameter.html). Where the firmwares differ, and
+where both leave the document (silence instead of an error, no range check), they are followed;
+`ParameterPolicy` holds every difference.
+"""
+
+import math
+import struct
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.parameters import (
+    INTEGER_LIMITS,
+    ParameterDefinition,
+    ParameterError,
+    ParameterStore,
+    ParameterType,
+)
+from autopilot_bridge.services.channel import (
+    Broadcast,
+    Channel,
+    MavlinkMessage,
+    Source,
+    is_congested,
+    send_to_all,
+)
+
+HASH_NAME: Final = "_HASH_CHECK"
+NO_INDEX: Final = 65535
+_AS_FLOAT: Final = struct.Struct("<f")
+_AS_INT32: Final = struct.Struct("<i")
+_AS_UINT32: Final = struct.Struct("<I")
+_ROUNDING: Final = 0.01  # ArduPilot adds this away from zero before it truncates to a whole number
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ParameterPolicy:
+    """What one firmware does its own way.
+
+    Attributes:
+        bytewise: integers travel as their bit pattern in the float field (PX4), else as a float (ArduPilot).
+        strict_type: a PARAM_SET of another type than the parameter's is ignored (PX4).
+        ignore_case: names match in any case, and a reply repeats the name as asked (ArduPilot).
+        index_by_name: replies to requests by name carry the index (PX4), else 65535 (ArduPilot).
+        set_echo_to_all: every PARAM_SET is answered on all channels (ArduPilot); else on the asking channel,
+            and on all channels once more if the value changed (PX4).
+        hash_parameter: the list starts with `_HASH_CHECK`, and setting it ends the list (PX4).
+        list_per_tick: parameters sent per 50 Hz tick and channel while listing.
+    """
+
+    bytewise: bool
+    strict_type: bool
+    ignore_case: bool
+    index_by_name: bool
+    set_echo_to_all: bool
+    hash_parameter: bool
+    list_per_tick: int
+
+    def __post_init__(self) -> None:
+        if self.list_per_tick < 1:
+            raise ValueError(f"list_per_tick {self.list_per_tick} is not at least 1")
+
+
+PX4_PARAMETER_POLICY: Final = ParameterPolicy(
+    bytewise=True,
+    strict_type=True,
+    ignore_case=False,
+    index_by_name=True,
+    set_echo_to_all=False,
+    hash_parameter=True,
+    list_per_tick=20,  # 904 were seen to take 0.9 s
+)
+ARDUPILOT_PARAMETER_POLICY: Final = ParameterPolicy(
+    bytewise=False,
+    strict_type=False,
+    ignore_case=True,
+    index_by_name=False,
+    set_echo_to_all=True,
+    hash_parameter=False,
+    list_per_tick=43,  # 1397 were seen to take 0.65 s
+)
+
+
+class _Listing:
+    """Progress of one PARAM_REQUEST_LIST on one channel."""
+
+    __slots__ = ("channel", "next_index")
+
+    def __init__(self, channel: Channel, next_index: int) -> None:
+        self.channel = channel
+        self.next_index = next_index  # -1: the hash comes first
+
+
+class ParameterService:
+    """Answers PARAM_REQUEST_READ, PARAM_REQUEST_LIST and PARAM_SET from a `ParameterStore`.
+
+    A parameter that anybody changes (a ground station, the autopilot itself) is announced on every channel.
+
+    Args:
+        store: the values.
+        policy: the firmware's ways.
+        broadcast: all channels of the autopilot.
+        on_list: called with the asking channel for each PARAM_REQUEST_LIST (ArduPilot sends its banner then).
+    """
+
+    def __init__(
+        self,
+        store: ParameterStore,
+        policy: ParameterPolicy,
+        broadcast: Broadcast,
+        *,
+        on_list: Callable[[Channel], None] | None = None,
+    ) -> None:
+        self._store = store
+        self._policy = policy
+        self._broadcast = broadcast
+        self._on_list = on_list
+        self._listings: list[_Listing] = []
+        self._setting: str | None = None  # being set by PARAM_SET, whose echo stands for the announcement
+        store.subscribe(self._announce_change)
+
+    @property
+    def hash_check(self) -> int:
+        """CRC-32 over all names and values: equal sets of values have equal hashes."""
+        crc = 0
+        for name, value in self._store.as_dict().items():
+            definition = self._store.find(name)
+            packed = _AS_FLOAT.pack(value) if not definition or not definition.is_integer else _raw_int(value)
+            crc = zlib.crc32(packed, zlib.crc32(name.encode(), crc))
+        return crc
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
+                self._read(message, source.channel)
+            case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
+                self._start_list(source.channel)
+            case mavlink.MAVLINK_MSG_ID_PARAM_SET:
+                self._set(message, source.channel)
+            case _:
+                return False
+        return True
+
+    def tick(self, time_us: int) -> None:
+        """Send the next parameters of every running list."""
+        if not self._listings:
+            return
+        for listing in self._listings:
+            self._continue_list(listing)
+        self._listings = [listing for listing in self._listings if listing.next_index < self._store.count]
+
+    def _read(self, message: MavlinkMessage, channel: Channel) -> None:
+        if message.param_index >= 0:
+            if message.param_index < self._store.count:
+                definition = self._store.by_index(message.param_index)
+                channel.send(self._value_message(definition, index=message.param_index))
+            return
+        name = _name_of(message)
+        if self._policy.hash_parameter and name == HASH_NAME:
+            channel.send(self._hash_message())
+            return
+        found = self._store.find(name, ignore_case=self._policy.ignore_case)
+        if found is not None:
+            channel.send(self._value_message(found, index=self._index_in_reply(found), name=name))
+
+    def _start_list(self, channel: Channel) -> None:
+        running = next((listing for listing in self._listings if listing.channel is channel), None)
+        if running is not None:
+            running.next_index = 0  # PX4 skips the hash when a list is asked for again before its end
+        else:
+            self._listings.append(_Listing(channel, -1 if self._policy.hash_parameter else 0))
+        if self._on_list is not None:
+            self._on_list(channel)
+
+    def _continue_list(self, listing: _Listing) -> None:
+        for _ in range(self._policy.list_per_tick):
+            if listing.next_index >= self._store.count or is_congested(listing.channel):
+                return
+            if listing.next_index < 0:
+                listing.channel.send(self._hash_message())
+            else:
+                definition = self._store.by_index(listing.next_index)
+                listing.channel.send(self._value_message(definition, index=listing.next_index))
+            listing.next_index += 1
+
+    def _set(self, message: MavlinkMessage, channel: Channel) -> None:
+        name = _name_of(message)
+        if self._policy.hash_parameter and name == HASH_NAME:
+            # The ground station has the whole list in its cache: stop sending it.
+            self._listings = [listing for listing in self._listings if listing.channel is not channel]
+            return
+        definition = self._store.find(name, ignore_case=self._policy.ignore_case)
+        if definition is None:
+            return
+        value = self._decode(definition, message)
+        if value is None:
+            return
+        self._setting = definition.name
+        try:
+            changed = self._store.set(definition.name, value, check_range=False)
+        except ParameterError:
+            return  # beyond the storage type: refused in silence, as the firmwares refuse
+        finally:
+            self._setting = None
+        reply = self._value_message(definition, index=self._index_in_reply(definition))
+        if self._policy.set_echo_to_all:
+            send_to_all(self._broadcast, reply)
+            return
+        channel.send(reply)
+        if changed:
+            send_to_all(
+                self._broadcast, self._value_message(definition, index=self._index_in_reply(definition))
+            )
+
+    def _decode(self, definition: ParameterDefinition, message: MavlinkMessage) -> float | None:
+        """The value a PARAM_SET asks for; None when the firmware would ignore it."""
+        value = message.param_value
+        if self._policy.strict_type and message.param_type != definition.type:
+            return None
+        if self._policy.bytewise and definition.is_integer:
+            try:
+                whole: int = _AS_INT32.unpack(_AS_FLOAT.pack(value))[0]
+            except OverflowError:  # not a single-precision value: no frame can have carried it
+                return None
+            return whole
+        if not math.isfinite(value):
+            return None
+        if not definition.is_integer:
+            return float(value)
+        low, high = INTEGER_LIMITS[definition.type]
+        return min(max(math.trunc(value + math.copysign(_ROUNDING, value)), low), high)
+
+    def _announce_change(self, name: str, value: float) -> None:
+        if name == self._setting:
+            return
+        definition = self._store.by_index(self._store.index_of(name))
+        send_to_all(self._broadcast, self._value_message(definition, index=self._index_in_reply(definition)))
+
+    def _index_in_reply(self, definition: ParameterDefinition) -> int:
+        return self._store.index_of(definition.name) if self._policy.index_by_name else NO_INDEX
+
+    def _value_message(
+        self, definition: ParameterDefinition, *, index: int, name: str | None = None
+    ) -> MavlinkMessage:
+        value = self._store.get(definition.name)
+        if self._policy.bytewise and definition.is_integer:
+            value = _AS_FLOAT.unpack(_raw_int(value))[0]
+        return mavlink.MAVLink_param_value_message(
+            (name or definition.name).encode("ascii", "replace"),
+            float(value),
+            int(definition.type),
+            self._store.count,
+            index,
+        )
+
+    def _hash_message(self) -> MavlinkMessage:
+        value = _AS_FLOAT.unpack(_AS_UINT32.pack(self.hash_check))[0]
+        return mavlink.MAVLink_param_value_message(
+            HASH_NAME.encode(), value, int(ParameterType.UINT32), self._store.count, NO_INDEX
+        )
+
+
+def _raw_int(value: float) -> bytes:
+    return _AS_UINT32.pack(int(value) & 0xFFFFFFFF)
+
+
+def _name_of(message: MavlinkMessage) -> str:
+    """The parameter name of a message, up to the first NUL."""
+    name = message.param_id
+    if isinstance(name, bytes):
+        name = name.split(b"\0", 1)[0].decode("ascii", "replace")
+    return str(name)
