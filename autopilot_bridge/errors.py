@@ -10,7 +10,9 @@ class AddressError(BridgeError, ValueError):
 
 
 class LinkError(BridgeError, OSError):
-    """A link could not be opened (busy port, no such device); the message names the address and what to do."""
+    """A link could not be opened (busy port, no such device); the message names the address and what to
+    do.
+    """
 
 
 class MessageError(BridgeError, ValueError):

@@ -1,7 +1,7 @@
 """Frames to pymavlink's message objects."""
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
@@ -13,7 +13,8 @@ from autopilot_bridge.mavlink.frame import CHECKSUM_SIZE, HEADER_SIZE_V1, HEADER
 def decode(frame: Frame) -> MAVLinkMessage:
     """The message in a frame, as pymavlink would give it: fields as attributes, header filled in.
 
-    Strings end at their first zero; bytes that are not ASCII become U+FFFD. Never raises for a frame of the parser.
+    Strings end at their first zero; bytes that are not ASCII become U+FFFD. Never raises for a frame of
+    the parser.
     """
     message = _constructor(frame.message_id)(frame.payload)
     raw = frame.raw
@@ -35,7 +36,7 @@ def decode(frame: Frame) -> MAVLinkMessage:
     return message
 
 
-@lru_cache(maxsize=None)
+@cache
 def _constructor(message_id: int) -> Callable[[bytes], Any]:
     """A function that makes the message object from its full-size payload."""
     found = definition(message_id)

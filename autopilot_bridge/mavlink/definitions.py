@@ -1,7 +1,8 @@
-"""Message definitions: what the codec must know of each message of the dialect, taken from pymavlink's classes.
+"""Message definitions: what the codec must know of each message of the dialect, taken from pymavlink's
+classes.
 
-The dialect is `all`: every message of MAVLink's public definitions. Payloads are little-endian with fields sorted
-by size, extension fields last (MAVLink guide, "Serialization", field reordering).
+The dialect is `all`: every message of MAVLink's public definitions. Payloads are little-endian with
+fields sorted by size, extension fields last (MAVLink guide, "Serialization", field reordering).
 """
 
 import struct
@@ -14,7 +15,9 @@ from pymavlink.dialects.v20 import all as dialect
 from autopilot_bridge.errors import MessageError
 
 MAVLinkMessage = Any
-"""A message object of the dialect (`pymavlink.dialects.v20.all.MAVLink_message`); pymavlink carries no types."""
+"""A message object of the dialect (`pymavlink.dialects.v20.all.MAVLink_message`); pymavlink carries no
+types.
+"""
 
 _STRUCT_CODES: Final = {
     "char": "s",
@@ -65,7 +68,8 @@ class MessageDefinition:
         wire_fields: in the order on the wire.
         wire: struct of the whole payload, one value per array element (strings: one value).
         size: payload size in bytes, extension fields included.
-        target_system_offset, target_component_offset: offsets in the payload; None when the message has no target.
+        target_system_offset, target_component_offset: offsets in the payload; None when the message has
+            no target.
     """
 
     message_id: int

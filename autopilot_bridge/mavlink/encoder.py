@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from functools import cache
 from operator import attrgetter
 from typing import Any, Final
 
@@ -82,7 +82,7 @@ class FrameEncoder:
         return frame + _pack_checksum(mcrf4xx(frame[1:] + known[1]))
 
 
-@lru_cache(maxsize=None)
+@cache
 def payload_packer(message_id: int) -> Callable[[MAVLinkMessage], bytes]:
     """A function that packs a message of this id into its full-size payload.
 

@@ -50,9 +50,12 @@ class ParserCounters:
         bytes_in: bytes fed.
         bytes_framed: bytes of good frames.
         bytes_junk: bytes between frames, those left over from damaged frames included.
-        bytes_bad_crc: first bytes of what looked like a frame with a wrong checksum (the search goes on behind it).
-        bytes_unsupported: first bytes of what looked like a MAVLink 2 frame with unknown incompatibility flags.
-        bytes_unknown_message: whole frames of messages the dialect does not know; their checksum can't be verified.
+        bytes_bad_crc: first bytes of what looked like a frame with a wrong checksum (the search goes on
+            behind it).
+        bytes_unsupported: first bytes of what looked like a MAVLink 2 frame with unknown incompatibility
+            flags.
+        bytes_unknown_message: whole frames of messages the dialect does not know; their checksum can't
+            be verified.
         frames: good frames; `frames_v1` and `frames_signed` are those in MAVLink 1 and with a signature.
         bad_crc, unsupported_flags, unknown_message: how often each happened.
         sources: counters by (system id, component id).
@@ -86,10 +89,11 @@ class ParserCounters:
 class FrameParser:
     """Frames from one byte stream: one parser for each peer of a link.
 
-    A byte that can't begin a good frame is dropped and the search goes on behind it, so damage costs no more than the
-    damaged frame. A frame of an unknown message is skipped whole when another frame or the end of the data follows it;
-    otherwise it is taken for junk. Frames with incompatibility flags other than "signed" are dropped, as the MAVLink
-    guide demands ("Incompatibility Flags"). Signatures are passed over unverified.
+    A byte that can't begin a good frame is dropped and the search goes on behind it, so damage costs no
+    more than the damaged frame. A frame of an unknown message is skipped whole when another frame or the
+    end of the data follows it; otherwise it is taken for junk. Frames with incompatibility flags other
+    than "signed" are dropped, as the MAVLink guide demands ("Incompatibility Flags"). Signatures are
+    passed over unverified.
     """
 
     __slots__ = ("_pending", "counters")
@@ -125,7 +129,9 @@ class FrameParser:
         return self._search(self._pending + data)
 
     def flush(self) -> None:
-        """The stream has ended or was interrupted: what is pending will not be completed and is counted as junk."""
+        """The stream has ended or was interrupted: what is pending will not be completed and is counted
+        as junk.
+        """
         self.counters.bytes_junk += len(self._pending)
         self._pending = b""
 
