@@ -1,0 +1,157 @@
+"""SET_MESSAGE_INTERVAL, GET_MESSAGE_INTERVAL, REQUEST_MESSAGE and ArduPilot's REQUEST_DATA_STREAM.
+
+The results are those of reference sections 6 and 7 (PX4) and 2 (ArduPilot); `IntervalPolicy` holds the differences.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.mavlink.definitions import DEFINITIONS
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
+
+ALL_STREAMS: Final = mavlink.MAV_DATA_STREAM_ALL
+_FASTEST_REQUESTABLE_US: Final = 100_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IntervalPolicy:
+    """What one firmware does its own way.
+
+    Attributes:
+        unknown_set, unknown_get, unknown_request: results for a message the firmware does not send.
+        fixed: messages whose interval can't be set (PX4: HEARTBEAT).
+        not_requestable: messages that exist but are refused on request.
+        refuse_running: a message that a fast stream is sending anyway is refused on request (PX4).
+        max_rate_hz: fastest stream that is accepted; faster ones are denied with a text.
+        groups: REQUEST_DATA_STREAM group -> message ids; empty: the message is ignored.
+        unknown_text, too_fast_text: texts to the pilot, with the message id; empty: silence.
+    """
+
+    unknown_set: Result
+    unknown_get: Result
+    unknown_request: Result
+    fixed: frozenset[int] = frozenset()
+    not_requestable: frozenset[int] = frozenset()
+    refuse_running: bool = False
+    max_rate_hz: float = math.inf
+    groups: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
+    unknown_text: str = ""
+    too_fast_text: str = ""
+
+
+class MessageIntervalService:
+    """Changes and answers for the streams of every channel.
+
+    Args:
+        policy: the firmware's ways.
+        tables: the stream table of each channel, by channel name; the mapping may grow.
+        cache: builds the messages.
+        announce: sends a STATUSTEXT (MAV_SEVERITY, text).
+        on_demand: messages that are only sent on request: id -> function (channel, param2).
+    """
+
+    def __init__(
+        self,
+        policy: IntervalPolicy,
+        tables: Mapping[str, StreamTable],
+        cache: PayloadCache,
+        announce: Callable[[int, str], None],
+        on_demand: Mapping[int, Callable[[Channel, float], None]],
+    ) -> None:
+        self._policy = policy
+        self._tables = tables
+        self._cache = cache
+        self._announce = announce
+        self._on_demand = on_demand
+        self._pending: list[tuple[Channel, int, float]] = []
+        self._time_us = 0
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """REQUEST_DATA_STREAM; the commands come through the methods below."""
+        self._time_us = time_us
+        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
+            return False
+        table = self._tables.get(source.channel.name)
+        groups = self._policy.groups
+        if table is not None and groups:
+            chosen = groups if message.req_stream_id == ALL_STREAMS else (message.req_stream_id,)
+            running = bool(message.start_stop) and message.req_message_rate > 0
+            interval_us = round(MICROSECONDS / message.req_message_rate) if running else -1
+            for group in chosen:
+                for message_id in groups.get(group, ()):
+                    table.set_default(message_id, interval_us, time_us)
+        return True
+
+    def tick(self, time_us: int) -> None:
+        """Send what was requested since the last tick: always after the acknowledgement of the request."""
+        self._time_us = time_us
+        while self._pending:
+            channel, message_id, parameter = self._pending.pop(0)
+            if message_id in self._on_demand:
+                self._on_demand[message_id](channel, parameter)
+                continue
+            payload = self._cache.payload(message_id, time_us)
+            if payload is not None:
+                channel.send_payload(message_id, payload)  # type: ignore[attr-defined]
+
+    def set_interval(self, source: Source, message_id: int, interval_us: float) -> Result:
+        """MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 the channel's default, else the interval in microseconds."""
+        table = self._tables.get(source.channel.name)
+        if table is None or not math.isfinite(interval_us):
+            return Result.DENIED
+        if message_id not in self._cache:
+            if self._policy.unknown_text:
+                self._announce(mavlink.MAV_SEVERITY_WARNING, self._policy.unknown_text.format(message_id))
+            return self._policy.unknown_set
+        if message_id in self._policy.fixed:
+            return Result.FAILED
+        if interval_us < 0:
+            table.set_interval(message_id, -1, self._time_us)
+            return Result.ACCEPTED
+        interval = round(min(interval_us, 1e12))
+        if interval == 0:
+            interval = table.default_interval_us(message_id)
+        elif MICROSECONDS / interval > self._policy.max_rate_hz:
+            if self._policy.too_fast_text:
+                self._announce(mavlink.MAV_SEVERITY_WARNING, self._policy.too_fast_text.format(message_id))
+            return Result.DENIED
+        table.set_interval(message_id, interval, self._time_us)
+        return Result.ACCEPTED
+
+    def get_interval(self, source: Source, message_id: int) -> Result:
+        """MAV_CMD_GET_MESSAGE_INTERVAL: answers MESSAGE_INTERVAL, 0 when the message is not known."""
+        table = self._tables.get(source.channel.name)
+        interval_us, known = 0, message_id in self._cache
+        if table is not None and known:
+            interval_us = table.intervals_us.get(message_id, -1)
+        if 0 <= message_id <= 0xFFFF:
+            source.channel.send(
+                mavlink.MAVLink_message_interval_message(message_id, min(interval_us, 0x7FFFFFFF))
+            )
+        return Result.ACCEPTED if known else self._policy.unknown_get
+
+    def request(self, source: Source, message_id: int, parameter: float = 0.0) -> Result:
+        """MAV_CMD_REQUEST_MESSAGE: the message follows the acknowledgement."""
+        if message_id in self._on_demand:
+            self._pending.append((source.channel, message_id, parameter))
+            return Result.ACCEPTED
+        policy = self._policy
+        if (
+            message_id not in DEFINITIONS
+            or message_id not in self._cache
+            or message_id in policy.not_requestable
+        ):
+            return policy.unknown_request
+        table = self._tables.get(source.channel.name)
+        if policy.refuse_running and table is not None:
+            interval_us = table.intervals_us.get(message_id)
+            if interval_us is not None and interval_us < _FASTEST_REQUESTABLE_US:
+                return Result.DENIED
+        self._pending.append((source.channel, message_id, parameter))
+        return Result.ACCEPTED

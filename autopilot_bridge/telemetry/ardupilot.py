@@ -1,0 +1,258 @@
+"""Messages and stream groups of ArduPilot Copter 4.6, as seen on its links."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.navigation import NavigationHealth
+from autopilot_bridge.telemetry.common import NAN, CommonMessages
+from autopilot_bridge.telemetry.streams import Builder, Values
+
+_M = mavlink
+
+START_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
+    {_M.MAVLINK_MSG_ID_HEARTBEAT: 1, _M.MAVLINK_MSG_ID_TIMESYNC: 0.1}
+)
+"""What a copter sends before anything is requested: SRn_* are 0, reference section 1."""
+
+STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
+    {
+        _M.MAV_DATA_STREAM_RAW_SENSORS: (
+            _M.MAVLINK_MSG_ID_RAW_IMU,
+            _M.MAVLINK_MSG_ID_SCALED_IMU2,
+            _M.MAVLINK_MSG_ID_SCALED_PRESSURE,
+        ),
+        _M.MAV_DATA_STREAM_EXTENDED_STATUS: (
+            _M.MAVLINK_MSG_ID_SYS_STATUS,
+            _M.MAVLINK_MSG_ID_POWER_STATUS,
+            _M.MAVLINK_MSG_ID_MEMINFO,
+            _M.MAVLINK_MSG_ID_MISSION_CURRENT,
+            _M.MAVLINK_MSG_ID_GPS_RAW_INT,
+            _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
+            _M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
+        ),
+        _M.MAV_DATA_STREAM_RC_CHANNELS: (
+            _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW,
+            _M.MAVLINK_MSG_ID_RC_CHANNELS,
+        ),
+        _M.MAV_DATA_STREAM_POSITION: (
+            _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
+            _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED,
+        ),
+        _M.MAV_DATA_STREAM_EXTRA1: (_M.MAVLINK_MSG_ID_ATTITUDE, _M.MAVLINK_MSG_ID_AHRS2),
+        _M.MAV_DATA_STREAM_EXTRA2: (_M.MAVLINK_MSG_ID_VFR_HUD,),
+        _M.MAV_DATA_STREAM_EXTRA3: (
+            _M.MAVLINK_MSG_ID_AHRS,
+            _M.MAVLINK_MSG_ID_BATTERY_STATUS,
+            _M.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+            _M.MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4,
+            _M.MAVLINK_MSG_ID_SYSTEM_TIME,
+            _M.MAVLINK_MSG_ID_TERRAIN_REPORT,
+            _M.MAVLINK_MSG_ID_VIBRATION,
+            _M.MAVLINK_MSG_ID_WIND,
+            _M.MAVLINK_MSG_ID_DISTANCE_SENSOR,
+        ),
+    }
+)
+"""REQUEST_DATA_STREAM groups, reference section 2."""
+
+STREAM_RATE_PARAMETERS: Final[Mapping[int, str]] = MappingProxyType(
+    {
+        _M.MAV_DATA_STREAM_RAW_SENSORS: "RAW_SENS",
+        _M.MAV_DATA_STREAM_EXTENDED_STATUS: "EXT_STAT",
+        _M.MAV_DATA_STREAM_RC_CHANNELS: "RC_CHAN",
+        _M.MAV_DATA_STREAM_POSITION: "POSITION",
+        _M.MAV_DATA_STREAM_EXTRA1: "EXTRA1",
+        _M.MAV_DATA_STREAM_EXTRA2: "EXTRA2",
+        _M.MAV_DATA_STREAM_EXTRA3: "EXTRA3",
+    }
+)
+"""Ending of the SRn_ parameter that holds a group's rate."""
+
+NOT_REQUESTABLE: Final = frozenset(
+    {
+        _M.MAVLINK_MSG_ID_AVAILABLE_MODES,
+        _M.MAVLINK_MSG_ID_CURRENT_MODE,
+        _M.MAVLINK_MSG_ID_ALTITUDE,
+        _M.MAVLINK_MSG_ID_ODOMETRY,
+        _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+        _M.MAVLINK_MSG_ID_UTM_GLOBAL_POSITION,
+        _M.MAVLINK_MSG_ID_TIMESYNC,
+    }
+)
+"""Messages that 4.6 refuses to send on request, reference section 1."""
+
+_RC_NEUTRAL_US: Final = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
+_POSITION_ONLY_MASK: Final = 0xFDF8
+
+
+class ArdupilotMessages(CommonMessages):
+    """Builders of what ArduCopter sends."""
+
+    def builders(self) -> Mapping[int, Builder]:
+        """Message id -> builder."""
+        return {
+            **super().builders(),
+            _M.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
+            _M.MAVLINK_MSG_ID_RAW_IMU: self.raw_imu,
+            _M.MAVLINK_MSG_ID_SCALED_IMU2: self.scaled_imu,
+            _M.MAVLINK_MSG_ID_POWER_STATUS: self.power_status,
+            _M.MAVLINK_MSG_ID_MEMINFO: self.meminfo,
+            _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT: self.nav_controller_output,
+            _M.MAVLINK_MSG_ID_RC_CHANNELS: self.rc_channels,
+            _M.MAVLINK_MSG_ID_AHRS: self.ahrs,
+            _M.MAVLINK_MSG_ID_AHRS2: self.ahrs2,
+            _M.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self.ekf_status_report,
+            _M.MAVLINK_MSG_ID_ESC_TELEMETRY_1_TO_4: self.esc_telemetry,
+            _M.MAVLINK_MSG_ID_TERRAIN_REPORT: self.terrain_report,
+            _M.MAVLINK_MSG_ID_WIND: self.wind,
+        }
+
+    def timesync(self) -> Values:
+        """TIMESYNC (111) request."""
+        return (0, self.view.time_us * 1000, 0, 0)
+
+    def airspeed_m_s(self) -> float:
+        """Without an airspeed sensor ArduCopter shows its ground speed."""
+        return self.view.ground_speed_m_s
+
+    def raw_imu(self) -> Values | None:
+        """RAW_IMU (27), scaled like SCALED_IMU."""
+        values = self.raw_scaled_imu()
+        return None if values is None else (self.view.time_us, *values, 0, self.temperature_cdeg())
+
+    def power_status(self) -> Values:
+        """POWER_STATUS (125)."""
+        return (5000, 0, 0)
+
+    def meminfo(self) -> Values:
+        """MEMINFO (152): free memory of the emulated board."""
+        return (0, 65535, 131072)
+
+    def nav_controller_output(self) -> Values:
+        """NAV_CONTROLLER_OUTPUT (62)."""
+        q_w, q_x, q_y, q_z = self.sources.controller.attitude_setpoint.tolist()
+        roll = math.atan2(2.0 * (q_w * q_x + q_y * q_z), 1.0 - 2.0 * (q_x * q_x + q_y * q_y))
+        pitch = math.asin(max(-1.0, min(1.0, 2.0 * (q_w * q_y - q_z * q_x))))
+        v = self.view
+        bearing_deg, distance_m, alt_error_m = 0, 0.0, 0.0
+        target = self.trajectory_setpoint()
+        if target is not None and all(map(math.isfinite, target[:3])):
+            north, east, down = (goal - here for goal, here in zip(target[:3], v.pos, strict=True))
+            distance_m = math.hypot(north, east)
+            bearing_deg = round(math.degrees(math.atan2(east, north)))
+            alt_error_m = -down
+        heading_deg = round(math.degrees(v.yaw))
+        return (
+            math.degrees(roll) if math.isfinite(roll) else 0.0,
+            math.degrees(pitch) if math.isfinite(pitch) else 0.0,
+            heading_deg,
+            bearing_deg,
+            round(distance_m),
+            alt_error_m,
+            0.0,
+            0.0,
+        )
+
+    def rc_channels(self) -> Values:
+        """RC_CHANNELS (65): the simulated transmitter at rest."""
+        return (self.view.time_ms, 8, *_RC_NEUTRAL_US, *(0,) * 10, 255)
+
+    def ahrs(self) -> Values:
+        """AHRS (163): gyro bias estimate."""
+        bias = self.sources.navigation.state[16:19].tolist()
+        return (*bias, 0.0, 0.0, 0.0, 0.0)
+
+    def ahrs2(self) -> Values | None:
+        """AHRS2 (178)."""
+        v = self.view
+        if not v.has_global:
+            return None
+        return (v.roll, v.pitch, v.yaw, v.alt_amsl_m, v.lat_e7, v.lon_e7)
+
+    def ekf_status_report(self) -> Values:
+        """EKF_STATUS_REPORT (193); variances are innovation test ratios, 1 at the gate."""
+        health = self.sources.navigation.health
+        return (
+            ekf_flags(health),
+            finite(health.velocity_test_ratio),
+            finite(health.position_horizontal_test_ratio),
+            finite(health.position_vertical_test_ratio),
+            finite(health.magnetometer_test_ratio),
+            finite(health.height_above_ground_test_ratio),
+            0.0,
+        )
+
+    def esc_telemetry(self) -> Values | None:
+        """ESC_TELEMETRY_1_TO_4 (11030): voltage of the battery; the ESCs report no speed."""
+        battery = self.view.battery
+        if battery is None:
+            return None
+        voltage_cv = round(battery[0] * 100.0)
+        current_ca = round(battery[1] * 25.0)
+        used_mah = round(battery[2] * 250.0)
+        count = (self.view.time_ms // 100) & 0xFFFF
+        return (
+            (32,) * 4,
+            (voltage_cv,) * 4,
+            (max(0, current_ca),) * 4,
+            (used_mah,) * 4,
+            (0,) * 4,
+            (count,) * 4,
+        )
+
+    def terrain_report(self) -> Values | None:
+        """TERRAIN_REPORT (136): no terrain data is loaded."""
+        v = self.view
+        if not v.has_global:
+            return None
+        return (v.lat_e7, v.lon_e7, 0, 0.0, 0.0, 0, 0)
+
+    def wind(self) -> Values:
+        """WIND (168); a copter without a drag model reports calm."""
+        return (-180.0, 0.0, 0.0)
+
+    def home_quaternion(self) -> tuple[float, float, float, float]:
+        """ArduPilot leaves the quaternion out."""
+        return (NAN, NAN, NAN, NAN)
+
+    def extended_sys_state(self) -> Values:
+        """EXTENDED_SYS_STATE (245): a copter calls itself VTOL in multicopter state."""
+        return (mavlink.MAV_VTOL_STATE_MC, int(self.sources.context.landed_state))
+
+    def position_target_global_int(self) -> Values | None:
+        """POSITION_TARGET_GLOBAL_INT (87): frame 0, altitude above mean sea level."""
+        values = super().position_target_global_int()
+        if values is None:
+            return None
+        return (values[0], mavlink.MAV_FRAME_GLOBAL, _POSITION_ONLY_MASK, *values[3:6], *(0.0,) * 8)
+
+
+def finite(value: float) -> float:
+    """The value, or 0 where nothing was measured yet."""
+    return value if math.isfinite(value) else 0.0
+
+
+def ekf_flags(health: NavigationHealth) -> int:
+    """EKF_STATUS_FLAGS of the filter's health; 831 (0x33F) is ready."""
+    if not health.attitude:
+        return int(_M.EKF_UNINITIALIZED)
+    flags = 0
+    for bit, is_set in (
+        (_M.EKF_ATTITUDE, health.attitude),
+        (_M.EKF_VELOCITY_HORIZ, health.velocity_horizontal or health.constant_position),
+        (_M.EKF_VELOCITY_VERT, health.velocity_vertical),
+        (_M.EKF_POS_HORIZ_REL, health.position_horizontal_relative),
+        (_M.EKF_POS_HORIZ_ABS, health.position_horizontal_absolute),
+        (_M.EKF_POS_VERT_ABS, health.position_vertical_absolute),
+        (_M.EKF_CONST_POS_MODE, health.constant_position),
+        (_M.EKF_PRED_POS_HORIZ_REL, health.predicted_position_horizontal_relative),
+        (_M.EKF_PRED_POS_HORIZ_ABS, health.predicted_position_horizontal_absolute),
+        (_M.EKF_GPS_GLITCHING, health.gps_glitch),
+    ):
+        if is_set:
+            flags |= bit
+    return flags

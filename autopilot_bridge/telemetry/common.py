@@ -1,0 +1,385 @@
+"""Messages that both firmwares send alike (MAVLink common message set)."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.multicopter import MulticopterController
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, TelemetryView, pressure_altitude_m
+from flightsim import interface
+from flightsim.interface import SensorReadings
+
+NAN: Final = math.nan
+HIGHRES_FIELDS_UPDATED: Final = 63
+
+
+@dataclass(slots=True, kw_only=True)
+class TelemetrySources:
+    """Where the messages take their contents from.
+
+    Attributes:
+        heartbeat: field values of HEARTBEAT in definition order.
+        sys_status: (present, enabled, health) sensor bits of SYS_STATUS.
+        mission_current: field values of MISSION_CURRENT.
+        autopilot_version: field values of AUTOPILOT_VERSION.
+        battery_level: MAV_BATTERY_CHARGE_STATE.
+        hover_thrust: collective at hover, 0..1.
+        unix_epoch_us: Unix time of boot, microseconds.
+    """
+
+    view: TelemetryView
+    context: FlightContext
+    navigation: NavigationFilter
+    controller: MulticopterController
+    readings: SensorReadings
+    heartbeat: Callable[[], Values]
+    sys_status: Callable[[], tuple[int, int, int]]
+    mission_current: Callable[[], Values]
+    autopilot_version: Callable[[], Values]
+    battery_level: Callable[[], int]
+    unix_epoch_us: int
+
+
+class CommonMessages:
+    """Builders of the messages that are the same for both flavours; flavours extend and override them."""
+
+    servo_unused_us = 0
+    servo_disarmed_us = 1000
+
+    def __init__(self, sources: TelemetrySources) -> None:
+        self.sources = sources
+        self.view = sources.view
+
+    def builders(self) -> Mapping[int, Builder]:
+        """Message id -> builder of its field values."""
+        return {
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self.sources.heartbeat,
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
+            mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
+            mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: self.scaled_pressure,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: self.attitude,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: self.attitude_quaternion,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self.local_position_ned,
+            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.global_position_int,
+            mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self.servo_output_raw,
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self.sources.mission_current,
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self.gps_global_origin,
+            mavlink.MAVLINK_MSG_ID_VFR_HUD: self.vfr_hud,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: self.attitude_target,
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self.position_target_local_ned,
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: self.position_target_global_int,
+            mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: self.highres_imu,
+            mavlink.MAVLINK_MSG_ID_SCALED_IMU: self.scaled_imu,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self.battery_status,
+            mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self.sources.autopilot_version,
+            mavlink.MAVLINK_MSG_ID_VIBRATION: self.vibration,
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION: self.home_position,
+            mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self.extended_sys_state,
+            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self.distance_sensor,
+        }
+
+    def sys_status(self) -> Values:
+        """SYS_STATUS (1)."""
+        present, enabled, health = self.sources.sys_status()
+        voltage_mv, current_ca, remaining = UINT16_UNKNOWN, -1, -1
+        battery = self.view.battery
+        if battery is not None:
+            voltage_mv = round(battery[0] * 1000.0)
+            current_ca = round(battery[1] * 100.0)
+            remaining = round(battery[3] * 100.0)
+        return (present, enabled, health, 0, voltage_mv, current_ca, remaining, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+
+    def system_time(self) -> Values:
+        """SYSTEM_TIME (2)."""
+        return (self.sources.unix_epoch_us + self.view.time_us, self.view.time_ms)
+
+    def gps_raw_int(self) -> Values | None:
+        """GPS_RAW_INT (24); eph and epv are the dilutions of precision x 100, as both firmwares send."""
+        gps = self.sources.readings.gps
+        if gps.time_us < 0:
+            return None
+        v = gps.values.tolist()
+        fix_type = int(v[interface.GPS_FIX_TYPE])
+        vn, ve, _ = v[interface.GPS_VEL_NED_M_S]
+        if fix_type < 2 or not math.isfinite(v[interface.GPS_LAT_DEG]):
+            satellites = int(v[interface.GPS_SATELLITES]) if math.isfinite(v[interface.GPS_SATELLITES]) else 0
+            return (gps.time_us, fix_type, 0, 0, 0, UINT16_UNKNOWN, UINT16_UNKNOWN, 0, 0, satellites) + (
+                0,
+            ) * 6
+        alt_mm = round(v[interface.GPS_ALT_M] * 1000.0)
+        return (
+            gps.time_us,
+            fix_type,
+            round(v[interface.GPS_LAT_DEG] * 1e7),
+            round(v[interface.GPS_LON_DEG] * 1e7),
+            alt_mm,
+            round(v[interface.GPS_HDOP] * 100.0),
+            round(v[interface.GPS_VDOP] * 100.0),
+            round(math.hypot(vn, ve) * 100.0),
+            round(math.degrees(math.atan2(ve, vn)) % 360.0 * 100.0) % 36000,
+            int(v[interface.GPS_SATELLITES]),
+            alt_mm,
+            round(v[interface.GPS_EPH_M] * 1000.0),
+            round(v[interface.GPS_EPV_M] * 1000.0),
+            round(v[interface.GPS_SPEED_ACCURACY_M_S] * 1000.0),
+            0,
+            0,
+        )
+
+    def scaled_pressure(self) -> Values | None:
+        """SCALED_PRESSURE (29), hPa."""
+        pressure_pa, temperature_c = self.view.pressure()
+        if not math.isfinite(pressure_pa):
+            return None
+        return (self.view.time_ms, pressure_pa * 0.01, 0.0, round(temperature_c * 100.0), 0)
+
+    def attitude(self) -> Values | None:
+        """ATTITUDE (30)."""
+        v = self.view
+        if not self.sources.navigation.health.attitude:
+            return None
+        return (v.time_ms, v.roll, v.pitch, v.yaw, *v.rates)
+
+    def attitude_quaternion(self) -> Values | None:
+        """ATTITUDE_QUATERNION (31)."""
+        v = self.view
+        if not self.sources.navigation.health.attitude:
+            return None
+        return (v.time_ms, *v.q, *v.rates, (0.0, 0.0, 0.0, 0.0))
+
+    def local_position_ned(self) -> Values:
+        """LOCAL_POSITION_NED (32)."""
+        v = self.view
+        return (v.time_ms, *v.pos, *v.vel)
+
+    def global_position_int(self) -> Values | None:
+        """GLOBAL_POSITION_INT (33)."""
+        v = self.view
+        if not v.has_global:
+            return None
+        vn, ve, vd = v.vel
+        return (
+            v.time_ms,
+            v.lat_e7,
+            v.lon_e7,
+            round(v.alt_amsl_m * 1000.0),
+            round(v.alt_relative_m * 1000.0),
+            round(vn * 100.0),
+            round(ve * 100.0),
+            round(vd * 100.0),
+            v.heading_cdeg,
+        )
+
+    def servo_output_raw(self) -> Values:
+        """SERVO_OUTPUT_RAW (36): motor outputs 1000..2000 us."""
+        motors = self.sources.controller.actuators.tolist()[:4]
+        if self.sources.context.armed:
+            pulses = [1000 + round(1000.0 * motor) for motor in motors]
+        else:
+            pulses = [self.servo_disarmed_us] * 4
+        return (self.view.time_us & 0xFFFFFFFF, 0, *pulses, *(self.servo_unused_us,) * 12)
+
+    def gps_global_origin(self) -> Values | None:
+        """GPS_GLOBAL_ORIGIN (49): the filter's local origin."""
+        frame = self.sources.context.frame
+        if frame is None:
+            return None
+        origin = frame.origin
+        return (
+            round(origin.lat_deg * 1e7),
+            round(origin.lon_deg * 1e7),
+            round(origin.alt_m * 1000.0),
+            self.view.time_us,
+        )
+
+    def vfr_hud(self) -> Values:
+        """VFR_HUD (74)."""
+        v = self.view
+        return (
+            self.airspeed_m_s(),
+            v.ground_speed_m_s,
+            int(v.heading_deg),
+            round(self.throttle() * 100.0),
+            v.alt_amsl_m if v.has_global else 0.0,
+            -v.vel[2],
+        )
+
+    def airspeed_m_s(self) -> float:
+        """What VFR_HUD shows as airspeed without an airspeed sensor."""
+        return 0.0
+
+    def throttle(self) -> float:
+        """Collective being commanded, 0..1."""
+        return self.sources.controller.thrust if self.sources.context.armed else 0.0
+
+    def attitude_target(self) -> Values | None:
+        """ATTITUDE_TARGET (83): what the attitude loop is following."""
+        context = self.sources.context
+        if not context.armed or context.setpoint[sp.LEVEL] < sp.RATES:
+            return None
+        controller = self.sources.controller
+        return (
+            self.view.time_ms,
+            0,
+            controller.attitude_setpoint.tolist(),
+            *controller.rates_setpoint.tolist(),
+            controller.thrust,
+            (0.0, 0.0, 0.0),
+        )
+
+    def trajectory_setpoint(self) -> list[float] | None:
+        """Position 3, velocity 3, acceleration 3, yaw, yaw rate asked of the control laws; None when not flying so."""
+        context = self.sources.context
+        if not context.armed or context.setpoint[sp.LEVEL] != sp.TRAJECTORY:
+            return None
+        return context.setpoint[: sp.YAW_RATE_RAD_S + 1].tolist()
+
+    def position_target_local_ned(self) -> Values | None:
+        """POSITION_TARGET_LOCAL_NED (85)."""
+        target = self.trajectory_setpoint()
+        if target is None:
+            return None
+        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, 0, *target)
+
+    def position_target_global_int(self) -> Values | None:
+        """POSITION_TARGET_GLOBAL_INT (87)."""
+        target = self.trajectory_setpoint()
+        frame = self.sources.context.frame
+        if target is None or frame is None or not all(map(math.isfinite, target[:3])):
+            return None
+        lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(*target[:3])
+        return (
+            self.view.time_ms,
+            mavlink.MAV_FRAME_GLOBAL_INT,
+            0,
+            round(lat_deg * 1e7),
+            round(lon_deg * 1e7),
+            alt_m,
+            *target[3:],
+        )
+
+    def highres_imu(self) -> Values | None:
+        """HIGHRES_IMU (105): m/s^2, rad/s, gauss, hPa."""
+        imu = self.view.imu()
+        pressure_pa, _ = self.view.pressure()
+        if not math.isfinite(imu[0]) or not math.isfinite(pressure_pa):
+            return None
+        return (
+            self.view.time_us,
+            *imu[interface.IMU_ACCEL_FRD_M_S2],
+            *imu[interface.IMU_GYRO_FRD_RAD_S],
+            *self.view.magnetometer_gauss(),
+            pressure_pa * 0.01,
+            0.0,
+            pressure_altitude_m(pressure_pa),
+            imu[interface.IMU_TEMPERATURE_C],
+            HIGHRES_FIELDS_UPDATED,
+            0,
+        )
+
+    def raw_scaled_imu(self) -> tuple[int, ...] | None:
+        """Accelerometer (milli-g), gyro (mrad/s), magnetometer (mgauss) as integers."""
+        imu = self.view.imu()
+        if not math.isfinite(imu[0]):
+            return None
+        milli_g = [round(value * (1000.0 / 9.80665)) for value in imu[interface.IMU_ACCEL_FRD_M_S2]]
+        mrad = [round(value * 1000.0) for value in imu[interface.IMU_GYRO_FRD_RAD_S]]
+        mgauss = [round(value * 1000.0) for value in self.view.magnetometer_gauss()]
+        return (*milli_g, *mrad, *mgauss)
+
+    def temperature_cdeg(self) -> int:
+        """IMU temperature, centidegrees."""
+        return round(self.view.imu()[interface.IMU_TEMPERATURE_C] * 100.0)
+
+    def scaled_imu(self) -> Values | None:
+        """SCALED_IMU (26)."""
+        values = self.raw_scaled_imu()
+        return None if values is None else (self.view.time_ms, *values, self.temperature_cdeg())
+
+    def battery_status(self) -> Values | None:
+        """BATTERY_STATUS (147)."""
+        battery = self.view.battery
+        if battery is None:
+            return None
+        voltage_v, current_a, used_ah, remaining = battery
+        return (
+            0,
+            mavlink.MAV_BATTERY_FUNCTION_ALL,
+            mavlink.MAV_BATTERY_TYPE_LIPO,
+            32767,
+            (round(voltage_v * 1000.0), *(UINT16_UNKNOWN,) * 9),
+            round(current_a * 100.0),
+            round(used_ah * 1000.0),
+            -1,
+            round(remaining * 100.0),
+            0,
+            self.sources.battery_level(),
+            (0, 0, 0, 0),
+            0,
+            0,
+        )
+
+    def vibration(self) -> Values:
+        """VIBRATION (241)."""
+        return (self.view.time_us, *self.view.vibration.rms_m_s2, 0, 0, 0)
+
+    def home_position(self) -> Values | None:
+        """HOME_POSITION (242)."""
+        context = self.sources.context
+        frame = context.frame
+        north, east, down = context.home_ned_m.tolist()
+        if frame is None or not math.isfinite(north):
+            return None
+        lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(north, east, down)
+        return (
+            round(lat_deg * 1e7),
+            round(lon_deg * 1e7),
+            round(alt_m * 1000.0),
+            north,
+            east,
+            down,
+            self.home_quaternion(),
+            0.0,
+            0.0,
+            0.0,
+            self.view.time_us,
+        )
+
+    def home_quaternion(self) -> tuple[float, float, float, float]:
+        """Heading at home as HOME_POSITION carries it."""
+        half_yaw = 0.5 * self.sources.context.home_yaw_rad
+        return (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
+
+    def extended_sys_state(self) -> Values:
+        """EXTENDED_SYS_STATE (245)."""
+        return (mavlink.MAV_VTOL_STATE_UNDEFINED, int(self.sources.context.landed_state))
+
+    def distance_sensor(self) -> Values | None:
+        """DISTANCE_SENSOR (132), facing down."""
+        reading = self.sources.readings.rangefinder
+        if reading.time_us < 0:
+            return None
+        distance_m, min_m, max_m = reading.values.tolist()
+        in_range = math.isfinite(distance_m)
+        return (
+            reading.time_us // 1000,
+            round(min_m * 100.0),
+            round(max_m * 100.0),
+            round(distance_m * 100.0) if in_range else round(max_m * 100.0) + 1,
+            mavlink.MAV_DISTANCE_SENSOR_LASER,
+            0,
+            mavlink.MAV_SENSOR_ROTATION_PITCH_270,
+            0,
+            0.0,
+            0.0,
+            (0.0, 0.0, 0.0, 0.0),
+            100 if in_range else 1,
+        )

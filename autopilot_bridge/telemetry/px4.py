@@ -1,0 +1,294 @@
+"""Messages and stream sets of PX4 v1.16, as seen on its onboard and ground-station links."""
+
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.navigation import NavigationHealth
+from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.telemetry.common import NAN, CommonMessages, TelemetrySources
+from autopilot_bridge.telemetry.streams import Builder, Values
+from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
+
+_M = mavlink
+
+ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
+    {
+        _M.MAVLINK_MSG_ID_ATTITUDE: 100,
+        _M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50,
+        _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50,
+        _M.MAVLINK_MSG_ID_HIGHRES_IMU: 50,
+        _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30,
+        _M.MAVLINK_MSG_ID_ODOMETRY: 30,
+        _M.MAVLINK_MSG_ID_ALTITUDE: 10,
+        _M.MAVLINK_MSG_ID_ATTITUDE_TARGET: 10,
+        _M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 10,
+        _M.MAVLINK_MSG_ID_DISTANCE_SENSOR: 10,
+        _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 10,
+        _M.MAVLINK_MSG_ID_TIMESYNC: 10,
+        _M.MAVLINK_MSG_ID_VFR_HUD: 10,
+        _M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: 10,
+        _M.MAVLINK_MSG_ID_GPS_RAW_INT: 8,
+        _M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5,
+        _M.MAVLINK_MSG_ID_SYS_STATUS: 5,
+        _M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: 2,
+        _M.MAVLINK_MSG_ID_HEARTBEAT: 1,
+        _M.MAVLINK_MSG_ID_SYSTEM_TIME: 1,
+        _M.MAVLINK_MSG_ID_PING: 1,
+        _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1,
+        _M.MAVLINK_MSG_ID_SCALED_PRESSURE: 1,
+        _M.MAVLINK_MSG_ID_MISSION_CURRENT: 1,
+        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: 1,
+        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: 1,
+        _M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+        _M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
+        _M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+        _M.MAVLINK_MSG_ID_VIBRATION: 0.5,
+    }
+)
+"""PX4's ONBOARD mode (UDP 14540), reference section 6."""
+
+GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
+    {
+        _M.MAVLINK_MSG_ID_ATTITUDE: 50,
+        _M.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 50,
+        _M.MAVLINK_MSG_ID_ATTITUDE_TARGET: 50,
+        _M.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 50,
+        _M.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 50,
+        _M.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: 50,
+        _M.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: 50,
+        _M.MAVLINK_MSG_ID_GPS_RAW_INT: 5,
+        _M.MAVLINK_MSG_ID_VFR_HUD: 4,
+        _M.MAVLINK_MSG_ID_ALTITUDE: 1,
+        _M.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 1,
+        _M.MAVLINK_MSG_ID_HEARTBEAT: 1,
+        _M.MAVLINK_MSG_ID_MISSION_CURRENT: 1,
+        _M.MAVLINK_MSG_ID_SCALED_PRESSURE: 1,
+        _M.MAVLINK_MSG_ID_SYS_STATUS: 1,
+        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: 1,
+        _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: 1,
+        _M.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+        _M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
+        _M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+        _M.MAVLINK_MSG_ID_DISTANCE_SENSOR: 0.5,
+        _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 0.5,
+        _M.MAVLINK_MSG_ID_VIBRATION: 0.1,
+        _M.MAVLINK_MSG_ID_PING: 0.1,
+    }
+)
+"""PX4's NORMAL mode with raised rates (UDP 14550), reference section 6."""
+
+ODID_EPOCH_UNIX_S: Final = 1546300800
+"""2019-01-01, the epoch of Open Drone ID's system time stamp."""
+
+
+class Px4Messages(CommonMessages):
+    """Builders of what PX4 sends.
+
+    Args:
+        current_mode: (standard_mode, custom_mode, intended_custom_mode).
+        estimator_flags: ESTIMATOR_STATUS_FLAGS of the navigation filter.
+        orbit: (signed radius m, centre north, east, down m) while circling, else None.
+    """
+
+    servo_unused_us = 900
+    servo_disarmed_us = 900
+
+    def __init__(
+        self,
+        sources: TelemetrySources,
+        *,
+        current_mode: Callable[[], Values],
+        orbit: Callable[[], tuple[float, float, float, float] | None],
+    ) -> None:
+        super().__init__(sources)
+        self._current_mode = current_mode
+        self._orbit = orbit
+        self._ping_sequence = -1
+
+    def builders(self) -> Mapping[int, Builder]:
+        """Message id -> builder."""
+        return {
+            **super().builders(),
+            _M.MAVLINK_MSG_ID_PING: self.ping,
+            _M.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
+            _M.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
+            _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
+            _M.MAVLINK_MSG_ID_ODOMETRY: self.odometry,
+            _M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: self.orbit_execution_status,
+            _M.MAVLINK_MSG_ID_CURRENT_MODE: self._current_mode,
+            _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: self.open_drone_id_location,
+            _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_SYSTEM: self.open_drone_id_system,
+        }
+
+    def ping(self) -> Values:
+        """PING (4), to everybody."""
+        self._ping_sequence += 1
+        return (self.view.time_us, self._ping_sequence, 0, 0)
+
+    def timesync(self) -> Values:
+        """TIMESYNC (111) request, nanoseconds since boot."""
+        return (0, self.view.time_us * 1000, 0, 0)
+
+    def altitude(self) -> Values | None:
+        """ALTITUDE (141)."""
+        v = self.view
+        if not v.has_global:
+            return None
+        clearance_m = float(self.sources.navigation.state[nav.HEIGHT_ABOVE_GROUND_M])
+        terrain_m = v.alt_amsl_m - clearance_m if math.isfinite(clearance_m) else NAN
+        return (
+            v.time_us,
+            v.alt_amsl_m,
+            v.alt_amsl_m,
+            -v.pos[2],
+            v.alt_relative_m,
+            terrain_m,
+            clearance_m,
+        )
+
+    def estimator_status(self) -> Values:
+        """ESTIMATOR_STATUS (230)."""
+        health = self.sources.navigation.health
+        return (
+            self.view.time_us,
+            estimator_flags(health),
+            health.velocity_test_ratio,
+            health.position_horizontal_test_ratio,
+            health.position_vertical_test_ratio,
+            health.magnetometer_test_ratio,
+            health.height_above_ground_test_ratio,
+            NAN,
+            health.position_horizontal_accuracy_m,
+            health.position_vertical_accuracy_m,
+        )
+
+    def odometry(self) -> Values | None:
+        """ODOMETRY (331): pose in local NED, velocity in the local frame as PX4 sends it."""
+        v = self.view
+        navigation = self.sources.navigation
+        if not navigation.health.attitude:
+            return None
+        pose = [NAN] * 21
+        velocity = [NAN] * 21
+        variances = navigation.variances.tolist()
+        for index, diagonal in enumerate((0, 6, 11)):
+            pose[diagonal] = variances[6 + index]
+            velocity[diagonal] = variances[3 + index]
+        for index, diagonal in enumerate((15, 18, 20)):
+            pose[diagonal] = variances[index]
+        return (
+            v.time_us,
+            mavlink.MAV_FRAME_LOCAL_NED,
+            mavlink.MAV_FRAME_LOCAL_NED,
+            *v.pos,
+            v.q,
+            *v.vel,
+            *v.rates,
+            pose,
+            velocity,
+            0,
+            mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
+            0,
+        )
+
+    def orbit_execution_status(self) -> Values | None:
+        """ORBIT_EXECUTION_STATUS (360), while circling."""
+        orbit = self._orbit()
+        frame = self.sources.context.frame
+        if orbit is None or frame is None:
+            return None
+        radius_m, north_m, east_m, down_m = orbit
+        lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(north_m, east_m, down_m)
+        return (
+            self.view.time_us,
+            radius_m,
+            mavlink.MAV_FRAME_GLOBAL_INT,
+            round(lat_deg * 1e7),
+            round(lon_deg * 1e7),
+            alt_m,
+        )
+
+    def open_drone_id_location(self) -> Values | None:
+        """OPEN_DRONE_ID_LOCATION (12901), ASTM F3411."""
+        v = self.view
+        if not v.has_global:
+            return None
+        airborne = int(self.sources.context.landed_state) != mavlink.MAV_LANDED_STATE_ON_GROUND
+        course_cdeg = round(math.degrees(math.atan2(v.vel[1], v.vel[0])) % 360.0 * 100.0) % 36000
+        pressure_pa, _ = v.pressure()
+        return (
+            0,
+            0,
+            (0,) * 20,
+            mavlink.MAV_ODID_STATUS_AIRBORNE if airborne else mavlink.MAV_ODID_STATUS_GROUND,
+            course_cdeg,
+            round(v.ground_speed_m_s * 100.0),
+            round(-v.vel[2] * 100.0),
+            v.lat_e7,
+            v.lon_e7,
+            pressure_altitude_m_or_unknown(pressure_pa),
+            v.alt_amsl_m,
+            mavlink.MAV_ODID_HEIGHT_REF_OVER_TAKEOFF,
+            v.alt_relative_m,
+            mavlink.MAV_ODID_HOR_ACC_1_METER,
+            mavlink.MAV_ODID_VER_ACC_1_METER,
+            mavlink.MAV_ODID_VER_ACC_UNKNOWN,
+            mavlink.MAV_ODID_SPEED_ACC_1_METERS_PER_SECOND,
+            float(UINT16_UNKNOWN),
+            0,
+        )
+
+    def open_drone_id_system(self) -> Values | None:
+        """OPEN_DRONE_ID_SYSTEM (12904): the operator is taken to stand at home."""
+        home = self.home_position()
+        if home is None:
+            return None
+        unix_s = (self.sources.unix_epoch_us + self.view.time_us) // 1_000_000
+        return (
+            0,
+            0,
+            (0,) * 20,
+            mavlink.MAV_ODID_OPERATOR_LOCATION_TYPE_TAKEOFF,
+            mavlink.MAV_ODID_CLASSIFICATION_TYPE_UNDECLARED,
+            home[0],
+            home[1],
+            1,
+            0,
+            -1000.0,
+            -1000.0,
+            mavlink.MAV_ODID_CATEGORY_EU_UNDECLARED,
+            mavlink.MAV_ODID_CLASS_EU_UNDECLARED,
+            float(home[2]) * 1e-3,
+            max(0, unix_s - ODID_EPOCH_UNIX_S),
+        )
+
+
+def pressure_altitude_m_or_unknown(pressure_pa: float) -> float:
+    """Pressure altitude, or -1000 (unknown in ASTM F3411) without a barometer."""
+    return pressure_altitude_m(pressure_pa) if math.isfinite(pressure_pa) else -1000.0
+
+
+def estimator_flags(health: NavigationHealth) -> int:
+    """ESTIMATOR_STATUS_FLAGS of the filter's health."""
+    flags = 0
+    for bit, is_set in (
+        (_M.ESTIMATOR_ATTITUDE, health.attitude),
+        (_M.ESTIMATOR_VELOCITY_HORIZ, health.velocity_horizontal),
+        (_M.ESTIMATOR_VELOCITY_VERT, health.velocity_vertical),
+        (_M.ESTIMATOR_POS_HORIZ_REL, health.position_horizontal_relative),
+        (_M.ESTIMATOR_POS_HORIZ_ABS, health.position_horizontal_absolute),
+        (_M.ESTIMATOR_POS_VERT_ABS, health.position_vertical_absolute),
+        (_M.ESTIMATOR_POS_VERT_AGL, health.position_vertical_agl),
+        (_M.ESTIMATOR_CONST_POS_MODE, health.constant_position),
+        (_M.ESTIMATOR_PRED_POS_HORIZ_REL, health.predicted_position_horizontal_relative),
+        (_M.ESTIMATOR_PRED_POS_HORIZ_ABS, health.predicted_position_horizontal_absolute),
+        (_M.ESTIMATOR_GPS_GLITCH, health.gps_glitch),
+        (_M.ESTIMATOR_ACCEL_ERROR, health.accel_error),
+    ):
+        if is_set:
+            flags |= bit
+    return flags

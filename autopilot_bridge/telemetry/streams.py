@@ -1,0 +1,132 @@
+"""Which messages go out on a channel, and when.
+
+A `StreamTable` belongs to one channel. Every stream keeps its own due time, so any rate is exact on average on the
+physics grid; the payload of a message that several channels send in the same step is built once (`PayloadCache`).
+"""
+
+import heapq
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol
+
+from autopilot_bridge.mavlink.definitions import definition
+from autopilot_bridge.telemetry.packing import values_packer
+
+Values = tuple[object, ...]
+Builder = Callable[[], Values | None]
+"""Field values of one message in the order of its XML definition; None: nothing to say now."""
+
+MICROSECONDS: Final = 1_000_000
+
+
+class PayloadSink(Protocol):
+    """Where a stream's packed payloads go: one MAVLink channel."""
+
+    def send_payload(self, message_id: int, payload: bytes) -> None:
+        """Frame the payload and send it."""
+
+
+class PayloadCache:
+    """Builds and packs messages, once per physics step however many channels send them."""
+
+    __slots__ = ("_builders", "_packers", "_payloads", "time_us")
+
+    def __init__(self, builders: Mapping[int, Builder]) -> None:
+        self._builders = builders
+        self._packers = {message_id: values_packer(definition(message_id)) for message_id in builders}
+        self._payloads: dict[int, bytes | None] = {}
+        self.time_us = -1
+
+    def __contains__(self, message_id: int) -> bool:
+        return message_id in self._builders
+
+    def payload(self, message_id: int, time_us: int) -> bytes | None:
+        """Packed payload of a message at this step, or None when there is nothing to say."""
+        if time_us != self.time_us:
+            self.time_us = time_us
+            self._payloads.clear()
+        try:
+            return self._payloads[message_id]
+        except KeyError:
+            pass
+        values = self._builders[message_id]()
+        payload = None if values is None else self._packers[message_id](values)
+        self._payloads[message_id] = payload
+        return payload
+
+
+class StreamTable:
+    """The periodic messages of one channel.
+
+    Args:
+        cache: where payloads come from.
+        sink: the channel.
+        rates_hz: message id -> rate of the streams that run from the start.
+        physics_step_us: no stream runs faster than the physics.
+    """
+
+    __slots__ = ("_cache", "_defaults_us", "_heap", "_intervals_us", "_sink", "_step_us", "next_due_us")
+
+    NEVER: Final = 1 << 62
+
+    def __init__(
+        self, cache: PayloadCache, sink: PayloadSink, rates_hz: Mapping[int, float], *, physics_step_us: int
+    ) -> None:
+        self._cache = cache
+        self._sink = sink
+        self._step_us = physics_step_us
+        self._heap: list[tuple[int, int]] = []
+        self._intervals_us: dict[int, int] = {}
+        self._defaults_us = {
+            message_id: max(physics_step_us, round(MICROSECONDS / rate_hz))
+            for message_id, rate_hz in rates_hz.items()
+            if message_id in cache
+        }
+        self.next_due_us = self.NEVER
+        for message_id, interval_us in self._defaults_us.items():
+            self._start(message_id, interval_us, interval_us)
+
+    @property
+    def intervals_us(self) -> Mapping[int, int]:
+        """Running streams: message id -> interval."""
+        return self._intervals_us
+
+    def default_interval_us(self, message_id: int) -> int:
+        """Interval of the stream in the channel's default set; -1 when it is not in it."""
+        return self._defaults_us.get(message_id, -1)
+
+    def set_interval(self, message_id: int, interval_us: int, time_us: int) -> None:
+        """Run a stream at a new interval (microseconds), or stop it (-1). The next one is due after one interval."""
+        self._heap = [entry for entry in self._heap if entry[1] != message_id]
+        heapq.heapify(self._heap)
+        self._intervals_us.pop(message_id, None)
+        if interval_us > 0:
+            interval_us = max(interval_us, self._step_us)
+            self._start(message_id, interval_us, time_us + interval_us)
+        self.next_due_us = self._heap[0][0] if self._heap else self.NEVER
+
+    def set_default(self, message_id: int, interval_us: int, time_us: int) -> None:
+        """Change the default of a stream (-1: none) and run it so, as a stream-rate parameter does."""
+        if interval_us > 0:
+            self._defaults_us[message_id] = interval_us
+        else:
+            self._defaults_us.pop(message_id, None)
+        self.set_interval(message_id, interval_us, time_us)
+
+    def tick(self, time_us: int) -> None:
+        """Send what is due."""
+        heap = self._heap
+        while heap and heap[0][0] <= time_us:
+            due_us, message_id = heap[0]
+            next_us = due_us + self._intervals_us[message_id]
+            if next_us <= time_us:  # a stream never bursts to catch up
+                next_us = time_us + self._intervals_us[message_id]
+            heapq.heapreplace(heap, (next_us, message_id))
+            payload = self._cache.payload(message_id, time_us)
+            if payload is not None:
+                self._sink.send_payload(message_id, payload)
+        self.next_due_us = heap[0][0] if heap else self.NEVER
+
+    def _start(self, message_id: int, interval_us: int, due_us: int) -> None:
+        self._intervals_us[message_id] = interval_us
+        heapq.heappush(self._heap, (due_us, message_id))
+        self.next_due_us = self._heap[0][0]

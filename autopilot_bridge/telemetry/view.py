@@ -1,0 +1,118 @@
+"""What the telemetry messages are made of, converted once per physics step to plain numbers in the wire's units."""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.telemetry.vibration import VibrationMeter
+from flightsim import interface
+from flightsim.interface import SensorReadings
+
+UINT16_UNKNOWN: Final = 65535
+GRAVITY_M_S2: Final = 9.80665
+
+
+class TelemetryView:
+    """Snapshot of one autopilot's state for the message builders; `refresh` costs one array-to-list conversion.
+
+    Attributes (after `refresh`): `time_us`, `time_ms`; attitude `q` (w, x, y, z), `rates` rad/s, `roll`, `pitch`, `yaw`
+    rad; `pos` and `vel` NED m, m/s; `acc` NED m/s^2; `heading_cdeg`; and, when the filter has an origin, `lat_e7`,
+    `lon_e7`, `alt_amsl_m`, `alt_relative_m` (to home).
+    """
+
+    __slots__ = (
+        "_nav_state",
+        "acc",
+        "alt_amsl_m",
+        "alt_relative_m",
+        "context",
+        "has_global",
+        "heading_cdeg",
+        "heading_deg",
+        "lat_e7",
+        "lon_e7",
+        "pitch",
+        "pos",
+        "q",
+        "rates",
+        "readings",
+        "roll",
+        "time_ms",
+        "time_us",
+        "vel",
+        "vibration",
+        "yaw",
+    )
+
+    def __init__(
+        self, context: FlightContext, nav_state: NDArray[np.float64], readings: SensorReadings
+    ) -> None:
+        self.context = context
+        self.readings = readings
+        self.vibration = VibrationMeter()
+        self._nav_state = nav_state
+        self.time_us = -1
+        self.has_global = False
+        self.refresh(0)
+
+    def refresh(self, time_us: int) -> None:
+        """Bring the snapshot to this step; free when it is there already."""
+        if time_us == self.time_us:
+            return
+        self.time_us = time_us
+        self.time_ms = time_us // 1000
+        state = self._nav_state.tolist()
+        self.q = state[nav.Q_NED_FROM_FRD]
+        self.rates = state[nav.RATES_FRD_RAD_S]
+        self.vel = state[nav.VEL_NED_M_S]
+        self.pos = state[nav.POS_NED_M]
+        self.acc = state[nav.ACC_NED_M_S2]
+        self.roll, self.pitch, self.yaw = state[nav.EULER_RAD]
+        self.heading_deg = math.degrees(self.yaw) % 360.0
+        self.heading_cdeg = round(self.heading_deg * 100.0) % 36000
+        frame = self.context.frame
+        self.has_global = frame is not None
+        if frame is not None:
+            north, east, down = self.pos
+            lat_deg, lon_deg, self.alt_amsl_m = frame.geodetic_from_ned(north, east, down)
+            self.lat_e7 = round(lat_deg * 1e7)
+            self.lon_e7 = round(lon_deg * 1e7)
+            home_down = self.context.home_ned_m[2]
+            self.alt_relative_m = (home_down if home_down == home_down else 0.0) - down
+
+    @property
+    def ground_speed_m_s(self) -> float:
+        """Horizontal speed over ground."""
+        return math.hypot(self.vel[0], self.vel[1])
+
+    @property
+    def battery(self) -> tuple[float, float, float, float] | None:
+        """(voltage V, current A, used Ah, remaining 0..1), or None before the first reading."""
+        reading = self.readings.battery
+        if reading.time_us < 0:
+            return None
+        values = reading.values.tolist()
+        return values[0], values[1], values[2], values[3]
+
+    def imu(self) -> list[float]:
+        """Newest gyro (rad/s), accelerometer (m/s^2), temperature (deg C)."""
+        return self.readings.imu.values.tolist()  # type: ignore[no-any-return]
+
+    def magnetometer_gauss(self) -> list[float]:
+        """Newest body field; zeros before the first reading."""
+        reading = self.readings.magnetometer
+        return [0.0, 0.0, 0.0] if reading.time_us < 0 else reading.values.tolist()
+
+    def pressure(self) -> tuple[float, float]:
+        """(static pressure Pa, temperature deg C); NaN before the first reading."""
+        values = self.readings.barometer.values
+        return float(values[interface.BARO_PRESSURE_PA]), float(values[interface.BARO_TEMPERATURE_C])
+
+
+def pressure_altitude_m(pressure_pa: float) -> float:
+    """Height in the ICAO standard atmosphere (doc 7488, troposphere) of a static pressure."""
+    return 44330.769 * (1.0 - (pressure_pa / 101325.0) ** 0.190263)
