@@ -1,0 +1,14 @@
+"""Time: the one place that sleeps or asks what time it is.
+
+* `Clock`: what missions and other tasks wait on: vehicle time.
+* `VirtualTimeLoop`, `LoopClock`, `run`: an embedded world's time, as fast as it goes or paced.
+* `TelemetryClock`: the time of a remote vehicle, from its timestamped messages.
+* `RealTimeClock`: keeps a simulation in step with the wall clock.
+"""
+
+from autopilot_bridge.clock.base import Clock, LoopClock
+from autopilot_bridge.clock.pacing import Pacer, RealTimeClock
+from autopilot_bridge.clock.telemetry import TelemetryClock
+from autopilot_bridge.clock.virtual import VirtualTimeLoop, run
+
+__all__ = ["Clock", "LoopClock", "Pacer", "RealTimeClock", "TelemetryClock", "VirtualTimeLoop", "run"]

@@ -1,0 +1,49 @@
+"""What tasks wait on."""
+
+import asyncio
+from contextlib import AbstractAsyncContextManager
+from typing import Any, Protocol
+
+
+class Clock(Protocol):
+    """Vehicle time for asyncio tasks."""
+
+    @property
+    def time_us(self) -> int:
+        """Microseconds since the vehicle booted; never runs backwards."""
+        ...
+
+    async def sleep_until(self, time_us: int) -> None:
+        """Wait until the vehicle's time has come; a time in the past only yields to other tasks."""
+        ...
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait for `seconds` of vehicle time."""
+        ...
+
+    def timeout(self, seconds: float) -> AbstractAsyncContextManager[Any]:
+        """`async with clock.timeout(5.0):` raises TimeoutError when the block takes longer than that."""
+        ...
+
+
+class LoopClock:
+    """The running event loop's own time: vehicle time on a `VirtualTimeLoop`."""
+
+    __slots__ = ()
+
+    @property
+    def time_us(self) -> int:
+        """Microseconds of the loop's time."""
+        return round(asyncio.get_running_loop().time() * 1e6)
+
+    async def sleep_until(self, time_us: int) -> None:
+        """Wait until the loop's time has come."""
+        await asyncio.sleep(max(0, time_us - self.time_us) * 1e-6)
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait for `seconds` of the loop's time."""
+        await asyncio.sleep(seconds)
+
+    def timeout(self, seconds: float) -> AbstractAsyncContextManager[Any]:
+        """Raises TimeoutError when the block takes longer."""
+        return asyncio.timeout(seconds)

@@ -1,0 +1,184 @@
+"""The time of a vehicle somewhere else, from the timestamps in its messages."""
+
+import asyncio
+import math
+import time
+from collections import deque
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from typing import Any, Final
+
+_WINDOW_S: Final = 4.0  # wall seconds over which the rate is measured
+_MIN_WINDOW_S: Final = 0.25  # a shorter base says nothing about the rate
+_MIN_SPACING_S: Final = 0.02  # observations kept for the rate are no closer than this
+_MAX_STEP_BACK_US: Final = 1_000_000  # messages overtake each other by less; more is a new time base
+_RATE_LIMITS: Final = (0.01, 1000.0)
+_MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are looked at again: rates change
+
+
+class TelemetryClock:
+    """Vehicle time, carried on between messages at the rate (speed factor) seen lately.
+
+    `time_us` follows the vehicle's own time since boot. It never runs backwards: when the vehicle reboots, or comes
+    back from a pause during which deadlines went on, time continues from where it was. When nothing is
+    heard, time goes on at the last rate, so that deadlines expire on a dead link too. The first
+    observation sets the time; waits begun before keep what they had left.
+
+    Args:
+        monotonic: wall clock in seconds.
+
+    Attributes:
+        reboots: how often the vehicle's own time jumped back.
+    """
+
+    def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
+        self._monotonic = monotonic
+        self._wall_s = monotonic()  # of the newest observation
+        self._base_us = 0.0  # clock time at that moment
+        self._offset_us = 0.0  # clock time minus vehicle time
+        self._vehicle_us: int | None = None
+        self._rate = 1.0
+        self._history: deque[tuple[float, int]] = deque()
+        self._reported_us = 0
+        self._deadlines: list[_Deadline] = []
+        self._timer: asyncio.TimerHandle | None = None
+        self.reboots = 0
+
+    @property
+    def rate(self) -> float:
+        """Vehicle seconds per wall second."""
+        return self._rate
+
+    @property
+    def vehicle_time_us(self) -> int | None:
+        """Newest time the vehicle has told; None before the first."""
+        return self._vehicle_us
+
+    @property
+    def silence_s(self) -> float:
+        """Wall seconds since the newest observation (or since the clock was made)."""
+        return self._monotonic() - self._wall_s
+
+    @property
+    def time_us(self) -> int:
+        """Vehicle time now; never runs backwards."""
+        elapsed_us = (self._monotonic() - self._wall_s) * 1e6 * self._rate
+        self._reported_us = max(self._reported_us, math.floor(self._base_us + elapsed_us))
+        return self._reported_us
+
+    def observe(self, vehicle_time_us: int) -> None:
+        """Take the timestamp of a message that arrived just now."""
+        now_us = self.time_us
+        wall_s = self._monotonic()
+        previous_us = self._vehicle_us
+        if previous_us is None:
+            self._set_first(vehicle_time_us, now_us)
+        elif vehicle_time_us < previous_us:
+            if previous_us - vehicle_time_us <= _MAX_STEP_BACK_US:
+                return  # overtaken on the way
+            self.reboots += 1
+            self._history.clear()
+            self._offset_us = now_us - vehicle_time_us
+        elif now_us - (vehicle_time_us + self._offset_us) > _MAX_STEP_BACK_US:
+            # The vehicle stood still (paused simulator, suspended machine) while deadlines went on.
+            self._history.clear()
+            self._offset_us = now_us - vehicle_time_us
+        self._vehicle_us = vehicle_time_us
+        self._wall_s = wall_s
+        self._base_us = vehicle_time_us + self._offset_us
+        self._update_rate(wall_s, vehicle_time_us)
+        self._fire_due()
+
+    async def sleep_until(self, time_us: int) -> None:
+        """Wait until the vehicle's time has come."""
+        if self.time_us >= time_us:
+            await asyncio.sleep(0)
+            return
+        done = asyncio.get_running_loop().create_future()
+        deadline = self._add_deadline(time_us, lambda: done.done() or done.set_result(None))
+        try:
+            await done
+        finally:
+            self._remove_deadline(deadline)
+
+    async def sleep(self, seconds: float) -> None:
+        """Wait for `seconds` of vehicle time."""
+        await self.sleep_until(self.time_us + round(seconds * 1e6))
+
+    def timeout(self, seconds: float) -> AbstractAsyncContextManager[Any]:
+        """Raises TimeoutError when the block takes longer than `seconds` of vehicle time."""
+        return self._timeout(seconds)
+
+    @asynccontextmanager
+    async def _timeout(self, seconds: float) -> AsyncIterator[asyncio.Timeout]:
+        loop = asyncio.get_running_loop()
+        async with asyncio.timeout(None) as scope:
+            deadline = self._add_deadline(
+                self.time_us + round(seconds * 1e6), lambda: scope.reschedule(loop.time())
+            )
+            try:
+                yield scope
+            finally:
+                self._remove_deadline(deadline)
+
+    def _set_first(self, vehicle_time_us: int, now_us: int) -> None:
+        if vehicle_time_us >= now_us:
+            for deadline in self._deadlines:
+                deadline.time_us += vehicle_time_us - now_us
+            self._reported_us = vehicle_time_us
+        else:  # the vehicle booted after us
+            self._offset_us = now_us - vehicle_time_us
+
+    def _update_rate(self, wall_s: float, vehicle_us: int) -> None:
+        history = self._history
+        if not history or wall_s - history[-1][0] >= _MIN_SPACING_S:
+            history.append((wall_s, vehicle_us))
+        while len(history) > 2 and wall_s - history[1][0] >= _WINDOW_S:
+            history.popleft()
+        first_s, first_us = history[0]
+        if wall_s - first_s >= _MIN_WINDOW_S:
+            rate = (vehicle_us - first_us) * 1e-6 / (wall_s - first_s)
+            self._rate = min(max(rate, _RATE_LIMITS[0]), _RATE_LIMITS[1])
+
+    def _add_deadline(self, time_us: int, callback: Callable[[], object]) -> "_Deadline":
+        deadline = _Deadline(time_us, callback)
+        self._deadlines.append(deadline)
+        self._arm()
+        return deadline
+
+    def _remove_deadline(self, deadline: "_Deadline") -> None:
+        if deadline in self._deadlines:
+            self._deadlines.remove(deadline)
+        if not self._deadlines and self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _fire_due(self) -> None:
+        now_us = self.time_us
+        for deadline in [item for item in self._deadlines if item.time_us <= now_us]:
+            self._deadlines.remove(deadline)
+            deadline.callback()
+
+    def _arm(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if self._deadlines:
+            first_us = min(deadline.time_us for deadline in self._deadlines)
+            wait_s = max(0.0, (first_us - self.time_us) * 1e-6 / self._rate)
+            self._timer = asyncio.get_running_loop().call_later(min(wait_s, _MAX_TIMER_S), self._on_timer)
+
+    def _on_timer(self) -> None:
+        self._timer = None
+        self._fire_due()
+        self._arm()
+
+
+class _Deadline:
+    """A moment of vehicle time and what is to happen then."""
+
+    __slots__ = ("callback", "time_us")
+
+    def __init__(self, time_us: int, callback: Callable[[], object]) -> None:
+        self.time_us = time_us
+        self.callback = callback
