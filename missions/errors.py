@@ -1,0 +1,29 @@
+"""The error tree of missions. Messages name the value, what is accepted, and the next step."""
+
+
+class MissionError(Exception):
+    """A mission could not be done. The CLI prints the message and exits 1."""
+
+
+class VehicleTimeout(MissionError):
+    """Something awaited of the vehicle did not come in time; says what was awaited and what was heard last."""
+
+
+class CommandRejected(MissionError):
+    """The vehicle refused a command, a mission or a parameter.
+
+    Attributes:
+        result: the MAV_RESULT or MAV_MISSION_RESULT it answered with.
+    """
+
+    def __init__(self, message: str, result: int) -> None:
+        super().__init__(message)
+        self.result = result
+
+
+class LinkClosed(MissionError):
+    """The link to the vehicle is gone."""
+
+
+class PlanError(ValueError):
+    """What was asked for can't be flown; found before flying. The CLI prints the message and exits 2."""

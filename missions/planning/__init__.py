@@ -1,0 +1,16 @@
+"""From a pattern to something a vehicle can fly: a trajectory in time, or waypoints."""
+
+from missions.planning.limits import VehicleLimits
+from missions.planning.natural import natural_trajectory
+from missions.planning.trajectory import Trajectory, TrajectoryPoint, line_trajectory, plan_trajectory
+from missions.planning.waypoints import waypoints_along
+
+__all__ = [
+    "Trajectory",
+    "TrajectoryPoint",
+    "VehicleLimits",
+    "line_trajectory",
+    "natural_trajectory",
+    "plan_trajectory",
+    "waypoints_along",
+]

@@ -1,0 +1,258 @@
+"""A path in time: position, velocity, acceleration and yaw for every moment."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from missions.errors import PlanError
+from missions.patterns.curve import ArcLengthTable, Array, Curve
+from missions.patterns.polyline import Polyline
+from missions.planning.limits import VehicleLimits
+from missions.planning.profile import STEP_S, Profile, speed_profile
+
+_BISECTIONS: Final = 14
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrajectoryPoint:
+    """Where to be, and how to move, at one moment: NED at the pattern's origin, m, m/s, m/s^2, rad, rad/s."""
+
+    position_ned_m: tuple[float, float, float]
+    velocity_ned_m_s: tuple[float, float, float]
+    acceleration_ned_m_s2: tuple[float, float, float]
+    yaw_rad: float
+    yaw_rate_rad_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """A trajectory sampled every `step_s`; between the samples it is linear.
+
+    Attributes:
+        step_s: time between samples.
+        position_ned_m, velocity_ned_m_s, acceleration_ned_m_s2: (n, 3).
+        yaw_rad: (n,), continuous (unwrapped).
+        yaw_rate_rad_s: (n,).
+    """
+
+    step_s: float
+    position_ned_m: Array
+    velocity_ned_m_s: Array
+    acceleration_ned_m_s2: Array
+    yaw_rad: Array
+    yaw_rate_rad_s: Array
+
+    @property
+    def duration_s(self) -> float:
+        return (len(self.yaw_rad) - 1) * self.step_s
+
+    @property
+    def length_m(self) -> float:
+        """Distance along the samples."""
+        return float(np.linalg.norm(np.diff(self.position_ned_m, axis=0), axis=1).sum())
+
+    @property
+    def max_speed_m_s(self) -> float:
+        return float(np.linalg.norm(self.velocity_ned_m_s, axis=1).max())
+
+    @property
+    def max_acceleration_m_s2(self) -> float:
+        return float(np.linalg.norm(self.acceleration_ned_m_s2, axis=1).max())
+
+    def at(self, time_s: float) -> TrajectoryPoint:
+        """The point at a time; before the start and after the end the first and the last one."""
+        place = min(max(time_s / self.step_s, 0.0), len(self.yaw_rad) - 1.0)
+        k = min(int(place), len(self.yaw_rad) - 2)
+        f = place - k
+        return TrajectoryPoint(
+            position_ned_m=_between(self.position_ned_m, k, f),
+            velocity_ned_m_s=_between(self.velocity_ned_m_s, k, f),
+            acceleration_ned_m_s2=_between(self.acceleration_ned_m_s2, k, f),
+            yaw_rad=math.remainder(float(self.yaw_rad[k] * (1.0 - f) + self.yaw_rad[k + 1] * f), math.tau),
+            yaw_rate_rad_s=float(self.yaw_rate_rad_s[k] * (1.0 - f) + self.yaw_rate_rad_s[k + 1] * f),
+        )
+
+
+def _between(table: Array, k: int, f: float) -> tuple[float, float, float]:
+    a, b = table[k], table[k + 1]
+    return (
+        float(a[0] + f * (b[0] - a[0])),
+        float(a[1] + f * (b[1] - a[1])),
+        float(a[2] + f * (b[2] - a[2])),
+    )
+
+
+def plan_trajectory(
+    curve: Curve,
+    *,
+    altitude_m: float,
+    speed_m_s: float,
+    limits: VehicleLimits,
+    duration_s: float | None = None,
+) -> Trajectory:
+    """Fly a curve from rest to rest at constant altitude, nose along the path.
+
+    Speed is `speed_m_s` wherever curvature, yaw rate and acceleration allow; at sharp corners and cusps the vehicle stops and turns.
+
+    Args:
+        curve: pattern around the origin of the local frame.
+        altitude_m: above the origin.
+        speed_m_s: ground speed asked for.
+        limits: of the vehicle.
+        duration_s: end, at rest, after this time (the search time) if the curve is not done before.
+
+    Raises:
+        PlanError: speed or altitude out of the limits, or a curve that leads too far.
+    """
+    limits.check_speed(speed_m_s)
+    limits.check_altitude(altitude_m)
+    table = ArcLengthTable.of(curve)
+    limits.check_reach(float(np.hypot(*table.points_m.T).max()))
+    pieces = _plan_pieces(table, len(table.arc_m) - 1, speed_m_s, limits)
+    if duration_s is not None and _duration_s(pieces) > duration_s:
+        pieces = _cut(table, pieces, speed_m_s, limits, duration_s)
+    return _assemble(curve, table, pieces, altitude_m)
+
+
+def line_trajectory(
+    start_ned_m: tuple[float, float, float],
+    stop_ned_m: tuple[float, float, float],
+    *,
+    speed_m_s: float,
+    limits: VehicleLimits,
+) -> Trajectory:
+    """Straight from one point to another, from rest to rest; yaw along the way (0 for a climb on the spot)."""
+    start, stop = np.array(start_ned_m), np.array(stop_ned_m)
+    distance = float(np.linalg.norm(stop - start))
+    if distance < 1e-3:
+        raise PlanError("a line between two equal points has no length")
+    profile = speed_profile(np.array([0.0, distance]), np.zeros(2), min(speed_m_s, limits.speed_m_s), limits)
+    along = (stop - start) / distance
+    horizontal = math.hypot(along[0], along[1])
+    yaw = math.atan2(along[1], along[0]) if horizontal > 1e-3 else 0.0
+    return Trajectory(
+        step_s=STEP_S,
+        position_ned_m=start + profile.arc_m[:, None] * along,
+        velocity_ned_m_s=profile.speed_m_s[:, None] * along,
+        acceleration_ned_m_s2=profile.acceleration_m_s2[:, None] * along,
+        yaw_rad=np.full(len(profile.arc_m), yaw),
+        yaw_rate_rad_s=np.zeros(len(profile.arc_m)),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Piece:
+    """One stretch between stops: its profile, the knots it runs over, and the turn on the spot before it."""
+
+    profile: Profile
+    first: int
+    last: int
+    turn_s: float
+
+
+def _plan_pieces(table: ArcLengthTable, end: int, speed_m_s: float, limits: VehicleLimits) -> list[_Piece]:
+    bounds = [0, *(k for k in table.stops if k < end), end]
+    pieces = []
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        knots = slice(first, last + 1)
+        curvature = table.curvature_per_m[knots].copy()
+        curvature[0], curvature[-1] = curvature[min(1, last - first)], curvature[max(-2, first - last - 1)]
+        profile = speed_profile(table.arc_m[knots], curvature, speed_m_s, limits)
+        turn = abs(table.course_rad[first] - table.course_rad[first - 1]) if first else 0.0
+        pieces.append(
+            _Piece(profile=profile, first=first, last=last, turn_s=1.5 * turn / limits.yaw_rate_rad_s)
+        )
+    return pieces
+
+
+def _duration_s(pieces: list[_Piece]) -> float:
+    return sum((len(p.profile.arc_m) - 1) * STEP_S + p.turn_s for p in pieces)
+
+
+def _cut(
+    table: ArcLengthTable, pieces: list[_Piece], speed_m_s: float, limits: VehicleLimits, duration_s: float
+) -> list[_Piece]:
+    """The longest plan that ends, at rest, within the time."""
+    kept: list[_Piece] = []
+    left = duration_s
+    for piece in pieces:
+        needs = _duration_s([piece])
+        if needs > left:
+            break
+        kept.append(piece)
+        left -= needs
+    else:
+        return kept
+    low, high = piece.first + 1, piece.last
+    best: list[_Piece] = []
+    for _ in range(_BISECTIONS):
+        middle = (low + high) // 2
+        tail = _plan_pieces(table, middle, speed_m_s, limits)[-1]
+        if _duration_s([tail]) <= left:
+            best, low = [tail], middle
+        else:
+            high = middle
+        if high - low <= 1:
+            break
+    if not kept and not best:
+        raise PlanError(
+            f"a search time of {duration_s:g} s is too short to fly anything; ask for more --search-time"
+        )
+    return kept + best
+
+
+def _assemble(curve: Curve, table: ArcLengthTable, pieces: list[_Piece], altitude_m: float) -> Trajectory:
+    positions, velocities, accelerations, yaws, yaw_rates = [], [], [], [], []
+    for piece in pieces:
+        if piece.turn_s > 0.0 and positions:
+            _append_turn(table, piece, positions, velocities, accelerations, yaws, yaw_rates)
+        arc, speed, push = piece.profile.arc_m, piece.profile.speed_m_s, piece.profile.acceleration_m_s2
+        # inside the piece: the last knot of it already carries the next piece's course
+        knots = slice(
+            piece.first, max(piece.last, piece.first + 2) if piece.last < len(table.arc_m) - 1 else None
+        )
+        course = np.interp(arc, table.arc_m[knots], table.course_rad[knots])
+        bend = np.interp(arc, table.arc_m[knots], table.curvature_per_m[knots])
+        points = curve.points(table.parameter_at(arc))
+        along = np.stack((np.cos(course), np.sin(course), np.zeros_like(course)), axis=1)
+        across = np.stack((-np.sin(course), np.cos(course), np.zeros_like(course)), axis=1)
+        positions.append(np.column_stack((points, np.full(len(points), -altitude_m))))
+        velocities.append(speed[:, None] * along)
+        accelerations.append(push[:, None] * along + (speed**2 * bend)[:, None] * across)
+        yaws.append(course)
+        yaw_rates.append(bend * speed)
+    return Trajectory(
+        step_s=STEP_S,
+        position_ned_m=np.concatenate(positions),
+        velocity_ned_m_s=np.concatenate(velocities),
+        acceleration_ned_m_s2=np.concatenate(accelerations),
+        yaw_rad=np.concatenate(yaws),
+        yaw_rate_rad_s=np.concatenate(yaw_rates),
+    )
+
+
+def _append_turn(
+    table: ArcLengthTable,
+    piece: _Piece,
+    positions: list[Array],
+    velocities: list[Array],
+    accelerations: list[Array],
+    yaws: list[Array],
+    yaw_rates: list[Array],
+) -> None:
+    """Stand still and turn the nose from one course to the next, smoothly (cubic)."""
+    count = max(2, int(math.ceil(piece.turn_s / STEP_S)))
+    f = np.arange(1, count) / count
+    start, stop = yaws[-1][-1], table.course_rad[piece.first]
+    positions.append(np.repeat(positions[-1][-1:], count - 1, axis=0))
+    velocities.append(np.zeros((count - 1, 3)))
+    accelerations.append(np.zeros((count - 1, 3)))
+    yaws.append(start + (stop - start) * f * f * (3.0 - 2.0 * f))
+    yaw_rates.append((stop - start) * 6.0 * f * (1.0 - f) / (count * STEP_S))
+
+
+def flight_curve(curve: Curve, corner_m: float) -> Curve:
+    """The curve as it is flown with setpoints: a polyline gets rounded corners."""
+    return curve.rounded(corner_m) if isinstance(curve, Polyline) else curve

@@ -1,0 +1,65 @@
+"""A curve as waypoints: close together where it bends, far apart where it is straight."""
+
+import math
+
+import numpy as np
+
+from missions.errors import PlanError
+from missions.patterns.curve import ArcLengthTable, Curve
+from missions.patterns.polyline import Polyline
+
+
+def waypoints_along(
+    curve: Curve,
+    *,
+    deviation_m: float = 0.5,
+    spacing_min_m: float = 3.0,
+    spacing_max_m: float = 25.0,
+    length_m: float | None = None,
+) -> list[tuple[float, float]]:
+    """Waypoints (north, east), m, the first and the last point of the curve included.
+
+    A polyline gives its own corners. Otherwise the legs' sagitta, c^2 kappa / 8 for a chord c, stays below
+    `deviation_m` as far as `spacing_min_m` allows.
+
+    Args:
+        curve: the pattern.
+        deviation_m: largest distance from the straight legs to the curve.
+        spacing_min_m, spacing_max_m: limits of the leg lengths.
+        length_m: end after this much of the curve.
+    """
+    if not (deviation_m > 0.0 and 0.0 < spacing_min_m <= spacing_max_m):
+        raise PlanError(
+            f"waypoint deviation {deviation_m:g} m, spacing {spacing_min_m:g}..{spacing_max_m:g} m: "
+            "all must be more than 0, and in order"
+        )
+    if isinstance(curve, Polyline):
+        return _cut_polyline(curve, length_m)
+    table = ArcLengthTable.of(curve)
+    chord = np.sqrt(8.0 * deviation_m / np.maximum(np.abs(table.curvature_per_m), 1e-9))
+    density = 1.0 / np.clip(chord, spacing_min_m, spacing_max_m)
+    arc = table.arc_m
+    # legs flown so far, as a function of distance: equal steps of it make the waypoints
+    legs = np.concatenate(([0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(arc))))
+    total = float(legs[-1] if length_m is None else np.interp(min(length_m, table.length_m), arc, legs))
+    count = max(2, math.ceil(total))
+    where = np.interp(np.linspace(0.0, total, count + 1), legs, arc)
+    points = curve.points(table.parameter_at(where))
+    return [(float(n), float(e)) for n, e in points]
+
+
+def _cut_polyline(curve: Polyline, length_m: float | None) -> list[tuple[float, float]]:
+    vertices = list(curve.vertices_m)
+    if length_m is None or length_m >= curve.length_m:
+        return vertices
+    kept = [vertices[0]]
+    left = length_m
+    for (n0, e0), (n1, e1) in zip(vertices, vertices[1:], strict=False):
+        leg = math.dist((n0, e0), (n1, e1))
+        if leg >= left:
+            f = max(left, 1e-3) / leg
+            kept.append((n0 + f * (n1 - n0), e0 + f * (e1 - e0)))
+            break
+        kept.append((n1, e1))
+        left -= leg
+    return kept
