@@ -1,1 +1,1 @@
-"""Modes, arming, failsafes and home: who decides what the vehicle flies. Flavour-neutral, parametrised by policy."""
+"""Modes, arming, failsafes and home: who decides what the vehicle flies. Flavour-neutral, set up by a policy."""

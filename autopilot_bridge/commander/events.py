@@ -58,16 +58,6 @@ class BatteryLevel(IntEnum):
     EMERGENCY = 4
 
 
-class LandedState(IntEnum):
-    """MAVLink MAV_LANDED_STATE."""
-
-    UNDEFINED = 0
-    ON_GROUND = 1
-    IN_AIR = 2
-    TAKEOFF = 3
-    LANDING = 4
-
-
 class SystemStatus(IntEnum):
     """MAVLink MAV_STATE."""
 

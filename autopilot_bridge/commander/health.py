@@ -1,17 +1,18 @@
 """Which sensors and which parts of the navigation solution may be trusted right now.
 
-The commander's checks, failsafes and SYS_STATUS all read one `VehicleHealth`. `HealthMonitor` fills it from the
-newest sensor readings (late, frozen or impossible samples count as broken) and from what the navigation filter says
-of itself.
+The commander's checks, failsafes and SYS_STATUS all read one `VehicleHealth`. `HealthMonitor` fills it from
+the newest sensor readings (late, frozen or impossible samples count as broken) and from what the navigation
+filter says of itself.
 """
 
 import math
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.navigation.health import NavigationHealth
 from flightsim import interface
 from flightsim.interface import Reading, SensorReadings
 
@@ -30,19 +31,6 @@ _FIELD_GAUSS: Final = (0.1, 1.2)
 _GPS_MIN_SATELLITES: Final = 6
 _GPS_MAX_EPH_M: Final = 5.0
 _FIX_3D: Final = 3
-
-
-class NavigationStatus(Protocol):
-    """What the commander asks the navigation filter about itself."""
-
-    @property
-    def attitude_valid(self) -> bool: ...
-    @property
-    def altitude_valid(self) -> bool: ...
-    @property
-    def velocity_valid(self) -> bool: ...
-    @property
-    def position_valid(self) -> bool: ...
 
 
 @dataclass(slots=True)
@@ -116,7 +104,7 @@ class HealthMonitor:
         "health",
     )
 
-    def __init__(self, readings: SensorReadings, navigation: NavigationStatus) -> None:
+    def __init__(self, readings: SensorReadings, navigation: NavigationHealth) -> None:
         self.health = VehicleHealth()
         self._readings = readings
         self._navigation = navigation
@@ -149,10 +137,10 @@ class HealthMonitor:
             and bool(gps[interface.GPS_EPH_M] <= _GPS_MAX_EPH_M)
         )
         health.rangefinder = self._rangefinder.alive(time_us)
-        health.attitude = navigation.attitude_valid
-        health.altitude = navigation.altitude_valid
-        health.velocity = navigation.velocity_valid
-        health.position = navigation.position_valid
+        health.attitude = navigation.attitude
+        health.altitude = navigation.position_vertical_absolute
+        health.velocity = navigation.velocity_horizontal
+        health.position = navigation.position_horizontal_absolute
         battery = readings.battery.values
         health.battery = self._battery.alive(time_us) and bool(battery[interface.BATTERY_VOLTAGE_V] > 0.0)
         health.battery_voltage_v = float(battery[interface.BATTERY_VOLTAGE_V])

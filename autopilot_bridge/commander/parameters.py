@@ -1,4 +1,4 @@
-"""What a pilot may tune in the commander, in flavour-neutral names; flavours fill it from their own parameters."""
+"""What a pilot may tune in the commander, in neutral names; flavours fill it from their own parameters."""
 
 import math
 from dataclasses import dataclass, fields
@@ -11,15 +11,20 @@ class CommanderParameters:
     """Time-outs, thresholds and actions of arming and failsafes.
 
     Attributes:
-        offboard_loss_s: age of the last setpoint at which a streamed-setpoint mode counts as lost; 0 switches it off.
-        gcs_loss_s, manual_loss_s: age of the last ground-station heartbeat, of the last stick input.
-        action_delay_s: hold this long before a link failsafe acts, so that a person can step in (PX4 COM_FAIL_ACT_T).
+        offboard_loss_s: age of the last setpoint at which OFFBOARD counts as lost.
+        gcs_loss_s, manual_loss_s: the same for ground-station heartbeats and for sticks; 0 switches it off.
+        action_delay_s: hold this long before a link failsafe acts, so that a person can step in.
         battery_*_remaining: remaining fraction below which the level is reached; 0 switches it off.
         battery_*_v: voltage below which the level is reached after `battery_timer_s`; 0 switches it off.
         position_loss_s: how long the filter may be without a position before the failsafe acts.
         fence_radius_m, fence_height_max_m: cylinder around home; 0 switches that wall off.
+        fence_polygons: the uploaded fence counts too.
         disarm_preflight_s, disarm_landed_s: automatic disarming; 0 or less switches it off.
         takeoff_height_m: height over home of a takeoff that names none.
+        stick_override: moved sticks take over from automatic flight (PX4 COM_RC_OVERRIDE, bit 0).
+        stick_override_offboard: and from OFFBOARD (bit 1).
+        stick_override_threshold: stick travel, 0..1, that counts as moved.
+        check_arming: False skips the arming checks that may be skipped.
     """
 
     offboard_loss_s: float
@@ -42,10 +47,14 @@ class CommanderParameters:
     position_loss_action: FailsafeAction
     fence_radius_m: float
     fence_height_max_m: float
+    fence_polygons: bool
     fence_action: FailsafeAction
     disarm_preflight_s: float
     disarm_landed_s: float
     takeoff_height_m: float
+    stick_override: bool
+    stick_override_offboard: bool
+    stick_override_threshold: float
     check_arming: bool
 
     def __post_init__(self) -> None:

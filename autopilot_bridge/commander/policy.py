@@ -13,21 +13,30 @@ class CommanderPolicy:
     Attributes:
         boot_mode: mode after power-up.
         heartbeat_start_s: time of the first heartbeat.
-        boot_s: end of the boot phase (PX4: system status 0, ArduPilot: BOOT until then).
+        boot_s: end of the boot phase (ArduPilot: system status BOOT until then).
         armable_s: earliest time at which the arming checks that need no position can pass.
-        position_ready_s: earliest time at which the navigation solution is taken as a position.
+        position_ready_s: earliest time at which the navigation solution counts as a position.
         home_s: earliest time at which home is set.
         armable_modes: modes in which arming is allowed.
-        flown_modes: modes that can be entered in flight.
         ground_modes: modes that can be chosen while disarmed.
+        flown_modes: modes that can be entered in flight.
+        kept_after_disarm: a disarm goes back to the last commanded mode of these (PX4); empty: the mode stays.
+        takeoff_mode: taking off is a mode of its own (PX4), not something GUIDED does (ArduPilot).
+        reposition_mode: mode in which the vehicle flies to a commanded place.
+        mission_return_is_mode: a return item of a mission changes the mode (PX4).
         manual_control_always: sticks are there without anybody sending them (ArduPilot's simulated radio).
-        recovers: the commanded mode comes back by itself when a failsafe condition clears.
-        status_active_when_landed: system status ACTIVE as soon as armed (PX4), not only in the air (ArduPilot).
-        status_armable_only: system status is 0 while not armable in the commanded mode (PX4).
-        arming_denied, mode_denied: results of requests that are refused.
-        disarm_in_air_denied: result of an unforced disarm in the air.
+        recovers: the commanded mode comes back by itself when a failsafe condition clears (PX4);
+            else a failsafe is a mode change like any other (ArduPilot).
+        fallback_land: what lands the vehicle when there is no position.
+        critical_on_warning: system status is CRITICAL for failsafes that only warn, too (ArduPilot).
+        active_when_landed: system status is ACTIVE as soon as armed (PX4), not only in the air.
+        standby_when_armable: system status is UNINIT while not armable in the commanded mode (PX4).
+        preflight_disarm_extra_s: added to the automatic disarming before takeoff (PX4: spool-up).
+        disarm_landed_everywhere: the short disarm after landing works in every mode (PX4), not only in the ones
+            that land by themselves.
+        prearm_report_s: interval at which failing arming checks are announced unasked; 0: never.
+        arming_denied, mode_denied, disarm_in_air_denied: results of refused requests.
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
-        explicit_takeoff: position setpoints lift nothing off the ground; only a takeoff does (ArduPilot GUIDED).
     """
 
     boot_mode: FlightMode
@@ -37,14 +46,22 @@ class CommanderPolicy:
     position_ready_s: float
     home_s: float
     armable_modes: frozenset[FlightMode]
-    flown_modes: frozenset[FlightMode]
     ground_modes: frozenset[FlightMode]
+    flown_modes: frozenset[FlightMode]
+    kept_after_disarm: frozenset[FlightMode]
+    takeoff_mode: FlightMode | None
+    reposition_mode: FlightMode
+    mission_return_is_mode: bool
     manual_control_always: bool
     recovers: bool
-    status_active_when_landed: bool
-    status_armable_only: bool
+    fallback_land: FlightMode
+    critical_on_warning: bool
+    active_when_landed: bool
+    standby_when_armable: bool
+    preflight_disarm_extra_s: float
+    disarm_landed_everywhere: bool
+    prearm_report_s: float
     arming_denied: Result
     mode_denied: Result
     disarm_in_air_denied: Result
     force_arm_skips_checks: bool
-    explicit_takeoff: bool

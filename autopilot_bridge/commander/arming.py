@@ -1,0 +1,100 @@
+"""Arming checks, and whether a mode can be flown now. Pure functions of the situation."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
+from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
+from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.situation import Situation
+from autopilot_bridge.commander.verdict import Reason
+
+MAX_ARMING_TILT_RAD: Final = math.radians(30.0)
+
+_MANDATORY: Final = frozenset(
+    {
+        Reason.MODE_NOT_ARMABLE,
+        Reason.POSITION,
+        Reason.TERMINATED,
+        Reason.MISSION_MISSING,
+        Reason.MISSION_INVALID,
+    }
+)
+"""What even a forced arming needs (ArduPilot; PX4 checks everything always)."""
+
+
+def shortfalls(mode: FlightMode, situation: Situation, parameters: CommanderParameters) -> tuple[Reason, ...]:
+    """What a mode needs and does not have, in the order a pilot would mend it; empty when it can be flown."""
+    needs = MODE_NEEDS[mode]
+    health = situation.health
+    reasons = []
+    if Need.ATTITUDE in needs and not health.attitude:
+        reasons.append(Reason.ATTITUDE)
+    if Need.ALTITUDE in needs and not health.altitude:
+        reasons.append(Reason.ALTITUDE)
+    if Need.POSITION in needs and not situation.position:
+        reasons.append(Reason.POSITION)
+    if Need.HOME in needs and not situation.home_set:
+        reasons.append(Reason.HOME)
+    if Need.MANUAL_CONTROL in needs and situation.sticks_age_s > parameters.manual_loss_s:
+        reasons.append(Reason.MANUAL_CONTROL)
+    if Need.MISSION in needs and situation.mission_problem is not None:
+        reasons.append(situation.mission_problem)
+    if Need.SETPOINTS in needs:
+        if situation.setpoint_age_s > parameters.offboard_loss_s:
+            reasons.append(Reason.NO_SETPOINTS)
+        elif situation.setpoint_needs_position and not situation.position:
+            reasons.append(Reason.POSITION)
+    return tuple(reasons)
+
+
+def arming_reasons(
+    mode: FlightMode,
+    situation: Situation,
+    policy: CommanderPolicy,
+    parameters: CommanderParameters,
+    *,
+    forced: bool = False,
+) -> tuple[Reason, ...]:
+    """Every reason against arming in `mode`; empty when the vehicle may be armed.
+
+    Args:
+        forced: the client sent the override number; it skips checks only where the policy says so.
+    """
+    reasons: list[Reason] = []
+    health = situation.health
+    if situation.terminated:
+        reasons.append(Reason.TERMINATED)
+    if mode not in policy.armable_modes:
+        reasons.append(Reason.MODE_NOT_ARMABLE)
+    if not situation.ready:
+        reasons.append(Reason.BOOTING)
+    sensors = (
+        (health.gyro, Reason.GYRO),
+        (health.accelerometer, Reason.ACCELEROMETER),
+        (health.barometer, Reason.BAROMETER),
+        (health.magnetometer, Reason.COMPASS),
+    )
+    reasons.extend(reason for healthy, reason in sensors if not healthy)
+    needs = MODE_NEEDS[mode]
+    if not health.attitude:
+        reasons.append(Reason.ATTITUDE)
+    if Need.POSITION in needs and not health.gps:
+        reasons.append(Reason.GPS)
+    reasons.extend(reason for reason in shortfalls(mode, situation, parameters) if reason not in reasons)
+    if situation.battery_level >= BatteryLevel.CRITICAL:
+        reasons.append(Reason.BATTERY_FAILSAFE)
+    elif situation.battery_level >= BatteryLevel.LOW:
+        reasons.append(Reason.BATTERY_LOW)
+    if situation.outside_fence:
+        reasons.append(Reason.OUTSIDE_FENCE)
+    if not situation.tilt_rad < MAX_ARMING_TILT_RAD:  # NaN fails too
+        reasons.append(Reason.LEANING)
+    if situation.throttle_high and Need.MANUAL_CONTROL in needs:
+        reasons.append(Reason.THROTTLE_HIGH)
+    if parameters.gcs_loss_action > FailsafeAction.WARN and 0.0 < parameters.gcs_loss_s < situation.gcs_age_s:
+        reasons.append(Reason.GCS_LOST)
+    if not parameters.check_arming or (forced and policy.force_arm_skips_checks):
+        reasons = [reason for reason in reasons if reason in _MANDATORY]
+    return tuple(reasons)

@@ -1,0 +1,164 @@
+"""Failsafes: conditions with a time-out and an action each, and which action wins.
+
+PX4 keeps the commanded mode in mind and flies the strongest action while its condition lasts (some actions stay
+until a person chooses a mode). ArduPilot changes the mode once and does not change it back. Both read this monitor.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from autopilot_bridge.commander.events import (
+    BatteryLevel,
+    Event,
+    FailsafeAction,
+    FailsafeActivated,
+    FailsafeCleared,
+    FailsafeKind,
+)
+from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
+from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.situation import Situation
+
+_LINKS: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST})
+_LATCHING: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST, FailsafeKind.GEOFENCE})
+"""Kinds whose RETURN stays although the condition clears (PX4's ClearCondition::OnModeChangeOrDisarm)."""
+_NOT_OVERRIDABLE: Final = frozenset({FailsafeKind.POSITION_LOST})
+
+
+@dataclass(slots=True)
+class _Active:
+    action: FailsafeAction
+    since_us: int
+    present: bool = True
+    overridden: bool = False
+
+
+class FailsafeMonitor:
+    """Which failsafe conditions are up, since when, and what they ask for.
+
+    Args:
+        keeps_mode: the commanded mode stays commanded during a failsafe (PX4); else the failsafe replaces it.
+    """
+
+    __slots__ = ("_active", "_keeps_mode", "_position_lost_us", "started")
+
+    def __init__(self, *, keeps_mode: bool) -> None:
+        self._keeps_mode = keeps_mode
+        self._active: dict[FailsafeKind, _Active] = {}
+        self._position_lost_us: int | None = None
+        self.started: list[tuple[FailsafeKind, FailsafeAction]] = []
+
+    @property
+    def kinds(self) -> frozenset[FailsafeKind]:
+        """Conditions that are up, whatever their action."""
+        return frozenset(kind for kind, active in self._active.items() if active.present)
+
+    @property
+    def any(self) -> bool:
+        """Some condition is up, or its action still flown."""
+        return bool(self._active)
+
+    def update(self, situation: Situation, parameters: CommanderParameters) -> list[Event]:
+        """Judge every condition; returns what came up or cleared. `started` holds this update's new ones."""
+        events: list[Event] = []
+        self.started = []
+        time_us = situation.time_us
+        for kind, present, action in self._conditions(situation, parameters):
+            active = self._active.get(kind)
+            present = present and situation.armed
+            if present and active is None:
+                self._active[kind] = _Active(action, time_us)
+                self.started.append((kind, action))
+                events.append(FailsafeActivated(time_us=time_us, kind=kind, action=action))
+            elif active is not None and present:
+                active.present = True
+            elif active is not None:
+                if active.present:
+                    events.append(FailsafeCleared(time_us=time_us, kind=kind))
+                active.present = False
+                latched = kind in _LATCHING and active.action >= FailsafeAction.RETURN
+                if not latched or active.overridden or not situation.armed:
+                    del self._active[kind]
+        return events
+
+    def action(self, time_us: int, parameters: CommanderParameters) -> FailsafeAction:
+        """The strongest action asked for now; a lost link holds for `action_delay_s` first."""
+        strongest = FailsafeAction.NONE
+        for kind, active in self._active.items():
+            if active.overridden:
+                continue
+            action = active.action
+            if (
+                kind in _LINKS
+                and FailsafeAction.HOLD < action < FailsafeAction.TERMINATE
+                and time_us - active.since_us < parameters.action_delay_s * 1e6
+            ):
+                action = FailsafeAction.HOLD
+            strongest = max(strongest, action)
+        return strongest
+
+    def override(self) -> None:
+        """A person chose a mode: what is up now is left to them until it clears and comes up again."""
+        for kind in list(self._active):
+            active = self._active[kind]
+            if kind in _NOT_OVERRIDABLE or active.action >= FailsafeAction.TERMINATE:
+                continue
+            if active.present:
+                active.overridden = True
+            else:
+                del self._active[kind]
+
+    def _conditions(
+        self, situation: Situation, parameters: CommanderParameters
+    ) -> Iterator[tuple[FailsafeKind, bool, FailsafeAction]]:
+        time_us = situation.time_us
+        yield (
+            FailsafeKind.OFFBOARD_LOST,
+            situation.mode is FlightMode.OFFBOARD and situation.setpoint_age_s > parameters.offboard_loss_s,
+            parameters.offboard_loss_action,
+        )
+        yield (
+            FailsafeKind.GCS_LOST,
+            0.0 < parameters.gcs_loss_s < situation.gcs_age_s < math.inf,
+            parameters.gcs_loss_action,
+        )
+        yield (
+            FailsafeKind.MANUAL_LOST,
+            situation.sticks_at_arming and 0.0 < parameters.manual_loss_s < situation.sticks_age_s,
+            parameters.manual_loss_action,
+        )
+        level = situation.battery_level
+        yield FailsafeKind.BATTERY_LOW, level >= BatteryLevel.LOW, parameters.battery_low_action
+        yield (
+            FailsafeKind.BATTERY_CRITICAL,
+            level >= BatteryLevel.CRITICAL,
+            parameters.battery_critical_action,
+        )
+        yield (
+            FailsafeKind.BATTERY_EMERGENCY,
+            level >= BatteryLevel.EMERGENCY,
+            parameters.battery_emergency_action,
+        )
+        yield (
+            FailsafeKind.POSITION_LOST,
+            self._position_lost(situation, parameters),
+            parameters.position_loss_action,
+        )
+        yield FailsafeKind.GEOFENCE, situation.outside_fence, parameters.fence_action
+
+    def _position_lost(self, situation: Situation, parameters: CommanderParameters) -> bool:
+        """Without a position for too long in a mode that needs one."""
+        if situation.position:
+            self._position_lost_us = None
+            return False
+        if self._position_lost_us is None:
+            self._position_lost_us = situation.time_us
+        if situation.time_us - self._position_lost_us < parameters.position_loss_s * 1e6:
+            return False
+        if not self._keeps_mode and FailsafeKind.POSITION_LOST in self._active:
+            return True  # the mode it has chosen needs no position any more
+        if situation.mode is FlightMode.OFFBOARD:
+            return situation.setpoint_needs_position
+        return Need.POSITION in MODE_NEEDS[situation.mode]

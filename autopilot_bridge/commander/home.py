@@ -1,0 +1,69 @@
+"""Home: where the vehicle returns to, and the reference of relative altitudes."""
+
+import math
+
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.navigation import layout as nav
+
+
+class Home:
+    """Keeps home as a geodetic position and mirrors it into the flight context's local frame.
+
+    Attributes:
+        position: home, or None while unknown.
+        yaw_rad: heading there; NaN when a client set home.
+        commanded: a client chose it: arming does not move it.
+    """
+
+    __slots__ = ("_context", "_frame", "commanded", "position", "yaw_rad")
+
+    def __init__(self, context: FlightContext) -> None:
+        self._context = context
+        self._frame: LocalFrame | None = None
+        self.position: GeodeticPosition | None = None
+        self.yaw_rad = math.nan
+        self.commanded = False
+
+    def follow_frame(self) -> None:
+        """Keep the local copy right when the filter's origin moves."""
+        if self._context.frame is not self._frame and self.position is not None:
+            self._mirror()
+
+    def set_here(self) -> bool:
+        """Home is where the vehicle is; False while that is not known."""
+        context = self._context
+        north_m, east_m, down_m = context.nav[nav.POS_NED_M].tolist()
+        if context.frame is None or not (
+            math.isfinite(north_m) and math.isfinite(east_m) and math.isfinite(down_m)
+        ):
+            return False
+        lat_deg, lon_deg, alt_m = context.frame.geodetic_from_ned(north_m, east_m, down_m)
+        return self.set(lat_deg, lon_deg, alt_m, yaw_rad=float(context.nav[nav.EULER_RAD][2]))
+
+    def set(self, lat_deg: float, lon_deg: float, alt_m: float, *, yaw_rad: float = math.nan) -> bool:
+        """Home is there; False when that is no place on Earth or the vehicle does not know where it is itself."""
+        if self._context.frame is None:
+            return False
+        try:
+            self.position = GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
+        except ValueError:
+            return False
+        self.yaw_rad = yaw_rad
+        self._mirror()
+        return True
+
+    def moved_m(self) -> float:
+        """Distance of the vehicle from home, vertical distance included; infinite while unknown."""
+        if self.position is None:
+            return math.inf
+        distance_m = math.dist(self._context.nav[nav.POS_NED_M].tolist(), self._context.home_ned_m.tolist())
+        return distance_m if math.isfinite(distance_m) else math.inf
+
+    def _mirror(self) -> None:
+        home, frame = self.position, self._context.frame
+        if home is None or frame is None:
+            return
+        self._frame = frame
+        self._context.home_ned_m[:] = frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
+        self._context.home_yaw_rad = self.yaw_rad

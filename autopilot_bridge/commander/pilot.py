@@ -1,0 +1,64 @@
+"""What people send the vehicle: sticks and the heartbeats of ground stations, each with its age."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.flight.context import ManualInput
+
+_NO_INPUT: Final = ManualInput()
+_RADIO_AT_REST: Final = ManualInput(throttle=-1.0, valid=True)
+THROTTLE_HIGH: Final = -0.8  # above this the throttle stick is not down
+
+
+class PilotInput:
+    """Newest sticks and the time they came.
+
+    Args:
+        built_in_radio: without any sender the sticks are centred and the throttle is down (ArduPilot's SITL); else
+            there are no sticks (PX4).
+    """
+
+    __slots__ = ("_built_in_radio", "_gcs_time_us", "_sticks", "_time_us", "radio_failed_since_us")
+
+    def __init__(self, *, built_in_radio: bool) -> None:
+        self._built_in_radio = built_in_radio
+        self._sticks = _NO_INPUT
+        self._time_us = -1
+        self._gcs_time_us = -1
+        self.radio_failed_since_us: int | None = None
+
+    def move(self, *, roll: float, pitch: float, throttle: float, yaw: float, time_us: int) -> None:
+        """New sticks, each -1..1 (clamped); throttle 0 is the middle. Not-a-number input is ignored."""
+        values = (roll, pitch, throttle, yaw)
+        if not all(math.isfinite(value) for value in values):
+            return
+        roll, pitch, throttle, yaw = (min(1.0, max(-1.0, value)) for value in values)
+        self._sticks = ManualInput(roll=roll, pitch=pitch, throttle=throttle, yaw=yaw, valid=True)
+        self._time_us = time_us
+
+    def release(self) -> None:
+        """The sender lets go of the sticks."""
+        self._time_us = -1
+        self._sticks = _NO_INPUT
+
+    def hear_gcs(self, time_us: int) -> None:
+        """A ground station's heartbeat."""
+        self._gcs_time_us = time_us
+
+    def sticks(self, time_us: int, timeout_s: float) -> ManualInput:
+        """What the flight task sees: the newest sticks while they are young, else none (or the radio's)."""
+        if self._time_us >= 0 and (time_us - self._time_us) * 1e-6 <= timeout_s:
+            return self._sticks
+        return _RADIO_AT_REST if self._built_in_radio and self.radio_failed_since_us is None else _NO_INPUT
+
+    def sticks_age_s(self, time_us: int, timeout_s: float) -> float:
+        """Since there were sticks; infinite when there never were."""
+        age_s = (time_us - self._time_us) * 1e-6 if self._time_us >= 0 else math.inf
+        if not self._built_in_radio or age_s <= timeout_s:
+            return age_s
+        failed_us = self.radio_failed_since_us
+        return 0.0 if failed_us is None else min(age_s, (time_us - failed_us) * 1e-6)
+
+    def gcs_age_s(self, time_us: int) -> float:
+        """Since a ground station was heard; infinite when none ever was."""
+        return (time_us - self._gcs_time_us) * 1e-6 if self._gcs_time_us >= 0 else math.inf

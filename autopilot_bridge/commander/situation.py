@@ -1,0 +1,55 @@
+"""What arming checks and failsafes look at: one snapshot of the vehicle, refreshed at 50 Hz."""
+
+import math
+from dataclasses import dataclass, field
+
+from autopilot_bridge.commander.events import BatteryLevel
+from autopilot_bridge.commander.health import VehicleHealth
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Reason
+
+
+@dataclass(slots=True)
+class Situation:
+    """Snapshot of the vehicle for the checks.
+
+    Attributes:
+        time_us: vehicle time.
+        mode: the commanded mode.
+        armed, airborne: motors may turn; off the ground.
+        ready: the boot timeline allows arming.
+        health: sensors and navigation.
+        position: navigation gives a position, and has been doing so long enough after boot.
+        setpoint_age_s: since the last streamed setpoint; infinite when there is none.
+        setpoint_needs_position: the stream asks for positions or velocities.
+        gcs_age_s: since the last heartbeat of a ground station; infinite when none was ever heard.
+        sticks_age_s: since the last stick input; infinite when there is none, 0 for a built-in radio.
+        sticks_at_arming: there were sticks when the vehicle was armed.
+        throttle_high: the throttle stick is up.
+        home_set: home is known.
+        mission_problem: why the stored mission can't be flown; None when it can.
+        battery_level: warning level.
+        outside_fence: beyond the geofence.
+        tilt_rad: angle between the body's down axis and the vertical.
+        terminated: flight termination was commanded.
+    """
+
+    time_us: int = 0
+    mode: FlightMode = FlightMode.HOLD
+    armed: bool = False
+    airborne: bool = False
+    ready: bool = False
+    health: VehicleHealth = field(default_factory=VehicleHealth)
+    position: bool = False
+    setpoint_age_s: float = math.inf
+    setpoint_needs_position: bool = False
+    gcs_age_s: float = math.inf
+    sticks_age_s: float = math.inf
+    sticks_at_arming: bool = False
+    throttle_high: bool = False
+    home_set: bool = False
+    mission_problem: Reason | None = Reason.MISSION_MISSING
+    battery_level: BatteryLevel = BatteryLevel.OK
+    outside_fence: bool = False
+    tilt_rad: float = 0.0
+    terminated: bool = False

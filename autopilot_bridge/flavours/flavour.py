@@ -1,0 +1,124 @@
+"""The shape of a flavour: everything in which one firmware differs from another, as data and small functions."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from autopilot_bridge.commander.events import Event
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.control.parameters import MulticopterParameters
+from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
+from autopilot_bridge.services.channel import AddressRule
+
+
+class Notice(NamedTuple):
+    """A text for the pilot: MAV_SEVERITY and what STATUSTEXT says."""
+
+    severity: int
+    text: str
+
+
+class ModeDisplay(NamedTuple):
+    """What HEARTBEAT.base_mode depends on.
+
+    Attributes:
+        mode: the mode being flown.
+        armed: motors may turn.
+        booted: the boot phase is over.
+        landed: standing on the ground.
+        attitude_setpoints: the setpoint stream asks for positions, velocities or attitudes (not for body rates).
+        thrust_setpoints: the setpoint stream asks for attitudes or body rates, with thrust.
+    """
+
+    mode: FlightMode
+    armed: bool
+    booted: bool
+    landed: bool
+    attitude_setpoints: bool
+    thrust_setpoints: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identity:
+    """What AUTOPILOT_VERSION, PROTOCOL_VERSION and the banner say.
+
+    Attributes:
+        product: name in texts, "ArduCopter V4.6.3 (3fc7011a)".
+        capabilities: MAV_PROTOCOL_CAPABILITY bits.
+        flight_sw_version: major, minor, patch and FIRMWARE_VERSION_TYPE, a byte each from the top.
+        middleware_sw_version, os_sw_version, board_version, vendor_id, product_id, uid: as AUTOPILOT_VERSION.
+        flight_custom_version: 8 bytes of the source revision.
+        uid2: 18 bytes of hardware identity.
+        answers_protocol_version: PROTOCOL_VERSION can be requested.
+    """
+
+    product: str
+    capabilities: int
+    flight_sw_version: int
+    middleware_sw_version: int
+    os_sw_version: int
+    board_version: int
+    vendor_id: int
+    product_id: int
+    uid: int
+    flight_custom_version: bytes
+    uid2: bytes
+    answers_protocol_version: bool
+
+    def __post_init__(self) -> None:
+        if len(self.flight_custom_version) != 8:
+            raise ValueError(f"flight_custom_version has {len(self.flight_custom_version)} bytes, not 8")
+        if len(self.uid2) != 18:
+            raise ValueError(f"uid2 has {len(self.uid2)} bytes, not 18")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flavour:
+    """One firmware for one vehicle class.
+
+    Attributes:
+        name: as the user types it.
+        autopilot: MAV_AUTOPILOT.
+        vehicle_type: MAV_TYPE.
+        custom_modes: HEARTBEAT.custom_mode of every mode this firmware knows.
+        mode_names: what the firmware calls its modes in texts.
+        base_mode: HEARTBEAT.base_mode.
+        policy: what the commander follows.
+        notices: the texts of an event; empty for events this firmware is silent about.
+        identity: versions and capabilities.
+        command_address: target ids of commands this firmware takes for its own, for a system id.
+        parameter_definitions: the parameter table in listing order.
+        commander_parameters, flight_parameters, controller_parameters, navigation_parameters: typed parameters from
+            the store's current values; called again after a change. They clamp what a ground station may have set
+            beyond reason, and never raise.
+        text_needs_heartbeat: no STATUSTEXT on a channel before a heartbeat was received there.
+        heartbeat_on_mode_change: an extra heartbeat is sent at once.
+        bytewise_parameters: integer parameters travel as bit patterns, not as floats.
+    """
+
+    name: str
+    autopilot: int
+    vehicle_type: int
+    custom_modes: Mapping[FlightMode, int]
+    mode_names: Mapping[FlightMode, str]
+    base_mode: Callable[[ModeDisplay], int]
+    policy: CommanderPolicy
+    notices: Callable[[Event], tuple[Notice, ...]]
+    identity: Identity
+    command_address: Callable[[int], AddressRule]
+    parameter_definitions: Callable[[], tuple[ParameterDefinition, ...]]
+    commander_parameters: Callable[[ParameterStore], CommanderParameters]
+    flight_parameters: Callable[[ParameterStore], FlightParameters]
+    controller_parameters: Callable[[ParameterStore], MulticopterParameters]
+    navigation_parameters: Callable[[ParameterStore], NavigationParameters]
+    text_needs_heartbeat: bool
+    heartbeat_on_mode_change: bool
+    bytewise_parameters: bool
+
+    def mode_of(self, custom_mode: int) -> FlightMode | None:
+        """The mode of a custom_mode number, or None when this firmware has no such number."""
+        return next((mode for mode, number in self.custom_modes.items() if number == custom_mode), None)
