@@ -1,1 +1,38 @@
-"""Simulated sensors: each is rate, delay, noise, buffer and fault, with its own seeded stream."""
+"""Simulated sensors: each is rate, delay, noise, buffer and fault around a compiled measurement model.
+
+To add one: a module with its parameter dataclass and kernel (`SensorParameters`, `SensorModel`), a reading,
+and `SensorSuite.add`. No other sensor's code or random stream changes.
+"""
+
+from flightsim.sensors.barometer import BarometerParameters
+from flightsim.sensors.battery import BatteryMonitorParameters
+from flightsim.sensors.fault_kinds import FaultTarget, FaultType, SensorUnit
+from flightsim.sensors.faults import FaultPanel, UnsupportedFaultError
+from flightsim.sensors.gps import FIX_AT_BOOT, RTK_FIX_AFTER_10_S, GpsFixStage, GpsParameters
+from flightsim.sensors.imu import ImuParameters
+from flightsim.sensors.magnetometer import MagnetometerParameters
+from flightsim.sensors.rangefinder import RangefinderParameters
+from flightsim.sensors.sensor import Sensor, SensorModel, SensorParameters
+from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
+
+__all__ = [
+    "FIX_AT_BOOT",
+    "RTK_FIX_AFTER_10_S",
+    "BarometerParameters",
+    "BatteryMonitorParameters",
+    "FaultPanel",
+    "FaultTarget",
+    "FaultType",
+    "GpsFixStage",
+    "GpsParameters",
+    "ImuParameters",
+    "MagnetometerParameters",
+    "RangefinderParameters",
+    "Sensor",
+    "SensorModel",
+    "SensorParameters",
+    "SensorSuite",
+    "SensorSuiteParameters",
+    "SensorUnit",
+    "UnsupportedFaultError",
+]

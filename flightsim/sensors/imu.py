@@ -1,0 +1,219 @@
+"""Inertial measurement unit: three gyros and three accelerometers at the centre of gravity, one reading.
+
+Per axis: cross-axis matrix, turn-on bias, wandering bias (first-order Gauss-Markov), white noise, saturation,
+quantisation. Model and terms: Woodman, An introduction to inertial navigation (2007), section 3.2; IEEE Std 952.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flightsim import truth as t
+from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
+from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
+from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
+from flightsim.sensors.kernels import gauss_markov, quantise, saturate
+from flightsim.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+STANDARD_GRAVITY_M_S2: Final = 9.80665
+_DEG: Final = math.pi / 180.0
+_KELVIN: Final = 273.15
+
+# Each triad has the same constants, accelerometer after gyro.
+_MATRIX: Final = 0  # 9 numbers: what the axes read of a vector in FRD
+_BIAS: Final = 9  # 3 numbers: turn-on bias
+_WHITE: Final = 12
+_DECAY: Final = 13
+_DRIVE: Final = 14
+_LIMIT: Final = 15
+_QUANTUM: Final = 16
+_TRIAD: Final = 17
+_RISE_K: Final = 2 * _TRIAD
+_WARMUP_DECAY: Final = _RISE_K + 1
+_TEMPERATURE_QUANTUM: Final = _RISE_K + 2
+_CONSTANTS: Final = _RISE_K + 3
+
+# state: wandering bias of gyro and accelerometer, share of the self-heating still to come
+_WARMUP: Final = 6
+_STATE: Final = 7
+_NORMALS: Final = 12
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImuParameters:
+    """A calibrated Bosch BMI088, the IMU of Pixhawk 5X and 6X boards, unless a line says otherwise.
+
+    Numbers are one-sigma where they describe a spread. Datasheet: BST-BMI088-DS001, tables 2 and 3.
+
+    Attributes:
+        rate_hz: samples per second.
+        latency_s: zero: PX4 and ArduPilot read the FIFO within a control step.
+        gyro_noise_density_rad_s_sqrt_hz: 0.014 deg/s/sqrt(Hz). White noise per sample is density * sqrt(rate), the
+            convention of continuous-time IMU models (angle random walk in rad/sqrt(s)).
+        gyro_bias_instability_rad_s: of the wandering bias; 0.015 deg/s/K (datasheet TCO) at about 1 K in flight.
+        gyro_bias_time_constant_s: PX4's Gazebo IMU plugin.
+        gyro_turn_on_bias_rad_s: left after the calibration at boot, about 0.06 deg/s.
+        gyro_scale_error: datasheet tolerance 1 % taken as three sigma.
+        gyro_cross_axis_error: likewise from 1 %, with the factory's alignment of the die in the package.
+        gyro_range_rad_s, gyro_quantum_rad_s: 2000 deg/s in 16 bits.
+        accel_noise_density_m_s2_sqrt_hz: 175 ug/sqrt(Hz) (160 for x and y, 190 for z).
+        accel_bias_instability_m_s2: 0.2 mg/K (datasheet TCO) at about 1 K.
+        accel_bias_time_constant_s: PX4's Gazebo IMU plugin.
+        accel_turn_on_bias_m_s2: left after a six-side calibration of the datasheet's 20 mg offset.
+        accel_scale_error, accel_cross_axis_error: left after calibration.
+        accel_range_m_s2, accel_quantum_m_s2: 24 g in 16 bits.
+        self_heating_k, warm_up_s: the board's temperature over the air's, reached exponentially from boot.
+        temperature_quantum_k: 0.125 K.
+    """
+
+    rate_hz: int = 250
+    latency_s: float = 0.0
+    gyro_noise_density_rad_s_sqrt_hz: float = 0.014 * _DEG
+    gyro_bias_instability_rad_s: float = 0.015 * _DEG
+    gyro_bias_time_constant_s: float = 1000.0
+    gyro_turn_on_bias_rad_s: float = 1.0e-3
+    gyro_scale_error: float = 0.0033
+    gyro_cross_axis_error: float = 0.001
+    gyro_range_rad_s: float = 2000.0 * _DEG
+    gyro_quantum_rad_s: float = 2000.0 * _DEG / 32768.0
+    accel_noise_density_m_s2_sqrt_hz: float = 175e-6 * STANDARD_GRAVITY_M_S2
+    accel_bias_instability_m_s2: float = 0.2e-3 * STANDARD_GRAVITY_M_S2
+    accel_bias_time_constant_s: float = 300.0
+    accel_turn_on_bias_m_s2: float = 0.02
+    accel_scale_error: float = 0.001
+    accel_cross_axis_error: float = 0.001
+    accel_range_m_s2: float = 24.0 * STANDARD_GRAVITY_M_S2
+    accel_quantum_m_s2: float = 24.0 * STANDARD_GRAVITY_M_S2 / 32768.0
+    self_heating_k: float = 15.0
+    warm_up_s: float = 300.0
+    temperature_quantum_k: float = 0.125
+
+    def __post_init__(self) -> None:
+        require_rate(self.rate_hz)
+        require_positive(
+            gyro_bias_time_constant_s=self.gyro_bias_time_constant_s,
+            gyro_range_rad_s=self.gyro_range_rad_s,
+            accel_bias_time_constant_s=self.accel_bias_time_constant_s,
+            accel_range_m_s2=self.accel_range_m_s2,
+            warm_up_s=self.warm_up_s,
+        )
+        require_not_negative(
+            latency_s=self.latency_s,
+            gyro_noise_density_rad_s_sqrt_hz=self.gyro_noise_density_rad_s_sqrt_hz,
+            gyro_bias_instability_rad_s=self.gyro_bias_instability_rad_s,
+            gyro_turn_on_bias_rad_s=self.gyro_turn_on_bias_rad_s,
+            gyro_scale_error=self.gyro_scale_error,
+            gyro_cross_axis_error=self.gyro_cross_axis_error,
+            gyro_quantum_rad_s=self.gyro_quantum_rad_s,
+            accel_noise_density_m_s2_sqrt_hz=self.accel_noise_density_m_s2_sqrt_hz,
+            accel_bias_instability_m_s2=self.accel_bias_instability_m_s2,
+            accel_turn_on_bias_m_s2=self.accel_turn_on_bias_m_s2,
+            accel_scale_error=self.accel_scale_error,
+            accel_cross_axis_error=self.accel_cross_axis_error,
+            accel_quantum_m_s2=self.accel_quantum_m_s2,
+            self_heating_k=self.self_heating_k,
+            temperature_quantum_k=self.temperature_quantum_k,
+        )
+
+    def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
+        """One specimen: draws its scale, cross-axis and turn-on errors and where its bias starts."""
+        constants = np.zeros(_CONSTANTS)
+        state = np.zeros(_STATE)
+        triads = (
+            (
+                self.gyro_scale_error,
+                self.gyro_cross_axis_error,
+                self.gyro_turn_on_bias_rad_s,
+                self.gyro_noise_density_rad_s_sqrt_hz,
+                (self.gyro_bias_instability_rad_s, self.gyro_bias_time_constant_s),
+                (self.gyro_range_rad_s, self.gyro_quantum_rad_s),
+            ),
+            (
+                self.accel_scale_error,
+                self.accel_cross_axis_error,
+                self.accel_turn_on_bias_m_s2,
+                self.accel_noise_density_m_s2_sqrt_hz,
+                (self.accel_bias_instability_m_s2, self.accel_bias_time_constant_s),
+                (self.accel_range_m_s2, self.accel_quantum_m_s2),
+            ),
+        )
+        for index, (scale, cross_axis, turn_on, density, wander, converter) in enumerate(triads):
+            c = constants[index * _TRIAD : (index + 1) * _TRIAD]
+            spread = np.full((3, 3), cross_axis) + (scale - cross_axis) * np.eye(3)
+            c[_MATRIX : _MATRIX + 9] = (np.eye(3) + spread * rng.standard_normal((3, 3))).ravel()
+            c[_BIAS : _BIAS + 3] = turn_on * rng.standard_normal(3)
+            c[_WHITE] = density / math.sqrt(interval_s)
+            c[_DECAY], c[_DRIVE] = gauss_markov(*wander, interval_s)
+            c[_LIMIT], c[_QUANTUM] = converter
+            state[3 * index : 3 * index + 3] = wander[0] * rng.standard_normal(3)
+        constants[_RISE_K] = self.self_heating_k
+        constants[_WARMUP_DECAY] = math.exp(-interval_s / self.warm_up_s)
+        constants[_TEMPERATURE_QUANTUM] = self.temperature_quantum_k
+        state[_WARMUP] = 1.0
+        return SensorModel(
+            kernel=_measure,
+            constants=constants,
+            state=state,
+            normals_per_sample=_NORMALS,
+            size=IMU_SIZE,
+            fault_targets=(
+                FaultTarget(
+                    unit=SensorUnit.GYRO,
+                    channels=IMU_GYRO_FRD_RAD_S,
+                    wrong_bias=(0.2, 0.0, 0.0),
+                    drift_per_s=(0.005, 0.0, 0.0),
+                    garbage_low=(-self.gyro_range_rad_s,) * 3,
+                    garbage_high=(self.gyro_range_rad_s,) * 3,
+                ),
+                FaultTarget(
+                    unit=SensorUnit.ACCEL,
+                    channels=IMU_ACCEL_FRD_M_S2,
+                    wrong_bias=(2.0, 0.0, 0.0),
+                    drift_per_s=(0.05, 0.0, 0.0),
+                    garbage_low=(-self.accel_range_m_s2,) * 3,
+                    garbage_high=(self.accel_range_m_s2,) * 3,
+                ),
+            ),
+        )
+
+
+_RATES: Final = t.RATES_FRD_RAD_S.start
+_FORCE: Final = t.SPECIFIC_FORCE_FRD_M_S2.start
+_GYRO: Final = IMU_GYRO_FRD_RAD_S.start
+_ACCEL: Final = IMU_ACCEL_FRD_M_S2.start
+
+
+@njit(cache=True)
+def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+    for triad in range(2):
+        c = triad * _TRIAD
+        source = _RATES if triad == 0 else _FORCE
+        target = _GYRO if triad == 0 else _ACCEL
+        x, y, z = truth[source], truth[source + 1], truth[source + 2]
+        for axis in range(3):
+            wander = 3 * triad + axis
+            m = c + _MATRIX + 3 * axis
+            value = (
+                constants[m] * x
+                + constants[m + 1] * y
+                + constants[m + 2] * z
+                + constants[c + _BIAS + axis]
+                + state[wander]
+                + constants[c + _WHITE] * normals[row, wander]
+            )
+            out[target + axis] = quantise(saturate(value, constants[c + _LIMIT]), constants[c + _QUANTUM])
+            state[wander] = (
+                constants[c + _DECAY] * state[wander] + constants[c + _DRIVE] * normals[row, 6 + wander]
+            )
+    air_c = truth[t.TEMPERATURE_K] - _KELVIN
+    out[IMU_TEMPERATURE_C] = quantise(
+        air_c + constants[_RISE_K] * (1.0 - state[_WARMUP]), constants[_TEMPERATURE_QUANTUM]
+    )
+    state[_WARMUP] *= constants[_WARMUP_DECAY]
+    return True

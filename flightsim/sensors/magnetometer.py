@@ -1,0 +1,97 @@
+"""Magnetometer: the Earth's field in the body frame, residual hard and soft iron, noise, quantum."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flightsim import truth as t
+from flightsim.interface import MAG_SIZE
+from flightsim.rotations import rotate_inverse
+from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
+from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
+from flightsim.sensors.kernels import quantise, saturate
+from flightsim.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+_SCALE: Final = 0  # 3 numbers
+_HARD_IRON: Final = 3  # 3 numbers
+_NOISE: Final = 6
+_LIMIT: Final = 7
+_QUANTUM: Final = 8
+_CONSTANTS: Final = 9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MagnetometerParameters:
+    """A calibrated iSentek IST8310, the compass of Holybro's GPS modules.
+
+    Attributes:
+        rate_hz: samples per second.
+        latency_s: zero.
+        noise_gauss: per sample; 0.0004 gauss/sqrt(Hz) of PX4's Gazebo magnetometer plugin at 50 Hz.
+        hard_iron_gauss: one sigma per axis, left after calibration; 0.5 deg of heading at mid latitudes.
+        scale_error: one sigma, left after calibration (soft iron).
+        range_gauss, quantum_gauss: 1600 uT and 0.3 uT per bit (datasheet).
+    """
+
+    rate_hz: int = 50
+    latency_s: float = 0.0
+    noise_gauss: float = 0.0028
+    hard_iron_gauss: float = 0.002
+    scale_error: float = 0.005
+    range_gauss: float = 16.0
+    quantum_gauss: float = 0.003
+
+    def __post_init__(self) -> None:
+        require_rate(self.rate_hz)
+        require_positive(range_gauss=self.range_gauss)
+        require_not_negative(
+            latency_s=self.latency_s,
+            noise_gauss=self.noise_gauss,
+            hard_iron_gauss=self.hard_iron_gauss,
+            scale_error=self.scale_error,
+            quantum_gauss=self.quantum_gauss,
+        )
+
+    def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
+        """One specimen: draws its hard iron and scale errors."""
+        constants = np.zeros(_CONSTANTS)
+        constants[_SCALE : _SCALE + 3] = 1.0 + self.scale_error * rng.standard_normal(3)
+        constants[_HARD_IRON : _HARD_IRON + 3] = self.hard_iron_gauss * rng.standard_normal(3)
+        constants[_NOISE] = self.noise_gauss
+        constants[_LIMIT] = self.range_gauss
+        constants[_QUANTUM] = self.quantum_gauss
+        return SensorModel(
+            kernel=_measure,
+            constants=constants,
+            state=np.zeros(1),
+            normals_per_sample=MAG_SIZE,
+            size=MAG_SIZE,
+            fault_targets=(
+                FaultTarget(
+                    unit=SensorUnit.MAG,
+                    channels=slice(0, MAG_SIZE),
+                    wrong_bias=(0.2, 0.2, 0.0),
+                    drift_per_s=(0.005, 0.005, 0.0),
+                    garbage_low=(-self.range_gauss,) * MAG_SIZE,
+                    garbage_high=(self.range_gauss,) * MAG_SIZE,
+                ),
+            ),
+        )
+
+
+@njit(cache=True)
+def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+    rotate_inverse(truth[t.Q_NED_FROM_FRD], truth[t.MAG_NED_GAUSS], out)
+    for axis in range(3):
+        value = (
+            constants[_SCALE + axis] * out[axis]
+            + constants[_HARD_IRON + axis]
+            + constants[_NOISE] * normals[row, axis]
+        )
+        out[axis] = quantise(saturate(value, constants[_LIMIT]), constants[_QUANTUM])
+    return True

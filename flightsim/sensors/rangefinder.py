@@ -1,0 +1,117 @@
+"""Rangefinder: one narrow beam down the body's z axis onto level ground."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flightsim import truth as t
+from flightsim.interface import RANGE_DISTANCE_M, RANGE_MAX_M, RANGE_MIN_M, RANGE_SIZE
+from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
+from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
+from flightsim.sensors.kernels import quantise
+from flightsim.sensors.sensor import SensorModel
+
+Array = NDArray[np.float64]
+
+_MIN: Final = 0
+_MAX: Final = 1
+_NOISE: Final = 2
+_NOISE_PER_RANGE: Final = 3
+_QUANTUM: Final = 4
+_MIN_COSINE: Final = 5
+_CONSTANTS: Final = 6
+
+_QX: Final = t.Q_NED_FROM_FRD.start + 1
+_QY: Final = t.Q_NED_FROM_FRD.start + 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RangefinderParameters:
+    """A Benewake TFmini-S (datasheet), a time-of-flight lidar that both firmwares know.
+
+    The beam starts at the centre of gravity.
+
+    Attributes:
+        rate_hz: samples per second.
+        latency_s: zero.
+        min_range_m, max_range_m: beyond them the distance reads NaN.
+        noise_m: one sigma per sample; the datasheet's 6 cm accuracy below 6 m taken as three sigma.
+        noise_per_range: one sigma as a share of the distance; 1 % beyond 6 m likewise.
+        quantum_m: 1 cm.
+        max_tilt_rad: beyond it no echo comes back from the ground and the distance reads NaN.
+    """
+
+    rate_hz: int = 25
+    latency_s: float = 0.0
+    min_range_m: float = 0.1
+    max_range_m: float = 12.0
+    noise_m: float = 0.02
+    noise_per_range: float = 0.003
+    quantum_m: float = 0.01
+    max_tilt_rad: float = math.radians(60.0)
+
+    def __post_init__(self) -> None:
+        require_rate(self.rate_hz)
+        require_positive(max_range_m=self.max_range_m, max_tilt_rad=self.max_tilt_rad)
+        require_not_negative(
+            latency_s=self.latency_s,
+            min_range_m=self.min_range_m,
+            noise_m=self.noise_m,
+            noise_per_range=self.noise_per_range,
+            quantum_m=self.quantum_m,
+        )
+        if self.max_range_m <= self.min_range_m:
+            raise ValueError(
+                f"max_range_m = {self.max_range_m} is not accepted: "
+                f"more than min_range_m = {self.min_range_m} is"
+            )
+        if self.max_tilt_rad >= 0.5 * math.pi:
+            raise ValueError(f"max_tilt_rad = {self.max_tilt_rad} is not accepted: less than pi/2 is")
+
+    def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
+        """One specimen; nothing about it is drawn."""
+        constants = np.zeros(_CONSTANTS)
+        constants[_MIN] = self.min_range_m
+        constants[_MAX] = self.max_range_m
+        constants[_NOISE] = self.noise_m
+        constants[_NOISE_PER_RANGE] = self.noise_per_range
+        constants[_QUANTUM] = self.quantum_m
+        constants[_MIN_COSINE] = math.cos(self.max_tilt_rad)
+        nan = math.nan
+        return SensorModel(
+            kernel=_measure,
+            constants=constants,
+            state=np.zeros(1),
+            normals_per_sample=1,
+            size=RANGE_SIZE,
+            fault_targets=(
+                FaultTarget(
+                    unit=SensorUnit.DISTANCE_SENSOR,
+                    channels=slice(0, RANGE_SIZE),
+                    wrong_bias=(3.0, 0.0, 0.0),
+                    drift_per_s=(0.1, 0.0, 0.0),
+                    garbage_low=(self.min_range_m, nan, nan),
+                    garbage_high=(self.max_range_m, nan, nan),
+                ),
+            ),
+        )
+
+
+@njit(cache=True)
+def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+    out[RANGE_MIN_M] = constants[_MIN]
+    out[RANGE_MAX_M] = constants[_MAX]
+    out[RANGE_DISTANCE_M] = math.nan
+    cos_tilt = 1.0 - 2.0 * (truth[_QX] * truth[_QX] + truth[_QY] * truth[_QY])
+    if cos_tilt < constants[_MIN_COSINE]:
+        return True
+    distance_m = truth[t.HEIGHT_ABOVE_GROUND_M] / cos_tilt
+    sigma_m = math.hypot(constants[_NOISE], constants[_NOISE_PER_RANGE] * distance_m)
+    measured_m = quantise(distance_m + sigma_m * normals[row, 0], constants[_QUANTUM])
+    if constants[_MIN] <= measured_m <= constants[_MAX]:
+        out[RANGE_DISTANCE_M] = measured_m
+    return True
