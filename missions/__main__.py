@@ -1,0 +1,5 @@
+"""`python -m missions`: the command line."""
+
+from missions.cli import main
+
+main()
