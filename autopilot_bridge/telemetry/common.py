@@ -8,7 +8,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.control.multicopter import MulticopterController
+from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.streams import Builder, Values
@@ -230,7 +230,7 @@ class CommonMessages:
             self.view.time_ms,
             0,
             controller.attitude_setpoint.tolist(),
-            *controller.rates_setpoint.tolist(),
+            *controller.rate_setpoint_frd_rad_s.tolist(),
             controller.thrust,
             (0.0, 0.0, 0.0),
         )

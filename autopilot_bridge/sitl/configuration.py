@@ -1,0 +1,139 @@
+"""What a SITL world holds: vehicles, place, air and seed. Data only; `Sitl` builds it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from flightsim.environment import Environment
+
+FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
+"""2025-01-01T00:00:00Z: the moment of boot unless asked otherwise, so that equal flights give equal logs."""
+
+TEAM_SPACING_M: Final = 5.0
+MAX_VEHICLES: Final = 250
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Home:
+    """Where the first vehicle stands.
+
+    Attributes:
+        position: latitude and longitude in degrees, ground height above mean sea level in metres.
+        heading_deg: where the noses point, clockwise from true north.
+    """
+
+    position: GeodeticPosition
+    heading_deg: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.heading_deg):
+            raise ValueError(f"heading {self.heading_deg} deg is not a finite number")
+
+    @classmethod
+    def parse(cls, text: str) -> "Home":
+        """Home from "lat,lon,alt,heading" as ArduPilot's SITL writes it (heading may be left out)."""
+        parts = text.split(",")
+        try:
+            numbers = [float(part) for part in parts]
+        except ValueError:
+            numbers = []
+        if len(numbers) not in (3, 4):
+            raise ValueError(f"home {text!r} is not 'lat,lon,alt[,heading]', for example 47.3977,8.5456,489,0")
+        position = GeodeticPosition(lat_deg=numbers[0], lon_deg=numbers[1], alt_m=numbers[2])
+        return cls(position=position, heading_deg=numbers[3] if len(numbers) == 4 else 0.0)
+
+
+HOMES: Final[Mapping[str, Home]] = MappingProxyType(
+    {
+        "px4": Home(position=GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)),
+        "ardupilot": Home(
+            position=GeodeticPosition(lat_deg=-35.3632621, lon_deg=149.1652374, alt_m=584.0),
+            heading_deg=353.0,
+        ),
+    }
+)
+"""Where each firmware's own SITL stands: Zurich and Canberra."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleSpecification:
+    """One vehicle of the world.
+
+    Attributes:
+        system_id: MAVLink system id, 1..250.
+        model: name of one of our models, or a path.
+        flavour: "px4" or "ardupilot".
+        offset_ned_m: where it stands, from home.
+        parameters: autopilot parameters that differ from the flavour's defaults.
+    """
+
+    system_id: int = 1
+    model: str | Path = "iris"
+    flavour: str = "px4"
+    offset_ned_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.system_id <= MAX_VEHICLES:
+            raise ValueError(f"system id {self.system_id} is not in 1..{MAX_VEHICLES}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SitlConfiguration:
+    """A whole world.
+
+    Attributes:
+        vehicles: at least one; system ids differ.
+        home: None: the place of the first vehicle's flavour.
+        environment: wind, turbulence, date.
+        seed: root of every random stream.
+        physics_rate_hz: steps per second.
+        unix_epoch_us: what the vehicles' clocks call the moment of boot.
+    """
+
+    vehicles: tuple[VehicleSpecification, ...] = (VehicleSpecification(),)
+    home: Home | None = None
+    environment: Environment = field(default_factory=Environment)
+    seed: int = 0
+    physics_rate_hz: int = 250
+    unix_epoch_us: int = FIXED_EPOCH_UNIX_US
+
+    def __post_init__(self) -> None:
+        if not self.vehicles:
+            raise ValueError("a SITL needs at least one vehicle")
+        ids = [vehicle.system_id for vehicle in self.vehicles]
+        if len(set(ids)) != len(ids):
+            raise ValueError(f"system ids {ids} are not all different")
+
+    @property
+    def place(self) -> Home:
+        """Home, resolved."""
+        if self.home is not None:
+            return self.home
+        return HOMES.get(self.vehicles[0].flavour, HOMES["px4"])
+
+
+def team(
+    count: int, *, model: str | Path, flavour: str, parameters: Mapping[str, float]
+) -> tuple[VehicleSpecification, ...]:
+    """`count` equal vehicles with system ids 1, 2, ... standing in a row to the east.
+
+    Raises:
+        ValueError: count is not in 1..250.
+    """
+    if not 1 <= count <= MAX_VEHICLES:
+        raise ValueError(f"vehicle count {count} is not in 1..{MAX_VEHICLES}")
+    return tuple(
+        VehicleSpecification(
+            system_id=index + 1,
+            model=model,
+            flavour=flavour,
+            offset_ned_m=(0.0, TEAM_SPACING_M * index, 0.0),
+            parameters=parameters,
+        )
+        for index in range(count)
+    )

@@ -1,0 +1,189 @@
+"""The one visible wiring: world, sensors, autopilots and links, stepped together.
+
+Execution order of a step, for each vehicle in turn: vehicle dynamics, sensors, autopilot (navigation, slow loop,
+control, streams). Then the world's clock moves on and what links have brought is handed to the autopilots.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from autopilot_bridge.autopilot import Autopilot
+from autopilot_bridge.flavours import get_flavour
+from autopilot_bridge.links import Link, MemoryLink, memory_pair
+from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.routing import Router
+from autopilot_bridge.sitl.channel import LinkChannel
+from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TruthEncoder
+from flightsim.random_streams import RandomStreams
+from flightsim.sensors import SensorSuite, SensorSuiteParameters
+from flightsim.world import World
+
+TruthListener = Callable[[int, bytes], None]
+"""Called with vehicle time (microseconds) and a frame of truth."""
+
+_NEVER_US: Final = 1 << 62
+
+
+class SitlVehicle:
+    """One vehicle with its sensors, autopilot and channels.
+
+    Attributes:
+        vehicle: the JSBSim vehicle.
+        sensors: its sensor suite; `sensors.faults` switches failures.
+        autopilot: the emulated autopilot.
+        channels: its open links.
+    """
+
+    def __init__(
+        self, specification: VehicleSpecification, index: int, configuration: SitlConfiguration, world: World
+    ) -> None:
+        streams = RandomStreams(configuration.seed)
+        flavour = get_flavour(specification.flavour)
+        self.specification = specification
+        self.vehicle = world.add_vehicle(specification.model, offset_ned_m=specification.offset_ned_m)
+        self.sensors = SensorSuite(
+            SensorSuiteParameters(),
+            physics_rate_hz=configuration.physics_rate_hz,
+            truth=self.vehicle.truth,
+            seeds=lambda name: streams.child("vehicle", index, "sensor", name),
+        )
+        self.autopilot = Autopilot(
+            flavour,
+            system_id=specification.system_id,
+            readings=self.sensors.readings,
+            physics_rate_hz=configuration.physics_rate_hz,
+            parameters=specification.parameters,
+            unix_epoch_us=configuration.unix_epoch_us,
+            faults=self.sensors.faults,
+        )
+        self.channels: list[LinkChannel] = []
+        self._router = Router()
+        self.truth_encoder = TruthEncoder(specification.system_id)
+
+    def step(self, time_us: int) -> None:
+        """One physics step, ending at `time_us`."""
+        self.vehicle.step(self.autopilot.actuators)
+        self.sensors.step(time_us)
+        self.autopilot.step(time_us)
+
+    def open(self, link: Link, *, name: str | None = None, role: str = "onboard") -> LinkChannel:
+        """Give the autopilot one more link.
+
+        Args:
+            name: unique per vehicle; None: made from the link.
+            role: which default streams run on it ("onboard" or "gcs").
+        """
+        if name is None:
+            name = f"{role}{len(self.channels)} {link.description}"
+        channel = LinkChannel(name, link, system_id=self.specification.system_id)
+        self.channels.append(channel)
+        self.autopilot.add_channel(channel, role=role)
+        return channel
+
+    def close(self, channel: LinkChannel) -> None:
+        """Take a link away; the link itself is closed too."""
+        self.channels.remove(channel)
+        self.autopilot.remove_channel(channel)
+        self._router.forget(channel)
+        channel.link.close()
+
+    def poll(self) -> None:
+        """Hand everything that has arrived to the autopilot, and forward what is for somebody else."""
+        for channel in self.channels:
+            frames = channel.receive()
+            if frames:
+                self._take(channel, frames)
+
+    def _take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
+        for frame in frames:
+            self.autopilot.receive(frame, channel)
+            if len(self.channels) > 1:
+                for other in self._router.route(frame, channel, self.channels):
+                    other.send_frame(frame.raw)
+
+
+class Sitl:
+    """A world of vehicles under autopilots, advanced step by step.
+
+    Args:
+        configuration: what it holds.
+
+    Raises:
+        ValueError: a model, flavour or parameter that does not exist or is out of range.
+    """
+
+    def __init__(self, configuration: SitlConfiguration) -> None:
+        self.configuration = configuration
+        place = configuration.place
+        self.world = World(
+            physics_rate_hz=configuration.physics_rate_hz,
+            home=place.position,
+            heading_deg=place.heading_deg,
+            environment=configuration.environment,
+            seed=configuration.seed,
+        )
+        self.vehicles = tuple(
+            SitlVehicle(specification, index, configuration, self.world)
+            for index, specification in enumerate(configuration.vehicles)
+        )
+        self._step_us = 1_000_000 // configuration.physics_rate_hz
+        self._time_us = 0
+        self._poll_us = self._step_us
+        self._next_poll_us = _NEVER_US
+        self._truth_listeners: list[TruthListener] = []
+        self._truth_interval_us = 1_000_000 // TRUTH_RATE_HZ
+        self._next_truth_us = _NEVER_US
+
+    @property
+    def time_us(self) -> int:
+        """Vehicle time, microseconds since boot."""
+        return self._time_us
+
+    @property
+    def step_us(self) -> int:
+        """Length of a physics step."""
+        return self._step_us
+
+    def advance(self) -> None:
+        """Make one physics step."""
+        time_us = self._time_us + self._step_us
+        self._time_us = time_us
+        for vehicle in self.vehicles:
+            vehicle.step(time_us)
+        self.world.advance()
+        if time_us >= self._next_poll_us:
+            self._next_poll_us = time_us + self._poll_us
+            for vehicle in self.vehicles:
+                vehicle.poll()
+        if time_us >= self._next_truth_us:
+            self._next_truth_us = time_us + self._truth_interval_us
+            for vehicle in self.vehicles:
+                frame = vehicle.truth_encoder.encode(time_us, vehicle.vehicle.truth)
+                for listener in self._truth_listeners:
+                    listener(time_us, frame)
+
+    def poll_every(self, interval_us: int) -> None:
+        """Look at real links every so often (vehicle time); memory links need no polling."""
+        self._poll_us = max(self._step_us, interval_us)
+        self._next_poll_us = self._time_us + self._poll_us
+
+    def connect(self, index: int, *, role: str = "onboard") -> MemoryLink:
+        """A memory link to vehicle `index`; the returned end is the client's."""
+        vehicle = self.vehicles[index]
+        ours, theirs = memory_pair()
+        channel = vehicle.open(ours, role=role)
+        ours.on_receive = lambda: vehicle._take(channel, channel.receive())
+        return theirs
+
+    def on_truth(self, listener: TruthListener) -> None:
+        """Have truth frames delivered at 50 Hz, for the log and the score."""
+        self._truth_listeners.append(listener)
+        if self._next_truth_us == _NEVER_US:
+            self._next_truth_us = self._time_us + self._truth_interval_us
+
+    def close(self) -> None:
+        """Close every link."""
+        for vehicle in self.vehicles:
+            for channel in list(vehicle.channels):
+                vehicle.close(channel)
