@@ -1,0 +1,180 @@
+"""What makes a mission item acceptable, and how an autopilot stores it: rules both flavours share.
+
+Results are MAV_MISSION_RESULT values. Both firmwares acknowledge some impossible items; here every impossible
+value is refused with the result the MAVLink specification has for it.
+"""
+
+import math
+from typing import Final, Protocol
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.services.mission_messages import GEODETIC_FRAMES
+
+ACCEPTED: Final = mavlink.MAV_MISSION_ACCEPTED
+INVALID_PARAM: Final = (
+    mavlink.MAV_MISSION_INVALID_PARAM1,
+    mavlink.MAV_MISSION_INVALID_PARAM2,
+    mavlink.MAV_MISSION_INVALID_PARAM3,
+    mavlink.MAV_MISSION_INVALID_PARAM4,
+)
+MAX_ALTITUDE_M: Final = 83_000.0  # ArduPilot's LOCATION_ALT_MAX_M
+
+POLYGON_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+        mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+    )
+)
+CIRCLE_COMMANDS: Final = frozenset(
+    (mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, mavlink.MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION)
+)
+FENCE_COMMANDS: Final = POLYGON_COMMANDS | CIRCLE_COMMANDS | {mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT}
+RALLY_COMMANDS: Final = frozenset((mavlink.MAV_CMD_NAV_RALLY_POINT,))
+HERE_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_LOITER_TURNS,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+    )
+)
+"""Commands whose unset latitude and longitude mean the place where the vehicle is."""
+
+
+class ItemRules(Protocol):
+    """How one firmware judges, stores and reads back mission items."""
+
+    def check(self, item: MissionItem, mission_type: MissionType, seq: int, count: int) -> int:
+        """MAV_MISSION_RESULT for one uploaded item of a plan of `count` items; ACCEPTED (0) if it is good."""
+        ...
+
+    def stored(self, item: MissionItem) -> MissionItem:
+        """An accepted item as the firmware keeps it."""
+        ...
+
+    def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
+        """A stored item as the firmware sends it."""
+        ...
+
+
+def check_position(item: MissionItem) -> int:
+    """Latitude, longitude and altitude of an item in a geodetic frame."""
+    unset = math.isnan(item.x) and math.isnan(item.y) and item.command in HERE_COMMANDS
+    if not unset:
+        if not abs(item.x) <= 90.0:
+            return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
+        if not abs(item.y) <= 180.0:
+            return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+    return check_altitude(item)
+
+
+def check_altitude(item: MissionItem) -> int:
+    if not abs(item.z) <= MAX_ALTITUDE_M:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM7)
+    return int(ACCEPTED)
+
+
+def check_params(item: MissionItem, *, nan_allowed: tuple[bool, bool, bool, bool]) -> int:
+    """Finite param1..param4; NaN ("not set") where allowed."""
+    params = (item.param1, item.param2, item.param3, item.param4)
+    for value, may_be_nan, result in zip(params, nan_allowed, INVALID_PARAM, strict=True):
+        if math.isinf(value) or (math.isnan(value) and not may_be_nan):
+            return int(result)
+    return int(ACCEPTED)
+
+
+def check_special(item: MissionItem, seq: int, count: int) -> int:
+    """The commands with parameters that can be impossible: jumps, speeds, delays."""
+    match item.command:
+        case mavlink.MAV_CMD_DO_JUMP:
+            target = item.param1
+            if not 0 <= target < count or target != int(target) or target == seq:
+                return int(mavlink.MAV_MISSION_INVALID_PARAM1)
+            if not -1.0 <= item.param2 <= 65535.0:
+                return int(mavlink.MAV_MISSION_INVALID_PARAM2)
+        case mavlink.MAV_CMD_DO_CHANGE_SPEED:
+            # -1 keeps the speed, -2 returns to the default one.
+            if not (item.param2 >= 0.0 or item.param2 in (-1.0, -2.0)):
+                return int(mavlink.MAV_MISSION_INVALID_PARAM2)
+        case mavlink.MAV_CMD_NAV_WAYPOINT | mavlink.MAV_CMD_NAV_LOITER_TIME:
+            if item.param1 < 0.0:
+                return int(mavlink.MAV_MISSION_INVALID_PARAM1)
+    return int(ACCEPTED)
+
+
+def check_fence(item: MissionItem) -> int:
+    """One item of a fence plan."""
+    if item.command not in FENCE_COMMANDS:
+        return int(mavlink.MAV_MISSION_UNSUPPORTED)
+    if item.frame not in GEODETIC_FRAMES:
+        return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+    if item.command in POLYGON_COMMANDS and not 3.0 <= item.param1 <= 65535.0:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM1)
+    if item.command in CIRCLE_COMMANDS and not (item.param1 > 0.0 and math.isfinite(item.param1)):
+        return int(mavlink.MAV_MISSION_INVALID_PARAM1)
+    return check_horizontal(item)
+
+
+def check_rally(item: MissionItem) -> int:
+    """One item of a rally plan."""
+    if item.command not in RALLY_COMMANDS:
+        return int(mavlink.MAV_MISSION_UNSUPPORTED)
+    if item.frame not in GEODETIC_FRAMES:
+        return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+    return check_horizontal(item) or check_altitude(item)
+
+
+def check_horizontal(item: MissionItem) -> int:
+    if not abs(item.x) <= 90.0:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
+    if not abs(item.y) <= 180.0:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+    return int(ACCEPTED)
+
+
+def check_fence_polygons(items: tuple[MissionItem, ...]) -> int:
+    """A whole fence plan: each polygon has as many vertices in a row as each of them says."""
+    left = 0
+    size = 0
+    command = 0
+    for item in items:
+        if item.command not in POLYGON_COMMANDS:
+            if left:
+                return int(mavlink.MAV_MISSION_INVALID_PARAM1)
+            continue
+        if left == 0:
+            size = left = round(item.param1)
+            command = item.command
+        if item.command != command or round(item.param1) != size:
+            return int(mavlink.MAV_MISSION_INVALID_PARAM1)
+        left -= 1
+    return int(mavlink.MAV_MISSION_INVALID_PARAM1) if left else int(ACCEPTED)
+
+
+def fence_excludes(items: tuple[MissionItem, ...], lat_deg: float, lon_deg: float) -> bool:
+    """True when a point lies outside every inclusion polygon of a fence plan that has any (even-odd rule)."""
+    polygons: list[list[tuple[float, float]]] = []
+    left = 0
+    for item in items:
+        if item.command != mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION:
+            continue
+        if left == 0:
+            polygons.append([])
+            left = round(item.param1)
+        polygons[-1].append((item.x, item.y))
+        left -= 1
+    return bool(polygons) and not any(_inside(polygon, lat_deg, lon_deg) for polygon in polygons)
+
+
+def _inside(polygon: list[tuple[float, float]], x: float, y: float) -> bool:
+    inside = False
+    x1, y1 = polygon[-1]
+    for x2, y2 in polygon:
+        if (y1 > y) != (y2 > y) and x < (x2 - x1) * (y - y1) / (y2 - y1) + x1:
+            inside = not inside
+        x1, y1 = x2, y2
+    return inside

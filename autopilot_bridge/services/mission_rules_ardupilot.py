@@ -1,0 +1,139 @@
+"""ArduPilot's rules for mission items: commands, frames and how items are read back."""
+
+from dataclasses import replace
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.services.mission_messages import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
+from autopilot_bridge.services.mission_rules import (
+    check_fence,
+    check_params,
+    check_position,
+    check_rally,
+    check_special,
+)
+
+POSITION_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TURNS,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+        mavlink.MAV_CMD_NAV_VTOL_LAND,
+        mavlink.MAV_CMD_NAV_PAYLOAD_PLACE,
+        mavlink.MAV_CMD_DO_SET_HOME,
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_RETURN_PATH_START,
+        mavlink.MAV_CMD_DO_GO_AROUND,
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+    )
+)
+"""Mission commands with a position."""
+
+PLAIN_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        mavlink.MAV_CMD_NAV_GUIDED_ENABLE,
+        mavlink.MAV_CMD_NAV_DELAY,
+        mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
+        mavlink.MAV_CMD_NAV_SCRIPT_TIME,
+        mavlink.MAV_CMD_NAV_ATTITUDE_TIME,
+        mavlink.MAV_CMD_CONDITION_DELAY,
+        mavlink.MAV_CMD_CONDITION_DISTANCE,
+        mavlink.MAV_CMD_CONDITION_YAW,
+        mavlink.MAV_CMD_DO_JUMP,
+        mavlink.MAV_CMD_JUMP_TAG,
+        mavlink.MAV_CMD_DO_JUMP_TAG,
+        mavlink.MAV_CMD_DO_CHANGE_SPEED,
+        mavlink.MAV_CMD_DO_SET_RELAY,
+        mavlink.MAV_CMD_DO_REPEAT_RELAY,
+        mavlink.MAV_CMD_DO_SET_SERVO,
+        mavlink.MAV_CMD_DO_REPEAT_SERVO,
+        mavlink.MAV_CMD_DO_SET_REVERSE,
+        mavlink.MAV_CMD_DO_SET_ROI_NONE,
+        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        mavlink.MAV_CMD_DO_FENCE_ENABLE,
+        mavlink.MAV_CMD_DO_PARACHUTE,
+        mavlink.MAV_CMD_DO_INVERTED_FLIGHT,
+        mavlink.MAV_CMD_DO_GRIPPER,
+        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,
+        mavlink.MAV_CMD_DO_SPRAYER,
+        mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
+        mavlink.MAV_CMD_DO_AUX_FUNCTION,
+        mavlink.MAV_CMD_DO_GUIDED_LIMITS,
+        mavlink.MAV_CMD_DO_ENGINE_CONTROL,
+        mavlink.MAV_CMD_SET_CAMERA_ZOOM,
+        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
+        mavlink.MAV_CMD_SET_CAMERA_SOURCE,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_DO_WINCH,
+    )
+)
+"""Mission commands without a position; their frame is not looked at."""
+
+_YAW_IN_PARAM4: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+    )
+)
+
+
+class ArdupilotItemRules:
+    """`ItemRules` of ArduPilot 4.6."""
+
+    def check(self, item: MissionItem, mission_type: MissionType, seq: int, count: int) -> int:
+        if mission_type is MissionType.FENCE:
+            return check_fence(item)
+        if mission_type is MissionType.RALLY:
+            return check_rally(item)
+        if seq == 0:  # home: whatever it holds is replaced
+            return int(mavlink.MAV_MISSION_ACCEPTED)
+        if item.command in POSITION_COMMANDS:
+            if item.frame not in GEODETIC_FRAMES:
+                return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+            result = self._check_params(item) or check_position(item)
+        elif item.command in PLAIN_COMMANDS:
+            result = self._check_params(item)
+        else:
+            return int(mavlink.MAV_MISSION_UNSUPPORTED)
+        return result or check_special(item, seq, count)
+
+    def stored(self, item: MissionItem) -> MissionItem:
+        return item
+
+    def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
+        if item.command not in POSITION_COMMANDS and item.frame not in GEODETIC_FRAMES:
+            return replace(item, frame=mavlink.MAV_FRAME_GLOBAL, x=0.0, y=0.0)
+        if item.command in PLAIN_COMMANDS or item.frame in GLOBAL_FRAMES:
+            frame = mavlink.MAV_FRAME_GLOBAL
+        elif item.frame in RELATIVE_FRAMES:
+            frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        else:
+            frame = mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT
+        return replace(item, frame=frame)
+
+    @staticmethod
+    def _check_params(item: MissionItem) -> int:
+        vtol_land = item.command == mavlink.MAV_CMD_NAV_VTOL_LAND
+        yaw_may_be_nan = vtol_land or item.command in _YAW_IN_PARAM4
+        return check_params(item, nan_allowed=(False, False, vtol_land, yaw_may_be_nan))
