@@ -4,6 +4,11 @@ import time
 from collections.abc import Callable
 from typing import Final
 
+wall_time_s: Final = time.monotonic
+"""The wall clock: seconds from an arbitrary start. For pacing and for peers that fell silent, nothing
+else.
+"""
+
 MAX_LAG_S: Final = 0.25
 """Wall seconds of lag that are caught up; a longer stop (SIGSTOP, suspended laptop) is forgotten."""
 
@@ -25,7 +30,7 @@ class Pacer:
     def __init__(
         self,
         speedup: float = 1.0,
-        monotonic: Callable[[], float] = time.monotonic,
+        monotonic: Callable[[], float] = wall_time_s,
         max_lag_s: float = MAX_LAG_S,
     ) -> None:
         if not 0.0 < speedup < float("inf"):
@@ -74,7 +79,7 @@ class RealTimeClock:
         self,
         speed: float = 1.0,
         *,
-        monotonic: Callable[[], float] = time.monotonic,
+        monotonic: Callable[[], float] = wall_time_s,
         wait: Callable[[float], object] = time.sleep,
         max_lag_s: float = MAX_LAG_S,
     ) -> None:

@@ -19,9 +19,9 @@ _MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are looked at ag
 class TelemetryClock:
     """Vehicle time, carried on between messages at the rate (speed factor) seen lately.
 
-    `time_us` follows the vehicle's own time since boot. It never runs backwards: when the vehicle reboots, or comes
-    back from a pause during which deadlines went on, time continues from where it was. When nothing is
-    heard, time goes on at the last rate, so that deadlines expire on a dead link too. The first
+    `time_us` follows the vehicle's own time since boot. It never runs backwards: when the vehicle reboots,
+    or comes back from a pause during which deadlines went on, time continues from where it was. When nothing
+    is heard, time goes on at the last rate, so that deadlines expire on a dead link too. The first
     observation sets the time; waits begun before keep what they had left.
 
     Args:

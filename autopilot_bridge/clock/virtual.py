@@ -1,7 +1,7 @@
 """An asyncio event loop whose time is a simulated world's.
 
-`asyncio.sleep(1)` in a mission means one second of vehicle time. Whenever no task can run, the loop lets the world
-make physics steps until a timer is due or a step has woken a task (trio's autojump clock, with a world
+`asyncio.sleep(1)` in a mission means one second of vehicle time. Whenever no task can run, the loop lets the
+world make physics steps until a timer is due or a step has woken a task (trio's autojump clock, with a world
 that must be stepped through instead of jumped over). Without real file descriptors in play the order of
 events depends on the world alone: neither on the machine, nor on the speed factor, nor on how often the
 process was stopped.

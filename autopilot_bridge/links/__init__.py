@@ -1,0 +1,46 @@
+"""Links: bytes to and from peers over memory, UDP, TCP, serial lines and logs. Non-blocking."""
+
+from autopilot_bridge.links.address import (
+    Address,
+    ReplayLog,
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpClient,
+    UdpPeer,
+    UdpServer,
+    parse_address,
+)
+from autopilot_bridge.links.link import Link, LinkCounters, PeerId
+from autopilot_bridge.links.lossy import Impairment, LossyLink
+from autopilot_bridge.links.memory import MemoryLink, memory_pair
+from autopilot_bridge.links.opening import open_link
+from autopilot_bridge.links.replay import ReplayLink
+from autopilot_bridge.links.serial_port import SerialLink
+from autopilot_bridge.links.tcp import TcpClientLink, TcpServerLink
+from autopilot_bridge.links.udp import UdpLink
+
+__all__ = [
+    "Address",
+    "Impairment",
+    "Link",
+    "LinkCounters",
+    "LossyLink",
+    "MemoryLink",
+    "PeerId",
+    "ReplayLink",
+    "ReplayLog",
+    "SerialLink",
+    "SerialPort",
+    "TcpClient",
+    "TcpClientLink",
+    "TcpServer",
+    "TcpServerLink",
+    "UdpClient",
+    "UdpLink",
+    "UdpPeer",
+    "UdpServer",
+    "memory_pair",
+    "open_link",
+    "parse_address",
+]

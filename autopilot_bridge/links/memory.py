@@ -1,0 +1,97 @@
+"""Links inside one process."""
+
+from collections import deque
+from collections.abc import Callable
+from typing import Final
+
+from autopilot_bridge.links.link import LinkCounters, PeerId
+
+MAX_INBOX: Final = 100_000
+
+
+class MemoryLink:
+    """One end of a pair. What one end sends, the other receives, in order, at once.
+
+    Args:
+        name: for descriptions; the other end is known by it.
+
+    Attributes:
+        on_receive: when set, is called with the bytes at the moment the other end sends them; `receive` then
+            gives nothing.
+    """
+
+    __slots__ = ("_inbox", "_other", "_peer", "closed", "counters", "name", "on_receive")
+
+    def __init__(self, name: str, on_receive: Callable[[bytes], None] | None = None) -> None:
+        self.name = name
+        self.on_receive = on_receive
+        self.counters = LinkCounters()
+        self.closed = False
+        self._inbox: deque[bytes] = deque()
+        self._other: MemoryLink | None = None
+        self._peer: PeerId = (name, 0)
+
+    @property
+    def description(self) -> str:
+        """`memory:` and the name of this end."""
+        return f"memory:{self.name}"
+
+    @property
+    def peers(self) -> tuple[PeerId, ...]:
+        """The other end, while it is open."""
+        return () if self._other is None or self._other.closed else (self._peer,)
+
+    @property
+    def congested(self) -> bool:
+        """Never."""
+        return False
+
+    def send(self, data: bytes, to: PeerId | None = None) -> None:
+        """Hand bytes to the other end."""
+        other = self._other
+        counters = self.counters
+        if self.closed or other is None or other.closed or len(other._inbox) >= MAX_INBOX:
+            counters.dropped += 1
+            counters.bytes_dropped += len(data)
+            return
+        counters.writes += 1
+        counters.bytes_out += len(data)
+        other.counters.reads += 1
+        other.counters.bytes_in += len(data)
+        if other.on_receive is not None:
+            other.on_receive(data)
+        else:
+            other._inbox.append(data)
+
+    def receive(self) -> list[tuple[PeerId, bytes]]:
+        """What the other end has sent since the last call."""
+        inbox = self._inbox
+        if not inbox:
+            return []
+        peer = self._peer
+        received = [(peer, data) for data in inbox]
+        inbox.clear()
+        return received
+
+    def filenos(self) -> tuple[int, ...]:
+        """None."""
+        return ()
+
+    def close(self) -> None:
+        """Close this end; what the other end sends is dropped from now on."""
+        self.closed = True
+        self._inbox.clear()
+
+
+def memory_pair(
+    name_a: str = "a",
+    name_b: str = "b",
+    *,
+    on_receive_a: Callable[[bytes], None] | None = None,
+    on_receive_b: Callable[[bytes], None] | None = None,
+) -> tuple[MemoryLink, MemoryLink]:
+    """Two connected links; `on_receive_a` is called for what arrives at the first."""
+    a, b = MemoryLink(name_a, on_receive_a), MemoryLink(name_b, on_receive_b)
+    a._other, b._other = b, a
+    a._peer, b._peer = (name_b, 0), (name_a, 0)
+    return a, b

@@ -1,0 +1,149 @@
+"""Serial links (POSIX): USB, UART, and pseudo terminals."""
+
+import os
+import termios
+from collections.abc import Callable
+from typing import Final
+
+import serial
+
+from autopilot_bridge.clock.pacing import wall_time_s
+from autopilot_bridge.errors import LinkError
+from autopilot_bridge.links.address import SerialPort
+from autopilot_bridge.links.link import MAX_READS, LinkCounters, PeerId, SendQueue
+
+REOPEN_INTERVAL_S: Final = 1.0
+_READ_SIZE: Final = 4096
+_MAX_BACKLOG_BYTES: Final = 32 * 1024  # about 3 s at 115200 baud
+
+
+class SerialLink:
+    """A serial device. When it is unplugged, `receive` looks for it again, once a second at most.
+
+    Args:
+        address: device and baud rate.
+        monotonic: wall clock in seconds, for the time between attempts.
+
+    Raises:
+        LinkError: no such device, not permitted, in use, or the baud rate is not possible.
+    """
+
+    def __init__(self, address: SerialPort, *, monotonic: Callable[[], float] = wall_time_s) -> None:
+        self._address = address
+        self._monotonic = monotonic
+        self._last_attempt_s = monotonic()
+        self._peer: PeerId = (address.device, 0)
+        self._closed = False
+        self.description = str(address)
+        self.counters = LinkCounters()
+        self._queue = SendQueue(self.counters, _MAX_BACKLOG_BYTES)
+        try:
+            self._port: serial.Serial | None = self._open()
+        except (serial.SerialException, OSError, ValueError, termios.error) as error:
+            raise _open_error(address, error) from error
+
+    @property
+    def connected(self) -> bool:
+        """The device is there."""
+        return self._port is not None
+
+    @property
+    def peers(self) -> tuple[PeerId, ...]:
+        """The device, while it is there."""
+        return (self._peer,) if self._port is not None else ()
+
+    @property
+    def congested(self) -> bool:
+        """True while the line is behind with what was sent."""
+        return self._queue.congested
+
+    def send(self, data: bytes, to: PeerId | None = None) -> None:
+        """Send; dropped while the device is away."""
+        if self._port is None:
+            self.counters.dropped += 1
+            self.counters.bytes_dropped += len(data)
+            return
+        try:
+            self._queue.send(data, self._write)
+        except OSError:
+            self._unplugged()
+
+    def receive(self) -> list[tuple[PeerId, bytes]]:
+        """All bytes that have arrived."""
+        received: list[tuple[PeerId, bytes]] = []
+        if self._closed or (self._port is None and not self._reopen()):
+            return received
+        assert self._port is not None
+        try:
+            self._queue.flush(self._write)
+            for _ in range(MAX_READS):
+                data = os.read(self._port.fileno(), _READ_SIZE)
+                if not data:
+                    break
+                self.counters.reads += 1
+                self.counters.bytes_in += len(data)
+                received.append((self._peer, data))
+        except (BlockingIOError, InterruptedError):
+            pass
+        except OSError:
+            self._unplugged()
+        return received
+
+    def filenos(self) -> tuple[int, ...]:
+        """The device, while it is there."""
+        return () if self._port is None else (self._port.fileno(),)
+
+    def close(self) -> None:
+        """Close the device for good."""
+        self._closed = True
+        if self._port is not None:
+            self._queue.clear()
+            self._port.close()
+            self._port = None
+
+    def _open(self) -> serial.Serial:
+        # `exclusive`: a second program on the same port would eat half of the bytes.
+        opened = serial.Serial(
+            self._address.device, self._address.baud, timeout=0, write_timeout=0, exclusive=True
+        )
+        os.set_blocking(opened.fileno(), False)
+        self.counters.connects += 1
+        return opened
+
+    def _write(self, data: bytes) -> int:
+        # Not pyserial's write: it spins when the line takes nothing.
+        assert self._port is not None
+        return os.write(self._port.fileno(), data)
+
+    def _unplugged(self) -> None:
+        assert self._port is not None
+        self.counters.errors += 1
+        self.counters.disconnects += 1
+        self._queue.clear()
+        self._port.close()
+        self._port = None
+        self._last_attempt_s = self._monotonic()
+
+    def _reopen(self) -> bool:
+        if self._monotonic() - self._last_attempt_s < REOPEN_INTERVAL_S:
+            return False
+        self._last_attempt_s = self._monotonic()
+        try:
+            self._port = self._open()
+        except (serial.SerialException, OSError, ValueError, termios.error):
+            self.counters.errors += 1
+            return False
+        return True
+
+
+def _open_error(address: SerialPort, error: Exception) -> LinkError:
+    text = str(error)
+    if "lock" in text:
+        advice = "another program has it open: stop that program"
+    elif not os.path.exists(address.device):
+        advice = "there is no such device: check the cable, `ls /dev/tty*` lists the devices"
+    elif isinstance(error, OSError) and error.errno == 13:
+        advice = "not permitted: add yourself to the group that owns it (often 'dialout')"
+    else:
+        advice = "check the device and the baud rate"
+    return LinkError(f"can't open {address}: {advice} ({text})")

@@ -1,0 +1,68 @@
+"""Who gets a frame: the MAVLink routing guide ("Routing", https://mavlink.io/en/guide/routing.html).
+
+A frame goes to every other channel when it has no target or targets everybody (system 0); otherwise only
+to channels on which the target system (and the target component, unless it is 0) has been heard. It
+never goes back to where it came from.
+"""
+
+from typing import Generic, TypeVar
+
+from autopilot_bridge.mavlink.frame import Frame
+
+ChannelT = TypeVar("ChannelT")
+
+
+class Router(Generic[ChannelT]):
+    """Routing table over channels of any kind (links, peers of a link, names).
+
+    A channel must be hashable. Frames are given by id alone, so nothing is packed again: forward `frame.raw`.
+    """
+
+    __slots__ = ("_heard",)
+
+    def __init__(self) -> None:
+        self._heard: dict[ChannelT, set[tuple[int, int]]] = {}
+
+    @property
+    def channels(self) -> tuple[ChannelT, ...]:
+        """All channels, in the order they were added."""
+        return tuple(self._heard)
+
+    def add(self, channel: ChannelT) -> None:
+        """Make a channel known; a second time does nothing."""
+        self._heard.setdefault(channel, set())
+
+    def remove(self, channel: ChannelT) -> None:
+        """Forget a channel and what was heard on it."""
+        self._heard.pop(channel, None)
+
+    def heard(self, channel: ChannelT) -> frozenset[tuple[int, int]]:
+        """(system id, component id) of everybody heard on a channel."""
+        return frozenset(self._heard.get(channel, ()))
+
+    def route(self, frame: Frame, source: ChannelT) -> list[ChannelT]:
+        """Learn from a frame that came in on `source` and tell which channels it is to be sent to."""
+        sender = (frame.system_id, frame.component_id)
+        table = self._heard.get(source)
+        if table is None:
+            table = self._heard[source] = set()
+        table.add(sender)
+        return self.destinations(frame.target_system, frame.target_component, source)
+
+    def destinations(
+        self, target_system: int, target_component: int, source: ChannelT | None = None
+    ) -> list[ChannelT]:
+        """Channels that lead to a target (0: all), without `source`."""
+        return [
+            channel
+            for channel, heard in self._heard.items()
+            if channel != source and _leads_to(heard, target_system, target_component)
+        ]
+
+
+def _leads_to(heard: set[tuple[int, int]], system: int, component: int) -> bool:
+    if system == 0:
+        return True
+    if component == 0:
+        return any(heard_system == system for heard_system, _ in heard)
+    return (system, component) in heard

@@ -1,0 +1,225 @@
+"""Telemetry logs (.tlog): what pymavlink, MAVProxy and QGroundControl write and read.
+
+A record is the time in microseconds of the Unix epoch, 8 bytes, big endian, and then one raw MAVLink frame.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Final
+
+from autopilot_bridge.errors import TlogError
+from autopilot_bridge.mavlink.frame import (
+    CHECKSUM_SIZE,
+    HEADER_SIZE_V1,
+    HEADER_SIZE_V2,
+    INCOMPAT_SIGNED,
+    MAGIC_V1,
+    MAGIC_V2,
+    SIGNATURE_SIZE,
+    Frame,
+)
+from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
+
+_TIME: Final = struct.Struct(">Q")
+_pack_time: Final = _TIME.pack
+FLUSH_BYTES: Final = 64 * 1024
+FLUSH_INTERVAL_US: Final = 1_000_000
+_CHUNK_BYTES: Final = 1 << 20
+
+
+class TlogWriter:
+    """Writes a new log; whole records only, so that the file is readable whatever ends the process.
+
+    Records are kept until there are 64 KiB of them or one second of log time has passed, then they are
+    handed to the operating system in one piece: a killed process loses at most that.
+
+    Args:
+        path: the file; it must not exist.
+
+    Raises:
+        TlogError: the file exists or can't be created.
+    """
+
+    __slots__ = ("_buffer", "_file", "_flushed_us", "bytes_written", "path", "records")
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self.records = 0
+        self.bytes_written = 0
+        self._buffer = bytearray()
+        self._flushed_us: int | None = None
+        try:
+            self._file: BinaryIO | None = open(self.path, "xb", buffering=0)  # noqa: SIM115
+        except FileExistsError as error:
+            raise TlogError(
+                f"{self.path} exists and is not overwritten; choose another path or remove it"
+            ) from error
+        except OSError as error:
+            raise TlogError(f"can't create {self.path}: {error.strerror}; check the folder") from error
+
+    def write(self, time_us: int, frame: bytes) -> None:
+        """Append one frame.
+
+        Args:
+            time_us: microseconds of the Unix epoch.
+            frame: one raw frame.
+
+        Raises:
+            TlogError: the log is closed, or the disk is full.
+        """
+        buffer = self._buffer
+        buffer += _pack_time(time_us)
+        buffer += frame
+        self.records += 1
+        if self._flushed_us is None:
+            self._flushed_us = time_us
+        if len(buffer) >= FLUSH_BYTES or abs(time_us - self._flushed_us) >= FLUSH_INTERVAL_US:
+            self._flushed_us = time_us
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand everything to the operating system.
+
+        Raises:
+            TlogError: the log is closed, or the disk is full.
+        """
+        if self._file is None:
+            raise TlogError(f"{self.path} is closed; open a new log")
+        try:
+            while self._buffer:
+                written = self._file.write(self._buffer)
+                self.bytes_written += written
+                del self._buffer[:written]
+        except OSError as error:
+            raise TlogError(f"can't write {self.path}: {error.strerror}; check the disk") from error
+
+    def close(self) -> None:
+        """Write what is left and close; a second time does nothing."""
+        if self._file is None:
+            return
+        try:
+            self.flush()
+        finally:
+            self._file.close()
+            self._file = None
+
+    def __enter__(self) -> "TlogWriter":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+@dataclass(slots=True)
+class TlogCounters:
+    """Where every byte of a log went.
+
+    Attributes:
+        records: good records.
+        bytes_skipped: bytes that belong to no good record (damage, messages the dialect does not know,
+            and the torn record at the end of a log whose writer was killed).
+        frames: what the frames themselves showed; see `ParserCounters`.
+    """
+
+    records: int = 0
+    bytes_skipped: int = 0
+    frames: ParserCounters = field(default_factory=ParserCounters)
+
+
+class TlogReader:
+    """Reads a log, one record after the other; damage is skipped and counted.
+
+    Args:
+        path: the log.
+
+    Attributes:
+        counters: of the newest iteration.
+
+    Raises:
+        TlogError: the file can't be read.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self.counters = TlogCounters()
+        self._open().close()
+
+    def __iter__(self) -> Iterator[tuple[int, Frame]]:
+        """(time in microseconds of the Unix epoch, frame), in the order of the file."""
+        parser = FrameParser()
+        self.counters = counters = TlogCounters(frames=parser.counters)
+        buffer, start, ended = b"", 0, False
+        with self._open() as file:
+            while True:
+                size = _record_size(buffer, start)
+                if size is None:  # more bytes are needed
+                    if ended:
+                        counters.bytes_skipped += len(buffer) - start
+                        return
+                    chunk = self._read(file)
+                    ended = not chunk
+                    buffer, start = buffer[start:] + chunk, 0
+                    continue
+                end = start + size
+                if size:
+                    raw = buffer[start + _TIME.size : end]
+                    frames = parser.feed(raw)
+                    if frames and len(frames[0].raw) == len(raw):
+                        counters.records += 1
+                        yield _TIME.unpack_from(buffer, start)[0], frames[0]
+                        start = end
+                        continue
+                    parser.flush()
+                    if end == len(buffer) or _record_size(buffer, end) != 0:
+                        counters.bytes_skipped += size  # damaged, or a message the dialect does not know
+                        start = end
+                        continue
+                following = _next_record(buffer, start + 1)
+                counters.bytes_skipped += following - start
+                start = following
+
+    def _open(self) -> BinaryIO:
+        try:
+            return open(self.path, "rb")
+        except OSError as error:
+            raise TlogError(f"can't read {self.path}: {error.strerror}; give the path of a .tlog") from error
+
+    def _read(self, file: BinaryIO) -> bytes:
+        try:
+            return file.read(_CHUNK_BYTES)
+        except OSError as error:
+            raise TlogError(f"can't read {self.path}: {error.strerror}") from error
+
+
+def _record_size(buffer: bytes, start: int) -> int | None:
+    """Size of the record that begins at `start`; 0 when none does, None when the buffer ends before its
+    end.
+    """
+    at = start + _TIME.size
+    available = len(buffer) - at
+    if available < 1:
+        return None
+    magic = buffer[at]
+    if magic not in (MAGIC_V1, MAGIC_V2):
+        return 0
+    if available < 3:
+        return None
+    if magic == MAGIC_V1:
+        size = HEADER_SIZE_V1 + buffer[at + 1] + CHECKSUM_SIZE
+    else:
+        size = HEADER_SIZE_V2 + buffer[at + 1] + CHECKSUM_SIZE
+        if buffer[at + 2] & INCOMPAT_SIGNED:
+            size += SIGNATURE_SIZE
+    return _TIME.size + size if size <= available else None
+
+
+def _next_record(buffer: bytes, start: int) -> int:
+    """Where, at or behind `start`, a record may begin."""
+    at = start + _TIME.size
+    found = [index for magic in (MAGIC_V1, MAGIC_V2) if (index := buffer.find(bytes([magic]), at)) >= 0]
+    return min(found, default=max(start, len(buffer) - _TIME.size + 1)) - (_TIME.size if found else 0)
