@@ -1,0 +1,223 @@
+"""What a flight task sees: one mutable context per vehicle, filled by the autopilot before each 50 Hz update.
+
+Everything here comes from the navigation filter, the parameters and the pilot; never from truth or a clock.
+Positions are local NED metres at the filter's origin.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.control.setpoint import SETPOINT_SIZE
+from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.navigation import layout as nav_layout
+
+Array = NDArray[np.float64]
+
+TASK_RATE_HZ: Final = 50.0
+
+
+class LandedState(IntEnum):
+    """MAV_LANDED_STATE."""
+
+    UNDEFINED = 0
+    ON_GROUND = 1
+    IN_AIR = 2
+    TAKEOFF = 3
+    LANDING = 4
+
+
+class FlightPhase(IntEnum):
+    """What the active task is doing, as far as the landed state shows it."""
+
+    CRUISE = 0
+    TAKEOFF = 1
+    LANDING = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ManualInput:
+    """Sticks as MANUAL_CONTROL means them, -1..1: positive is right, stick forward,
+    up, clockwise. `valid` is False while no pilot is heard."""
+
+    roll: float = 0.0
+    pitch: float = 0.0  # positive: stick forward, fly forward
+    throttle: float = 0.0
+    yaw: float = 0.0
+    valid: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("roll", "pitch", "throttle", "yaw"):
+            value = getattr(self, name)
+            if not -1.0 <= value <= 1.0:
+                raise ValueError(f"manual input {name} = {value} is not in -1..1")
+
+
+@dataclass(frozen=True, slots=True)
+class WaypointReached:
+    """A mission item was completed (MISSION_ITEM_REACHED)."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class WaypointStarted:
+    """A mission item became the current one."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFinished:
+    """The last item of the plan is done; the vehicle holds where it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionModeRequested:
+    """A mission item hands the vehicle over to another kind of flying (NAV_RETURN_TO_LAUNCH)."""
+
+    command: int
+
+
+@dataclass(frozen=True, slots=True)
+class HomeChangeRequested:
+    """A mission item asks for a new home (DO_SET_HOME), local NED."""
+
+    north_m: float
+    east_m: float
+    down_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class TaskFinished:
+    """The active task is done."""
+
+    task: str
+
+
+@dataclass(frozen=True, slots=True)
+class TouchedDown:
+    """A landing task felt the ground for good."""
+
+
+FlightEvent = (
+    WaypointReached
+    | WaypointStarted
+    | MissionFinished
+    | MissionModeRequested
+    | HomeChangeRequested
+    | TaskFinished
+    | TouchedDown
+)
+
+
+class NavigationStatus(Protocol):
+    """What flight tasks ask of `navigation.NavigationHealth`."""
+
+    @property
+    def altitude_valid(self) -> bool: ...
+    @property
+    def velocity_valid(self) -> bool: ...
+    @property
+    def position_valid(self) -> bool: ...
+
+
+class FlightContext:
+    """State shared by the autopilot, its flight tasks and the land detector.
+
+    Attributes:
+        time_us: vehicle time of this update.
+        dt_s: time since the previous update (the task period).
+        nav: navigation state, layout `navigation.layout` (shared with the filter).
+        health: what the filter says of its own state; None before the first solution.
+        setpoint: control setpoint, layout `control.setpoint` (shared with the controller); tasks write it.
+        home_ned_m: home in the local frame, (3,); NaN while unset.
+        home_yaw_rad: heading at home, NaN while unset.
+        parameters: limits and habits of flight.
+        landed_state: newest result of the land detector.
+        ground_contact: the land detector feels the ground but isn't sure yet.
+        maybe_landed: the thrust is low and nothing moves; one step before ON_GROUND.
+        phase: whether the active task takes off or lands.
+        armed: motors may turn.
+        sticks: newest pilot input.
+        frame: local frame of the filter's origin, None before it is known.
+        events: what happened since the autopilot last emptied the list.
+        hover_thrust: the controller's estimate, 0..1.
+    """
+
+    __slots__ = (
+        "armed",
+        "dt_s",
+        "events",
+        "frame",
+        "ground_contact",
+        "health",
+        "home_ned_m",
+        "home_yaw_rad",
+        "hover_thrust",
+        "landed_state",
+        "maybe_landed",
+        "nav",
+        "parameters",
+        "phase",
+        "setpoint",
+        "sticks",
+        "time_us",
+    )
+
+    def __init__(
+        self,
+        *,
+        nav: Array | None = None,
+        setpoint: Array | None = None,
+        parameters: FlightParameters | None = None,
+    ) -> None:
+        self.time_us = 0
+        self.dt_s = 1.0 / TASK_RATE_HZ
+        self.nav: Array = np.full(nav_layout.NAV_SIZE, np.nan) if nav is None else nav
+        self.health: NavigationStatus | None = None
+        self.setpoint: Array = np.full(SETPOINT_SIZE, np.nan) if setpoint is None else setpoint
+        self.home_ned_m: Array = np.full(3, np.nan)
+        self.home_yaw_rad = math.nan
+        self.parameters = FlightParameters() if parameters is None else parameters
+        self.landed_state = LandedState.ON_GROUND
+        self.ground_contact = True
+        self.maybe_landed = True
+        self.phase = FlightPhase.CRUISE
+        self.armed = False
+        self.sticks = ManualInput()
+        self.frame: LocalFrame | None = None
+        self.events: list[FlightEvent] = []
+        self.hover_thrust = 0.5
+
+    @property
+    def on_ground(self) -> bool:
+        """The land detector is sure of the ground."""
+        return self.landed_state is LandedState.ON_GROUND
+
+    @property
+    def position_valid(self) -> bool:
+        """The horizontal position may be flown by."""
+        return self.health is not None and self.health.position_valid
+
+    @property
+    def velocity_valid(self) -> bool:
+        """The horizontal velocity may be flown by."""
+        return self.health is not None and self.health.velocity_valid
+
+    @property
+    def altitude_valid(self) -> bool:
+        """The vertical position and velocity may be flown by."""
+        return self.health is not None and self.health.altitude_valid
+
+    @property
+    def height_above_home_m(self) -> float:
+        """Height over home; over the filter's origin while home is unset."""
+        home_down_m = float(self.home_ned_m[2])
+        down_m = float(self.nav[nav_layout.POS_NED_M][2])
+        return -down_m if math.isnan(home_down_m) else home_down_m - down_m

@@ -1,0 +1,116 @@
+"""Limits and habits of flight, in the meaning shared by PX4 (MPC_*, RTL_*, MIS_*) and ArduPilot (WPNAV_*, RTL_*)."""
+
+import math
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Final
+
+_MAY_BE_ZERO: Final = frozenset(
+    {
+        "spoolup_time_s",
+        "takeoff_ramp_time_s",
+        "return_descend_altitude_m",
+        "return_loiter_time_s",
+        "return_min_distance_m",
+        "return_climb_min_m",
+        "manual_deadzone",
+        "manual_expo",
+    }
+)
+
+
+class YawBehaviour(IntEnum):
+    """Where the nose points on the way to a target when nobody asked for a yaw (PX4 MPC_YAW_MODE 0/.., ArduPilot WP_YAW_BEHAVIOR)."""
+
+    KEEP = 0
+    TOWARDS_TARGET = 1
+    ALONG_TRACK = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightParameters:
+    """Parameters of every flight task. PX4's and ArduPilot's names stand beside each field.
+
+    Raises:
+        ValueError: a field is not finite, or not positive where it must be.
+    """
+
+    cruise_speed_m_s: float = 5.0  # MPC_XY_CRUISE | WPNAV_SPEED
+    max_speed_m_s: float = 12.0  # MPC_XY_VEL_MAX | WPNAV_SPEED
+    climb_speed_m_s: float = 3.0  # MPC_Z_V_AUTO_UP | WPNAV_SPEED_UP
+    descend_speed_m_s: float = 1.5  # MPC_Z_V_AUTO_DN | WPNAV_SPEED_DN
+    acceleration_m_s2: float = 3.0  # MPC_ACC_HOR | WPNAV_ACCEL
+    corner_acceleration_m_s2: float = 2.5  # lateral, in mission corners | WPNAV_ACCEL_C
+    acceleration_up_m_s2: float = 4.0  # MPC_ACC_UP_MAX | WPNAV_ACCEL_Z
+    acceleration_down_m_s2: float = 3.0  # MPC_ACC_DOWN_MAX | WPNAV_ACCEL_Z
+    jerk_m_s3: float = 4.0  # MPC_JERK_AUTO | PSC_JERK_XY
+    trajectory_p_1_s: float = 1.0  # MPC_XY_TRAJ_P: cross-track and end-of-leg gain
+    trajectory_error_max_m: float = 2.0  # MPC_XY_ERR_MAX: the trajectory waits for a vehicle this far behind
+    yaw_rate_max_rad_s: float = math.radians(45.0)  # MPC_YAWRAUTO_MAX | ATC_SLEW_YAW
+    yaw_acceleration_rad_s2: float = math.radians(60.0)  # MPC_YAWRAUTO_ACC
+    yaw_behaviour: YawBehaviour = YawBehaviour.TOWARDS_TARGET  # MPC_YAW_MODE | WP_YAW_BEHAVIOR
+    acceptance_radius_m: float = 2.0  # NAV_ACC_RAD | WPNAV_RADIUS
+    acceptance_altitude_m: float = 0.8  # NAV_MC_ALT_RAD
+
+    takeoff_altitude_m: float = 2.5  # MIS_TAKEOFF_ALT
+    takeoff_speed_m_s: float = 1.5  # MPC_TKO_SPEED | WPNAV_SPEED_UP
+    takeoff_ramp_time_s: float = 3.0  # MPC_TKO_RAMP_T | TKOFF_SLEW_TIME
+    spoolup_time_s: float = 1.0  # COM_SPOOLUP_TIME | MOT_SPOOL_TIME
+
+    land_speed_m_s: float = 0.7  # MPC_LAND_SPEED | LAND_SPEED
+    land_descend_speed_m_s: float = 1.5  # MPC_Z_V_AUTO_DN | LAND_SPEED_HIGH or WPNAV_SPEED_DN
+    land_slow_altitude_m: float = 5.0  # MPC_LAND_ALT2 | LAND_ALT_LOW: at and below, land_speed
+    land_fast_altitude_m: float = 10.0  # MPC_LAND_ALT1 | LAND_ALT_LOW: at and above, land_descend_speed
+
+    return_altitude_m: float = 30.0  # RTL_RETURN_ALT | RTL_ALT, above home
+    return_descend_altitude_m: float = 10.0  # RTL_DESCEND_ALT | RTL_ALT_FINAL, above home
+    return_loiter_time_s: float = 0.0  # RTL_LAND_DELAY | RTL_LOIT_TIME; negative (PX4 -1): hold, don't land
+    return_speed_m_s: float = 5.0  # MPC_XY_CRUISE | RTL_SPEED
+    return_cone_half_angle_rad: float = math.radians(
+        45.0
+    )  # RTL_CONE_ANG; ArduPilot: atan(1/RTL_CONE_SLOPE); 0: off
+    return_min_distance_m: float = (
+        10.0  # RTL_MIN_DIST: the cone rule works within this range; inf: everywhere
+    )
+    return_climb_min_m: float = 0.0  # RTL_CLIMB_MIN
+
+    orbit_radius_m: float = 20.0  # default of DO_ORBIT | CIRCLE_RADIUS
+    orbit_speed_m_s: float = 3.0  # default of DO_ORBIT | CIRCLE_RATE
+    orbit_acceleration_max_m_s2: float = 2.0
+
+    manual_speed_m_s: float = 10.0  # MPC_VEL_MANUAL | LOIT_SPEED
+    manual_climb_speed_m_s: float = 3.0  # MPC_Z_VEL_MAX_UP | PILOT_SPEED_UP
+    manual_descend_speed_m_s: float = 1.5  # MPC_Z_VEL_MAX_DN | PILOT_SPEED_DN
+    manual_tilt_rad: float = math.radians(35.0)  # MPC_MAN_TILT_MAX | ANGLE_MAX
+    manual_yaw_rate_rad_s: float = math.radians(150.0)  # MPC_MAN_Y_MAX | PILOT_Y_RATE
+    acro_rate_rad_s: float = math.radians(100.0)  # MC_ACRO_R_MAX, MC_ACRO_P_MAX | ACRO_RP_RATE
+    acro_yaw_rate_rad_s: float = math.radians(100.0)  # MC_ACRO_Y_MAX | ACRO_Y_RATE
+    manual_throttle_min: float = 0.08  # MPC_MANTHR_MIN
+    manual_deadzone: float = 0.1  # MPC_HOLD_DZ
+    manual_expo: float = 0.6  # MPC_XY_MAN_EXPO
+
+    guided_timeout_s: float = 3.0  # GUID_TIMEOUT
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            name = field.name
+            value = getattr(self, name)
+            if name == "return_min_distance_m" and value == math.inf:
+                continue
+            if not math.isfinite(value):
+                raise ValueError(f"{name} = {value} is not a finite number")
+            if name in ("return_loiter_time_s", "yaw_behaviour"):
+                continue
+            if name in _MAY_BE_ZERO or name == "return_cone_half_angle_rad":
+                if value < 0.0:
+                    raise ValueError(f"{name} = {value} is negative; zero or more is accepted")
+            elif value <= 0.0:
+                raise ValueError(f"{name} = {value} is not positive")
+        if self.manual_expo > 1.0:
+            raise ValueError(f"manual_expo = {self.manual_expo} is not in 0..1")
+        if self.manual_deadzone >= 1.0:
+            raise ValueError(f"manual_deadzone = {self.manual_deadzone} is not in 0..1 (1 excluded)")
+        if self.return_cone_half_angle_rad > math.pi / 2.0:
+            raise ValueError(
+                f"return_cone_half_angle_rad = {self.return_cone_half_angle_rad} is not in 0..pi/2"
+            )
