@@ -43,9 +43,9 @@ class BarometerParameters:
         rate_hz: samples per second.
         latency_s: zero: the conversion time is part of the lag.
         noise_pa: 0.012 mbar, the datasheet's resolution (RMS).
-        turn_on_bias_pa: one sigma of an offset that shifts all heights of a flight alike; well inside the
-            datasheet's accuracy of 1.5 mbar, which also holds over temperature cycles and soldering.
-        drift_pa, drift_time_constant_s: slow Gauss-Markov wandering (temperature, weather, air about the case);
+        turn_on_bias_pa: one sigma of an offset that shifts all heights of a flight alike; the datasheet's
+            accuracy of 1.5 mbar is the outer limit.
+        drift_pa, drift_time_constant_s: slow Gauss-Markov wandering (temperature, weather, air in the case);
             3 Pa is 0.25 m at sea level.
         lag_s: first-order lag: foam and case volume, and 9 ms of conversion.
         quantum_pa: 0.01 mbar, the datasheet's integer output.

@@ -1,7 +1,7 @@
 """How a sensor can fail: MAVLink's FAILURE_TYPE, plus drift.
 
-A failure acts on one unit's channels, sample by sample. It sees the samples that would have been delivered, after
-the sensor's latency; it may change the values in place, and says whether the unit delivers them.
+A failure acts on one unit's channels, sample by sample. It sees the samples that would have been delivered,
+after the sensor's latency; it may change the values in place, and says whether the unit delivers them.
 """
 
 from collections import deque

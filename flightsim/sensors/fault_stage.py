@@ -84,7 +84,7 @@ class FaultPoint:
                 fault = kinds.Wrong(self._vector("bias", bias, target.wrong_bias), target.add_bias)
             case FaultType.SLOW:
                 factor = DEFAULT_SLOW_FACTOR if slow_factor is None else slow_factor
-                if factor < 2:
+                if not isinstance(factor, int) or factor < 2:
                     raise ValueError(f"slow_factor = {factor!r} is not accepted: a whole number from 2 is")
                 fault = kinds.Slow(factor)
             case FaultType.DELAYED:

@@ -14,9 +14,9 @@ class FaultPanel:
     """Failures of one vehicle's sensors, numbered as MAV_CMD_INJECT_FAILURE numbers them.
 
     Gyro and accelerometer fail apart although they share a reading. A unit that delivers nothing leaves its
-    reading stale (`fresh` never True). A gyro or accelerometer that alone delivers nothing leaves its last values
-    standing in the IMU reading, which stays fresh for the other's sake, as a driver does that reads registers
-    nobody updates; only when both are silent does the IMU reading go stale.
+    reading stale (`fresh` never True). A gyro or accelerometer that alone delivers nothing leaves its last
+    values standing in the IMU reading, which stays fresh for the other's sake, as a driver does that reads
+    registers nobody updates; only when both are silent does the IMU reading go stale.
 
     A unit has one failure at a time: a new one replaces the old. Failures draw from streams of their own, and
     the healthy noise goes on underneath, so after `clear` a sensor reads what it would have read anyway.

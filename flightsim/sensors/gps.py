@@ -146,8 +146,8 @@ class GpsParameters:
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws where the correlated error starts.
 
-        The accuracies reported are the true one-sigma errors per axis: eph and epv of white and correlated part
-        together, the speed accuracy as root mean square of the three axes.
+        The accuracies reported are the true one-sigma errors per axis: eph and epv of both parts together,
+        the speed accuracy as root mean square of the three axes.
         """
         white = np.array([self.horizontal_noise_m, self.horizontal_noise_m, self.vertical_noise_m])
         wander = np.array([self.horizontal_wander_m, self.horizontal_wander_m, self.vertical_wander_m])
@@ -197,7 +197,7 @@ class GpsParameters:
 
 
 def no_fix_values() -> tuple[float, ...]:
-    """What a receiver without a fix sends: fix type 1, no satellites, zero position and velocity, huge accuracies."""
+    """What a receiver without a fix sends: no satellites, zero position and velocity, huge accuracies."""
     values = np.zeros(i.GPS_SIZE)
     _write_no_fix(1.0, 0.0, values)
     return tuple(values.tolist())

@@ -1,7 +1,7 @@
 """Inertial measurement unit: three gyros and three accelerometers at the centre of gravity, one reading.
 
 Per axis: cross-axis matrix, turn-on bias, wandering bias (first-order Gauss-Markov), white noise, saturation,
-quantisation. Model and terms: Woodman, An introduction to inertial navigation (2007), section 3.2; IEEE Std 952.
+quantisation. Terms: Woodman, An introduction to inertial navigation (2007), section 3.2; IEEE Std 952.
 """
 
 import math
@@ -49,14 +49,14 @@ _NORMALS: Final = 12
 class ImuParameters:
     """A calibrated Bosch BMI088, the IMU of Pixhawk 5X and 6X boards, unless a line says otherwise.
 
-    Numbers are one-sigma where they describe a spread. Datasheet: BST-BMI088-DS001, tables 2 and 3.
+    Numbers are one-sigma where they describe a spread. Datasheet: BST-BMI088-DS001, section 1.2.
 
     Attributes:
         rate_hz: samples per second.
         latency_s: zero: PX4 and ArduPilot read the FIFO within a control step.
-        gyro_noise_density_rad_s_sqrt_hz: 0.014 deg/s/sqrt(Hz). White noise per sample is density * sqrt(rate), the
-            convention of continuous-time IMU models (angle random walk in rad/sqrt(s)).
-        gyro_bias_instability_rad_s: of the wandering bias; 0.015 deg/s/K (datasheet TCO) at about 1 K in flight.
+        gyro_noise_density_rad_s_sqrt_hz: 0.014 deg/s/sqrt(Hz). White noise per sample is
+            density * sqrt(rate), the convention of continuous-time IMU models (angle random walk, rad/sqrt(s)).
+        gyro_bias_instability_rad_s: of the wandering bias; 0.015 deg/s/K (datasheet TCO) times 1 K.
         gyro_bias_time_constant_s: PX4's Gazebo IMU plugin.
         gyro_turn_on_bias_rad_s: left after the calibration at boot, about 0.06 deg/s.
         gyro_scale_error: datasheet tolerance 1 % taken as three sigma.

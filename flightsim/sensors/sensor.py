@@ -1,8 +1,8 @@
 """The shell every sensor shares: noise supply, delay line, fault stage, reading.
 
-What differs between sensors is a `SensorModel`: a compiled measurement kernel with its constants and state. The
-way of a sample: kernel (always run, so that a fault never shifts the noise sequence), delay line, fault stage,
-reading.
+What differs between sensors is a `SensorModel`: a compiled measurement kernel with its constants and state.
+The way of a sample: kernel (always run, so that a fault never shifts the noise sequence), delay line, fault
+stage, reading.
 """
 
 from collections.abc import Callable
