@@ -158,9 +158,7 @@ class Connection:
                 self._clock_source = frame.system_id
             if frame.system_id == self._clock_source:
                 offset = _TIMESTAMPED[frame.message_id]
-                self._observed.observe(
-                    int.from_bytes(frame.payload[offset : offset + 4], "little") * 1000
-                )
+                self._observed.observe(int.from_bytes(frame.payload[offset : offset + 4], "little") * 1000)
         return self._observed.time_us
 
     async def _keep_looking_after_link(self) -> None:

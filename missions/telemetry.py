@@ -140,9 +140,7 @@ def gps(m: Any) -> Gps:
 
 def home(m: Any) -> GeodeticPosition:
     """From HOME_POSITION."""
-    return GeodeticPosition(
-        lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3
-    )
+    return GeodeticPosition(lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3)
 
 
 def progress(m: Any) -> MissionProgress:
@@ -179,6 +177,4 @@ class StatusTextAssembler:
         if len(text) >= 50:
             return None
         del self._parts[m.id]
-        return StatusText(
-            severity=m.severity, text="".join(parts[k] for k in sorted(parts)).rstrip("\t")
-        )
+        return StatusText(severity=m.severity, text="".join(parts[k] for k in sorted(parts)).rstrip("\t"))

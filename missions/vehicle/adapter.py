@@ -1,0 +1,84 @@
+"""What differs between PX4 and ArduPilot, seen from a mission."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Protocol
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mission_plan import MissionItem
+
+if TYPE_CHECKING:
+    from missions.planning.limits import VehicleLimits
+    from missions.vehicle.vehicle import Vehicle
+
+
+class Mode(StrEnum):
+    """Flight modes a mission asks for, by what the vehicle does in them."""
+
+    HOLD = "hold"
+    TAKEOFF = "takeoff"
+    GUIDED = "guided"
+    MISSION = "mission"
+    RETURN = "return"
+    LAND = "land"
+    POSITION = "position"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModeCommand:
+    """Parameters of MAV_CMD_DO_SET_MODE after the base mode."""
+
+    main: float
+    sub: float = 0.0
+
+
+class Adapter(Protocol):
+    """One autopilot firmware's ways. Stateless: the state is the vehicle's."""
+
+    name: str
+    modes: Mapping[Mode, int]
+    stream_rates_hz: Mapping[str, float]
+    bytewise_parameters: bool
+    setpoints_before_guided: bool
+    first_mission_item_is_home: bool
+
+    def mode_name(self, custom_mode: int) -> str:
+        """The firmware's own name of a mode."""
+        ...
+
+    def mode_command(self, mode: Mode) -> ModeCommand:
+        """How DO_SET_MODE asks for a mode."""
+        ...
+
+    def readiness(self, vehicle: "Vehicle") -> list[str]:
+        """What is still missing before the vehicle can be armed; empty when ready."""
+        ...
+
+    async def prepare_arming(self, vehicle: "Vehicle") -> None:
+        """Go to a mode in which arming is allowed."""
+        ...
+
+    async def take_off(self, vehicle: "Vehicle", altitude_m: float) -> None:
+        """Command the armed vehicle to take off."""
+        ...
+
+    async def start_streams(self, vehicle: "Vehicle") -> None:
+        """Ask for the telemetry a mission needs, where the firmware doesn't send it by itself."""
+        ...
+
+    async def start_mission(self, vehicle: "Vehicle") -> None:
+        """Fly the uploaded mission, from the ground or in the air."""
+        ...
+
+    async def limits(self, vehicle: "Vehicle") -> "VehicleLimits":
+        """What the vehicle's parameters allow."""
+        ...
+
+    async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
+        """The radius within which a waypoint counts as reached."""
+        ...
+
+    def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
+        """The mission item that begins a mission on the ground."""
+        ...

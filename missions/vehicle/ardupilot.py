@@ -1,0 +1,112 @@
+"""ArduPilot's copter as a mission meets it (4.6 behaviour)."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions.planning.limits import VehicleLimits
+from missions.vehicle.adapter import Mode, ModeCommand
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+_NAMES: Final = (
+    "Stabilize Acro Alt_Hold Auto Guided Loiter RTL Circle ? Land ? Drift ? Sport Flip AutoTune PosHold Brake "
+    "Throw Avoid_ADSB Guided_NoGPS Smart_RTL FlowHold Follow ZigZag SystemID AutoRotate Auto_RTL Turtle"
+).split()
+_PREARM_CHECK: Final = 0x10000000
+_EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions
+_EKF_CONST_POS: Final = 0x80
+
+
+class ArduCopter:
+    """ArduPilot copter: sends nothing until asked, numbers home as mission item 0, speaks PARAM_FLOAT."""
+
+    name = "ardupilot"
+    # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would obey (throttle low: descend)
+    modes: Mapping[Mode, int] = MappingProxyType(
+        {
+            Mode.HOLD: 17,
+            Mode.TAKEOFF: 4,
+            Mode.GUIDED: 4,
+            Mode.MISSION: 3,
+            Mode.RETURN: 6,
+            Mode.LAND: 9,
+            Mode.POSITION: 5,
+        }
+    )
+    stream_rates_hz: Mapping[str, float] = MappingProxyType(
+        {
+            "GLOBAL_POSITION_INT": 10.0,
+            "LOCAL_POSITION_NED": 20.0,
+            "ATTITUDE": 20.0,
+            "ATTITUDE_TARGET": 20.0,
+            "POSITION_TARGET_LOCAL_NED": 10.0,
+            "EXTENDED_SYS_STATE": 5.0,
+        }
+    )
+    bytewise_parameters = False
+    setpoints_before_guided = False
+    first_mission_item_is_home = True
+
+    def mode_name(self, custom_mode: int) -> str:
+        known = 0 <= custom_mode < len(_NAMES) and _NAMES[custom_mode] != "?"
+        return _NAMES[custom_mode] if known else f"mode {custom_mode}"
+
+    def mode_command(self, mode: Mode) -> ModeCommand:
+        return ModeCommand(main=self.modes[mode])
+
+    def readiness(self, vehicle: "Vehicle") -> list[str]:
+        missing = []
+        status = vehicle.message("SYS_STATUS")
+        if status is None or not status.onboard_control_sensors_health & _PREARM_CHECK:
+            missing.append("pre-arm checks")
+        if vehicle.message("HOME_POSITION") is None:
+            missing.append("home position")
+        if vehicle.message("GLOBAL_POSITION_INT") is None:
+            missing.append("position estimate")
+        ekf = vehicle.message("EKF_STATUS_REPORT")
+        if ekf is None or ekf.flags & _EKF_NEEDED != _EKF_NEEDED or ekf.flags & _EKF_CONST_POS:
+            missing.append("navigation filter on GPS")
+        return missing
+
+    async def prepare_arming(self, vehicle: "Vehicle") -> None:
+        if vehicle.custom_mode != self.modes[Mode.GUIDED]:
+            await vehicle.set_mode(Mode.GUIDED)
+
+    async def take_off(self, vehicle: "Vehicle", altitude_m: float) -> None:
+        if vehicle.custom_mode != self.modes[Mode.GUIDED]:
+            await vehicle.set_mode(Mode.GUIDED)
+        await vehicle.command(dialect.MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, altitude_m)
+
+    async def start_streams(self, vehicle: "Vehicle") -> None:
+        vehicle.send(
+            dialect.MAVLink_request_data_stream_message(
+                vehicle.system_id, 1, dialect.MAV_DATA_STREAM_ALL, 4, 1
+            )
+        )
+        for name, rate_hz in self.stream_rates_hz.items():
+            await vehicle.set_message_rate(name, rate_hz)
+
+    async def start_mission(self, vehicle: "Vehicle") -> None:
+        if not vehicle.armed:
+            await vehicle.arm()  # AUTO is not an armable mode: armed in GUIDED
+        await vehicle.set_mode(Mode.MISSION)
+        await vehicle.command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0)
+
+    async def limits(self, vehicle: "Vehicle") -> VehicleLimits:
+        known = VehicleLimits(speed_m_s=10.0, acceleration_m_s2=2.5)
+        return VehicleLimits(
+            speed_m_s=0.01 * await vehicle.parameter_or("WPNAV_SPEED", 100.0 * known.speed_m_s),
+            acceleration_m_s2=0.01
+            * await vehicle.parameter_or("WPNAV_ACCEL", 100.0 * known.acceleration_m_s2),
+        )
+
+    async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
+        return 0.01 * await vehicle.parameter_or("WPNAV_RADIUS", 100.0 * asked_m)  # param2 is not used
+
+    def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
+        return MissionItem(command=dialect.MAV_CMD_NAV_TAKEOFF, x=home.lat_deg, y=home.lon_deg, z=altitude_m)

@@ -1,0 +1,127 @@
+"""Streaming setpoints: PX4's OFFBOARD and ArduPilot's GUIDED, with their rules of entry."""
+
+import asyncio
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from missions.errors import MissionError
+from missions.vehicle.adapter import Mode
+from missions.vehicle.setpoint import Setpoint, Vector
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+SetpointSource = Callable[[float], Setpoint | None]
+"""Vehicle seconds since the start -> setpoint NED from home, or None at the end."""
+
+_BEFORE_ENTRY_S: Final = 0.6
+_SLOWEST_HZ: Final = 2.5
+_LEAD: Final = (
+    0.5  # of a period: a setpoint stands until the next one, so it is taken from the middle of that time
+)
+
+
+class GuidedSession:
+    """Setpoints streamed to one vehicle, at a fixed rate of vehicle time."""
+
+    def __init__(self, vehicle: "Vehicle", rate_hz: float, home_offset_ned_m: Vector) -> None:
+        if not _SLOWEST_HZ <= rate_hz <= 200.0:
+            raise MissionError(
+                f"a setpoint rate of {rate_hz:g} Hz does not keep a vehicle guided: {_SLOWEST_HZ:g}..200"
+            )
+        self._vehicle = vehicle
+        self._period_us = round(1e6 / rate_hz)
+        self._offset = home_offset_ned_m
+        self._source: SetpointSource | None = None
+        self._start_us = 0
+        self._last: Setpoint | None = None
+        self._done = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+        self._entered = False
+
+    async def follow(self, source: SetpointSource) -> None:
+        """Follow a source from its time 0 to its end.
+
+        Raises:
+            MissionError: the vehicle left the guided mode (a failsafe, a pilot).
+        """
+        first = source(0.0)
+        if first is None:
+            return
+        if not self._entered:
+            self._last = first
+            await self._enter()
+        self._done.clear()
+        self._start_us = self._vehicle.clock.time_us + self._period_us
+        self._source = source
+        assert self._task is not None
+        await self._until_done(self._task)
+
+    async def stay(self, setpoint: Setpoint, seconds: float) -> None:
+        """Keep one setpoint for some vehicle seconds."""
+        await self.follow(lambda t: setpoint if t < seconds else None)
+
+    async def finish(self) -> None:
+        """Leave the guided mode for hold while setpoints still go out, so that no failsafe sees a gap."""
+        if self._entered:
+            await self._vehicle.set_mode(Mode.HOLD)
+
+    async def stop(self) -> None:
+        """Stop streaming."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+            self._task = None
+
+    async def _enter(self) -> None:
+        vehicle = self._vehicle
+        if not vehicle.adapter.setpoints_before_guided:
+            await vehicle.set_mode(Mode.GUIDED)
+        self._task = asyncio.get_running_loop().create_task(self._stream())
+        if vehicle.adapter.setpoints_before_guided:
+            await vehicle.clock.sleep(_BEFORE_ENTRY_S)
+            await vehicle.set_mode(Mode.GUIDED)
+        self._entered = True
+
+    async def _stream(self) -> None:
+        vehicle, clock = self._vehicle, self._vehicle.clock
+        due_us = clock.time_us
+        while True:
+            if self._source is not None:
+                elapsed_s = max(0.0, (due_us - self._start_us + _LEAD * self._period_us) * 1e-6)
+                setpoint = self._source(elapsed_s)
+                if setpoint is None:
+                    self._source = None
+                    self._done.set()
+                else:
+                    self._last = setpoint
+            if self._last is not None:
+                vehicle.send(self._last.message(due_us, vehicle.system_id, self._offset))
+            due_us += self._period_us
+            if due_us < clock.time_us - self._period_us:  # fell behind: go on from now, without a burst
+                due_us = clock.time_us
+            await clock.sleep_until(due_us)
+
+    async def _until_done(self, stream: asyncio.Task[None]) -> None:
+        target = self._vehicle.adapter.modes[Mode.GUIDED]
+        left = asyncio.get_running_loop().create_future()
+
+        def look(_frame: object) -> None:
+            if not left.done() and self._vehicle.custom_mode != target:
+                left.set_result(self._vehicle.mode)
+
+        stop = self._vehicle.connection.listen("HEARTBEAT", look)
+        done = asyncio.ensure_future(self._done.wait())
+        try:
+            await asyncio.wait({done, left, stream}, return_when=asyncio.FIRST_COMPLETED)
+            if stream.done():
+                await stream  # raises what ended it
+            if left.done() and not done.done():
+                raise MissionError(
+                    f"the vehicle left the guided mode for {left.result()}; {self._vehicle.heard()}"
+                )
+        finally:
+            stop()
+            done.cancel()
+            left.cancel()
+            self._source = None

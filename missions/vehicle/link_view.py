@@ -1,0 +1,224 @@
+"""What a vehicle's messages say: identity, newest values, streams, waiting with deadlines.
+
+The lower half of `Vehicle`: it listens, and sends nothing but what it is given.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import AsyncIterator, Callable, Sequence
+from typing import Any, Final, TypeVar
+
+from autopilot_bridge.clock import Clock
+from autopilot_bridge.mavlink import MAVLinkMessage, decode, dialect
+from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
+from missions.errors import VehicleTimeout
+from missions.telemetry import SOURCES, StatusText, StatusTextAssembler
+from missions.vehicle.adapter import Adapter
+from missions.vehicle.ardupilot import ArduCopter
+from missions.vehicle.px4 import Px4
+
+T = TypeVar("T")
+
+_TEXTS_KEPT: Final = 50
+_ADAPTERS: Final[dict[int, Callable[[], Adapter]]] = {
+    dialect.MAV_AUTOPILOT_PX4: Px4,
+    dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: ArduCopter,
+}
+
+
+class VehicleView:
+    """The listening half of a vehicle.
+
+    Args:
+        connection: a started connection.
+        system_id: the vehicle's; None: the first autopilot heard.
+
+    Attributes:
+        connection: as given.
+        status_texts: the newest texts from the autopilot, oldest first.
+    """
+
+    def __init__(self, connection: Connection, system_id: int | None = None) -> None:
+        self.connection = connection
+        self.status_texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
+        self._system_id = system_id
+        self._adapter: Adapter | None = None
+        self._last_ack: Any = None
+        self._heard_us: int | None = None
+        self._assembler = StatusTextAssembler()
+        connection.listen("STATUSTEXT", self._on_status_text)
+        connection.listen("COMMAND_ACK", self._on_ack)
+        connection.listen("HEARTBEAT", self._on_heartbeat)
+
+    @property
+    def clock(self) -> Clock:
+        """Vehicle time."""
+        return self.connection.clock
+
+    @property
+    def system_id(self) -> int:
+        """The vehicle's MAVLink system id, known from its first heartbeat on."""
+        return self._known(self._system_id)
+
+    @property
+    def adapter(self) -> Adapter:
+        """The firmware's ways."""
+        return self._known(self._adapter)
+
+    @property
+    def autopilot(self) -> str:
+        """Firmware: "px4" or "ardupilot"."""
+        return self.adapter.name
+
+    @staticmethod
+    def _known(value: T | None) -> T:
+        if value is None:
+            raise VehicleTimeout("no heartbeat was heard yet: call wait_heartbeat first")
+        return value
+
+    def _on_heartbeat(self, frame: Any) -> None:
+        if frame.component_id != AUTOPILOT_COMPONENT:
+            return
+        if self._system_id is not None and frame.system_id != self._system_id:
+            return
+        if self._adapter is None:
+            make = _ADAPTERS.get(decode(frame).autopilot)
+            if make is None:
+                return
+            self._adapter = make()
+            self._system_id = frame.system_id
+        self._heard_us = self.clock.time_us
+
+    def _on_status_text(self, frame: Any) -> None:
+        if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
+            text = self._assembler.add(decode(frame))
+            if text is not None:
+                self.status_texts.append(text)
+
+    def _on_ack(self, frame: Any) -> None:
+        if frame.system_id == self._system_id:
+            self._last_ack = decode(frame)
+
+    # newest values
+
+    def message(self, name: str) -> MAVLinkMessage | None:
+        """Newest message of a name from the autopilot, or None."""
+        return self.connection.latest(name, self.system_id)
+
+    def latest(self, kind: type[T]) -> T | None:
+        """Newest telemetry of a kind, as `latest(Position)`; None before the first.
+
+        Kinds: `Position`, `LocalPosition`, `Attitude`, `Battery`, `Gps`, `MissionProgress`.
+        """
+        name, convert = SOURCES[kind]
+        message = self.message(name)
+        value: T | None = None if message is None else convert(message)
+        return value
+
+    async def telemetry(self, kind: type[T]) -> AsyncIterator[T]:
+        """Stream of telemetry: `async for position in vehicle.telemetry(Position)`."""
+        name, convert = SOURCES[kind]
+        with self.messages(name) as stream:
+            async for message in stream:
+                yield convert(message)
+
+    def messages(self, *names: str) -> MessageStream:
+        """Stream of the autopilot's messages by name."""
+        return self.connection.messages(*names, system_id=self.system_id, component_id=AUTOPILOT_COMPONENT)
+
+    @property
+    def armed(self) -> bool:
+        """By the newest heartbeat."""
+        heartbeat = self.message("HEARTBEAT")
+        return heartbeat is not None and bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
+
+    @property
+    def custom_mode(self) -> int:
+        """HEARTBEAT.custom_mode, as the firmware numbers it."""
+        heartbeat = self.message("HEARTBEAT")
+        return 0 if heartbeat is None else int(heartbeat.custom_mode)
+
+    @property
+    def mode(self) -> str:
+        """Flight mode by the newest heartbeat, as the firmware calls it."""
+        return self.adapter.mode_name(self.custom_mode)
+
+    @property
+    def landed_state(self) -> int:
+        """MAV_LANDED_STATE: 0 not known, 1 on the ground, 2 in the air, 3 taking off, 4 landing."""
+        message = self.message("EXTENDED_SYS_STATE")
+        return 0 if message is None else int(message.landed_state)
+
+    def addressed_here(self, message: MAVLinkMessage) -> bool:
+        """Whether a reply is for this mission: for all, or for its own ids."""
+        return message.target_system in (0, self.connection.system_id) and message.target_component in (
+            0,
+            self.connection.component_id,
+        )
+
+    def heard(self) -> str:
+        """What was heard last, for error messages."""
+        if self._adapter is None or self._heard_us is None:
+            return "nothing was heard from an autopilot"
+        parts = [f"last heard: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
+        position = self.message("GLOBAL_POSITION_INT")
+        if position is not None:
+            parts.append(f"{position.relative_alt * 1e-3:.1f} m above home")
+        silent_s = (self.clock.time_us - self._heard_us) * 1e-6
+        if silent_s > 3.0:
+            parts.append(f"no heartbeat for {silent_s:.0f} s")
+        if self._last_ack is not None:
+            parts.append(f"answer {describe_ack(self._last_ack)}")
+        if self.status_texts:
+            parts.append("texts " + " / ".join(repr(t.text) for t in list(self.status_texts)[-3:]))
+        return ", ".join(parts)
+
+    # waiting
+
+    async def wait_until(
+        self,
+        predicate: Callable[[], T | None],
+        *,
+        what: str | Callable[[], str],
+        on: Sequence[str],
+        timeout_s: float,
+    ) -> T:
+        """Wait until `predicate` gives something true, looked at now and after each message named in `on`.
+
+        Args:
+            predicate: looks at the newest values; may raise to give up.
+            what: what is awaited, for the error.
+            on: message names.
+            timeout_s: vehicle seconds.
+
+        Raises:
+            VehicleTimeout: says what was awaited and what was heard last.
+        """
+        value = predicate()
+        if value:
+            return value
+        changed = asyncio.Event()
+        stops = [self.connection.listen(name, lambda _frame: changed.set()) for name in on]
+        try:
+            async with self.clock.timeout(timeout_s):
+                while True:
+                    await changed.wait()
+                    changed.clear()
+                    value = predicate()
+                    if value:
+                        return value
+        except TimeoutError:
+            awaited = what if isinstance(what, str) else what()
+            raise VehicleTimeout(f"no {awaited} within {timeout_s:g} s; {self.heard()}") from None
+        finally:
+            for stop in stops:
+                stop()
+
+
+def describe_ack(ack: Any) -> str:
+    """A COMMAND_ACK in words: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
+    command = dialect.enums["MAV_CMD"].get(ack.command)
+    result = dialect.enums["MAV_RESULT"].get(ack.result)
+    command_name = command.name.removeprefix("MAV_CMD_") if command else f"command {ack.command}"
+    result_name = result.name.removeprefix("MAV_RESULT_") if result else f"result {ack.result}"
+    return f"{command_name}: {result_name}"

@@ -1,0 +1,92 @@
+"""Reading and setting a vehicle's parameters (MAVLink parameter protocol)."""
+
+import math
+import struct
+from typing import TYPE_CHECKING, Any, Final
+
+from autopilot_bridge.mavlink import dialect
+from missions.errors import CommandRejected, VehicleTimeout
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+_TRIES: Final = 4
+_WAIT_S: Final = 0.8
+_INTEGER_CODES: Final = {1: "<B3x", 2: "<b3x", 3: "<H2x", 4: "<h2x", 5: "<I", 6: "<i"}
+_REAL32: Final = 9
+
+
+def value_from_wire(value: float, kind: int, bytewise: bool) -> float:
+    """The number in PARAM_VALUE: PX4 puts the bytes of integers into the float, ArduPilot converts them."""
+    if bytewise and kind in _INTEGER_CODES:
+        return float(struct.unpack(_INTEGER_CODES[kind], struct.pack("<f", value))[0])
+    return value
+
+
+def value_to_wire(value: float, kind: int, bytewise: bool) -> float:
+    """The float for PARAM_SET."""
+    if bytewise and kind in _INTEGER_CODES:
+        packed: float = struct.unpack("<f", struct.pack(_INTEGER_CODES[kind], round(value)))[0]
+        return packed
+    return value
+
+
+def _name(message: Any) -> str:
+    return str(message.param_id).rstrip("\0")
+
+
+async def read(vehicle: "Vehicle", name: str) -> tuple[float, int]:
+    """Value and MAV_PARAM_TYPE of a parameter.
+
+    Raises:
+        VehicleTimeout: no answer; autopilots don't answer for names they don't know.
+    """
+    message = dialect.MAVLink_param_request_read_message(
+        vehicle.system_id, 1, name.encode("ascii", "replace")[:16], -1
+    )
+    with vehicle.messages("PARAM_VALUE") as replies:
+        for _ in range(_TRIES):
+            vehicle.send(message)
+            try:
+                async with vehicle.clock.timeout(_WAIT_S):
+                    async for reply in replies:
+                        if _name(reply).upper() == name.upper():
+                            bytewise = vehicle.adapter.bytewise_parameters
+                            value = value_from_wire(reply.param_value, reply.param_type, bytewise)
+                            return value, reply.param_type
+            except TimeoutError:
+                continue
+    raise VehicleTimeout(f"the vehicle did not answer for parameter {name}: it may not have it")
+
+
+async def write(vehicle: "Vehicle", name: str, value: float) -> None:
+    """Set a parameter and see it confirmed.
+
+    Raises:
+        CommandRejected: the vehicle kept another value.
+        VehicleTimeout: no answer.
+    """
+    if not math.isfinite(value):
+        raise CommandRejected(f"parameter {name} = {value} is not a number a vehicle can take", 0)
+    _, kind = await read(vehicle, name)
+    bytewise = vehicle.adapter.bytewise_parameters
+    message = dialect.MAVLink_param_set_message(
+        vehicle.system_id, 1, name.encode("ascii"), value_to_wire(value, kind, bytewise), kind
+    )
+    kept = math.nan
+    with vehicle.messages("PARAM_VALUE") as replies:
+        for _ in range(_TRIES):
+            vehicle.send(message)
+            try:
+                async with vehicle.clock.timeout(_WAIT_S):
+                    async for reply in replies:
+                        if _name(reply).upper() != name.upper():
+                            continue
+                        kept = value_from_wire(reply.param_value, reply.param_type, bytewise)
+                        if math.isclose(kept, value, rel_tol=1e-5, abs_tol=1e-6):
+                            return
+            except TimeoutError:
+                continue
+    if math.isnan(kept):
+        raise VehicleTimeout(f"setting parameter {name} was not answered; {vehicle.heard()}")
+    raise CommandRejected(f"the vehicle kept {name} = {kept:g} instead of {value:g}", 0)

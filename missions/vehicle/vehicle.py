@@ -1,0 +1,542 @@
+"""The vehicle as a mission sees it."""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import MAVLinkMessage, definition, dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions import telemetry
+from missions.connection import AUTOPILOT_COMPONENT, Connection
+from missions.errors import CommandRejected, MissionError, VehicleTimeout
+from missions.planning.limits import VehicleLimits
+from missions.vehicle import mission_transfer, parameter_client
+from missions.vehicle.adapter import Mode
+from missions.vehicle.guided import GuidedSession, SetpointSource
+from missions.vehicle.link_view import VehicleView, describe_ack
+
+_ACK_S: Final = 1.0
+_SENDINGS: Final = 5
+_MODE_AGAIN_S: Final = 1.5
+_ACCEPTED: Final = 0
+_TEMPORARILY_REJECTED: Final = 1
+_FAILED: Final = 4
+_IN_PROGRESS: Final = 5
+_GROUND: Final = 1
+
+
+class Vehicle(VehicleView):
+    """A vehicle over MAVLink, PX4 or ArduPilot: which one, its heartbeat says.
+
+    All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` says what was awaited and what was heard.
+    Heights are above home; local positions are NED metres from home.
+    """
+
+    def __init__(self, connection: Connection, system_id: int | None = None) -> None:
+        super().__init__(connection, system_id)
+        self._local_origin: GeodeticPosition | None = None
+
+    # beginning
+
+    async def wait_heartbeat(self, timeout_s: float = 15.0) -> None:
+        """Wait for an autopilot to be heard; from then on its firmware and system id are known."""
+        await self.wait_until(
+            lambda: self._adapter,
+            what="heartbeat of a PX4 or ArduPilot autopilot",
+            on=("HEARTBEAT",),
+            timeout_s=timeout_s,
+        )
+
+    async def wait_ready(self, timeout_s: float = 90.0) -> None:
+        """Wait until the vehicle could be armed: pre-arm checks, home, navigation."""
+        await self.wait_heartbeat(timeout_s)
+        await self.adapter.start_streams(self)
+        if self.message("HOME_POSITION") is None:
+            self._request_message("HOME_POSITION")
+        await self.wait_until(
+            lambda: not self.adapter.readiness(self),
+            what=lambda: "readiness to fly (missing: " + ", ".join(self.adapter.readiness(self)) + ")",
+            on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
+            timeout_s=timeout_s,
+        )
+
+    @property
+    def home(self) -> GeodeticPosition:
+        """Home as the vehicle reports it."""
+        message = self.message("HOME_POSITION")
+        if message is None:
+            raise VehicleTimeout("the vehicle has not told its home position: call wait_ready first")
+        return telemetry.home(message)
+
+    async def limits(self) -> VehicleLimits:
+        """What the vehicle's parameters allow a planner."""
+        return await self.adapter.limits(self)
+
+    # sending
+
+    def send(self, message: MAVLinkMessage) -> None:
+        """Send any message."""
+        self.connection.send(message)
+
+    def _request_message(self, name: str) -> None:
+        self.send(
+            dialect.MAVLink_command_long_message(
+                self.system_id,
+                AUTOPILOT_COMPONENT,
+                dialect.MAV_CMD_REQUEST_MESSAGE,
+                0,
+                float(definition(name).message_id),
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            )
+        )
+
+    async def request(self, name: str, timeout_s: float = 2.0) -> MAVLinkMessage:
+        """Have one message sent now (REQUEST_MESSAGE) and wait for it."""
+        with self.messages(name) as stream:
+            self._request_message(name)
+            try:
+                async with self.clock.timeout(timeout_s):
+                    return await anext(stream)
+            except TimeoutError:
+                raise VehicleTimeout(f"no {name} within {timeout_s:g} s of asking; {self.heard()}") from None
+
+    async def set_message_rate(self, name: str, rate_hz: float) -> None:
+        """Have a message streamed at a rate; a vehicle that refuses keeps what it had."""
+        interval_us = 1e6 / rate_hz
+        await self.try_command(
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(definition(name).message_id), interval_us
+        )
+
+    async def command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> None:
+        """Send a COMMAND_LONG until it is answered.
+
+        Raises:
+            CommandRejected: the answer was not ACCEPTED.
+            VehicleTimeout: no answer to any of the attempts.
+        """
+        result = await self.try_command(command, *params, timeout_s=timeout_s)
+        self._require(command, result)
+
+    async def try_command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> int:
+        """As `command`, but gives the MAV_RESULT back."""
+        values = (*params, *(0.0,) * (7 - len(params)))
+
+        def message(attempt: int) -> MAVLinkMessage:
+            return dialect.MAVLink_command_long_message(
+                self.system_id, AUTOPILOT_COMPONENT, command, attempt, *values
+            )
+
+        return await self._send_command(command, message, timeout_s)
+
+    async def command_int(
+        self,
+        command: int,
+        frame: int,
+        params: tuple[float, float, float, float],
+        x: int,
+        y: int,
+        z: float,
+    ) -> None:
+        """Send a COMMAND_INT until it is answered; raises as `command`."""
+        message = dialect.MAVLink_command_int_message(
+            self.system_id, AUTOPILOT_COMPONENT, frame, command, 0, 0, *params, x, y, z
+        )
+        self._require(command, await self._send_command(command, lambda _attempt: message, _ACK_S))
+
+    async def _send_command(
+        self, command: int, message: Callable[[int], MAVLinkMessage], timeout_s: float
+    ) -> int:
+        with self.messages("COMMAND_ACK") as acks:
+            for attempt in range(_SENDINGS):
+                self.send(message(attempt))
+                wait_s = timeout_s
+                try:
+                    while True:
+                        ack = await self._next_ack(acks, command, wait_s)
+                        if ack.result != _IN_PROGRESS:
+                            return int(ack.result)
+                        wait_s = 10.0
+                except TimeoutError:
+                    continue
+        name = dialect.enums["MAV_CMD"].get(command)
+        raise VehicleTimeout(
+            f"no answer to {name.name.removeprefix('MAV_CMD_') if name else command} "
+            f"after {_SENDINGS} attempts; {self.heard()}"
+        )
+
+    async def _next_ack(self, acks: Any, command: int, timeout_s: float) -> Any:
+        async with self.clock.timeout(timeout_s):
+            while True:
+                ack = await anext(acks)
+                if ack.command == command and self.addressed_here(ack):
+                    return ack
+
+    def _require(self, command: int, result: int) -> None:
+        if result != _ACCEPTED:
+            ack = dialect.MAVLink_command_ack_message(command, result)
+            raise CommandRejected(f"the vehicle refused {describe_ack(ack)}; {self.heard()}", result)
+
+    # modes and arming
+
+    async def set_mode(self, mode: Mode, timeout_s: float = 8.0) -> None:
+        """Switch the flight mode, and see it in a heartbeat: PX4 acknowledges modes before it knows.
+
+        A refusal is tried again until the deadline, since several pass by themselves (a mission that was just uploaded, an
+        estimator that settles).
+        """
+        target = self.adapter.modes[mode]
+        asked = self.adapter.mode_command(mode)
+        refused: Any = None
+        with self.messages("COMMAND_ACK", "HEARTBEAT") as replies:
+            try:
+                async with self.clock.timeout(timeout_s):
+                    while True:
+                        self._send_mode(asked.main, asked.sub)
+                        sent_us = self.clock.time_us
+                        refused = None
+                        while True:
+                            left_s = _MODE_AGAIN_S - (self.clock.time_us - sent_us) * 1e-6
+                            reply = await self._next_within(replies, left_s)
+                            if reply is None:
+                                break
+                            if reply.get_type() == "HEARTBEAT":
+                                if reply.custom_mode == target:
+                                    return
+                            elif reply.command == dialect.MAV_CMD_DO_SET_MODE:
+                                refused = reply if reply.result != _ACCEPTED else refused
+            except TimeoutError:
+                pass
+        if refused is not None:
+            raise CommandRejected(
+                f"the vehicle refused mode {mode}: {describe_ack(refused)}; {self.heard()}",
+                int(refused.result),
+            )
+        raise VehicleTimeout(f"mode {mode} was not entered within {timeout_s:g} s; {self.heard()}")
+
+    async def _next_within(self, replies: Any, seconds: float) -> Any:
+        if seconds <= 0.0:
+            return None
+        try:
+            async with self.clock.timeout(seconds):
+                return await anext(replies)
+        except TimeoutError:
+            return None
+
+    def _send_mode(self, main: float, sub: float) -> None:
+        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (
+            dialect.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
+        )
+        self.send(
+            dialect.MAVLink_command_long_message(
+                self.system_id,
+                AUTOPILOT_COMPONENT,
+                dialect.MAV_CMD_DO_SET_MODE,
+                0,
+                float(base),
+                main,
+                sub,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            )
+        )
+
+    async def arm(self, timeout_s: float = 15.0) -> None:
+        """Arm, and see it in a heartbeat; a refusal that may pass is tried again until the deadline."""
+        await self.adapter.prepare_arming(self)
+        end_us = self.clock.time_us + round(timeout_s * 1e6)
+        while not self.armed:
+            result = await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+            if result == _ACCEPTED:
+                break
+            may_pass = result in (_TEMPORARILY_REJECTED, _FAILED)
+            if not may_pass or self.clock.time_us >= end_us:
+                self._require(dialect.MAV_CMD_COMPONENT_ARM_DISARM, result)
+            await self.clock.sleep(1.0)
+        await self.wait_until(lambda: self.armed, what="armed heartbeat", on=("HEARTBEAT",), timeout_s=5.0)
+
+    async def disarm(self) -> None:
+        """Disarm, and see it in a heartbeat. Refused in the air."""
+        await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        await self.wait_disarmed(5.0)
+
+    # flying
+
+    async def takeoff(self, altitude_m: float, timeout_s: float | None = None) -> None:
+        """Arm if needed, take off, and wait until the height above home is reached and held."""
+        if not self.armed:
+            await self.arm()
+        await self.adapter.take_off(self, altitude_m)
+
+        def reached() -> bool:
+            position = self.latest(telemetry.Position)
+            if not self.armed:
+                raise MissionError(f"the vehicle disarmed during takeoff; {self.heard()}")
+            return (
+                position is not None
+                and position.height_m > altitude_m - max(0.5, 0.05 * altitude_m)
+                and abs(position.vel_ned_m_s[2]) < 0.4
+            )
+
+        await self.wait_until(
+            reached,
+            what=f"takeoff to {altitude_m:g} m",
+            on=("GLOBAL_POSITION_INT",),
+            timeout_s=timeout_s or 20.0 + 2.0 * altitude_m,
+        )
+
+    async def hold(self) -> None:
+        """Stop and hold position, in a mode that needs no pilot and no setpoints."""
+        await self.set_mode(Mode.HOLD)
+
+    async def goto(
+        self,
+        target: GeodeticPosition,
+        *,
+        tolerance_m: float = 1.0,
+        timeout_s: float | None = None,
+    ) -> None:
+        """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow."""
+        await self.command_int(
+            dialect.MAV_CMD_DO_REPOSITION,
+            dialect.MAV_FRAME_GLOBAL,
+            (-1.0, 1.0, 0.0, math.nan if self.adapter.bytewise_parameters else 0.0),
+            round(target.lat_deg * 1e7),
+            round(target.lon_deg * 1e7),
+            target.alt_m,
+        )
+        frame = LocalFrame(target)
+
+        def distance_m() -> float:
+            p = self.latest(telemetry.Position)
+            return math.hypot(*frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)) if p else math.inf
+
+        def there() -> bool:
+            p = self.latest(telemetry.Position)
+            return p is not None and distance_m() < tolerance_m and math.hypot(*p.vel_ned_m_s) < 0.7
+
+        away_m = distance_m()
+        limit_s = timeout_s or 30.0 + (away_m / 2.0 if math.isfinite(away_m) else 60.0)
+        await self.wait_until(
+            there,
+            what=lambda: f"arrival (still {distance_m():.1f} m away)",
+            on=("GLOBAL_POSITION_INT",),
+            timeout_s=limit_s,
+        )
+
+    async def goto_ned(
+        self, north_m: float, east_m: float, down_m: float, *, tolerance_m: float = 1.0
+    ) -> None:
+        """`goto` a point NED from home."""
+        lat, lon, alt = LocalFrame(self.home).geodetic_from_ned(north_m, east_m, down_m)
+        await self.goto(GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt), tolerance_m=tolerance_m)
+
+    async def set_speed(self, speed_m_s: float) -> None:
+        """Ground speed for missions, goto and return (DO_CHANGE_SPEED)."""
+        await self.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed_m_s, -1.0)
+
+    @asynccontextmanager
+    async def guided(self, rate_hz: float = 25.0) -> AsyncIterator[GuidedSession]:
+        """Fly by streamed setpoints: `async with vehicle.guided() as g: await g.follow(source)`.
+
+        PX4 gets setpoints before and all the time in OFFBOARD; between two `follow` the last one is repeated. At the end
+        the vehicle holds.
+        """
+        session = GuidedSession(self, rate_hz, await self.home_in_local_frame())
+        try:
+            yield session
+            await session.finish()
+        finally:
+            await session.stop()
+
+    async def follow(self, source: SetpointSource, rate_hz: float = 25.0) -> None:
+        """Follow streamed setpoints until the source ends, then hold.
+
+        Args:
+            source: called with vehicle seconds since the first setpoint was due; a `Setpoint` NED from home, or None at the end.
+            rate_hz: setpoints per vehicle second; PX4 needs more than 2.
+        """
+        async with self.guided(rate_hz) as session:
+            await session.follow(source)
+
+    async def return_to_launch(self, *, wait: bool = True, timeout_s: float = 600.0) -> None:
+        """Return, land and (with `wait`) see the vehicle disarmed."""
+        await self.set_mode(Mode.RETURN)
+        if wait:
+            await self.wait_disarmed(timeout_s)
+
+    async def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
+        """Land here and (with `wait`) see the vehicle disarmed."""
+        await self.set_mode(Mode.LAND)
+        if wait:
+            await self.wait_disarmed(timeout_s)
+
+    async def wait_landed(self, timeout_s: float = 300.0) -> None:
+        """Wait until the vehicle says it stands on the ground."""
+        await self.wait_until(
+            lambda: self.landed_state == _GROUND,
+            what="landing",
+            on=("EXTENDED_SYS_STATE",),
+            timeout_s=timeout_s,
+        )
+
+    async def wait_disarmed(self, timeout_s: float = 300.0) -> None:
+        """Wait until the vehicle is disarmed."""
+        await self.wait_until(
+            lambda: not self.armed, what="disarmed heartbeat", on=("HEARTBEAT",), timeout_s=timeout_s
+        )
+
+    # frames
+
+    async def local_origin(self) -> GeodeticPosition:
+        """Where the autopilot's local frame (LOCAL_POSITION_NED, local setpoints) has its origin.
+
+        From GPS_GLOBAL_ORIGIN, or where a vehicle doesn't tell that, from positions in both frames.
+        """
+        if self._local_origin is None:
+            try:
+                m = await self.request("GPS_GLOBAL_ORIGIN", 1.5)
+                self._local_origin = GeodeticPosition(
+                    lat_deg=m.latitude * 1e-7, lon_deg=m.longitude * 1e-7, alt_m=m.altitude * 1e-3
+                )
+            except VehicleTimeout:
+                self._local_origin = await self._origin_from_positions()
+        return self._local_origin
+
+    async def _origin_from_positions(self) -> GeodeticPosition:
+        def both() -> tuple[telemetry.Position, telemetry.LocalPosition] | None:
+            p, q = self.latest(telemetry.Position), self.latest(telemetry.LocalPosition)
+            return (p, q) if p and q and abs(p.time_us - q.time_us) <= 50_000 else None
+
+        p, q = await self.wait_until(
+            both,
+            what="global and local position of one moment",
+            on=("GLOBAL_POSITION_INT", "LOCAL_POSITION_NED"),
+            timeout_s=5.0,
+        )
+        here = GeodeticPosition(lat_deg=p.lat_deg, lon_deg=p.lon_deg, alt_m=p.alt_m)
+        lat, lon, alt = LocalFrame(here).geodetic_from_ned(*(-value for value in q.pos_ned_m))
+        return GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+
+    async def home_in_local_frame(self) -> tuple[float, float, float]:
+        """Home as a point of the autopilot's local frame."""
+        home = self.home
+        return LocalFrame(await self.local_origin()).ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
+
+    # missions
+
+    async def upload_mission(self, items: Sequence[MissionItem]) -> int:
+        """Upload a plan; gives the wire number of its first item (1 for ArduPilot, whose item 0 is home)."""
+        first = 1 if self.adapter.first_mission_item_is_home else 0
+        home = self.home
+        marker = MissionItem(
+            command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m
+        )
+        await mission_transfer.upload(self, [marker, *items] if first else items)
+        return first
+
+    async def download_mission(self) -> list[MissionItem]:
+        """The plan the vehicle holds (without ArduPilot's home item)."""
+        items = await mission_transfer.download(self)
+        return items[1:] if self.adapter.first_mission_item_is_home else items
+
+    async def clear_mission(self) -> None:
+        """Delete the plan the vehicle holds."""
+        await mission_transfer.clear(self)
+
+    async def start_mission(self) -> None:
+        """Fly the uploaded mission; arms and takes off when on the ground."""
+        await self.adapter.start_mission(self)
+
+    async def wait_item_reached(
+        self, sequence: int, timeout_s: float, progress: Callable[[int], None] | None = None
+    ) -> None:
+        """Wait until the mission has reached item `sequence` (wire number) or gone beyond.
+
+        Args:
+            progress: called with the number of each item reached.
+
+        Raises:
+            MissionError: the vehicle left the mission before.
+        """
+        mission_mode = self.adapter.modes[Mode.MISSION]
+        with self.messages("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT") as stream:
+            try:
+                async with self.clock.timeout(timeout_s):
+                    async for m in stream:
+                        kind = m.get_type()
+                        if kind == "HEARTBEAT":
+                            if m.custom_mode != mission_mode:
+                                name = self.adapter.mode_name(m.custom_mode)
+                                raise MissionError(
+                                    f"the vehicle left the mission for mode {name} "
+                                    f"before item {sequence}; {self.heard()}"
+                                )
+                            continue
+                        done = m.seq if kind == "MISSION_ITEM_REACHED" else m.seq - 1
+                        if progress is not None:
+                            progress(done)
+                        if done >= sequence:
+                            return
+            except TimeoutError:
+                raise VehicleTimeout(
+                    f"mission item {sequence} was not reached within {timeout_s:g} s; {self.heard()}"
+                ) from None
+
+    # parameters
+
+    async def parameter(self, name: str) -> float:
+        """Read a parameter."""
+        value, _ = await parameter_client.read(self, name)
+        return value
+
+    async def parameter_or(self, name: str, default: float) -> float:
+        """Read a parameter, or `default` when the vehicle doesn't answer for it."""
+        try:
+            return await self.parameter(name)
+        except VehicleTimeout:
+            return default
+
+    async def set_parameter(self, name: str, value: float) -> None:
+        """Set a parameter and see it confirmed."""
+        await parameter_client.write(self, name, value)
+
+    async def set_parameters(self, values: Mapping[str, float]) -> None:
+        """Set several parameters in order."""
+        for name, value in values.items():
+            await self.set_parameter(name, value)
+
+    # safety
+
+    @asynccontextmanager
+    async def safe_on_exit(self, action: Mode = Mode.RETURN) -> AsyncIterator["Vehicle"]:
+        """Leave the vehicle safe: when the block fails, is cancelled or interrupted in flight, `action` is commanded.
+
+        Args:
+            action: `Mode.RETURN` (then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is refused, the other two are tried.
+        """
+        try:
+            yield self
+        except BaseException:
+            await self._make_safe(action)
+            raise
+
+    async def _make_safe(self, action: Mode) -> None:
+        if self._adapter is None or not self.armed:
+            return
+        order = [action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)]
+        for mode in order:
+            try:
+                await asyncio.shield(asyncio.ensure_future(self.set_mode(mode, 5.0)))
+                return
+            except MissionError:
+                continue
