@@ -1,7 +1,7 @@
 """Layout of the navigation state: what the filter tells the rest of the autopilot, every physics step.
 
-One preallocated float64 array, written in place by the navigation filter. Positions are in the local NED frame
-at the filter's origin, metres; body is FRD.
+One preallocated float64 array, written in place by the navigation filter. Positions are in the local NED
+frame at the filter's origin, metres; body is FRD.
 """
 
 from typing import Final

@@ -1,0 +1,184 @@
+"""The navigation filter: an error-state Kalman filter on the vehicle's sensors.
+
+Every physics step runs the strapdown mechanisation; at `covariance_rate_hz` the covariance is predicted and
+the measurements that have come in are fused, each against the history at the time it was taken. What is fused
+when, and what happens when something is missing or refused, is decided in `Aiding`.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.navigation import mechanisation
+from autopilot_bridge.navigation.aiding import HAS_RANGE, Aiding
+from autopilot_bridge.navigation.alignment import Alignment
+from autopilot_bridge.navigation.fusion import HAS_BARO, HAS_GPS, HAS_MAG, UNSOUND
+from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.navigation.layout import HEIGHT_ABOVE_GROUND_M, NAV_SIZE, WIND_NED_M_S
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.navigation.solution import Solution
+from autopilot_bridge.navigation.states import GYRO, GYRO_LAST
+from flightsim.interface import SensorReadings
+
+
+class NavigationFilter:
+    """Estimates attitude, velocity, position and sensor errors from `SensorReadings`.
+
+    Attributes:
+        state: float64[NAV_SIZE], layout in `navigation/layout.py`, written by every `step`. Before alignment
+            the attitude is level and everything else zero; see `health.uninitialised`.
+        health: what is valid, what is used.
+        vehicle_at_rest: set by the land detector: the vehicle stands still on the ground.
+    """
+
+    __slots__ = (
+        "_aiding",
+        "_aligned",
+        "_alignment",
+        "_countdown",
+        "_divisor",
+        "_dt_s",
+        "_limits",
+        "_parameters",
+        "_pending",
+        "_readings",
+        "_solution",
+        "health",
+        "state",
+        "vehicle_at_rest",
+    )
+
+    def __init__(
+        self, parameters: NavigationParameters, *, readings: SensorReadings, physics_rate_hz: int
+    ) -> None:
+        """A filter that reads `readings` and has not aligned yet.
+
+        Args:
+            parameters: tuning.
+            readings: written in place by the sensors before each `step`.
+            physics_rate_hz: calls of `step` per second.
+
+        Raises:
+            ValueError: `covariance_rate_hz` does not divide the physics rate.
+        """
+        if physics_rate_hz <= 0 or physics_rate_hz % parameters.covariance_rate_hz:
+            raise ValueError(
+                f"covariance_rate_hz {parameters.covariance_rate_hz} is not accepted: "
+                f"it must divide the physics rate of {physics_rate_hz} Hz"
+            )
+        if 1_000_000 % physics_rate_hz:
+            raise ValueError(
+                f"physics_rate_hz {physics_rate_hz} is not accepted: its period must be whole microseconds"
+            )
+        self._parameters = parameters
+        self._readings = readings
+        self._dt_s = 1.0 / physics_rate_hz
+        self._divisor = physics_rate_hz // parameters.covariance_rate_hz
+        self._limits = (parameters.gyro_range_rad_s, parameters.accel_range_m_s2, parameters.imu_timeout_s)
+        self.state: NDArray[np.float64] = np.zeros(NAV_SIZE)
+        self.health = NavigationHealth()
+        self.vehicle_at_rest = False
+        self._alignment = Alignment(duration_s=parameters.alignment_time_s, dt_s=self._dt_s)
+        self._solution = Solution(parameters, physics_rate_hz=physics_rate_hz)
+        self._aiding = Aiding(parameters, readings=readings, solution=self._solution, health=self.health)
+        self.reset()
+
+    @property
+    def origin(self) -> GeodeticPosition | None:
+        """Origin of the NED frame; None before the first good GPS fix. It survives `reset`."""
+        frame = self._aiding.frame
+        return None if frame is None else frame.origin
+
+    @property
+    def frame(self) -> LocalFrame | None:
+        """The NED frame at `origin`."""
+        return self._aiding.frame
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Read-only view (22, 22) of the error state's covariance (`navigation/states.py`)."""
+        view = self._solution.p.view()
+        view.flags.writeable = False
+        return view
+
+    def set_origin(self, origin: GeodeticPosition) -> None:
+        """Set the origin from outside (SET_GPS_GLOBAL_ORIGIN).
+
+        Raises:
+            ValueError: there is an origin already; positions refer to it.
+        """
+        if self._aiding.frame is not None:
+            raise ValueError(f"origin {origin} is not accepted: the filter has one already, {self.origin}")
+        self._aiding.set_origin(origin)
+
+    def reset(self) -> None:
+        """Forget the estimate and align anew. The origin and the reset counters stay."""
+        self._aligned = False
+        self._pending = 0
+        self._countdown = self._divisor
+        self._alignment.restart()
+        self._solution.clear()
+        self._aiding.restart()
+        self.health.clear()
+        self.state[:] = 0.0
+        self.state[0] = 1.0
+        self.state[HEIGHT_ABOVE_GROUND_M] = math.nan
+        self.state[WIND_NED_M_S] = math.nan
+
+    def step(self, time_us: int) -> None:
+        """One physics step at vehicle time `time_us`: take fresh readings, write `state`."""
+        if not self._aligned:
+            self._align(time_us)
+            return
+        solution = self._solution
+        row = solution.row + 1
+        if row == solution.rows:
+            row = 0
+        solution.row = row
+        readings = self._readings
+        imu = readings.imu
+        gyro_range, accel_range, timeout_s = self._limits
+        mechanisation.step(
+            solution.core,
+            self.state,
+            solution.history,
+            imu.values,
+            imu.fresh,
+            row,
+            self._dt_s,
+            gyro_range,
+            accel_range,
+            timeout_s,
+        )
+        if readings.magnetometer.fresh:
+            self._pending |= HAS_MAG
+        if readings.barometer.fresh:
+            self._pending |= HAS_BARO
+        if readings.rangefinder.fresh:
+            self._pending |= HAS_RANGE
+        if readings.gps.fresh:
+            self._pending |= HAS_GPS
+        self._countdown -= 1
+        if self._countdown == 0:
+            self._countdown = self._divisor
+            pending, self._pending = self._pending, 0
+            solution.steps += self._divisor
+            self._aiding.at_rest = self.vehicle_at_rest
+            if self._aiding.update(time_us, pending) & UNSOUND:
+                self.health.filter_resets += 1
+                self.reset()
+
+    def _align(self, time_us: int) -> None:
+        alignment = self._alignment
+        alignment.step(self._readings)
+        if not alignment.ready:
+            return
+        mechanisation.take_sample(self._solution.core, self._readings.imu.values, *self._limits[:2])
+        core = self._solution.core
+        core[GYRO_LAST : GYRO_LAST + 3] = core[GYRO : GYRO + 3]
+        self._aiding.align(time_us, alignment.accel_frd_m_s2, alignment.mag_frd_gauss)
+        mechanisation.write_navigation(core, self.state)
+        self._aligned = True
+        self.health.uninitialised = False

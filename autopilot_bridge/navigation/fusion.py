@@ -1,0 +1,348 @@
+"""Measurement updates: scalar by scalar, each with its Jacobian written out on the few states it touches.
+
+Delayed measurements are compared with the history at the time they were taken. Their Jacobians refer to the
+present
+errors, so they carry the past back: over a delay d with the specific force integrated to u (NED),
+    p(t - d) error = p error - d * velocity error,
+    v(t - d) error = v error + u x theta + d * R accel_bias error (first order in d).
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from autopilot_bridge.navigation.covariance import apply_scalar, inject, is_sound, predict
+from autopilot_bridge.navigation.states import (
+    ACCEL_BIAS,
+    ATT,
+    BARO_OFFSET,
+    CORRECTION_POS,
+    CORRECTION_VEL,
+    DX,
+    EARTH_RATE,
+    ERROR_SIZE,
+    GPS_ERROR,
+    GRAVITY,
+    GYRO_BIAS,
+    HISTORY_POS,
+    HISTORY_Q,
+    HISTORY_VEL,
+    MAG_BIAS,
+    PH,
+    POS,
+    SUM_GYRO,
+    SUM_GYRO_TIME,
+    VEL,
+    X_BARO_OFFSET,
+    X_GPS_ERROR,
+    X_GYRO_BIAS,
+    X_MAG_BIAS,
+    X_POS,
+    X_VEL,
+    R,
+)
+
+Array = NDArray[np.float64]
+
+# obs: the measurements of one update
+GPS_POS: Final = 0  # NED from the origin, m
+GPS_VEL: Final = 3
+GPS_POS_VAR: Final = 6
+GPS_VEL_VAR: Final = 9
+GPS_DELAY_S: Final = 12
+BARO_HEIGHT: Final = 13  # pressure altitude, m
+BARO_VAR: Final = 14
+BARO_DELAY_S: Final = 15
+MAG: Final = 16  # FRD, gauss
+MAG_VAR: Final = 19
+MAG_NED: Final = 20  # expected field
+HOLD: Final = 23  # held position, NED
+HOLD_VAR: Final = 26
+HOLD_HEIGHT_VAR: Final = 27
+REST_VEL_VAR: Final = 28
+REST_RATE_VAR: Final = 29
+GATE_GPS: Final = 30
+GATE_GPS_VEL: Final = 31
+GATE_BARO: Final = 32
+GATE_MAG: Final = 33
+# results
+RATIO_VEL: Final = 34
+RATIO_POS: Final = 35
+RATIO_GPS_HEIGHT: Final = 36
+RATIO_BARO: Final = 37
+RATIO_MAG: Final = 38
+OBS_SIZE: Final = 39
+
+# which measurements are there
+HAS_GPS: Final = 1
+HAS_BARO: Final = 2
+HAS_MAG: Final = 4
+HAS_HOLD: Final = 8
+HAS_HOLD_HEIGHT: Final = 16
+HAS_REST: Final = 32
+# what was accepted
+ACCEPTED_GPS_VEL: Final = 1
+ACCEPTED_GPS_POS: Final = 2
+ACCEPTED_GPS_HEIGHT: Final = 4
+ACCEPTED_BARO: Final = 8
+ACCEPTED_MAG: Final = 16
+UNSOUND: Final = 32
+
+
+@njit(cache=True)
+def single_ph(p: Array, work: Array, index: int) -> None:
+    """PH of a measurement of state `index` itself."""
+    for i in range(ERROR_SIZE):
+        work[PH + i] = p[i, index]
+
+
+@njit(cache=True)
+def position_dot(work: Array, base: int, axis: int, delay: float) -> float:
+    """H times the vector at `base` of `work`, for a GPS position axis."""
+    return work[base + POS + axis] - delay * work[base + VEL + axis] + work[base + GPS_ERROR + axis]
+
+
+@njit(cache=True)
+def position_ph(p: Array, work: Array, axis: int, delay: float) -> float:
+    """PH of a GPS position axis; returns H P H^T."""
+    a, b, c = POS + axis, VEL + axis, GPS_ERROR + axis
+    for i in range(ERROR_SIZE):
+        work[PH + i] = p[i, a] - delay * p[i, b] + p[i, c]
+    return position_dot(work, PH, axis, delay)
+
+
+@njit(cache=True)
+def velocity_dot(
+    work: Array, base: int, axis: int, u_next: float, u_last: float, b0: float, b1: float, b2: float
+) -> float:
+    """H times the vector at `base`; (u x theta)_axis = u[axis+1] theta[axis+2] - u[axis+2] theta[axis+1]."""
+    return (
+        work[base + VEL + axis]
+        + u_next * work[base + ATT + (axis + 2) % 3]
+        - u_last * work[base + ATT + (axis + 1) % 3]
+        + b0 * work[base + ACCEL_BIAS]
+        + b1 * work[base + ACCEL_BIAS + 1]
+        + b2 * work[base + ACCEL_BIAS + 2]
+    )
+
+
+@njit(cache=True)
+def velocity_ph(
+    p: Array, work: Array, axis: int, u_next: float, u_last: float, b0: float, b1: float, b2: float
+) -> float:
+    """PH of a GPS velocity axis; returns H P H^T."""
+    a, n, m = VEL + axis, ATT + (axis + 2) % 3, ATT + (axis + 1) % 3
+    for i in range(ERROR_SIZE):
+        work[PH + i] = (
+            p[i, a]
+            + u_next * p[i, n]
+            - u_last * p[i, m]
+            + b0 * p[i, ACCEL_BIAS]
+            + b1 * p[i, ACCEL_BIAS + 1]
+            + b2 * p[i, ACCEL_BIAS + 2]
+        )
+    return velocity_dot(work, PH, axis, u_next, u_last, b0, b1, b2)
+
+
+@njit(cache=True)
+def baro_dot(work: Array, base: int, delay: float) -> float:
+    """H times the vector at `base`, for the pressure altitude."""
+    return -work[base + POS + 2] + delay * work[base + VEL + 2] + work[base + BARO_OFFSET]
+
+
+@njit(cache=True)
+def baro_ph(p: Array, work: Array, delay: float) -> float:
+    """PH of the pressure altitude; returns H P H^T."""
+    for i in range(ERROR_SIZE):
+        work[PH + i] = -p[i, POS + 2] + delay * p[i, VEL + 2] + p[i, BARO_OFFSET]
+    return baro_dot(work, PH, delay)
+
+
+@njit(cache=True)
+def mag_dot(work: Array, base: int, axis: int, h0: float, h1: float, h2: float) -> float:
+    """H times the vector at `base`, for a magnetometer axis."""
+    return (
+        h0 * work[base + ATT]
+        + h1 * work[base + ATT + 1]
+        + h2 * work[base + ATT + 2]
+        + work[base + MAG_BIAS + axis]
+    )
+
+
+@njit(cache=True)
+def mag_ph(p: Array, work: Array, axis: int, h0: float, h1: float, h2: float) -> float:
+    """PH of a magnetometer axis; returns H P H^T."""
+    for i in range(ERROR_SIZE):
+        work[PH + i] = h0 * p[i, ATT] + h1 * p[i, ATT + 1] + h2 * p[i, ATT + 2] + p[i, MAG_BIAS + axis]
+    return mag_dot(work, PH, axis, h0, h1, h2)
+
+
+@njit(cache=True)
+def body_axis_in_ned(history: Array, row: int, axis: int) -> tuple[float, float, float]:
+    """Column `axis` of r_ned_from_frd at a row of the history."""
+    w, x, y, z = (
+        history[row, HISTORY_Q],
+        history[row, HISTORY_Q + 1],
+        history[row, HISTORY_Q + 2],
+        history[row, HISTORY_Q + 3],
+    )
+    if axis == 0:
+        return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
+    if axis == 1:
+        return 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+@njit(cache=True)
+def fuse_gps(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> int:
+    """GPS velocity, horizontal position and height, each gated as a whole."""
+    accepted = 0
+    d = obs[GPS_DELAY_S]
+    ux = core[X_VEL] - history[row, HISTORY_VEL] - core[CORRECTION_VEL]
+    uy = core[X_VEL + 1] - history[row, HISTORY_VEL + 1] - core[CORRECTION_VEL + 1]
+    uz = core[X_VEL + 2] - history[row, HISTORY_VEL + 2] - core[CORRECTION_VEL + 2] - core[GRAVITY] * d
+    worst = 0.0
+    for again in range(2):  # gate first, then fuse
+        for a in range(3):
+            un = uy if a == 0 else (uz if a == 1 else ux)
+            ul = uz if a == 0 else (ux if a == 1 else uy)
+            b0, b1, b2 = d * core[R + 3 * a], d * core[R + 3 * a + 1], d * core[R + 3 * a + 2]
+            s = velocity_ph(p, work, a, un, ul, b0, b1, b2) + obs[GPS_VEL_VAR + a]
+            residual = obs[GPS_VEL + a] - history[row, HISTORY_VEL + a] - core[CORRECTION_VEL + a]
+            residual -= velocity_dot(work, DX, a, un, ul, b0, b1, b2)
+            if again == 0:
+                worst = max(worst, abs(residual) / (obs[GATE_GPS_VEL] * math.sqrt(s)))
+            else:
+                apply_scalar(p, work, residual, s)
+        if again == 0:
+            obs[RATIO_VEL] = worst
+            if not worst <= 1.0:
+                break
+            accepted |= ACCEPTED_GPS_VEL
+
+    for height in range(2):
+        axes = range(2, 3) if height == 1 else range(2)
+        worst = 0.0
+        for again in range(2):
+            for a in axes:
+                s = position_ph(p, work, a, d) + obs[GPS_POS_VAR + a]
+                residual = obs[GPS_POS + a] - history[row, HISTORY_POS + a] - core[CORRECTION_POS + a]
+                residual -= core[X_GPS_ERROR + a] + position_dot(work, DX, a, d)
+                if again == 0:
+                    worst = max(worst, abs(residual) / (obs[GATE_GPS] * math.sqrt(s)))
+                else:
+                    apply_scalar(p, work, residual, s)
+            if again == 0:
+                if height == 1:
+                    obs[RATIO_GPS_HEIGHT] = worst
+                else:
+                    obs[RATIO_POS] = worst
+                if not worst <= 1.0:
+                    break
+                accepted |= ACCEPTED_GPS_HEIGHT if height == 1 else ACCEPTED_GPS_POS
+    return accepted
+
+
+@njit(cache=True)
+def fuse_baro(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> int:
+    """Pressure altitude."""
+    s = baro_ph(p, work, obs[BARO_DELAY_S]) + obs[BARO_VAR]
+    height = -history[row, HISTORY_POS + 2] - core[CORRECTION_POS + 2]
+    residual = obs[BARO_HEIGHT] - height - core[X_BARO_OFFSET] - baro_dot(work, DX, obs[BARO_DELAY_S])
+    obs[RATIO_BARO] = abs(residual) / (obs[GATE_BARO] * math.sqrt(s))
+    if not obs[RATIO_BARO] <= 1.0:
+        return 0
+    apply_scalar(p, work, residual, s)
+    return ACCEPTED_BARO
+
+
+@njit(cache=True)
+def fuse_mag(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> int:
+    """The three magnetometer axes: z_i = r_i . m + bias_i, and r_i x m is the Jacobian to the attitude
+    error."""
+    mx, my, mz = obs[MAG_NED], obs[MAG_NED + 1], obs[MAG_NED + 2]
+    worst = 0.0
+    for again in range(2):
+        for a in range(3):
+            rx, ry, rz = body_axis_in_ned(history, row, a)
+            h0, h1, h2 = ry * mz - rz * my, rz * mx - rx * mz, rx * my - ry * mx
+            s = mag_ph(p, work, a, h0, h1, h2) + obs[MAG_VAR]
+            residual = obs[MAG + a] - (rx * mx + ry * my + rz * mz) - core[X_MAG_BIAS + a]
+            residual -= mag_dot(work, DX, a, h0, h1, h2)
+            if again == 0:
+                worst = max(worst, abs(residual) / (obs[GATE_MAG] * math.sqrt(s)))
+            else:
+                apply_scalar(p, work, residual, s)
+        if again == 0:
+            obs[RATIO_MAG] = worst
+            if not worst <= 1.0:
+                return 0
+    return ACCEPTED_MAG
+
+
+@njit(cache=True)
+def fuse_direct(p: Array, work: Array, index: int, residual: float, variance: float) -> None:
+    """A measurement of state `index` itself, not gated (position hold, standing still)."""
+    single_ph(p, work, index)
+    apply_scalar(p, work, residual - work[DX + index], work[PH + index] + variance)
+
+
+@njit(cache=True)
+def fuse_rest(p: Array, core: Array, work: Array, obs: Array) -> None:
+    """Standing still: velocity zero, and the mean gyro reading is bias and Earth's rotation."""
+    for a in range(3):
+        fuse_direct(p, work, VEL + a, -core[X_VEL + a], obs[REST_VEL_VAR])
+    if core[SUM_GYRO_TIME] > 0.0:
+        for a in range(3):
+            rate = core[SUM_GYRO + a] / core[SUM_GYRO_TIME]
+            for k in range(3):
+                rate -= core[R + 3 * k + a] * core[EARTH_RATE + k]
+            fuse_direct(p, work, GYRO_BIAS + a, rate - core[X_GYRO_BIAS + a], obs[REST_RATE_VAR])
+
+
+@njit(cache=True)
+def restart_mean_rate(core: Array) -> None:
+    """Begin a new average of the gyro for the next update at rest."""
+    for a in range(3):
+        core[SUM_GYRO + a] = 0.0
+    core[SUM_GYRO_TIME] = 0.0
+
+
+@njit(cache=True)
+def update(
+    p: Array,
+    core: Array,
+    history: Array,
+    work: Array,
+    obs: Array,
+    process: Array,
+    has: int,
+    gps_row: int,
+    baro_row: int,
+    mag_row: int,
+) -> int:
+    """Predict the covariance, fuse what is there (`has`), inject; returns what was accepted and soundness."""
+    predict(p, core, process)
+    accepted = 0
+    if has & HAS_GPS:
+        accepted |= fuse_gps(p, core, history, work, obs, gps_row)
+    if has & HAS_BARO:
+        accepted |= fuse_baro(p, core, history, work, obs, baro_row)
+    if has & HAS_MAG:
+        accepted |= fuse_mag(p, core, history, work, obs, mag_row)
+    if has & HAS_HOLD:
+        fuse_direct(p, work, POS, obs[HOLD] - core[X_POS], obs[HOLD_VAR])
+        fuse_direct(p, work, POS + 1, obs[HOLD + 1] - core[X_POS + 1], obs[HOLD_VAR])
+    if has & HAS_HOLD_HEIGHT:
+        fuse_direct(p, work, POS + 2, obs[HOLD + 2] - core[X_POS + 2], obs[HOLD_HEIGHT_VAR])
+    if has & HAS_REST:
+        fuse_rest(p, core, work, obs)
+        restart_mean_rate(core)
+    if has:
+        inject(core, work)
+    if not is_sound(p, core):
+        accepted |= UNSOUND
+    return accepted

@@ -1,0 +1,101 @@
+"""Is the receiver's fix good enough to use? PX4's EKF2_REQ_* checks, with a time they must hold.
+
+One check more: from sample to sample the position must move about as the velocity says, or a receiver that
+talks nonsense in good form would be believed once the filter has nothing else left.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from flightsim.interface import (
+    GPS_ALT_M,
+    GPS_EPH_M,
+    GPS_EPV_M,
+    GPS_FIX_TYPE,
+    GPS_HDOP,
+    GPS_LAT_DEG,
+    GPS_LON_DEG,
+    GPS_SATELLITES,
+    GPS_SIZE,
+    GPS_SPEED_ACCURACY_M_S,
+    GPS_VEL_NED_M_S,
+)
+
+_M_PER_DEG: Final = 111_200.0
+_ALLOWED_STEP_M: Final = 5.0
+_ALLOWED_STEP_SIGMAS: Final = 5.0
+
+
+class GpsQuality:
+    """Judges each sample, and remembers since when they have been good.
+
+    Attributes:
+        good: the newest sample passes.
+        good_since_us: time of the first sample of the present good series; -1 when the newest one failed.
+    """
+
+    __slots__ = ("_last", "_last_measured_us", "_newest_us", "_parameters", "good", "good_since_us")
+
+    def __init__(self, parameters: NavigationParameters) -> None:
+        self._parameters = parameters
+        self._last: NDArray[np.float64] = np.zeros(GPS_SIZE)
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget the past."""
+        self.good = False
+        self.good_since_us = -1
+        self._newest_us = -1
+        self._last_measured_us = -1
+
+    def judge(self, values: NDArray[np.float64], measured_us: int, time_us: int) -> bool:
+        """Take a sample received at `time_us`; True when it is good and the checks have held long enough."""
+        p = self._parameters
+        if self._newest_us >= 0 and time_us - self._newest_us > 2_000_000:
+            self.good_since_us = -1  # silence ends a series
+        self._newest_us = time_us
+        north, east, down = values[GPS_VEL_NED_M_S]
+        self.good = bool(
+            values[GPS_FIX_TYPE] >= 3.0
+            and values[GPS_SATELLITES] >= p.gps_required_satellites
+            and 0.0 <= values[GPS_EPH_M] <= p.gps_required_eph_m
+            and 0.0 <= values[GPS_EPV_M] <= p.gps_required_epv_m
+            and 0.0 <= values[GPS_SPEED_ACCURACY_M_S] <= p.gps_required_speed_accuracy_m_s
+            and 0.0 <= values[GPS_HDOP] <= p.gps_required_hdop
+            and abs(values[GPS_LAT_DEG]) <= 90.0
+            and abs(values[GPS_LON_DEG]) <= 180.0
+            and abs(values[GPS_ALT_M]) <= 1.0e5
+            and math.hypot(north, east, down) <= 1.0e3
+        )
+        coherent = self._moves_as_it_says(values, measured_us)
+        self._last[:] = values
+        self._last_measured_us = measured_us if self.good else -1
+        self.good = self.good and coherent
+        if not self.good:
+            self.good_since_us = -1
+            return False
+        if self.good_since_us < 0:
+            self.good_since_us = time_us
+        return time_us - self.good_since_us >= round(p.gps_check_time_s * 1e6)
+
+    def _moves_as_it_says(self, values: NDArray[np.float64], measured_us: int) -> bool:
+        elapsed_s = (measured_us - self._last_measured_us) * 1e-6
+        if self._last_measured_us < 0 or not 0.0 < elapsed_s <= 2.0:
+            return True
+        last = self._last
+        north_m = (values[GPS_LAT_DEG] - last[GPS_LAT_DEG]) * _M_PER_DEG
+        dlon = (values[GPS_LON_DEG] - last[GPS_LON_DEG] + 180.0) % 360.0 - 180.0
+        east_m = dlon * _M_PER_DEG * math.cos(math.radians(values[GPS_LAT_DEG]))
+        up_m = values[GPS_ALT_M] - last[GPS_ALT_M]
+        mean = 0.5 * (values[GPS_VEL_NED_M_S] + last[GPS_VEL_NED_M_S]) * elapsed_s
+        allowed_m = _ALLOWED_STEP_SIGMAS * math.hypot(values[GPS_EPH_M], values[GPS_EPV_M]) + _ALLOWED_STEP_M
+        return math.hypot(north_m - mean[0], east_m - mean[1], up_m + mean[2]) <= allowed_m
+
+    def silent(self, time_us: int) -> None:
+        """No sample lately: the receiver is not good."""
+        if time_us - self._newest_us > 2_000_000:
+            self.good = False

@@ -1,0 +1,160 @@
+"""Tuning of the navigation filter."""
+
+import math
+from dataclasses import dataclass, fields
+
+_MAY_BE_ZERO = frozenset(
+    {
+        "barometer_lag_s",
+        "gyro_scale_error",
+        "gyro_cross_axis_error",
+        "rangefinder_noise_fraction",
+        "gps_check_time_s",
+        "magnetometer_bias_walk_gauss_per_sqrt_s",
+        "barometer_offset_walk_m_per_sqrt_s",
+        "terrain_walk_m_per_sqrt_s",
+        "terrain_gradient",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NavigationParameters:
+    """What the filter believes about its sensors, and when it trusts them.
+
+    The noise figures are tuned values, as EKF2_* (PX4) and EK3_* (ArduPilot) are: they are set to fit the
+    class of sensors on the vehicle, from data sheets and Allan variances; nothing is read from the simulator.
+    Gates are in standard deviations of the innovation. Times and checks follow PX4 1.16's EKF2 where not said
+    otherwise.
+
+    Attributes:
+        covariance_rate_hz: rate of covariance prediction and measurement updates; divides the physics rate.
+        gyro_noise_rad_s_sqrt_hz: angular random walk (EKF2_GYR_NOISE is its discrete counterpart).
+        gyro_bias_rad_s, gyro_bias_tau_s: first-order Gauss-Markov bias: 1-sigma (turn-on bias and wandering
+            together) and correlation time, long enough that 2 sigma^2 / tau is the wandering's random walk.
+        gyro_scale_error, gyro_cross_axis_error: 1-sigma, fractions; they add uncertainty per angle turned.
+        accel_noise_m_s2_sqrt_hz, accel_bias_m_s2, accel_bias_tau_s: as for the gyro; the bias includes what
+            scale and cross-axis errors make of gravity.
+        gps_position_noise_m: white part of the GPS position error, 1-sigma, (horizontal, vertical).
+        gps_position_walk_m, gps_position_tau_s: its Gauss-Markov part, (horizontal, vertical), and
+            correlation time.
+        gps_velocity_noise_m_s: 1-sigma of the GPS velocity, (north, east, down).
+        gps_nominal_speed_accuracy_m_s: what the receiver reports in good conditions; when it reports worse,
+            the velocity noise grows in proportion. What a reported position accuracy exceeds the white part
+            by is
+            taken as correlated: atmosphere and multipath wander slowly.
+        gps_required_satellites, gps_required_eph_m, gps_required_epv_m, gps_required_speed_accuracy_m_s,
+            gps_required_hdop: quality checks before use (EKF2_REQ_NSATS, _EPH, _EPV, _SACC, _PDOP).
+        gps_check_time_s: how long the checks must have passed before GPS is taken into use (EKF2_REQ_GPS_H).
+        gps_gate, gps_velocity_gate, barometer_gate, magnetometer_gate, rangefinder_gate: innovation gates.
+        gps_timeout_s: GPS refused for this long although it is good: the filter resets to it (7 s).
+        no_aid_timeout_s: without horizontal aiding for this long, position and velocity are no longer valid
+            (EKF2_NOAID_TOUT).
+        height_timeout_s: the same for heights.
+        barometer_noise_m: white noise of the pressure altitude.
+        barometer_lag_s: first-order lag of the barometer, taken as a delay (EKF2_BARO_DELAY).
+        barometer_offset_walk_m_per_sqrt_s: random walk of the offset between pressure altitude and height.
+        magnetometer_noise_gauss: white noise of one axis.
+        magnetometer_bias_initial_gauss: 1-sigma of the hard iron that calibration left.
+        magnetometer_bias_walk_gauss_per_sqrt_s: its random walk.
+        magnetometer_timeout_s: refused or missing for this long: no longer in use.
+        mag_ned_gauss: Earth's field to expect, NED. None: from the World Magnetic Model at the filter's
+            origin.
+        magnetic_year: decimal year for the World Magnetic Model.
+        rangefinder_noise_m, rangefinder_noise_fraction: 1-sigma, absolute and per metre.
+        rangefinder_max_tilt_rad: the rangefinder isn't used beyond this tilt (RNG_SENS_TILT).
+        terrain_walk_m_per_sqrt_s: random walk of the terrain's height (EKF2_TERR_NOISE: 5 m/s).
+        terrain_gradient: growth of the terrain's uncertainty per distance flown (EKF2_TERR_GRAD).
+        terrain_timeout_s: height above ground is not valid without a measurement for this long.
+        ground_clearance_m: height of the centre of gravity above ground when landed (EKF2_MIN_RNG).
+        no_aid_noise_m: 1-sigma of the held position without horizontal aiding in flight (EKF2_NOAID_NOISE).
+        at_rest_noise_m: the same when the vehicle is at rest.
+        zero_velocity_noise_m_s: 1-sigma of the zero-velocity measurement when at rest.
+        zero_rate_noise_rad_s: 1-sigma of the mean-rate measurement when at rest.
+        alignment_time_s: length of the averages the initial attitude comes from.
+        alignment_tilt_rad, alignment_yaw_rad: prior 1-sigma of tilt and yaw before the first updates.
+        imu_timeout_s: without a valid IMU sample for this long the attitude is no longer valid.
+        gyro_range_rad_s, accel_range_m_s2: samples beyond are garbage.
+        history_s: how far back measurements can be delayed.
+    """
+
+    covariance_rate_hz: int = 50
+    gyro_noise_rad_s_sqrt_hz: float = 2.5e-4
+    gyro_bias_rad_s: float = 1.1e-3
+    gyro_bias_tau_s: float = 16000.0
+    gyro_scale_error: float = 0.0033
+    gyro_cross_axis_error: float = 0.001
+    accel_noise_m_s2_sqrt_hz: float = 1.8e-3
+    accel_bias_m_s2: float = 0.025
+    accel_bias_tau_s: float = 40000.0
+    gps_position_noise_m: tuple[float, float] = (0.2, 0.5)
+    gps_position_walk_m: tuple[float, float] = (0.12, 0.25)
+    gps_position_tau_s: float = 100.0
+    gps_velocity_noise_m_s: tuple[float, float, float] = (0.06, 0.077, 0.158)
+    gps_nominal_speed_accuracy_m_s: float = 0.11
+    gps_required_satellites: int = 6
+    gps_required_eph_m: float = 3.0
+    gps_required_epv_m: float = 5.0
+    gps_required_speed_accuracy_m_s: float = 0.5
+    gps_required_hdop: float = 2.5
+    gps_check_time_s: float = 1.0
+    gps_gate: float = 5.0
+    gps_velocity_gate: float = 5.0
+    gps_timeout_s: float = 7.0
+    no_aid_timeout_s: float = 5.0
+    height_timeout_s: float = 5.0
+    barometer_gate: float = 5.0
+    barometer_noise_m: float = 0.11
+    barometer_lag_s: float = 0.02
+    barometer_offset_walk_m_per_sqrt_s: float = 0.02
+    magnetometer_gate: float = 3.0
+    magnetometer_noise_gauss: float = 0.003
+    magnetometer_bias_initial_gauss: float = 0.0035
+    magnetometer_bias_walk_gauss_per_sqrt_s: float = 1.0e-4
+    magnetometer_timeout_s: float = 5.0
+    mag_ned_gauss: tuple[float, float, float] | None = None
+    magnetic_year: float = 2026.0
+    rangefinder_gate: float = 5.0
+    rangefinder_noise_m: float = 0.03
+    rangefinder_noise_fraction: float = 0.005
+    rangefinder_max_tilt_rad: float = 0.7
+    terrain_walk_m_per_sqrt_s: float = 0.1
+    terrain_gradient: float = 0.5
+    terrain_timeout_s: float = 5.0
+    ground_clearance_m: float = 0.1
+    no_aid_noise_m: float = 10.0
+    at_rest_noise_m: float = 0.5
+    zero_velocity_noise_m_s: float = 0.05
+    zero_rate_noise_rad_s: float = 1.0e-3
+    alignment_time_s: float = 0.5
+    alignment_tilt_rad: float = 0.1
+    alignment_yaw_rad: float = 0.5
+    imu_timeout_s: float = 0.2
+    gyro_range_rad_s: float = 60.0
+    accel_range_m_s2: float = 400.0
+    history_s: float = 0.5
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if value is None:
+                continue
+            numbers = value if isinstance(value, tuple) else (value,)
+            if field.name == "mag_ned_gauss":
+                if not all(math.isfinite(number) for number in numbers) or math.hypot(*numbers) < 0.05:
+                    raise ValueError(
+                        f"mag_ned_gauss {value} is not a field of the Earth (0.2 to 0.7 gauss), NED"
+                    )
+                continue
+            for number in numbers:
+                if (
+                    not math.isfinite(number)
+                    or number < 0.0
+                    or (number == 0.0 and field.name not in _MAY_BE_ZERO)
+                ):
+                    accepted = "zero or positive" if field.name in _MAY_BE_ZERO else "positive"
+                    raise ValueError(
+                        f"{field.name} {value} is not accepted: it must be finite and {accepted}"
+                    )
+        if self.history_s > 10.0:
+            raise ValueError(f"history_s {self.history_s} is too long: at most 10 s")

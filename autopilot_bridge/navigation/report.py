@@ -1,0 +1,98 @@
+"""Health from the times of the last updates and from the covariance."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.navigation.solution import Solution
+from autopilot_bridge.navigation.states import ATT, POS, SAMPLE_AGE_S, VEL
+
+_IN_USE_US: Final = 1_000_000
+_MAX_TILT_SIGMA_RAD: Final = math.radians(10.0)
+_REFUSED_US: Final = 1_000_000  # both height sensors refused for this long: the accelerometer is suspected
+
+
+class Clocks:
+    """Times of the last accepted updates, microseconds since boot; -1 for never."""
+
+    __slots__ = (
+        "aligned_us",
+        "baro_us",
+        "gps_height_us",
+        "gps_position_us",
+        "gps_us",
+        "height_held",
+        "height_us",
+        "horizontal_aid_us",
+        "mag_refused_us",
+        "mag_us",
+    )
+
+    def __init__(self) -> None:
+        self.aligned_us = -1
+        self.baro_us = -1
+        self.gps_height_us = -1
+        self.gps_position_us = -1
+        self.gps_us = -1
+        self.height_us = -1
+        self.horizontal_aid_us = -1
+        self.mag_us = -1
+        self.mag_refused_us = -1
+        self.height_held = False
+
+
+def report(
+    health: NavigationHealth,
+    parameters: NavigationParameters,
+    solution: Solution,
+    clocks: Clocks,
+    time_us: int,
+    *,
+    held: bool,
+    at_rest: bool,
+) -> None:
+    """Write `health` (what GPS quality and the rangefinder say excepted)."""
+    p, obs = solution.p, solution.obs
+    horizontal_var = p[POS, POS] + p[POS + 1, POS + 1]
+    tilt_var = p[ATT, ATT] + p[ATT + 1, ATT + 1]
+    health.position_horizontal_accuracy_m = math.sqrt(horizontal_var)
+    health.position_vertical_accuracy_m = math.sqrt(p[POS + 2, POS + 2])
+    health.velocity_accuracy_m_s = math.sqrt(p[VEL, VEL] + p[VEL + 1, VEL + 1])
+    health.attitude_accuracy_rad = (math.sqrt(tilt_var), math.sqrt(p[ATT + 2, ATT + 2]))
+
+    def within(since_us: int, limit_us: float) -> bool:
+        return since_us >= 0 and time_us - since_us <= limit_us
+
+    imu_alive = solution.core[SAMPLE_AGE_S] <= parameters.imu_timeout_s
+    aided = not held and within(clocks.horizontal_aid_us, parameters.no_aid_timeout_s * 1e6)
+    height = within(clocks.height_us, parameters.height_timeout_s * 1e6)
+    health.attitude = bool(imu_alive and tilt_var < _MAX_TILT_SIGMA_RAD**2)
+    health.constant_position = held
+    health.position_horizontal_relative = aided and bool(imu_alive)
+    health.position_horizontal_absolute = health.position_horizontal_relative
+    health.velocity_horizontal = health.position_horizontal_relative or (held and at_rest)
+    health.position_vertical_absolute = height and bool(imu_alive)
+    health.velocity_vertical = health.position_vertical_absolute
+    ready = health.gps_quality and health.yaw_aligned
+    health.predicted_position_horizontal_relative = health.position_horizontal_relative or ready
+    health.predicted_position_horizontal_absolute = health.position_horizontal_absolute or ready
+    health.gps_in_use = within(clocks.gps_us, _IN_USE_US)
+    health.barometer_in_use = within(clocks.baro_us, _IN_USE_US)
+    health.magnetometer_in_use = within(clocks.mag_us, parameters.magnetometer_timeout_s * 1e6)
+    health.dead_reckoning = aided and not health.gps_in_use
+    health.time_since_gps_us = time_us - clocks.gps_us if clocks.gps_us >= 0 else -1
+    health.magnetometer_test_ratio = float(obs[f.RATIO_MAG])
+    health.position_vertical_test_ratio = float(
+        obs[f.RATIO_BARO] if clocks.baro_us >= 0 and health.barometer_in_use else obs[f.RATIO_GPS_HEIGHT]
+    )
+    refused = (
+        obs[f.RATIO_BARO] > 1.0
+        and obs[f.RATIO_GPS_HEIGHT] > 1.0
+        and not within(clocks.height_us, _REFUSED_US)
+        and clocks.height_us >= 0
+    )
+    health.accel_error = bool(refused or not imu_alive)
+    if not aided:
+        health.gps_glitch = False if not health.gps_quality else health.gps_glitch

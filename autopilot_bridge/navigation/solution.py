@@ -1,0 +1,250 @@
+"""The filter's arrays, and the ways its estimate may jump."""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.navigation import covariance as cov
+from autopilot_bridge.navigation.earth import STANDARD_GRAVITY_M_S2, earth_rate_ned_rad_s, normal_gravity_m_s2
+from autopilot_bridge.navigation.fusion import OBS_SIZE
+from autopilot_bridge.navigation.mechanisation import refresh_rotation
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.navigation.states import (
+    ACCEL,
+    ACCEL_BIAS,
+    ATT,
+    BARO_OFFSET,
+    CORE_SIZE,
+    CORRECTION_POS,
+    CORRECTION_VEL,
+    EARTH_RATE,
+    ERROR_SIZE,
+    FORCE_NED,
+    GPS_ERROR,
+    GRAVITY,
+    GYRO_BIAS,
+    HISTORY_COLUMNS,
+    HISTORY_POS,
+    HISTORY_Q,
+    HISTORY_VEL,
+    MAG_BIAS,
+    POS,
+    TERRAIN_DOWN,
+    VEL,
+    WORK_SIZE,
+    X_BARO_OFFSET,
+    X_GPS_ERROR,
+    X_MAG_BIAS,
+    X_POS,
+    Q,
+    R,
+)
+from flightsim.rotations import multiply, quaternion_from_euler
+
+Array = NDArray[np.float64]
+
+UNKNOWN_POSITION_M: Final = 100.0
+UNKNOWN_VELOCITY_M_S: Final = 10.0
+UNKNOWN_HEIGHT_M: Final = 50.0
+
+
+class Solution:
+    """Nominal state, covariance and history, with the jumps: align, reset position, velocity, height, yaw.
+
+    Attributes:
+        core, p, history, work, obs, process: arrays of `states.py`, `covariance.py` and `fusion.py`.
+        row: of the history's newest entry; rows: how many there are; steps: how many have been written.
+        steps_per_s: physics rate.
+    """
+
+    __slots__ = (
+        "_parameters",
+        "core",
+        "gps_error_var",
+        "history",
+        "obs",
+        "p",
+        "period_us",
+        "process",
+        "row",
+        "rows",
+        "steps",
+        "work",
+    )
+
+    def __init__(self, parameters: NavigationParameters, *, physics_rate_hz: int) -> None:
+        self._parameters = parameters
+        self.period_us = 1_000_000 // physics_rate_hz
+        self.rows = (
+            math.ceil(parameters.history_s * physics_rate_hz)
+            + physics_rate_hz // parameters.covariance_rate_hz
+        )
+        self.core: Array = np.zeros(CORE_SIZE)
+        self.p: Array = np.zeros((ERROR_SIZE, ERROR_SIZE))
+        self.history: Array = np.zeros((self.rows, HISTORY_COLUMNS))
+        self.work: Array = np.zeros(WORK_SIZE)
+        self.obs: Array = np.zeros(OBS_SIZE)
+        self.process: Array = process_from(parameters)
+        self.core[GRAVITY] = STANDARD_GRAVITY_M_S2
+        horizontal, vertical = parameters.gps_position_walk_m
+        self.gps_error_var = (horizontal**2, horizontal**2, vertical**2)
+        self.clear()
+
+    def clear(self) -> None:
+        """Nothing is known, except where on Earth gravity and rotation were found."""
+        gravity, rate = self.core[GRAVITY], self.core[EARTH_RATE : EARTH_RATE + 3].copy()
+        self.core[:] = 0.0
+        self.core[Q] = 1.0
+        self.core[GRAVITY] = gravity
+        self.core[EARTH_RATE : EARTH_RATE + 3] = rate
+        self.core[TERRAIN_DOWN] = math.nan
+        refresh_rotation(self.core)
+        self.p[:] = 0.0
+        self.history[:] = 0.0
+        self.work[:] = 0.0
+        self.row = 0
+        self.steps = 0
+
+    def set_latitude(self, lat_deg: float, alt_m: float) -> None:
+        """Gravity and Earth's rotation of the place."""
+        self.core[GRAVITY] = normal_gravity_m_s2(lat_deg, alt_m)
+        self.core[EARTH_RATE : EARTH_RATE + 3] = earth_rate_ned_rad_s(lat_deg)
+
+    def set_gps_accuracy(self, eph_m: float, epv_m: float) -> None:
+        """What the receiver reports beyond its white noise is the slow error's standard deviation."""
+        p = self._parameters
+        horizontal = max(eph_m**2 - p.gps_position_noise_m[0] ** 2, p.gps_position_walk_m[0] ** 2)
+        vertical = max(epv_m**2 - p.gps_position_noise_m[1] ** 2, p.gps_position_walk_m[1] ** 2)
+        self.gps_error_var = (horizontal, horizontal, vertical)
+        self.process[cov.GPS_VAR_HORIZONTAL] = horizontal
+        self.process[cov.GPS_VAR_VERTICAL] = vertical
+
+    def row_at(self, measured_us: int, time_us: int) -> int:
+        """History row of a past time; -1 when it's older than the history."""
+        back = max(0, (time_us - measured_us + self.period_us // 2) // self.period_us)
+        if back >= min(self.rows, self.steps):
+            return -1
+        return (self.row - back) % self.rows
+
+    def past_position(self, row: int) -> Array:
+        """Position at a row of the history, as seen now."""
+        return (
+            self.history[row, HISTORY_POS : HISTORY_POS + 3] + self.core[CORRECTION_POS : CORRECTION_POS + 3]
+        )
+
+    def past_velocity(self, row: int) -> Array:
+        """Velocity at a row of the history, as seen now."""
+        return (
+            self.history[row, HISTORY_VEL : HISTORY_VEL + 3] + self.core[CORRECTION_VEL : CORRECTION_VEL + 3]
+        )
+
+    def align(self, roll_rad: float, pitch_rad: float, yaw_rad: float, *, yaw_sigma_rad: float) -> None:
+        """Start at rest at the frame's origin with this attitude. Tilt and biases get their correlation from
+        the updates that follow, so their priors are wide and independent here."""
+        quaternion_from_euler(roll_rad, pitch_rad, yaw_rad, self.core[Q : Q + 4])
+        self.refresh()
+        p = self._parameters
+        for i in range(3):
+            cov.forget(self.p, VEL + i, 0.5**2)
+            cov.forget(self.p, GYRO_BIAS + i, p.gyro_bias_rad_s**2)
+            cov.forget(self.p, GPS_ERROR + i, self.gps_error_var[i])
+            cov.forget(self.p, POS + i, p.at_rest_noise_m**2 if i < 2 else 0.1**2)
+        cov.forget(self.p, BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
+        self.widen_attitude(yaw_sigma_rad)
+
+    def widen_attitude(self, yaw_sigma_rad: float) -> None:
+        """Attitude, accelerometer and magnetometer bias are as uncertain again as at alignment."""
+        p = self._parameters
+        for i in range(3):
+            cov.forget(self.p, ATT + i, p.alignment_tilt_rad**2 if i < 2 else yaw_sigma_rad**2)
+            cov.forget(self.p, ACCEL_BIAS + i, p.accel_bias_m_s2**2)
+        self.forget_mag_bias()
+        self.core[X_MAG_BIAS : X_MAG_BIAS + 3] = 0.0
+
+    def forget_mag_bias(self) -> None:
+        """The magnetometer's bias is as uncertain as at alignment."""
+        for i in range(3):
+            cov.forget(self.p, MAG_BIAS + i, self._parameters.magnetometer_bias_initial_gauss**2)
+
+    def refresh(self) -> None:
+        """Bring what follows from the quaternion up to date."""
+        core = self.core
+        refresh_rotation(core)
+        rotation = core[R : R + 9].reshape(3, 3)
+        core[FORCE_NED : FORCE_NED + 3] = rotation @ (
+            core[ACCEL : ACCEL + 3] - core[ACCEL_BIAS + 1 : ACCEL_BIAS + 4]
+        )
+
+    def turn_yaw(self, angle_rad: float, *, yaw_sigma_rad: float) -> None:
+        """Rotate the attitude, present and past, about the vertical; widen the attitude."""
+        turn: Array = np.array([math.cos(0.5 * angle_rad), 0.0, 0.0, math.sin(0.5 * angle_rad)])
+        turned: Array = np.zeros(4)
+        multiply(turn, self.core[Q : Q + 4], turned)
+        self.core[Q : Q + 4] = turned
+        for row in range(self.rows):
+            multiply(turn, self.history[row, HISTORY_Q : HISTORY_Q + 4], turned)
+            self.history[row, HISTORY_Q : HISTORY_Q + 4] = turned
+        self.refresh()
+        self.widen_attitude(yaw_sigma_rad)
+
+    def move_horizontally(self, north_m: float, east_m: float) -> None:
+        """Position jumps and is unknown around its new value, as is the GPS error."""
+        cov.shift(self.core, POS, north_m, east_m, 0.0)
+        for i in range(2):
+            cov.forget(self.p, POS + i, UNKNOWN_POSITION_M**2)
+            cov.forget(self.p, GPS_ERROR + i, self.gps_error_var[i])
+            self.core[X_GPS_ERROR + i] = 0.0
+
+    def change_velocity(self, north_m_s: float, east_m_s: float, *, sigma_m_s: float) -> None:
+        """Horizontal velocity jumps, with a new variance."""
+        cov.shift(self.core, VEL, north_m_s, east_m_s, 0.0)
+        cov.forget(self.p, VEL, sigma_m_s**2)
+        cov.forget(self.p, VEL + 1, sigma_m_s**2)
+
+    def move_vertically(self, down_m: float, *, with_baro: bool) -> None:
+        """Height jumps and is unknown; `with_baro`: the barometer's offset jumps along and stays known to
+        it."""
+        p = self.p
+        cov.shift(self.core, POS, 0.0, 0.0, down_m)
+        if with_baro:
+            self.core[X_BARO_OFFSET] += down_m
+            for i in (POS + 2, BARO_OFFSET):
+                for j in (POS + 2, BARO_OFFSET):
+                    p[i, j] += UNKNOWN_HEIGHT_M**2
+        else:
+            cov.forget(p, POS + 2, UNKNOWN_HEIGHT_M**2)
+
+    def forget_gps_height_error(self) -> None:
+        """The slow error of GPS heights is unknown."""
+        cov.forget(self.p, GPS_ERROR + 2, self.gps_error_var[2])
+        self.core[X_GPS_ERROR + 2] = 0.0
+
+    def set_baro_offset(self, offset_m: float) -> None:
+        """The barometer's offset is unknown around this value."""
+        self.core[X_BARO_OFFSET] = offset_m
+        cov.forget(self.p, BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
+
+    def position(self) -> tuple[float, float, float]:
+        """Present position, NED, m."""
+        return (float(self.core[X_POS]), float(self.core[X_POS + 1]), float(self.core[X_POS + 2]))
+
+
+def process_from(p: NavigationParameters) -> Array:
+    """The process noise of `covariance.predict`."""
+    out: Array = np.zeros(cov.PROCESS_SIZE)
+    out[cov.NOISE_ATT] = p.gyro_noise_rad_s_sqrt_hz**2
+    out[cov.NOISE_VEL] = p.accel_noise_m_s2_sqrt_hz**2
+    out[cov.TURN_SCALE] = p.gyro_scale_error**2
+    out[cov.TURN_CROSS] = p.gyro_cross_axis_error**2
+    out[cov.GYRO_BIAS_VAR] = p.gyro_bias_rad_s**2
+    out[cov.GYRO_BIAS_TAU] = p.gyro_bias_tau_s
+    out[cov.ACCEL_BIAS_VAR] = p.accel_bias_m_s2**2
+    out[cov.ACCEL_BIAS_TAU] = p.accel_bias_tau_s
+    out[cov.GPS_VAR_HORIZONTAL] = p.gps_position_walk_m[0] ** 2
+    out[cov.GPS_VAR_VERTICAL] = p.gps_position_walk_m[1] ** 2
+    out[cov.GPS_TAU] = p.gps_position_tau_s
+    out[cov.BARO_WALK] = p.barometer_offset_walk_m_per_sqrt_s**2
+    out[cov.MAG_WALK] = p.magnetometer_bias_walk_gauss_per_sqrt_s**2
+    return out

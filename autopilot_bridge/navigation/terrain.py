@@ -1,0 +1,86 @@
+"""Height of the ground below: a scalar Kalman filter on the rangefinder."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.navigation.parameters import NavigationParameters
+
+_RESET_REFUSED_US: Final = 1_000_000  # refused for this long: the ground has another height here
+
+
+class TerrainEstimator:
+    """Down position of the terrain as a random walk that also grows with the distance flown.
+
+    Attributes:
+        down_m: of the ground, in the filter's frame; NaN before anything is known.
+        test_ratio: of the newest range.
+        in_use: the newest range was accepted.
+    """
+
+    __slots__ = ("_fused_us", "_parameters", "_predicted_us", "_variance", "down_m", "in_use", "test_ratio")
+
+    def __init__(self, parameters: NavigationParameters) -> None:
+        self._parameters = parameters
+        self.restart()
+
+    def restart(self) -> None:
+        """Nothing is known of the ground."""
+        self.down_m = math.nan
+        self.test_ratio = 0.0
+        self.in_use = False
+        self._variance = math.inf
+        self._fused_us = -1
+        self._predicted_us = -1
+
+    def valid(self, time_us: int) -> bool:
+        """A measurement has been taken in within the time-out."""
+        timeout_us = round(self._parameters.terrain_timeout_s * 1e6)
+        return self._fused_us >= 0 and time_us - self._fused_us <= timeout_us
+
+    def shift(self, down_m: float) -> None:
+        """The frame's height has jumped: the ground moves along."""
+        self.down_m += down_m
+
+    def predict(self, time_us: int, speed_m_s: float) -> None:
+        """Let the uncertainty grow up to `time_us` at a horizontal speed; give up what has become too old."""
+        p = self._parameters
+        elapsed_s = (time_us - self._predicted_us) * 1e-6 if self._predicted_us >= 0 else 0.0
+        self._predicted_us = time_us
+        self._variance += elapsed_s * (
+            p.terrain_walk_m_per_sqrt_s**2 + (p.terrain_gradient * speed_m_s) ** 2 * 0.1
+        )
+        if not self.valid(time_us):
+            self.down_m = math.nan
+            self.in_use = False
+
+    def landed(self, time_us: int, down_m: float) -> None:
+        """The vehicle stands on the ground at `down_m`."""
+        self.down_m = down_m + self._parameters.ground_clearance_m
+        self._variance = self._parameters.rangefinder_noise_m**2
+        self._fused_us = time_us
+
+    def fuse(self, time_us: int, distance_m: float, cos_tilt: float, down_m: float) -> None:
+        """A range along the body's down axis, taken at height `down_m`."""
+        p = self._parameters
+        if not (math.isfinite(distance_m) and distance_m > 0.0) or cos_tilt < math.cos(
+            p.rangefinder_max_tilt_rad
+        ):
+            self.in_use = False
+            return
+        measured = down_m + distance_m * cos_tilt
+        noise = p.rangefinder_noise_m**2 + (p.rangefinder_noise_fraction * distance_m) ** 2
+        if math.isnan(self.down_m):
+            self.down_m, self._variance, self._fused_us = measured, noise, time_us
+            self.in_use, self.test_ratio = True, 0.0
+            return
+        s = self._variance + noise
+        innovation = measured - self.down_m
+        self.test_ratio = abs(innovation) / (p.rangefinder_gate * math.sqrt(s))
+        self.in_use = self.test_ratio <= 1.0
+        if self.in_use:
+            gain = self._variance / s
+            self.down_m += gain * innovation
+            self._variance *= 1.0 - gain
+            self._fused_us = time_us
+        elif time_us - self._fused_us > _RESET_REFUSED_US:
+            self.down_m, self._variance, self._fused_us = measured, noise, time_us
