@@ -55,7 +55,7 @@ class ImuParameters:
         rate_hz: samples per second.
         latency_s: zero: PX4 and ArduPilot read the FIFO within a control step.
         gyro_noise_density_rad_s_sqrt_hz: 0.014 deg/s/sqrt(Hz). White noise per sample is
-            density * sqrt(rate), the convention of continuous-time IMU models (angle random walk, rad/sqrt(s)).
+            density * sqrt(rate), the convention of angle random walk in rad/sqrt(s).
         gyro_bias_instability_rad_s: of the wandering bias; 0.015 deg/s/K (datasheet TCO) times 1 K.
         gyro_bias_time_constant_s: PX4's Gazebo IMU plugin.
         gyro_turn_on_bias_rad_s: left after the calibration at boot, about 0.06 deg/s.

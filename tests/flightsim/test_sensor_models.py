@@ -140,6 +140,29 @@ def test_imu_bias_wanders_as_gauss_markov(channels: slice, prefix: str, units: s
         assert measured == pytest.approx(expected, rel=5.0 * math.sqrt(3.0 / (3.0 * duration_s / tau_s)))
 
 
+@pytest.mark.parametrize("channel", range(6))
+def test_imu_white_and_wandering_parts_are_independent(channel: int) -> None:
+    """First differences of white w and Gauss-Markov d add up only when the two share no random numbers."""
+    sigma, time_constant_s = 1e-2, 0.02
+    parameters = ImuParameters(
+        **(
+            QUIET_IMU
+            | {
+                "rate_hz": 50,
+                "gyro_noise_density_rad_s_sqrt_hz": sigma / math.sqrt(50),
+                "gyro_bias_instability_rad_s": sigma,
+                "gyro_bias_time_constant_s": time_constant_s,
+                "accel_noise_density_m_s2_sqrt_hz": sigma / math.sqrt(50),
+                "accel_bias_instability_m_s2": sigma,
+                "accel_bias_time_constant_s": time_constant_s,
+            }
+        )
+    )
+    steps = np.diff(record(parameters, still_truth(), 40_000)[:, channel])
+    expected = 2.0 * sigma**2 + 2.0 * sigma**2 * (1.0 - math.exp(-1.0))
+    assert np.var(steps) == pytest.approx(expected, rel=0.05)
+
+
 def test_imu_specimens_spread_as_told() -> None:
     """Turn-on bias, scale and cross-axis errors over many specimens."""
     truth = still_truth()
@@ -220,6 +243,14 @@ def test_barometer_drifts_slowly() -> None:
     assert np.mean(drift_pa**2) == pytest.approx(parameters.drift_pa**2, rel=5.0 * math.sqrt(2.0 / 2_500))
     correlation = np.mean(drift_pa[20:] * drift_pa[:-20]) / np.mean(drift_pa**2)
     assert correlation == pytest.approx(math.exp(-1.0), abs=0.05)
+
+
+def test_barometer_noise_and_drift_are_independent() -> None:
+    parameters = BarometerParameters(
+        noise_pa=3.0, quantum_pa=0.0, turn_on_bias_pa=0.0, drift_pa=3.0, drift_time_constant_s=0.02
+    )
+    steps_pa = np.diff(record(parameters, still_truth(), 40_000)[:, i.BARO_PRESSURE_PA])
+    assert np.var(steps_pa) == pytest.approx(18.0 + 18.0 * (1.0 - math.exp(-1.0)), rel=0.05)
 
 
 def test_barometer_specimens_differ_by_turn_on_bias() -> None:
