@@ -101,11 +101,11 @@ class Connection:
         self._watched = list(self._link.filenos())
         for fileno in self._watched:
             loop.add_reader(fileno, self._drain)
+        self._drain()
         if hasattr(self._link, "on_receive"):
-            self._link.on_receive = self._drain
+            self._link.on_receive = lambda data: self._on_bytes(None, data)
         else:
             self._tasks.append(loop.create_task(self._keep_looking_after_link()))
-        self._drain()
         self._tasks.append(loop.create_task(self._keep_sending_heartbeats()))
 
     async def close(self) -> None:
@@ -129,12 +129,15 @@ class Connection:
 
     def _drain(self) -> None:
         for peer, data in self._link.receive():
-            parser = self.parsers.get(peer)
-            if parser is None:
-                parser = self.parsers[peer] = FrameParser()
-            frames = parser.feed(data)
-            if frames:
-                self._on_frames(frames)
+            self._on_bytes(peer, data)
+
+    def _on_bytes(self, peer: object, data: bytes) -> None:
+        parser = self.parsers.get(peer)
+        if parser is None:
+            parser = self.parsers[peer] = FrameParser()
+        frames = parser.feed(data)
+        if frames:
+            self._on_frames(frames)
 
     def _on_frames(self, frames: list[Frame]) -> None:
         time_us = self.clock.time_us

@@ -34,7 +34,17 @@ class ModeCommand:
 
 
 class Adapter(Protocol):
-    """One autopilot firmware's ways. Stateless: the state is the vehicle's."""
+    """One autopilot firmware's ways. Stateless: the state is the vehicle's.
+
+    Attributes:
+        name: "px4" or "ardupilot".
+        modes: HEARTBEAT.custom_mode of each mode.
+        stream_rates_hz: telemetry a mission needs.
+        bytewise_parameters: integers travel as bit patterns in PARAM_VALUE (PX4), not as numbers.
+        setpoints_before_guided: setpoints must flow before the guided mode can be entered.
+        first_mission_item_is_home: item 0 of a mission is home, whatever is uploaded there.
+        unset: what stands in a command or item parameter that is not set.
+    """
 
     name: str
     modes: Mapping[Mode, int]
@@ -42,6 +52,7 @@ class Adapter(Protocol):
     bytewise_parameters: bool
     setpoints_before_guided: bool
     first_mission_item_is_home: bool
+    unset: float
 
     def mode_name(self, custom_mode: int) -> str:
         """The firmware's own name of a mode."""

@@ -51,6 +51,7 @@ class ArduCopter:
     bytewise_parameters = False
     setpoints_before_guided = False
     first_mission_item_is_home = True
+    unset = 0.0  # NaN is refused
 
     def mode_name(self, custom_mode: int) -> str:
         known = 0 <= custom_mode < len(_NAMES) and _NAMES[custom_mode] != "?"

@@ -12,6 +12,7 @@ from autopilot_bridge.clock import Clock
 from autopilot_bridge.mavlink import MAVLinkMessage, decode, dialect
 from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.errors import VehicleTimeout
+from missions.notes import FlightNotes
 from missions.telemetry import SOURCES, StatusText, StatusTextAssembler
 from missions.vehicle.adapter import Adapter
 from missions.vehicle.ardupilot import ArduCopter
@@ -35,11 +36,13 @@ class VehicleView:
 
     Attributes:
         connection: as given.
+        notes: where a mission notes its phases, its progress and what it commands, for the run's summary.
         status_texts: the newest texts from the autopilot, oldest first.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
         self.connection = connection
+        self.notes = FlightNotes()
         self.status_texts: deque[StatusText] = deque(maxlen=_TEXTS_KEPT)
         self._system_id = system_id
         self._adapter: Adapter | None = None

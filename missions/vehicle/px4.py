@@ -65,6 +65,7 @@ class Px4:
     bytewise_parameters = True
     setpoints_before_guided = True
     first_mission_item_is_home = False
+    unset = math.nan
 
     def mode_name(self, custom_mode: int) -> str:
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24

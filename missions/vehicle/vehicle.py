@@ -309,7 +309,7 @@ class Vehicle(VehicleView):
         await self.command_int(
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL,
-            (-1.0, 1.0, 0.0, math.nan if self.adapter.bytewise_parameters else 0.0),
+            (-1.0, 1.0, 0.0, self.adapter.unset),
             round(target.lat_deg * 1e7),
             round(target.lon_deg * 1e7),
             target.alt_m,

@@ -1,0 +1,231 @@
+"""The missions that come with the package, and a user's own."""
+
+import importlib.util
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final, Protocol
+
+from missions.errors import PlanError
+from missions.options import FlightOptions
+from missions.patterns import (
+    Curve,
+    Lap,
+    Lissajous,
+    Polyline,
+    expanding_square,
+    named_lissajous,
+    parallel_sweep,
+    sector,
+)
+from missions.patterns.lissajous import reduced_ratio
+from missions.planning.limits import VehicleLimits
+from missions.vehicle.vehicle import Vehicle
+
+
+class Mission(Protocol):
+    """Something that can be flown.
+
+    Attributes:
+        name: for people and file names.
+    """
+
+    name: str
+
+    def check(self, options: FlightOptions) -> None:
+        """Refuse, with a PlanError, what can't be flown; before anything is started."""
+        ...
+
+    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
+        """Fly one vehicle, which is ready to arm, from the ground back to the ground."""
+        ...
+
+
+CurveMaker = Callable[[FlightOptions], Curve]
+
+
+class PatternMission:
+    """A mission that flies one search pattern.
+
+    Args:
+        name: for people and file names.
+        make_curve: the pattern for some options.
+    """
+
+    def __init__(self, name: str, make_curve: CurveMaker) -> None:
+        self.name = name
+        self._make_curve = make_curve
+
+    def check(self, options: FlightOptions) -> None:
+        """Plan with the widest limits of any vehicle; the vehicle's own come into it when it is known."""
+        from missions.pattern_flight import plan
+
+        for index in range(options.vehicles):
+            own = replace(options, index=index)
+            plan(self.curve(own), own, VehicleLimits(speed_m_s=20.0, acceleration_m_s2=5.0))
+
+    def curve(self, options: FlightOptions) -> Curve:
+        """The pattern around its centre, as often as asked."""
+        return self._make_curve(options)
+
+    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
+        from missions.pattern_flight import fly_pattern
+
+        await fly_pattern(vehicle, options, self.curve(options))
+
+
+def _passes(options: FlightOptions, one_pass_m: float) -> int:
+    """Whole passes for `--periods`, or enough of them for the search time."""
+    if options.search_time_s is not None:
+        return max(1, math.ceil(options.search_time_s * options.speed_m_s / one_pass_m))
+    if not float(options.periods).is_integer():
+        raise PlanError(f"--periods {options.periods:g}: this pattern is flown in whole passes")
+    return int(options.periods)
+
+
+def lissajous_curve(options: FlightOptions) -> Curve:
+    """The Lissajous pattern the options describe, in laps; a team's vehicles start evenly spread over it."""
+    if options.ratio is None:
+        shape = named_lissajous(options.pattern, width_m=options.width_m, height_m=options.height_m)
+    else:
+        ratio_x, ratio_y = reduced_ratio(*options.ratio)
+        shape = Lissajous(
+            amplitude_x_m=0.5 * options.width_m,
+            amplitude_y_m=0.5 * options.height_m,
+            ratio_x=ratio_x,
+            ratio_y=ratio_y,
+            phase_x_rad=0.5 * math.pi,
+        )
+    if options.phase_x_rad is not None:
+        shape = replace(shape, phase_x_rad=options.phase_x_rad)
+    if options.phase_y_rad is not None:
+        shape = replace(shape, phase_y_rad=options.phase_y_rad)
+    if not shape.closed:
+        slower_turns = options.periods
+        if options.search_time_s is not None:
+            slowest_turn_m = 2.0 * min(options.width_m, options.height_m)
+            slower_turns = max(1.0, options.search_time_s * options.speed_m_s / slowest_turn_m)
+        spread = math.tau * options.index / options.vehicles
+        return replace(
+            shape,
+            open_turns=slower_turns,
+            phase_x_rad=shape.phase_x_rad + spread * shape.ratio_x,
+            phase_y_rad=shape.phase_y_rad + spread * shape.ratio_y,
+        )
+    laps = options.periods
+    if options.search_time_s is not None:
+        if options.period_s is not None:
+            laps = math.ceil(options.search_time_s / options.period_s)
+        else:
+            once_m = 2.0 * math.hypot(options.width_m, options.height_m)
+            laps = max(1, math.ceil(options.search_time_s * options.speed_m_s / once_m))
+    return Lap(curve=shape, laps=laps, start=options.index / options.vehicles)
+
+
+def _sector(options: FlightOptions) -> Curve:
+    radius_m = 0.5 * min(options.width_m, options.height_m)
+    heading = options.heading_rad + math.radians(30.0) * options.index / options.vehicles
+    return sector(radius_m=radius_m, heading_rad=heading, passes=_passes(options, 9.0 * max(radius_m, 1e-3)))
+
+
+def _parallel_sweep(options: FlightOptions) -> Curve:
+    def make(passes: int) -> Polyline:
+        return parallel_sweep(
+            width_m=options.width_m,
+            height_m=options.height_m,
+            spacing_m=options.spacing_m,
+            heading_rad=options.heading_rad,
+            passes=passes,
+        )
+
+    whole = make(_passes(options, make(1).length_m))
+    return whole.reversed() if options.index % 2 else whole
+
+
+def _expanding_square(options: FlightOptions) -> Curve:
+    def make(passes: int) -> Polyline:
+        return expanding_square(
+            size_m=min(options.width_m, options.height_m),
+            spacing_m=options.spacing_m,
+            heading_rad=options.heading_rad + math.radians(90.0) * options.index / options.vehicles,
+            passes=passes,
+        )
+
+    return make(_passes(options, make(1).length_m))
+
+
+MISSIONS: Final[Mapping[str, Mission]] = MappingProxyType(
+    {
+        "lissajous": PatternMission("lissajous", lissajous_curve),
+        "sector": PatternMission("sector", _sector),
+        "parallel-sweep": PatternMission("parallel-sweep", _parallel_sweep),
+        "expanding-square": PatternMission("expanding-square", _expanding_square),
+    }
+)
+"""The missions that can be named on the command line."""
+
+
+class ScriptMission:
+    """A user's own mission: a Python file with `async def fly(vehicle, options)`.
+
+    The file may have a class `Mission` instead, made without arguments, with `async def fly(self, vehicle, options)` and, if it
+    likes, `def check(self, options)`, which raises `PlanError`. Each vehicle of a team flies it; `options.index` tells
+    them apart.
+
+    Raises:
+        PlanError: the file can't be read, or has neither.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.name = path.stem
+        module = _load(path)
+        holder: Any = module
+        if not hasattr(module, "fly") and inspect.isclass(getattr(module, "Mission", None)):
+            holder = module.Mission()
+        fly = getattr(holder, "fly", None)
+        if not inspect.iscoroutinefunction(fly):
+            raise PlanError(
+                f"{path} has neither `async def fly(vehicle, options)` nor a class `Mission` with it; add one"
+            )
+        self._fly = fly
+        self._check = getattr(holder, "check", None)
+
+    def check(self, options: FlightOptions) -> None:
+        if self._check is not None:
+            self._check(options)
+
+    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
+        await self._fly(vehicle, options)
+
+
+def _load(path: Path) -> Any:
+    if not path.is_file():
+        raise PlanError(f"mission file {path} does not exist")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise PlanError(f"mission file {path} is not Python; its name must end in .py")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # noqa: BLE001 -- a user's file may fail in any way, and is told where
+        raise PlanError(f"mission file {path} can't be loaded: {type(error).__name__}: {error}") from error
+    return module
+
+
+def find_mission(name: str) -> Mission:
+    """A mission by name, or a user's own by path (anything ending in .py).
+
+    Raises:
+        PlanError: no such mission; lists the known ones.
+    """
+    if name.endswith(".py"):
+        return ScriptMission(Path(name))
+    known = MISSIONS.get(name)
+    if known is None:
+        raise PlanError(
+            f"mission {name!r} is not known; there are {', '.join(MISSIONS)}, or the path of a mission file (.py)"
+        )
+    return known

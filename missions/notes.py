@@ -1,0 +1,76 @@
+"""What a mission tells about its flight while it flies: phases, progress, and what it commanded."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition
+
+PATTERN = "pattern"
+"""Name of the phase that is scored against the commanded path."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CommandedPath:
+    """What the vehicle was asked to fly.
+
+    Attributes:
+        origin: geodetic origin of the local frame: the vehicle's home.
+        points_ned_m: the commanded curve, finely sampled (n, 3).
+        waypoints_ned_m: the waypoints (m, 3); none when flown by setpoints.
+        acceptance_m: radius within which a waypoint counts as reached.
+    """
+
+    origin: GeodeticPosition
+    points_ned_m: NDArray[np.float64]
+    waypoints_ned_m: NDArray[np.float64]
+    acceptance_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Phase:
+    """A named stretch of the flight, in vehicle time."""
+
+    name: str
+    start_us: int
+    end_us: int
+
+
+@dataclass(slots=True)
+class FlightNotes:
+    """Notes of one vehicle's flight; a mission writes them, the run reads them.
+
+    Attributes:
+        phases: finished phases in order.
+        commanded: what it was asked to fly.
+        progress: 0..1 of the pattern.
+        system_id, autopilot: of the vehicle.
+    """
+
+    phases: list[Phase] = field(default_factory=list)
+    commanded: CommandedPath | None = None
+    progress: float = 0.0
+    system_id: int = 0
+    autopilot: str = ""
+    _open: tuple[str, int] | None = None
+
+    @property
+    def current(self) -> str:
+        """Name of the phase that is going on, or ""."""
+        return self._open[0] if self._open else ""
+
+    def begin(self, name: str, time_us: int) -> None:
+        """Begin a phase; ends the one before."""
+        self.end(time_us)
+        self._open = (name, time_us)
+
+    def end(self, time_us: int) -> None:
+        """End the phase that is going on."""
+        if self._open is not None:
+            self.phases.append(Phase(name=self._open[0], start_us=self._open[1], end_us=time_us))
+            self._open = None
+
+    def phase(self, name: str) -> Phase | None:
+        """The first finished phase of a name."""
+        return next((p for p in self.phases if p.name == name), None)

@@ -1,0 +1,89 @@
+"""What a person can choose about a flight."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from missions.errors import PlanError
+
+
+class Via(StrEnum):
+    """How a pattern is commanded."""
+
+    WAYPOINTS = "waypoints"
+    SETPOINTS = "setpoints"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightOptions:
+    """One vehicle's flight, in the units a mission computes with. Missions take what concerns them.
+
+    Attributes:
+        pattern: named Lissajous pattern, "L1".."L4"; not used when `ratio` is given.
+        width_m, height_m: size of the pattern, east and north.
+        ratio: frequencies x:y of a Lissajous pattern.
+        phase_x_rad, phase_y_rad: its phases; None: the named pattern's, or pi/2 and 0 for a ratio.
+        spacing_m: track spacing of sweeps and squares.
+        heading_rad: direction of the first leg of the IAMSAR patterns.
+        altitude_m: above home.
+        speed_m_s: ground speed.
+        period_s: time once round in a Lissajous pattern's own time law, in place of the speed.
+        periods: times round, or passes.
+        search_time_s: end the pattern after this time; it is repeated until then.
+        via: uploaded waypoints or streamed setpoints.
+        acceptance_m: radius within which a waypoint counts as reached; corners are rounded by as much.
+        rate_hz: setpoints per vehicle second.
+        vehicles, index: size of the team and which of it this is, 0 first.
+        separation_m: between the altitudes of a team.
+        centre: of the pattern; None: the vehicle's home.
+        arguments: what else the user gave to a mission of theirs, by name.
+    """
+
+    pattern: str = "L3"
+    width_m: float = 100.0
+    height_m: float = 100.0
+    ratio: tuple[float, float] | None = None
+    phase_x_rad: float | None = None
+    phase_y_rad: float | None = None
+    spacing_m: float = 10.0
+    heading_rad: float = 0.0
+    altitude_m: float = 10.0
+    speed_m_s: float = 5.0
+    period_s: float | None = None
+    periods: float = 1.0
+    search_time_s: float | None = None
+    via: Via = Via.WAYPOINTS
+    acceptance_m: float = 2.0
+    rate_hz: float = 25.0
+    vehicles: int = 1
+    index: int = 0
+    separation_m: float = 4.0
+    centre: GeodeticPosition | None = None
+    arguments: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self) -> None:
+        positive = {
+            "--periods": self.periods,
+            "--acceptance": self.acceptance_m,
+            "--spacing": self.spacing_m,
+            "--search-time": self.search_time_s,
+            "--period": self.period_s,
+            "--separation": self.separation_m,
+        }
+        for name, value in positive.items():
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise PlanError(f"{name} {value:g} is not possible; ask for more than 0")
+        if not 2.5 <= self.rate_hz <= 100.0:
+            raise PlanError(f"--rate {self.rate_hz:g} Hz is not in 2.5..100 Hz, what keeps a vehicle guided")
+        if not 1 <= self.vehicles <= 250:
+            raise PlanError(f"--vehicles {self.vehicles} is not in 1..250")
+        if self.period_s is not None and self.via is not Via.SETPOINTS:
+            raise PlanError("--period needs --via setpoints: waypoints are flown at a speed, not at times")
+
+    @property
+    def own_altitude_m(self) -> float:
+        """This vehicle's altitude: a team flies in layers, the first at `altitude_m`."""
+        return self.altitude_m + self.index * self.separation_m

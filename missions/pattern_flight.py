@@ -1,0 +1,248 @@
+"""Flying a pattern: as an uploaded waypoint mission, or by streamed setpoints."""
+
+import math
+
+import numpy as np
+
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import VehicleTimeout
+from missions.notes import PATTERN, CommandedPath
+from missions.options import FlightOptions, Via
+from missions.patterns.curve import ArcLengthTable, Array, Curve
+from missions.planning.limits import VehicleLimits
+from missions.planning.natural import is_lissajous, natural_trajectory
+from missions.planning.trajectory import (
+    Trajectory,
+    TrajectoryPoint,
+    flight_curve,
+    line_trajectory,
+    plan_trajectory,
+)
+from missions.planning.waypoints import waypoints_along
+from missions.errors import PlanError
+from missions.vehicle.adapter import Mode
+from missions.vehicle.setpoint import Setpoint
+from missions.vehicle.vehicle import Vehicle
+
+_SETTLE_S = 2.0
+_PATH_STEP_M = 0.25
+_TRANSIT_M_S = 5.0
+
+
+def plan(curve: Curve, options: FlightOptions, limits: VehicleLimits) -> Trajectory:
+    """The pattern in time, around its own centre.
+
+    Raises:
+        PlanError: the vehicle can't fly it.
+    """
+    altitude_m = options.own_altitude_m
+    if options.period_s is not None:
+        if not is_lissajous(curve):
+            raise PlanError("--period is for lissajous patterns; choose --speed for this one")
+        period_s = options.period_s * math.tau / _once_round(curve)
+        return natural_trajectory(
+            curve,
+            fundamental_period_s=period_s,
+            altitude_m=altitude_m,
+            limits=limits,
+            duration_s=options.search_time_s,
+        )
+    return plan_trajectory(
+        flight_curve(curve, options.acceptance_m),
+        altitude_m=altitude_m,
+        speed_m_s=options.speed_m_s,
+        limits=limits,
+        duration_s=options.search_time_s,
+    )
+
+
+def _once_round(curve: Curve) -> float:
+    inner: Curve = getattr(curve, "curve", curve)
+    return inner.end if inner.closed else math.tau
+
+
+async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> None:
+    """Fly a curve as the options say, from the ground back to the ground.
+
+    The vehicle is ready (`wait_ready`) and on the ground. Its notes get the commanded path and the phases.
+
+    Raises:
+        PlanError: the vehicle's parameters don't allow the pattern.
+        MissionError: the flight went wrong.
+    """
+    limits = await vehicle.limits()
+    trajectory = plan(curve, options, limits)
+    centre = (0.0, 0.0, 0.0)
+    if options.centre is not None:
+        c = options.centre
+        north, east, _ = LocalFrame(vehicle.home).ned_from_geodetic(c.lat_deg, c.lon_deg, c.alt_m)
+        centre = (north, east, 0.0)
+    if options.via is Via.SETPOINTS:
+        await _fly_setpoints(vehicle, options, limits, trajectory, centre)
+    else:
+        await _fly_waypoints(vehicle, options, curve, centre)
+
+
+def setpoint_at(point: TrajectoryPoint, centre: tuple[float, float, float]) -> Setpoint:
+    """A trajectory's point as a setpoint with full feed-forward, its position moved to the centre."""
+    n, e, d = point.position_ned_m
+    return Setpoint(
+        position_ned_m=(n + centre[0], e + centre[1], d + centre[2]),
+        velocity_ned_m_s=point.velocity_ned_m_s,
+        acceleration_ned_m_s2=point.acceleration_ned_m_s2,
+        yaw_rad=point.yaw_rad,
+        yaw_rate_rad_s=point.yaw_rate_rad_s,
+    )
+
+
+async def _fly_setpoints(
+    vehicle: Vehicle,
+    options: FlightOptions,
+    limits: VehicleLimits,
+    trajectory: Trajectory,
+    centre: tuple[float, float, float],
+) -> None:
+    notes, clock = vehicle.notes, vehicle.clock
+    altitude_m = options.own_altitude_m
+    notes.commanded = CommandedPath(
+        origin=vehicle.home,
+        points_ned_m=trajectory.position_ned_m[:: max(1, round(_PATH_STEP_M / (options.speed_m_s * 0.02)))]
+        + np.array(centre),
+        waypoints_ned_m=np.zeros((0, 3)),
+        acceptance_m=options.acceptance_m,
+    )
+    notes.begin("takeoff", clock.time_us)
+    await vehicle.takeoff(altitude_m)
+    above_home = (0.0, 0.0, -altitude_m)
+    first = setpoint_at(trajectory.at(0.0), centre)
+    last = setpoint_at(trajectory.at(trajectory.duration_s), centre)
+    assert first.position_ned_m is not None and last.position_ned_m is not None
+    async with vehicle.guided(options.rate_hz) as guided:
+        notes.begin("transit", clock.time_us)
+        await _fly_line(guided, above_home, first.position_ned_m, limits)
+        await guided.stay(
+            Setpoint(
+                position_ned_m=first.position_ned_m, velocity_ned_m_s=(0.0, 0.0, 0.0), yaw_rad=first.yaw_rad
+            ),
+            _SETTLE_S + math.pi / limits.yaw_rate_rad_s,
+        )
+        notes.begin(PATTERN, clock.time_us)
+        duration_s = trajectory.duration_s
+
+        def source(t: float) -> Setpoint | None:
+            notes.progress = min(1.0, t / duration_s)
+            return setpoint_at(trajectory.at(t), centre) if t <= duration_s else None
+
+        await guided.follow(source)
+        notes.begin("return", clock.time_us)
+        await _fly_line(guided, last.position_ned_m, above_home, limits)
+    await vehicle.land()
+    notes.end(clock.time_us)
+
+
+async def _fly_line(guided, start, stop, limits: VehicleLimits) -> None:  # type: ignore[no-untyped-def]
+    if math.dist(start, stop) < 0.3:
+        return
+    line = line_trajectory(start, stop, speed_m_s=_TRANSIT_M_S, limits=limits)
+    await guided.follow(lambda t: setpoint_at(line.at(t), (0.0, 0.0, 0.0)) if t <= line.duration_s else None)
+
+
+def waypoint_items(
+    vehicle: Vehicle,
+    points: list[tuple[float, float]],
+    options: FlightOptions,
+    centre: tuple[float, float, float],
+) -> list[MissionItem]:
+    """The plan to upload: takeoff, speed, waypoints, and the way home."""
+    home = vehicle.home
+    frame = LocalFrame(home)
+    unset = vehicle.adapter.unset
+    altitude_m = options.own_altitude_m
+
+    def waypoint(command: int, north_m: float, east_m: float, **params: float) -> MissionItem:
+        lat, lon, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
+        return MissionItem(command=command, x=lat, y=lon, param4=unset, **params)
+
+    items = [
+        vehicle.adapter.takeoff_item(home, altitude_m),
+        MissionItem(
+            command=dialect.MAV_CMD_DO_CHANGE_SPEED,
+            frame=2,
+            param1=1.0,
+            param2=options.speed_m_s,
+            param3=-1.0,
+        ),
+    ]
+    items += [
+        waypoint(
+            dialect.MAV_CMD_NAV_WAYPOINT,
+            n + centre[0],
+            e + centre[1],
+            param2=options.acceptance_m,
+            z=altitude_m,
+        )
+        for n, e in points
+    ]
+    if options.vehicles > 1:  # home in its own layer: returns all climb to one altitude
+        items.append(
+            waypoint(dialect.MAV_CMD_NAV_WAYPOINT, 0.0, 0.0, param2=options.acceptance_m, z=altitude_m)
+        )
+        items.append(waypoint(dialect.MAV_CMD_NAV_LAND, 0.0, 0.0))
+    else:
+        items.append(MissionItem(command=dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2))
+    return items
+
+
+async def _fly_waypoints(
+    vehicle: Vehicle, options: FlightOptions, curve: Curve, centre: tuple[float, float, float]
+) -> None:
+    notes, clock = vehicle.notes, vehicle.clock
+    length_m = None if options.search_time_s is None else options.search_time_s * options.speed_m_s
+    points = waypoints_along(curve, length_m=length_m)
+    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
+    items = waypoint_items(vehicle, points, options, centre)
+    down_m = -options.own_altitude_m
+    offset = np.array(centre)
+    notes.commanded = CommandedPath(
+        origin=vehicle.home,
+        points_ned_m=_flat_path(curve, length_m, down_m) + offset,
+        waypoints_ned_m=np.array([(n, e, down_m) for n, e in points]) + offset,
+        acceptance_m=acceptance_m,
+    )
+    notes.begin("upload", clock.time_us)
+    first = await vehicle.upload_mission(items) + 2
+    last = first + len(points) - 1
+    notes.begin("takeoff", clock.time_us)
+    await vehicle.start_mission()
+    route_m = float(np.linalg.norm(np.diff(notes.commanded.points_ned_m, axis=0), axis=1).sum())
+    reach_m = float(np.linalg.norm(notes.commanded.points_ned_m, axis=1).max())
+    await vehicle.wait_item_reached(first, 60.0 + 3.0 * options.own_altitude_m + reach_m)
+    notes.begin(PATTERN, clock.time_us)
+
+    def progress(done: int) -> None:
+        notes.progress = min(1.0, max(0.0, (done - first) / max(1, last - first)))
+
+    limit_s = 60.0 + 4.0 * route_m / options.speed_m_s
+    if options.search_time_s is not None:
+        limit_s = min(limit_s, options.search_time_s)
+    try:
+        await vehicle.wait_item_reached(last, limit_s, progress)
+    except VehicleTimeout:
+        if options.search_time_s is None:
+            raise
+        await vehicle.return_to_launch(wait=False)  # the search time is over
+    notes.begin("return", clock.time_us)
+    await vehicle.wait_disarmed(300.0 + 2.0 * reach_m)
+    notes.end(clock.time_us)
+
+
+def _flat_path(curve: Curve, length_m: float | None, down_m: float) -> Array:
+    table = ArcLengthTable.of(curve, _PATH_STEP_M)
+    kept = slice(None) if length_m is None else slice(int(np.searchsorted(table.arc_m, length_m)) + 1)
+    points = table.points_m[kept]
+    return np.column_stack((points, np.full(len(points), down_m)))
+
+
+__all__ = ["Mode", "fly_pattern", "plan", "setpoint_at", "waypoint_items"]

@@ -1,0 +1,233 @@
+"""The picture of a run: the track from above, and altitude and error against time below it."""
+
+import math
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from missions.notes import PATTERN, FlightNotes
+from missions.score import FlightScore, Track
+
+_COMMANDED: Final = "#9aa3af"
+_COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
+_TRUTH: Final = "#111827"
+_INK: Final = "#1f2937"
+_GRID: Final = "#e5e7eb"
+_PHASE: Final = "#f3f4f6"
+
+
+def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScore]]) -> None:
+    """Draw `track.png` for one vehicle or a team.
+
+    Args:
+        path: the file; it must not exist.
+        title: above the picture.
+        flights: notes and scores, one per vehicle. Tracks of a team are drawn around the first vehicle's home.
+    """
+    figure = Figure(figsize=(9.0, 11.6), dpi=130, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(3, 1, height_ratios=(3.6, 1.0, 1.0))
+    above, altitude, error = (figure.add_subplot(grid[k]) for k in range(3))
+    altitude.sharex(error)
+    figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
+    _draw_from_above(above, flights)
+    _draw_altitude(altitude, flights)
+    _draw_error(error, flights)
+    for axes in (above, altitude, error):
+        _tidy(axes)
+    with path.open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def _tidy(axes: Any) -> None:
+    axes.tick_params(colors=_INK, labelsize=8)
+    axes.grid(True, color=_GRID, linewidth=0.6)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color("#9ca3af")
+
+
+def _shown(track: Track, notes: FlightNotes) -> Track:
+    """The part of a track that is flight, thinned to what a picture can show."""
+    if notes.phases:
+        track = track.between(notes.phases[0].start_us, notes.phases[-1].end_us)
+    stride = max(1, len(track.time_s) // 6000)
+    return Track(
+        time_s=track.time_s[::stride],
+        pos_ned_m=track.pos_ned_m[::stride],
+        yaw_rad=track.yaw_rad[::stride],
+    )
+
+
+def _offset(notes: FlightNotes, first: FlightNotes) -> tuple[float, float]:
+    """North and east of this vehicle's home from the first one's."""
+    if notes.commanded is None or first.commanded is None or notes is first:
+        return 0.0, 0.0
+    from autopilot_bridge.geodesy import LocalFrame
+
+    home = notes.commanded.origin
+    north, east, _ = LocalFrame(first.commanded.origin).ned_from_geodetic(
+        home.lat_deg, home.lon_deg, home.alt_m
+    )
+    return north, east
+
+
+def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> None:
+    first = flights[0][0]
+    handles: list[Line2D] = []
+    for k, (notes, score) in enumerate(flights):
+        north, east = _offset(notes, first)
+        colour = _COLOURS[k % len(_COLOURS)]
+        name = f"vehicle {notes.system_id}: " if len(flights) > 1 else ""
+        if notes.commanded is not None:
+            path = notes.commanded.points_ned_m
+            axes.plot(
+                path[:, 1] + east, path[:, 0] + north, color=_COMMANDED, linewidth=4.5, alpha=0.55, zorder=1
+            )
+            waypoints = notes.commanded.waypoints_ned_m
+            axes.plot(
+                waypoints[:, 1] + east, waypoints[:, 0] + north, "o", color=_COMMANDED, markersize=3.2,
+                markerfacecolor="white", zorder=4,
+            )  # fmt: skip
+        if score.truth is not None:
+            track = _shown(score.truth, notes)
+            axes.plot(
+                track.pos_ned_m[:, 1] + east,
+                track.pos_ned_m[:, 0] + north,
+                color=_TRUTH,
+                linewidth=0.9,
+                zorder=3,
+            )
+        if score.estimate is not None:
+            track = _shown(score.estimate, notes)
+            axes.plot(
+                track.pos_ned_m[:, 1] + east, track.pos_ned_m[:, 0] + north, color=colour, linewidth=1.6,
+                alpha=0.85, zorder=2,
+            )  # fmt: skip
+        main = score.truth if score.truth is not None else score.estimate
+        if main is not None and len(main.time_s) > 1:
+            _draw_marks(axes, _shown(main, notes), colour, north, east)
+        handles.append(Line2D([], [], color=colour, linewidth=1.6, label=f"{name}autopilot's estimate"))
+    handles.insert(0, Line2D([], [], color=_COMMANDED, linewidth=4.5, alpha=0.55, label="commanded"))
+    if any(len(notes.commanded.waypoints_ned_m) for notes, _ in flights if notes.commanded):
+        handles.insert(
+            1,
+            Line2D(
+                [], [], color=_COMMANDED, marker="o", markerfacecolor="white", linestyle="", label="waypoints"
+            ),
+        )
+    if any(score.truth is not None for _, score in flights):
+        handles.append(Line2D([], [], color=_TRUTH, linewidth=0.9, label="truth"))
+    handles.append(Line2D([], [], color=_INK, marker="$\u27a4$", markersize=9, linestyle="", label="heading"))
+    handles.append(Line2D([], [], color="#15803d", marker="o", markersize=7, linestyle="", label="start"))
+    handles.append(Line2D([], [], color="#b91c1c", marker="s", markersize=6, linestyle="", label="end"))
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.margins(0.06)
+    axes.set_xlabel("east of home, m", fontsize=9, color=_INK)
+    axes.set_ylabel("north of home, m", fontsize=9, color=_INK)
+    axes.legend(
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07), ncols=min(len(handles), 6 if len(handles) < 7 else 7),
+        fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2,
+    )  # fmt: skip
+    _draw_scale(axes)
+
+
+def _draw_marks(axes: Any, track: Track, colour: str, north: float, east: float) -> None:
+    """Heading arrows evenly along the track, start and end."""
+    steps = np.linalg.norm(np.diff(track.pos_ned_m[:, :2], axis=0), axis=1)
+    arc = np.concatenate(([0.0], np.cumsum(steps)))
+    if arc[-1] > 1.0:
+        count = int(np.clip(arc[-1] / 45.0, 6, 28))
+        where = np.searchsorted(arc, (np.arange(count) + 0.5) / count * arc[-1])
+        yaw = track.yaw_rad[where]
+        axes.quiver(
+            track.pos_ned_m[where, 1] + east, track.pos_ned_m[where, 0] + north, np.sin(yaw), np.cos(yaw),
+            color=_INK, scale=42, width=0.0042, headwidth=4.2, headlength=5.0, headaxislength=4.4,
+            pivot="middle", zorder=6,
+        )  # fmt: skip
+    start, end = track.pos_ned_m[0], track.pos_ned_m[-1]
+    axes.plot(
+        start[1] + east,
+        start[0] + north,
+        "o",
+        color="#15803d",
+        markersize=9,
+        zorder=7,
+        markeredgecolor="white",
+    )
+    axes.plot(
+        end[1] + east, end[0] + north, "s", color="#b91c1c", markersize=6, zorder=8, markeredgecolor="white"
+    )
+
+
+def _draw_scale(axes: Any) -> None:
+    """A bar of a round length in the lower right corner, in the axes' own scale."""
+    left, right = axes.get_xlim()
+    span = right - left
+    exponent = math.floor(math.log10(span / 4.0))
+    length = max(m * 10.0**exponent for m in (1, 2, 5) if m * 10.0**exponent <= span / 4.0)
+    bottom, top = axes.get_ylim()
+    y = bottom + 0.035 * (top - bottom)
+    x = right - 0.04 * span
+    axes.plot([x - length, x], [y, y], color=_INK, linewidth=3.0, solid_capstyle="butt", zorder=9)
+    axes.annotate(
+        f"{length:g} m", ((x - 0.5 * length), y), xytext=(0, 4), textcoords="offset points", ha="center",
+        fontsize=8, color=_INK, zorder=9,
+    )  # fmt: skip
+    axes.set_xlim(left, right)
+    axes.set_ylim(bottom, top)
+
+
+def _shade_pattern(axes: Any, notes: FlightNotes) -> None:
+    phase = notes.phase(PATTERN)
+    if phase is not None:
+        axes.axvspan(phase.start_us * 1e-6, phase.end_us * 1e-6, color=_PHASE, zorder=0, linewidth=0)
+
+
+def _draw_altitude(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> None:
+    for k, (notes, score) in enumerate(flights):
+        colour = _COLOURS[k % len(_COLOURS)]
+        if k == 0:
+            _shade_pattern(axes, notes)
+        phase = notes.phase(PATTERN)
+        if notes.commanded is not None and phase is not None:
+            height = -float(notes.commanded.points_ned_m[0, 2])
+            axes.plot(
+                [phase.start_us * 1e-6, phase.end_us * 1e-6], [height, height], color=_COMMANDED, linewidth=4.5,
+                alpha=0.55, solid_capstyle="butt",
+            )  # fmt: skip
+        if score.estimate is not None:
+            track = _shown(score.estimate, notes)
+            axes.plot(track.time_s, -track.pos_ned_m[:, 2], color=colour, linewidth=1.6, alpha=0.85)
+        if score.truth is not None:
+            track = _shown(score.truth, notes)
+            axes.plot(track.time_s, -track.pos_ned_m[:, 2], color=_TRUTH, linewidth=0.9)
+    axes.set_ylabel("height above\nhome, m", fontsize=9, color=_INK)
+    axes.tick_params(labelbottom=False)
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+
+
+def _draw_error(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> None:
+    for k, (notes, score) in enumerate(flights):
+        if k == 0:
+            _shade_pattern(axes, notes)
+        if not len(score.error_m):
+            continue
+        colour = _COLOURS[k % len(_COLOURS)]
+        axes.plot(score.error_time_s, score.error_m, color=colour, linewidth=1.1)
+        rms = score.path_rms_error_m or 0.0
+        axes.axhline(rms, color=colour, linewidth=0.8, linestyle="--")
+        axes.annotate(
+            f"RMS {rms:.2f} m", (1.0, rms), xycoords=("axes fraction", "data"), xytext=(-4, 3 + 9 * k),
+            textcoords="offset points", ha="right", fontsize=8, color=colour,
+        )  # fmt: skip
+    axes.set_ylim(bottom=0.0)
+    reference = flights[0][1].reference
+    axes.set_ylabel(f"distance to path, m\n({reference})", fontsize=9, color=_INK)
+    axes.set_xlabel("vehicle time, s", fontsize=9, color=_INK)

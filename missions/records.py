@@ -1,0 +1,122 @@
+"""What a flight's frames hold, as columns: raw payloads collected per message, decoded in one go with numpy."""
+
+from collections import Counter
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.mavlink import DEFINITIONS, definition
+from autopilot_bridge.tlog import TlogReader, TlogWriter
+
+SCORED_MESSAGES: Final = frozenset(
+    definition(name).message_id
+    for name in (
+        "HIL_STATE_QUATERNION",
+        "LOCAL_POSITION_NED",
+        "GLOBAL_POSITION_INT",
+        "GPS_GLOBAL_ORIGIN",
+        "ATTITUDE",
+        "ATTITUDE_TARGET",
+        "HEARTBEAT",
+    )
+)
+"""Messages kept for the summary and the picture; all others are only counted."""
+
+UnixTime = Callable[[], int]
+"""Microseconds of the Unix epoch."""
+
+_MAGIC_V2: Final = 0xFD
+
+
+class FlightRecords:
+    """Counts of all messages of a flight, and the payloads of those that are scored."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[int] = Counter()
+        self._payloads: dict[tuple[int, int, int], list[bytes]] = {}
+
+    @classmethod
+    def from_tlog(cls, path: Path) -> "FlightRecords":
+        """Records of a log that was written before."""
+        records = cls()
+        for _, frame in TlogReader(path):
+            records.add(frame.raw)
+        return records
+
+    def add(self, raw: bytes) -> None:
+        """Take one good frame."""
+        if raw[0] == _MAGIC_V2:
+            message_id = raw[7] | raw[8] << 8 | raw[9] << 16
+            self._counts[message_id] += 1
+            if message_id in SCORED_MESSAGES:
+                key = (message_id, raw[5], raw[6])
+                self._payloads.setdefault(key, []).append(raw[10 : 10 + raw[1]])
+        else:
+            self._counts[raw[5]] += 1
+            if raw[5] in SCORED_MESSAGES:
+                self._payloads.setdefault((raw[5], raw[3], raw[4]), []).append(raw[6 : 6 + raw[1]])
+
+    @property
+    def message_counts(self) -> dict[str, int]:
+        """Frames by message name, sorted by name."""
+        return dict(sorted((DEFINITIONS[k].name, n) for k, n in self._counts.items()))
+
+    def table(self, name: str, system_id: int, component_id: int | None = None) -> NDArray[np.void]:
+        """All messages of a name from one system, as a structured array with the message's fields.
+
+        Args:
+            component_id: sender; None: any component of the system.
+        """
+        found = definition(name)
+        dtype = _dtype(found.message_id)
+        parts = [
+            payload
+            for (message_id, system, component), payloads in self._payloads.items()
+            if message_id == found.message_id and system == system_id and component_id in (None, component)
+            for payload in payloads
+        ]
+        size = dtype.itemsize
+        return np.frombuffer(b"".join(p[:size].ljust(size, b"\0") for p in parts), dtype=dtype)
+
+
+@cache
+def _dtype(message_id: int) -> np.dtype[np.void]:
+    """The payload on the wire as a numpy record."""
+    found = DEFINITIONS[message_id]
+    names, formats, offsets = [], [], []
+    for field in found.wire_fields:
+        names.append(field.name)
+        base = f"S{field.length or 1}" if field.code == "s" else np.dtype(f"<{field.code}").str
+        formats.append(base if field.code == "s" or not field.length else f"{field.length}{base}")
+        offsets.append(field.offset)
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": found.size})
+
+
+class FlightRecorder:
+    """Takes the frames of all connections, and the truth, into the log and the records.
+
+    Args:
+        log: an open log.
+        epoch_us: Unix time of vehicle time 0 (embedded flights), or None to stamp with `unix_time_us`.
+        unix_time_us: wall clock for flights of vehicles elsewhere.
+    """
+
+    def __init__(self, log: TlogWriter, *, epoch_us: int | None, unix_time_us: UnixTime) -> None:
+        self.records = FlightRecords()
+        self._log = log
+        self._epoch_us = epoch_us
+        self._unix_time_us = unix_time_us
+
+    def record(self, frame: bytes, time_us: int) -> None:
+        """Log one frame that passed at vehicle time `time_us`."""
+        stamp = self._unix_time_us() if self._epoch_us is None else self._epoch_us + time_us
+        self._log.write(stamp, frame)
+        self.records.add(frame)
+
+    def record_truth(self, time_us: int, frame: bytes) -> None:
+        """Log one frame of truth."""
+        self.record(frame, time_us)

@@ -1,0 +1,122 @@
+"""A run: the folder with the log, the summary and the picture. Nothing is ever overwritten."""
+
+import json
+import platform
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Final
+
+from missions.errors import PlanError
+from missions.notes import FlightNotes
+from missions.score import FlightScore
+
+EPOCH_UNIX_US: Final = 1_735_689_600_000_000
+"""2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that equal flights make equal logs."""
+
+LOG_NAME: Final = "flight.tlog"
+SUMMARY_NAME: Final = "summary.json"
+PICTURE_NAME: Final = "track.png"
+_PACKAGES: Final = ("flightstack", "jsbsim", "numpy", "numba", "pymavlink")
+
+
+def create_run_folder(out: Path | None, mission: str, runs: Path = Path("runs")) -> Path:
+    """Make the folder of a new run.
+
+    Args:
+        out: the folder asked for; it must not exist, or be empty. None: `runs/<mission>-<n>` with the next free number.
+        mission: name of the mission.
+        runs: where numbered runs go.
+
+    Raises:
+        PlanError: the folder holds something, or can't be made.
+    """
+    try:
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            if any(out.iterdir()):
+                raise PlanError(f"{out} is not empty, and nothing is overwritten; choose another --out")
+            return out
+        runs.mkdir(parents=True, exist_ok=True)
+        number = 1
+        while True:
+            try:
+                folder = runs / f"{mission}-{number}"
+                folder.mkdir()
+                return folder
+            except FileExistsError:
+                number += 1
+    except OSError as error:
+        raise PlanError(
+            f"can't make the run folder {out or runs}: {error.strerror}; choose another --out"
+        ) from error
+
+
+def versions() -> dict[str, str]:
+    """Versions of what decides how a flight goes."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def _rounded(value: float | None, digits: int = 4) -> float | None:
+    return None if value is None else round(value, digits)
+
+
+def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
+    """The figures of one vehicle's flight."""
+    block: dict[str, Any] = {
+        "system_id": notes.system_id,
+        "autopilot": notes.autopilot,
+        "distance_m": round(score.distance_m, 2),
+        "error_reference": score.reference,
+        "path_rms_error_m": _rounded(score.path_rms_error_m),
+        "path_max_error_m": _rounded(score.path_max_error_m),
+        "path_rms_error_absolute_m": _rounded(score.path_rms_error_absolute_m),
+        "path_rms_error_estimate_m": _rounded(score.path_rms_error_estimate_m),
+        "max_attitude_error_deg": _rounded(score.max_attitude_error_deg),
+        "max_attitude_tracking_error_deg": _rounded(score.max_attitude_tracking_error_deg),
+        "progress": round(notes.progress, 4),
+        "phases": [
+            {"name": p.name, "start_s": p.start_us * 1e-6, "end_s": p.end_us * 1e-6} for p in notes.phases
+        ],
+    }
+    if notes.commanded is not None:
+        home = notes.commanded.origin
+        block["home"] = {"lat_deg": home.lat_deg, "lon_deg": home.lon_deg, "alt_m": home.alt_m}
+    if score.waypoint_misses_m and notes.commanded is not None:
+        acceptance_m = notes.commanded.acceptance_m
+        misses = score.waypoint_misses_m
+        block["waypoints"] = {
+            "count": len(notes.commanded.waypoints_ned_m),
+            "acceptance_m": round(acceptance_m, 3),
+            "largest_miss_m": round(max(misses), 3),
+            "passed": sum(miss <= acceptance_m for miss in misses),
+        }
+    return block
+
+
+def team_figures(blocks: list[dict[str, Any]]) -> dict[str, Any]:
+    """The run's own figures: those of a single vehicle, the sum or the worst of a team."""
+
+    def worst(key: str) -> float | None:
+        known = [block[key] for block in blocks if block[key] is not None]
+        return max(known) if known else None
+
+    keys = ("path_rms_error_m", "path_max_error_m", "max_attitude_error_deg")
+    return {
+        "distance_m": round(sum(block["distance_m"] for block in blocks), 2),
+        **{key: worst(key) for key in keys},
+    }
+
+
+def write_summary(folder: Path, summary: dict[str, Any]) -> Path:
+    """Write `summary.json`."""
+    path = folder / SUMMARY_NAME
+    with path.open("x", encoding="utf-8") as file:
+        json.dump(summary, file, indent=2, allow_nan=False)
+        file.write("\n")
+    return path
