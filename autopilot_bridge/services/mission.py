@@ -1,7 +1,7 @@
 """The MAVLink mission protocol, autopilot side, as PX4 and ArduPilot speak it.
 
-Source: MAVLink mission protocol (mavlink.io/en/services/mission.html); `MissionPolicy` holds what each firmware
-does its own way. Missions, fences and rally points share the protocol, each with its own `MissionStore`.
+Source: MAVLink mission protocol (mavlink.io/en/services/mission.html); `MissionPolicy` holds what each
+firmware does its own way. Missions, fences and rally points share the protocol, each with its own store.
 """
 
 import math
@@ -88,7 +88,7 @@ class MissionService:
             self._report.item_reached(seq, self._last_time_us)
 
     def problems(self, *, landed: bool = True) -> tuple[str, ...]:
-        """Why the stored mission may not be flown, in the firmware's words; empty when it may or there is none."""
+        """Why the stored mission may not be flown, in the firmware's words; empty when nothing is wrong."""
         store = self._stores[MissionType.MISSION]
         if self._policy.home_is_item_0:  # ArduPilot finds out in flight
             return ()

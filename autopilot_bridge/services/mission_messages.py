@@ -2,8 +2,8 @@
 
 pymavlink's dialect leaves out the plan identifiers that the MAVLink definition gives as extension fields:
 MISSION_COUNT.opaque_id, MISSION_ACK.opaque_id and MISSION_CURRENT.mission_id, fence_id, rally_points_id (all
-uint32, 0 = unknown). They are added here; a pymavlink that has them is used as it is. Extension fields take no
-part in CRC_EXTRA, so every MAVLink 2 receiver understands both.
+uint32, 0 = unknown). They are added here; a pymavlink that has them is used as it is. Extension fields take
+no part in CRC_EXTRA, so every MAVLink 2 receiver understands both.
 """
 
 import math

@@ -1,0 +1,67 @@
+"""Parameter tables as TOML files: one line per parameter, beside the flavour they belong to.
+
+    MPC_XY_CRUISE = { type = "float", default = 5.0, min = 3.0, max = 20.0, unit = "m/s", text = "Cruise speed" }
+    "RC#_TRIM" = { type = "float", default = 1500.0, instances = [1, 8], text = "Neutral pulse" }
+
+`type` is int8, int16, int32 or float. With `instances`, `#` in the name stands for each number from the first to the
+last, and `default` may be a list with one value for each. `reboot = true`: a change waits for the next boot.
+"""
+
+import tomllib
+from collections.abc import Iterator
+from importlib.resources.abc import Traversable
+from typing import Any, Final
+
+from autopilot_bridge.parameters import ParameterDefinition, ParameterType
+
+_TYPES: Final = {
+    "int8": ParameterType.INT8,
+    "int16": ParameterType.INT16,
+    "int32": ParameterType.INT32,
+    "float": ParameterType.REAL32,
+}
+_KEYS: Final = frozenset(("type", "default", "min", "max", "unit", "reboot", "instances", "text"))
+
+
+def load_table(file: Traversable) -> tuple[ParameterDefinition, ...]:
+    """The definitions in a TOML table, in the order of the file.
+
+    Raises:
+        ValueError: an entry is not as described above; the message names it.
+    """
+    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    return tuple(definition for name, entry in table.items() for definition in _definitions(name, entry))
+
+
+def _definitions(name: str, entry: dict[str, Any]) -> Iterator[ParameterDefinition]:
+    unknown = set(entry) - _KEYS
+    if unknown:
+        raise ValueError(f"{name}: unknown key {min(unknown)!r}; accepted are {', '.join(sorted(_KEYS))}")
+    if entry.get("type") not in _TYPES:
+        raise ValueError(f"{name}: type {entry.get('type')!r}; accepted are {', '.join(_TYPES)}")
+    if "default" not in entry:
+        raise ValueError(f"{name}: no default")
+    if "instances" not in entry:
+        yield _definition(name, entry, entry["default"])
+        return
+    first, last = entry["instances"]
+    defaults = entry["default"]
+    if not isinstance(defaults, list):
+        defaults = [defaults] * (last - first + 1)
+    if "#" not in name or len(defaults) != last - first + 1:
+        raise ValueError(f"{name}: {len(defaults)} defaults for instances {first} to {last} of a name with #")
+    for number, default in enumerate(defaults, start=first):
+        yield _definition(name.replace("#", str(number)), entry, default)
+
+
+def _definition(name: str, entry: dict[str, Any], default: float) -> ParameterDefinition:
+    return ParameterDefinition(
+        name=name,
+        type=_TYPES[entry["type"]],
+        default=default,
+        minimum=entry.get("min"),
+        maximum=entry.get("max"),
+        unit=entry.get("unit", ""),
+        description=entry.get("text", ""),
+        reboot_required=entry.get("reboot", False),
+    )
