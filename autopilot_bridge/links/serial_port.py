@@ -78,7 +78,8 @@ class SerialLink:
             self._queue.flush(self._write)
             for _ in range(MAX_READS):
                 data = os.read(self._port.fileno(), _READ_SIZE)
-                if not data:
+                if not data:  # hung up
+                    self._unplugged()
                     break
                 self.counters.reads += 1
                 self.counters.bytes_in += len(data)
@@ -106,6 +107,10 @@ class SerialLink:
         opened = serial.Serial(
             self._address.device, self._address.baud, timeout=0, write_timeout=0, exclusive=True
         )
+        # pyserial's VMIN = 0 makes "nothing there" and "hung up" look the same to read().
+        attributes = termios.tcgetattr(opened.fileno())
+        attributes[6][termios.VMIN] = 1
+        termios.tcsetattr(opened.fileno(), termios.TCSANOW, attributes)
         os.set_blocking(opened.fileno(), False)
         self.counters.connects += 1
         return opened
