@@ -5,7 +5,13 @@ The transition over T seconds, with S = integral of r_ned_from_frd, u = integral
     theta' = theta - S gyro_bias
     v'     = v + theta x u - S accel_bias
     p'     = p + v T + (theta x u - S accel_bias) T / 2
-    biases and the GPS error decay as Gauss-Markov processes; offset and magnetometer bias stay.
+    biases and the GPS error decay as Gauss-Markov processes; the barometer's offset stays.
+
+The magnetometer's bias stands for hard iron and for soft iron, whose effect changes as the vehicle turns, so
+it decays with the angle turned as well as with time. The gyro's scale and cross-axis errors come in as noise
+per angle
+turned: about the vertical errors of one radian's turning are taken as independent of the next one's; a
+multirotor's tilting undoes itself, so it counts with its usual amplitude of some tenths of a radian.
 
 (Sola, arXiv:1711.02508, section 7, global angular error.) The products exploit that sparsity by hand.
 """
@@ -45,7 +51,6 @@ Array = NDArray[np.float64]
 NOISE_ATT = 0  # rad^2/s
 NOISE_VEL = 1  # m^2/s^3
 TURN_SCALE = 2  # about the vertical: rad^2 per rad turned
-TURN_CROSS = 12  # about the horizontal axes: rad^2 per rad turned about any axis
 GYRO_BIAS_VAR = 3  # stationary variances and time constants
 GYRO_BIAS_TAU = 4
 ACCEL_BIAS_VAR = 5
@@ -54,12 +59,16 @@ GPS_VAR_HORIZONTAL = 7
 GPS_VAR_VERTICAL = 8
 GPS_TAU = 9
 BARO_WALK = 10  # m^2/s
-MAG_WALK = 11  # gauss^2/s
-PROCESS_SIZE = 13
+MAG_BIAS_VAR = 11
+MAG_BIAS_TAU = 12
+MAG_BIAS_TURN = 13  # rad
+TURN_TILT = 14  # about the horizontal axes: rad^2 per rad turned about them
+TURN_CROSS = 15  # about the horizontal axes: rad^2 per rad turned about the vertical
+PROCESS_SIZE = 16
 
 
 @njit(cache=True)
-def _carry(p: Array, core: Array, t: float, along_rows: bool) -> None:
+def carry(p: Array, core: Array, t: float, along_rows: bool) -> None:
     """p <- F p (along_rows False: every column) or p <- p F^T (every row), the first nine states only."""
     s = SUM_R
     ux, uy, uz = core[SUM_FORCE], core[SUM_FORCE + 1], core[SUM_FORCE + 2]
@@ -109,25 +118,26 @@ def predict(p: Array, core: Array, process: Array) -> None:
     t = core[SUM_TIME]
     if t <= 0.0:
         return
-    _carry(p, core, t, False)
-    _carry(p, core, t, True)
+    carry(p, core, t, False)
+    carry(p, core, t, True)
     q = process[GYRO_BIAS_VAR]
     _decay(p, core, GYRO_BIAS, math.exp(-t / process[GYRO_BIAS_TAU]), q, q, q)
     q = process[ACCEL_BIAS_VAR]
     _decay(p, core, ACCEL_BIAS, math.exp(-t / process[ACCEL_BIAS_TAU]), q, q, q)
     q = process[GPS_VAR_HORIZONTAL]
     _decay(p, core, GPS_ERROR, math.exp(-t / process[GPS_TAU]), q, q, process[GPS_VAR_VERTICAL])
-    # Scale errors undo themselves when a vehicle rolls back to level, but not when it goes on turning; errors
-    # of one radian's turning are taken as independent of the next one's.
-    turned = core[SUM_TURN] + core[SUM_TURN + 1] + core[SUM_TURN + 2]
-    p[ATT, ATT] += process[TURN_CROSS] * turned
-    p[ATT + 1, ATT + 1] += process[TURN_CROSS] * turned
-    p[ATT + 2, ATT + 2] += process[TURN_SCALE] * core[SUM_TURN + 2]
+    turned_n, turned_e, turned_d = core[SUM_TURN], core[SUM_TURN + 1], core[SUM_TURN + 2]
+    q = process[MAG_BIAS_VAR]
+    turned = turned_n + turned_e + turned_d
+    factor = math.exp(-t / process[MAG_BIAS_TAU] - turned / process[MAG_BIAS_TURN])
+    _decay(p, core, MAG_BIAS, factor, q, q, q)
+    p[ATT, ATT] += process[TURN_TILT] * turned_n + process[TURN_CROSS] * turned_d
+    p[ATT + 1, ATT + 1] += process[TURN_TILT] * turned_e + process[TURN_CROSS] * turned_d
+    p[ATT + 2, ATT + 2] += process[TURN_SCALE] * turned_d
     for i in range(3):
         p[ATT + i, ATT + i] += process[NOISE_ATT] * t
         p[VEL + i, VEL + i] += process[NOISE_VEL] * t
         p[POS + i, POS + i] += process[NOISE_VEL] * t * t * t / 3.0
-        p[MAG_BIAS + i, MAG_BIAS + i] += process[MAG_WALK] * t
     p[BARO_OFFSET, BARO_OFFSET] += process[BARO_WALK] * t
     for i in range(ERROR_SIZE):
         for j in range(i):

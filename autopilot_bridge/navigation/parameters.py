@@ -10,7 +10,6 @@ _MAY_BE_ZERO = frozenset(
         "gyro_cross_axis_error",
         "rangefinder_noise_fraction",
         "gps_check_time_s",
-        "magnetometer_bias_walk_gauss_per_sqrt_s",
         "barometer_offset_walk_m_per_sqrt_s",
         "terrain_walk_m_per_sqrt_s",
         "terrain_gradient",
@@ -33,6 +32,7 @@ class NavigationParameters:
         gyro_bias_rad_s, gyro_bias_tau_s: first-order Gauss-Markov bias: 1-sigma (turn-on bias and wandering
             together) and correlation time, long enough that 2 sigma^2 / tau is the wandering's random walk.
         gyro_scale_error, gyro_cross_axis_error: 1-sigma, fractions; they add uncertainty per angle turned.
+        gyro_scale_tilt_rad: usual amplitude of tilting, over which its scale error adds up.
         accel_noise_m_s2_sqrt_hz, accel_bias_m_s2, accel_bias_tau_s: as for the gyro; the bias includes what
             scale and cross-axis errors make of gravity.
         gps_position_noise_m: white part of the GPS position error, 1-sigma, (horizontal, vertical).
@@ -41,8 +41,7 @@ class NavigationParameters:
         gps_velocity_noise_m_s: 1-sigma of the GPS velocity, (north, east, down).
         gps_nominal_speed_accuracy_m_s: what the receiver reports in good conditions; when it reports worse,
             the velocity noise grows in proportion. What a reported position accuracy exceeds the white part
-            by is
-            taken as correlated: atmosphere and multipath wander slowly.
+            by is taken as correlated: atmosphere and multipath wander slowly.
         gps_required_satellites, gps_required_eph_m, gps_required_epv_m, gps_required_speed_accuracy_m_s,
             gps_required_hdop: quality checks before use (EKF2_REQ_NSATS, _EPH, _EPV, _SACC, _PDOP).
         gps_check_time_s: how long the checks must have passed before GPS is taken into use (EKF2_REQ_GPS_H).
@@ -55,8 +54,9 @@ class NavigationParameters:
         barometer_lag_s: first-order lag of the barometer, taken as a delay (EKF2_BARO_DELAY).
         barometer_offset_walk_m_per_sqrt_s: random walk of the offset between pressure altitude and height.
         magnetometer_noise_gauss: white noise of one axis.
-        magnetometer_bias_initial_gauss: 1-sigma of the hard iron that calibration left.
-        magnetometer_bias_walk_gauss_per_sqrt_s: its random walk.
+        magnetometer_bias_gauss: 1-sigma of the hard and soft iron that calibration left.
+        magnetometer_bias_tau_s, magnetometer_bias_turn_rad: its correlation time, and the angle turned after
+            which soft iron has made another bias of it.
         magnetometer_timeout_s: refused or missing for this long: no longer in use.
         mag_ned_gauss: Earth's field to expect, NED. None: from the World Magnetic Model at the filter's
             origin.
@@ -84,6 +84,7 @@ class NavigationParameters:
     gyro_bias_tau_s: float = 16000.0
     gyro_scale_error: float = 0.0033
     gyro_cross_axis_error: float = 0.001
+    gyro_scale_tilt_rad: float = 0.2
     accel_noise_m_s2_sqrt_hz: float = 1.8e-3
     accel_bias_m_s2: float = 0.025
     accel_bias_tau_s: float = 40000.0
@@ -109,8 +110,9 @@ class NavigationParameters:
     barometer_offset_walk_m_per_sqrt_s: float = 0.02
     magnetometer_gate: float = 3.0
     magnetometer_noise_gauss: float = 0.003
-    magnetometer_bias_initial_gauss: float = 0.0035
-    magnetometer_bias_walk_gauss_per_sqrt_s: float = 1.0e-4
+    magnetometer_bias_gauss: float = 0.0032
+    magnetometer_bias_tau_s: float = 1000.0
+    magnetometer_bias_turn_rad: float = 9.0
     magnetometer_timeout_s: float = 5.0
     mag_ned_gauss: tuple[float, float, float] | None = None
     magnetic_year: float = 2026.0

@@ -166,7 +166,7 @@ class Solution:
     def forget_mag_bias(self) -> None:
         """The magnetometer's bias is as uncertain as at alignment."""
         for i in range(3):
-            cov.forget(self.p, MAG_BIAS + i, self._parameters.magnetometer_bias_initial_gauss**2)
+            cov.forget(self.p, MAG_BIAS + i, self._parameters.magnetometer_bias_gauss**2)
 
     def refresh(self) -> None:
         """Bring what follows from the quaternion up to date."""
@@ -237,6 +237,7 @@ def process_from(p: NavigationParameters) -> Array:
     out[cov.NOISE_ATT] = p.gyro_noise_rad_s_sqrt_hz**2
     out[cov.NOISE_VEL] = p.accel_noise_m_s2_sqrt_hz**2
     out[cov.TURN_SCALE] = p.gyro_scale_error**2
+    out[cov.TURN_TILT] = p.gyro_scale_error**2 * p.gyro_scale_tilt_rad
     out[cov.TURN_CROSS] = p.gyro_cross_axis_error**2
     out[cov.GYRO_BIAS_VAR] = p.gyro_bias_rad_s**2
     out[cov.GYRO_BIAS_TAU] = p.gyro_bias_tau_s
@@ -246,5 +247,7 @@ def process_from(p: NavigationParameters) -> Array:
     out[cov.GPS_VAR_VERTICAL] = p.gps_position_walk_m[1] ** 2
     out[cov.GPS_TAU] = p.gps_position_tau_s
     out[cov.BARO_WALK] = p.barometer_offset_walk_m_per_sqrt_s**2
-    out[cov.MAG_WALK] = p.magnetometer_bias_walk_gauss_per_sqrt_s**2
+    out[cov.MAG_BIAS_VAR] = p.magnetometer_bias_gauss**2
+    out[cov.MAG_BIAS_TAU] = p.magnetometer_bias_tau_s
+    out[cov.MAG_BIAS_TURN] = p.magnetometer_bias_turn_rad
     return out

@@ -92,7 +92,8 @@ class Bench:
         return out
 
     def nees(self) -> Array:
-        """Normalised estimation error squared of (attitude, velocity, position), three degrees of freedom each."""
+        """Normalised estimation error squared of (attitude, velocity, position), three degrees of freedom
+        each."""
         error, p = self.error(), self.filter.covariance
         return np.array(
             [

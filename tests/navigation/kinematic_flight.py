@@ -1,8 +1,8 @@
 """A flight that is pure kinematics: the truth vectors of a multirotor that thrusts along its own axis.
 
-Independent of the vehicle model and of the filter: positions are analytic, velocity and acceleration come from
-five-point differences of them, the attitude points the thrust where the acceleration needs it, the rates come
-from the attitude's differences.
+Independent of the vehicle model and of the filter: positions are analytic, velocity and acceleration come
+from five-point differences of them, the attitude points the thrust where the acceleration needs it, the rates
+come from the attitude's differences.
 """
 
 from collections.abc import Callable

@@ -1,0 +1,173 @@
+"""Transition and measurement Jacobians against numerical differentiation of the kernels themselves."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from autopilot_bridge.navigation import NavigationParameters, covariance, fusion, mechanisation
+from autopilot_bridge.navigation import states as s
+from autopilot_bridge.navigation.solution import process_from
+from flightsim.random_streams import RandomStreams
+from flightsim.rotations import quaternion_from_euler
+
+Array = NDArray[np.float64]
+DT_S = 0.004
+STEPS = 5
+IMU = np.array([0.4, -0.7, 0.9, 1.5, -2.0, -11.0, 20.0])
+
+
+def core_with(error: Array) -> Array:
+    """A moving vehicle's core with an error injected."""
+    core = np.zeros(s.CORE_SIZE)
+    quaternion_from_euler(0.3, -0.4, 1.2, core[s.Q : s.Q + 4])
+    core[s.X_VEL : s.X_VEL + 3] = 4.0, -3.0, 1.0
+    core[s.X_POS : s.X_POS + 3] = 100.0, 50.0, -20.0
+    core[s.X_GYRO_BIAS : s.X_GYRO_BIAS + 3] = 0.01, -0.02, 0.005
+    core[s.X_ACCEL_BIAS : s.X_ACCEL_BIAS + 3] = 0.1, -0.05, 0.2
+    core[s.X_MAG_BIAS : s.X_MAG_BIAS + 3] = 0.01, 0.02, -0.01
+    core[s.GRAVITY] = 9.81
+    work = np.zeros(s.WORK_SIZE)
+    work[: s.ERROR_SIZE] = error
+    covariance.inject(core, work)
+    mechanisation.take_sample(core, IMU, 60.0, 400.0)
+    core[s.GYRO_LAST : s.GYRO_LAST + 3] = IMU[:3]
+    mechanisation.refresh_rotation(core)
+    rotation = core[s.R : s.R + 9].reshape(3, 3)
+    core[s.FORCE_NED : s.FORCE_NED + 3] = rotation @ (IMU[3:6] - core[s.X_ACCEL_BIAS : s.X_ACCEL_BIAS + 3])
+    return core
+
+
+def error_between(true: Array, estimated: Array) -> Array:
+    """Error state from two cores."""
+    out = np.zeros(s.ERROR_SIZE)
+    turn = true[s.R : s.R + 9].reshape(3, 3) @ estimated[s.R : s.R + 9].reshape(3, 3).T
+    out[:3] = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    out[3:] = true[4 : s.NOMINAL_SIZE] - estimated[4 : s.NOMINAL_SIZE]
+    return out
+
+
+def propagated(error: Array) -> Array:
+    core = core_with(error)
+    for _ in range(STEPS):
+        mechanisation.advance(core, DT_S, 0.2)
+    return core
+
+
+def numerical_transition(nominal: Array) -> Array:
+    """Transition over `STEPS` by differencing the mechanisation."""
+    h = 1e-5
+    out = np.zeros((s.ERROR_SIZE, s.ERROR_SIZE))
+    for i in range(s.ERROR_SIZE):
+        step = np.zeros(s.ERROR_SIZE)
+        step[i] = h
+        out[:, i] = error_between(propagated(step), nominal) / h
+    return out
+
+
+def analytic_transition(core: Array) -> Array:
+    out = np.eye(s.ERROR_SIZE)
+    covariance.carry(out, core, core[s.SUM_TIME], False)
+    return out
+
+
+def test_transition() -> None:
+    nominal = propagated(np.zeros(s.ERROR_SIZE))
+    error = analytic_transition(nominal) - numerical_transition(nominal)
+    # What is of second order in the interval T = 20 ms: gyro bias to velocity, g T^2 / 2 = 2 mm/s per rad/s.
+    assert np.abs(error[s.VEL : s.VEL + 3, s.GYRO_BIAS : s.GYRO_BIAS + 3]).max() < 3e-3
+    error[s.VEL : s.POS + 3, s.GYRO_BIAS : s.GYRO_BIAS + 3] = 0.0
+    assert np.abs(error).max() < 4e-4
+
+
+def test_prediction_is_the_transition_and_the_noise() -> None:
+    nominal = propagated(np.zeros(s.ERROR_SIZE))
+    transition = analytic_transition(nominal)
+    root = RandomStreams(3).generator("transition").normal(size=(s.ERROR_SIZE, s.ERROR_SIZE))
+    p = root @ root.T
+    parameters = NavigationParameters(magnetometer_bias_turn_rad=1e15)
+    t = STEPS * DT_S
+    decay = np.ones(s.ERROR_SIZE)
+    decay[s.GYRO_BIAS : s.GYRO_BIAS + 3] = np.exp(-t / parameters.gyro_bias_tau_s)
+    decay[s.ACCEL_BIAS : s.ACCEL_BIAS + 3] = np.exp(-t / parameters.accel_bias_tau_s)
+    decay[s.GPS_ERROR : s.GPS_ERROR + 3] = np.exp(-t / parameters.gps_position_tau_s)
+    decay[s.MAG_BIAS : s.MAG_BIAS + 3] = np.exp(-t / parameters.magnetometer_bias_tau_s)
+    full = np.diag(decay) @ transition
+    expected = full @ p @ full.T
+    covariance.predict(p, nominal, process_from(parameters))
+    np.testing.assert_array_equal(p, p.T)
+    noise = p - expected
+    off_diagonal = noise - np.diag(np.diag(noise))
+    np.testing.assert_allclose(off_diagonal, 0.0, atol=1e-11)
+    assert noise[s.VEL, s.VEL] == pytest.approx(parameters.accel_noise_m_s2_sqrt_hz**2 * t, rel=1e-6)
+    walk = 1.0 - np.exp(-2.0 * t / parameters.gps_position_tau_s)
+    assert noise[s.GPS_ERROR, s.GPS_ERROR] == pytest.approx(0.12**2 * walk, rel=1e-6)
+    assert noise[s.BARO_OFFSET, s.BARO_OFFSET] == pytest.approx(0.02**2 * t, rel=1e-6)
+    assert (np.diag(noise)[: s.POS] > 0.0).all()
+    assert not nominal[s.SUM_TIME : s.SUM_GYRO].any()
+
+
+def history_row(core: Array) -> Array:
+    row = np.zeros((1, s.HISTORY_COLUMNS))
+    row[0, :3] = core[s.X_POS : s.X_POS + 3]
+    row[0, 3:6] = core[s.X_VEL : s.X_VEL + 3]
+    row[0, 6:] = core[s.Q : s.Q + 4]
+    return row
+
+
+def prediction(error: Array, kind: str, axis: int) -> float:
+    """What a sensor would read of a vehicle whose state differs from the nominal one by `error`."""
+    core = core_with(error)
+    if kind == "velocity":
+        return float(core[s.X_VEL + axis])
+    if kind == "position":
+        return float(core[s.X_POS + axis] + core[s.X_GPS_ERROR + axis])
+    if kind == "baro":
+        return float(-core[s.X_POS + 2] + core[s.X_BARO_OFFSET])
+    field = np.array([0.2, 0.02, 0.43])
+    return float((core[s.R : s.R + 9].reshape(3, 3).T @ field + core[s.X_MAG_BIAS : s.X_MAG_BIAS + 3])[axis])
+
+
+def analytic_row(kind: str, axis: int, delay_s: float, core: Array, u: Array) -> Array:
+    """H from the kernels: with P the identity, P H^T is H."""
+    p, work = np.eye(s.ERROR_SIZE), np.zeros(s.WORK_SIZE)
+    if kind == "velocity":
+        r = core[s.R : s.R + 9].reshape(3, 3)
+        b = delay_s * r[axis]
+        fusion.velocity_ph(p, work, axis, u[(axis + 1) % 3], u[(axis + 2) % 3], b[0], b[1], b[2])
+    elif kind == "position":
+        fusion.position_ph(p, work, axis, delay_s)
+    elif kind == "baro":
+        fusion.baro_ph(p, work, delay_s)
+    else:
+        rx, ry, rz = fusion.body_axis_in_ned(history_row(core), 0, axis)
+        mx, my, mz = 0.2, 0.02, 0.43
+        fusion.mag_ph(p, work, axis, ry * mz - rz * my, rz * mx - rx * mz, rx * my - ry * mx)
+    return work[s.PH :].copy()
+
+
+def numerical_row(kind: str, axis: int) -> Array:
+    h = 1e-6
+    out = np.zeros(s.ERROR_SIZE)
+    for i in range(s.ERROR_SIZE):
+        step = np.zeros(s.ERROR_SIZE)
+        step[i] = h
+        out[i] = (prediction(step, kind, axis) - prediction(-step, kind, axis)) / (2.0 * h)
+    return out
+
+
+@pytest.mark.parametrize("kind", ["velocity", "position", "baro", "mag"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_measurement(kind: str, axis: int) -> None:
+    core = core_with(np.zeros(s.ERROR_SIZE))
+    row = analytic_row(kind, axis, 0.0, core, np.zeros(3))
+    np.testing.assert_allclose(row, numerical_row(kind, axis), atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["velocity", "position", "baro"])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_delayed_measurement(kind: str, axis: int) -> None:
+    """A measurement of the past refers to the present error through the inverse of the transition since."""
+    now = propagated(np.zeros(s.ERROR_SIZE))
+    expected = numerical_row(kind, axis) @ np.linalg.inv(numerical_transition(now))
+    row = analytic_row(kind, axis, STEPS * DT_S, now, now[s.SUM_FORCE : s.SUM_FORCE + 3])
+    np.testing.assert_allclose(row, expected, atol=5e-3)  # first order in the delay of 20 ms
