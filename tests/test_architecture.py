@@ -1,0 +1,143 @@
+"""Imports point one way (DESIGN.md, section 2). Read from the sources, so that nothing need be imported."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("flightsim", "autopilot_bridge", "estimators", "missions")
+GROUND_FLOOR = tuple(
+    f"autopilot_bridge.{name}"
+    for name in ("mavlink", "links", "routing", "clock", "tlog", "errors", "geodesy", "mission_plan")
+)
+# Where the wall clock, sockets and files may be met.
+CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")
+SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "threading", "subprocess", "time")
+SANS_IO = (
+    *(f"autopilot_bridge.{name}" for name in ("mavlink", "routing", "geodesy", "mission_plan")),
+    *(
+        f"autopilot_bridge.{name}"
+        for name in ("navigation", "control", "flight", "commander", "flavours", "services", "autopilot")
+    ),
+)
+
+
+def is_in(module, packages):
+    return any(module == package or module.startswith(package + ".") for package in packages)
+
+
+def module_name(path, root=ROOT):
+    parts = path.relative_to(root).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported(source, name, is_package=False):
+    """Full names of everything a module imports, anywhere in it; type-checking imports count as well."""
+    found = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                parts = name.split(".")
+                kept = parts[: len(parts) - node.level + (1 if is_package else 0)]
+                base = ".".join([*kept, base] if base else kept)
+            found.add(base)
+            found.update(f"{base}.{alias.name}" for alias in node.names)
+    return found
+
+
+def modules():
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
+            name = module_name(path)
+            yield name, imported(path.read_text(encoding="utf-8"), name, path.name == "__init__.py")
+
+
+MODULES = dict(modules())
+
+
+def is_embedding(name):
+    """Modules of `missions` that may start an embedded SITL."""
+    return is_in(name, ("missions.embedded",)) or name.startswith("missions.cli")
+
+
+def complaints(name, imports):
+    """Imports of a module that go against the arrows."""
+    ours = {item for item in imports if is_in(item, PACKAGES)}
+    if is_in(name, ("flightsim",)):
+        allowed = ("flightsim",)
+        forbidden = {item for item in imports if is_in(item, ("socket", "time", "pymavlink", "asyncio"))}
+    elif name == "autopilot_bridge":
+        allowed, forbidden = (), set()
+    elif is_in(name, GROUND_FLOOR):
+        allowed, forbidden = GROUND_FLOOR, set()
+    elif is_in(name, ("autopilot_bridge",)):
+        allowed, forbidden = ("autopilot_bridge", "flightsim"), set()
+    elif is_in(name, ("estimators",)):
+        allowed, forbidden = ("estimators", *GROUND_FLOOR), set()
+    elif is_embedding(name):
+        allowed, forbidden = PACKAGES, set()
+    else:
+        allowed, forbidden = ("missions", "estimators", *GROUND_FLOOR), set()
+        # The command line stands above the missions, not below them.
+        if name != "missions.__main__":
+            forbidden |= {item for item in imports if item.startswith("missions.cli")}
+    # `from autopilot_bridge import links` names the package and the part; the part is what counts.
+    parents = {item.rpartition(".")[0] for item in ours}
+    wrong = {item for item in ours if not is_in(item, allowed) and not (item in parents and "." not in item)}
+    return sorted(wrong | forbidden)
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_imports_point_one_way(name):
+    assert complaints(name, MODULES[name]) == []
+
+
+@pytest.mark.parametrize("name", sorted(name for name in MODULES if is_in(name, SANS_IO)))
+def test_cores_do_no_io(name):
+    assert sorted(item for item in MODULES[name] if is_in(item, SANS_IO_FORBIDDEN)) == []
+
+
+def test_only_clock_and_shells_know_the_wall_clock():
+    """`time` is imported by the clock alone; what reports wall time (runners, benchmarks) asks the clock."""
+    users = [
+        name
+        for name, imports in MODULES.items()
+        if "time" in {item.split(".")[0] for item in imports} and not is_in(name, CLOCK_AND_LINKS)
+    ]
+    assert users == []
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "wrong"),
+    [
+        ("flightsim.world", "import autopilot_bridge.links", ["autopilot_bridge.links"]),
+        ("flightsim.world", "def f():\n    import time", ["time"]),
+        ("flightsim.world", "from pymavlink import mavutil", ["pymavlink", "pymavlink.mavutil"]),
+        ("autopilot_bridge.links.udp", "from flightsim import truth", ["flightsim.truth"]),
+        (
+            "autopilot_bridge.routing",
+            "from .autopilot import Autopilot",
+            ["autopilot_bridge.autopilot", "autopilot_bridge.autopilot.Autopilot"],
+        ),
+        ("autopilot_bridge.routing", "from autopilot_bridge import links", []),
+        ("autopilot_bridge.routing", "from autopilot_bridge import sitl", ["autopilot_bridge.sitl"]),
+        ("autopilot_bridge.sitl.runner", "from flightsim.world import World", []),
+        (
+            "estimators.ekf",
+            "from flightsim.truth import LAT_RAD",
+            ["flightsim.truth", "flightsim.truth.LAT_RAD"],
+        ),
+        ("estimators.ekf", "from autopilot_bridge.mavlink import decode", []),
+        ("estimators.ekf", "import autopilot_bridge.navigation", ["autopilot_bridge.navigation"]),
+        ("missions.lissajous", "import flightsim", ["flightsim"]),
+        ("missions.lissajous", "from autopilot_bridge.clock import Clock", []),
+        ("missions.embedded", "from autopilot_bridge.sitl import SitlRunner\nimport flightsim", []),
+        ("missions.cli.fly", "from flightsim.world import World", []),
+    ],
+)
+def test_the_test_sees_wrong_arrows(name, source, wrong):
+    assert complaints(name, imported(source, name)) == wrong
