@@ -94,8 +94,13 @@ class TelemetryClock:
         if self.time_us >= time_us:
             await asyncio.sleep(0)
             return
-        done = asyncio.get_running_loop().create_future()
-        deadline = self._add_deadline(time_us, lambda: done.done() or done.set_result(None))
+        done: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+
+        def wake() -> None:
+            if not done.done():
+                done.set_result(None)
+
+        deadline = self._add_deadline(time_us, wake)
         try:
             await done
         finally:

@@ -78,7 +78,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         return 0.0 if pacer is None else pacer.slipped_s
 
 
-class _WorldSelector(selectors.DefaultSelector):  # type: ignore[valid-type, misc]
+class _WorldSelector(selectors.DefaultSelector):
     """Where the loop would wait for file descriptors, the world goes on instead."""
 
     def __init__(

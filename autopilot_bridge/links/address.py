@@ -105,8 +105,16 @@ class ReplayLog:
 
 Address = UdpServer | UdpClient | UdpPeer | TcpClient | TcpServer | SerialPort | ReplayLog
 
-_SERVERS: Final = {"udp": UdpServer, "udpin": UdpServer, "tcpin": TcpServer}
-_CLIENTS: Final = {"udpout": UdpClient, "tcp": TcpClient, "tcpout": TcpClient}
+_SERVERS: Final[dict[str, type[UdpServer | TcpServer]]] = {
+    "udp": UdpServer,
+    "udpin": UdpServer,
+    "tcpin": TcpServer,
+}
+_CLIENTS: Final[dict[str, type[UdpClient | TcpClient]]] = {
+    "udpout": UdpClient,
+    "tcp": TcpClient,
+    "tcpout": TcpClient,
+}
 _SCHEME: Final = re.compile(r"([A-Za-z]+):(//)?(.*)", re.DOTALL)
 _DEVICE: Final = re.compile(r"/dev/.+")
 

@@ -59,7 +59,7 @@ def _constructor(message_id: int) -> Callable[[bytes], Any]:
 
         def construct_scalars(payload: bytes) -> Any:
             values = unpack(payload)
-            return make(*[values[position] for position in order])  # type: ignore[index]
+            return make(*[values[position] for position in order])
 
         return construct_scalars
 

@@ -92,13 +92,10 @@ def payload_packer(message_id: int) -> Callable[[MAVLinkMessage], bytes]:
     fields = found.wire_fields
     pack = struct.Struct("<" + "".join(_packed_format(field) for field in fields)).pack
     attributes = [_attribute(field) for field in fields]
-    if len(fields) == 1:
+    values_of: Callable[[MAVLinkMessage], tuple[Any, ...]] = attrgetter(*attributes)
+    if len(fields) == 1:  # an attrgetter of one name gives no tuple
         only = attrgetter(attributes[0])
-
-        def values_of(message: MAVLinkMessage) -> tuple[Any, ...]:
-            return (only(message),)
-    else:
-        values_of = attrgetter(*attributes)
+        values_of = lambda message: (only(message),)  # noqa: E731
 
     if not any(field.length and field.code != "s" for field in fields):
         return lambda message: pack(*values_of(message))
