@@ -5,9 +5,13 @@ from collections.abc import Callable
 from typing import Final
 
 wall_time_s: Final = time.monotonic
-"""The wall clock: seconds from an arbitrary start. For pacing and for peers that fell silent, nothing
-else.
-"""
+"""The wall clock: seconds from an arbitrary start. For pacing, silent peers and reports, never for a flight."""
+
+
+def unix_time_us() -> int:
+    """The calendar: microseconds of the Unix epoch, to stamp the log of a flight on real hardware with."""
+    return time.time_ns() // 1000
+
 
 MAX_LAG_S: Final = 0.25
 """Wall seconds of lag that are caught up; a longer stop (SIGSTOP, suspended laptop) is forgotten."""

@@ -2,11 +2,12 @@
 
 import asyncio
 import math
-import time
 from collections import deque
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any, Final
+
+from autopilot_bridge.clock.pacing import wall_time_s
 
 _WINDOW_S: Final = 4.0  # wall seconds over which the rate is measured
 _MIN_WINDOW_S: Final = 0.25  # a shorter base says nothing about the rate
@@ -31,7 +32,7 @@ class TelemetryClock:
         reboots: how often the vehicle's own time jumped back.
     """
 
-    def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, monotonic: Callable[[], float] = wall_time_s) -> None:
         self._monotonic = monotonic
         self._wall_s = monotonic()  # of the newest observation
         self._base_us = 0.0  # clock time at that moment

@@ -10,12 +10,11 @@ process was stopped.
 import asyncio
 import math
 import selectors
-import time
 from collections.abc import Callable, Coroutine
 from contextvars import Context
 from typing import Any, Final, TypeVar
 
-from autopilot_bridge.clock.pacing import Pacer
+from autopilot_bridge.clock.pacing import Pacer, wall_time_s
 from autopilot_bridge.errors import ClockError
 
 T = TypeVar("T")
@@ -47,7 +46,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         *,
         speedup: float | None = None,
         max_time_us: int | None = None,
-        monotonic: Callable[[], float] = time.monotonic,
+        monotonic: Callable[[], float] = wall_time_s,
     ) -> None:
         self._time_us = time_us
         self._world_selector = _WorldSelector(advance, time_us, max_time_us)

@@ -9,7 +9,15 @@ import threading
 
 import pytest
 
-from autopilot_bridge.clock import LoopClock, Pacer, RealTimeClock, TelemetryClock, VirtualTimeLoop, run
+from autopilot_bridge.clock import (
+    LoopClock,
+    Pacer,
+    RealTimeClock,
+    TelemetryClock,
+    VirtualTimeLoop,
+    run,
+    unix_time_us,
+)
 from autopilot_bridge.errors import ClockError
 
 STEP_US = 4000
@@ -361,6 +369,11 @@ def test_real_time_clock_holds_the_pace_and_tells_the_lag():
 def test_impossible_speeds_are_named(speedup):
     with pytest.raises(ValueError, match=f"speed factor {speedup} is not accepted"):
         Pacer(speedup)
+
+
+def test_the_calendar_is_in_microseconds():
+    year_s = 365.25 * 86400
+    assert 2024 < 1970 + unix_time_us() * 1e-6 / year_s < 2200
 
 
 # Vehicle time from telemetry: wall time is the virtual time of the test's loop
