@@ -6,7 +6,9 @@ class MissionError(Exception):
 
 
 class VehicleTimeout(MissionError):
-    """Something awaited of the vehicle did not come in time; says what was awaited and what was heard last."""
+    """Something awaited of the vehicle did not come in time; says what was awaited and what was heard
+    last.
+    """
 
 
 class CommandRejected(MissionError):

@@ -35,7 +35,7 @@ class Mission(Protocol):
 
     name: str
 
-    def check(self, options: FlightOptions) -> None:
+    def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
         """Refuse, with a PlanError, what can't be flown; before anything is started."""
         ...
 
@@ -59,13 +59,13 @@ class PatternMission:
         self.name = name
         self._make_curve = make_curve
 
-    def check(self, options: FlightOptions) -> None:
-        """Plan with the widest limits of any vehicle; the vehicle's own come into it when it is known."""
+    def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
+        """Plan for every vehicle of the team; the vehicle's own limits come into it when it is known."""
         from missions.pattern_flight import plan
 
         for index in range(options.vehicles):
             own = replace(options, index=index)
-            plan(self.curve(own), own, VehicleLimits(speed_m_s=20.0, acceleration_m_s2=5.0))
+            plan(self.curve(own), own, limits)
 
     def curve(self, options: FlightOptions) -> Curve:
         """The pattern around its centre, as often as asked."""
@@ -171,9 +171,9 @@ MISSIONS: Final[Mapping[str, Mission]] = MappingProxyType(
 class ScriptMission:
     """A user's own mission: a Python file with `async def fly(vehicle, options)`.
 
-    The file may have a class `Mission` instead, made without arguments, with `async def fly(self, vehicle, options)` and, if it
-    likes, `def check(self, options)`, which raises `PlanError`. Each vehicle of a team flies it; `options.index` tells
-    them apart.
+    The file may have a class `Mission` instead, made without arguments, with `async def fly(self, vehicle,
+    options)` and, if it likes, `def check(self, options)`, which raises `PlanError`. Each vehicle of a
+    team flies it; `options.index` tells them apart.
 
     Raises:
         PlanError: the file can't be read, or has neither.
@@ -193,7 +193,7 @@ class ScriptMission:
         self._fly = fly
         self._check = getattr(holder, "check", None)
 
-    def check(self, options: FlightOptions) -> None:
+    def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
         if self._check is not None:
             self._check(options)
 
@@ -210,7 +210,7 @@ def _load(path: Path) -> Any:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # noqa: BLE001 -- a user's file may fail in any way, and is told where
+    except Exception as error:
         raise PlanError(f"mission file {path} can't be loaded: {type(error).__name__}: {error}") from error
     return module
 
@@ -226,6 +226,7 @@ def find_mission(name: str) -> Mission:
     known = MISSIONS.get(name)
     if known is None:
         raise PlanError(
-            f"mission {name!r} is not known; there are {', '.join(MISSIONS)}, or the path of a mission file (.py)"
+            f"mission {name!r} is not known; there are {', '.join(MISSIONS)}, "
+            "or the path of a mission file (.py)"
         )
     return known

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from types import MappingProxyType
 
 from autopilot_bridge.geodesy import GeodeticPosition
@@ -87,3 +88,72 @@ class FlightOptions:
     def own_altitude_m(self) -> float:
         """This vehicle's altitude: a team flies in layers, the first at `altitude_m`."""
         return self.altitude_m + self.index * self.separation_m
+
+
+def parse_wind(text: str) -> tuple[float, float]:
+    """Wind from "SPEED" or "SPEED@FROM_DEG", for example "5@270": (m/s, degrees it comes from).
+
+    Raises:
+        PlanError: not of this form, or a speed out of 0..40 m/s.
+    """
+    speed_text, _, from_text = text.partition("@")
+    try:
+        speed_m_s, from_deg = float(speed_text), float(from_text or 0.0)
+    except ValueError:
+        raise PlanError(f"wind {text!r} is not SPEED or SPEED@FROM_DEG, for example 5@270") from None
+    if not (0.0 <= speed_m_s <= 40.0 and math.isfinite(from_deg)):
+        raise PlanError(f"wind {text!r}: the speed must be in 0..40 m/s, the direction a number of degrees")
+    return speed_m_s, from_deg % 360.0
+
+
+def parse_pair(text: str, name: str, separators: str) -> tuple[float, float]:
+    """Two numbers like "3:4" or "100x80"; a single one stands for both.
+
+    Args:
+        text: what the user gave.
+        name: of the option, for the error.
+        separators: characters that may part the numbers; the first is shown in the error.
+
+    Raises:
+        PlanError: not of this form.
+    """
+    cleaned = text.strip().lower()
+    for separator in separators:
+        cleaned = cleaned.replace(separator, " ")
+    parts = cleaned.split()
+    try:
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 2) or not all(math.isfinite(n) for n in numbers):
+        raise PlanError(f"{name} {text!r} is not one or two numbers, for example 3{separators[0]}4")
+    return numbers[0], numbers[-1]
+
+
+def parameters_from_file(path: str | Path) -> dict[str, float]:
+    """Parameters from a file: `NAME VALUE` or `NAME,VALUE` lines (MAVProxy, ArduPilot), or QGroundControl's
+    tab-separated vehicle, component, name, value, type. `#` begins a comment.
+
+    Raises:
+        PlanError: the file can't be read, or a line is neither; names the line.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is not text"
+        raise PlanError(f"parameter file {path} can't be read: {reason}") from error
+    values: dict[str, float] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        words = line.split("#", 1)[0].replace(",", " ").replace("=", " ").split()
+        if not words:
+            continue
+        if len(words) >= 4 and words[0].isdigit() and words[1].isdigit():
+            words = words[2:4]
+        try:
+            name, value = words[0], float(words[1])
+        except (IndexError, ValueError):
+            name, value = "", math.nan
+        if not (0 < len(name) <= 16 and name.isascii() and math.isfinite(value)) or len(words) > 3:
+            raise PlanError(f"parameter file {path}, line {number}: {line.strip()!r} is not NAME VALUE")
+        values[name] = value
+    return values

@@ -1,13 +1,14 @@
 """Flying a pattern: as an uploaded waypoint mission, or by streamed setpoints."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.errors import VehicleTimeout
+from missions.errors import PlanError, VehicleTimeout
 from missions.notes import PATTERN, CommandedPath
 from missions.options import FlightOptions, Via
 from missions.patterns.curve import ArcLengthTable, Array, Curve
@@ -21,9 +22,8 @@ from missions.planning.trajectory import (
     plan_trajectory,
 )
 from missions.planning.waypoints import waypoints_along
-from missions.errors import PlanError
-from missions.vehicle.adapter import Mode
-from missions.vehicle.setpoint import Setpoint
+from missions.vehicle.guided import GuidedSession
+from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.vehicle import Vehicle
 
 _SETTLE_S = 2.0
@@ -85,7 +85,7 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
         await _fly_waypoints(vehicle, options, curve, centre)
 
 
-def setpoint_at(point: TrajectoryPoint, centre: tuple[float, float, float]) -> Setpoint:
+def setpoint_at(point: TrajectoryPoint, centre: Vector) -> Setpoint:
     """A trajectory's point as a setpoint with full feed-forward, its position moved to the centre."""
     n, e, d = point.position_ned_m
     return Setpoint(
@@ -102,7 +102,7 @@ async def _fly_setpoints(
     options: FlightOptions,
     limits: VehicleLimits,
     trajectory: Trajectory,
-    centre: tuple[float, float, float],
+    centre: Vector,
 ) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     altitude_m = options.own_altitude_m
@@ -142,7 +142,7 @@ async def _fly_setpoints(
     notes.end(clock.time_us)
 
 
-async def _fly_line(guided, start, stop, limits: VehicleLimits) -> None:  # type: ignore[no-untyped-def]
+async def _fly_line(guided: GuidedSession, start: Vector, stop: Vector, limits: VehicleLimits) -> None:
     if math.dist(start, stop) < 0.3:
         return
     line = line_trajectory(start, stop, speed_m_s=_TRANSIT_M_S, limits=limits)
@@ -153,7 +153,7 @@ def waypoint_items(
     vehicle: Vehicle,
     points: list[tuple[float, float]],
     options: FlightOptions,
-    centre: tuple[float, float, float],
+    centre: Vector,
 ) -> list[MissionItem]:
     """The plan to upload: takeoff, speed, waypoints, and the way home."""
     home = vehicle.home
@@ -161,43 +161,34 @@ def waypoint_items(
     unset = vehicle.adapter.unset
     altitude_m = options.own_altitude_m
 
-    def waypoint(command: int, north_m: float, east_m: float, **params: float) -> MissionItem:
+    def over(command: int, north_m: float, east_m: float, height_m: float) -> MissionItem:
         lat, lon, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
-        return MissionItem(command=command, x=lat, y=lon, param4=unset, **params)
+        return MissionItem(
+            command=command, param2=options.acceptance_m, param4=unset, x=lat, y=lon, z=height_m
+        )
 
+    waypoint, land = dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_LAND
     items = [
         vehicle.adapter.takeoff_item(home, altitude_m),
         MissionItem(
             command=dialect.MAV_CMD_DO_CHANGE_SPEED,
-            frame=2,
+            frame=dialect.MAV_FRAME_MISSION,
             param1=1.0,
             param2=options.speed_m_s,
             param3=-1.0,
         ),
     ]
-    items += [
-        waypoint(
-            dialect.MAV_CMD_NAV_WAYPOINT,
-            n + centre[0],
-            e + centre[1],
-            param2=options.acceptance_m,
-            z=altitude_m,
-        )
-        for n, e in points
-    ]
+    items += [over(waypoint, n + centre[0], e + centre[1], altitude_m) for n, e in points]
     if options.vehicles > 1:  # home in its own layer: returns all climb to one altitude
-        items.append(
-            waypoint(dialect.MAV_CMD_NAV_WAYPOINT, 0.0, 0.0, param2=options.acceptance_m, z=altitude_m)
-        )
-        items.append(waypoint(dialect.MAV_CMD_NAV_LAND, 0.0, 0.0))
+        items += [over(waypoint, 0.0, 0.0, altitude_m), replace(over(land, 0.0, 0.0, 0.0), param2=0.0)]
     else:
-        items.append(MissionItem(command=dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2))
+        items.append(
+            MissionItem(command=dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=dialect.MAV_FRAME_MISSION)
+        )
     return items
 
 
-async def _fly_waypoints(
-    vehicle: Vehicle, options: FlightOptions, curve: Curve, centre: tuple[float, float, float]
-) -> None:
+async def _fly_waypoints(vehicle: Vehicle, options: FlightOptions, curve: Curve, centre: Vector) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     length_m = None if options.search_time_s is None else options.search_time_s * options.speed_m_s
     points = waypoints_along(curve, length_m=length_m)
@@ -243,6 +234,3 @@ def _flat_path(curve: Curve, length_m: float | None, down_m: float) -> Array:
     kept = slice(None) if length_m is None else slice(int(np.searchsorted(table.arc_m, length_m)) + 1)
     points = table.points_m[kept]
     return np.column_stack((points, np.full(len(points), down_m)))
-
-
-__all__ = ["Mode", "fly_pattern", "plan", "setpoint_at", "waypoint_items"]

@@ -26,7 +26,8 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
     Args:
         path: the file; it must not exist.
         title: above the picture.
-        flights: notes and scores, one per vehicle. Tracks of a team are drawn around the first vehicle's home.
+        flights: notes and scores, one per vehicle. Tracks of a team are drawn around the first vehicle's
+            home.
     """
     figure = Figure(figsize=(9.0, 11.6), dpi=130, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
@@ -132,7 +133,7 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
     axes.set_xlabel("east of home, m", fontsize=9, color=_INK)
     axes.set_ylabel("north of home, m", fontsize=9, color=_INK)
     axes.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07), ncols=min(len(handles), 6 if len(handles) < 7 else 7),
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07), ncols=min(len(handles), 7),
         fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2,
     )  # fmt: skip
     _draw_scale(axes)
@@ -199,8 +200,8 @@ def _draw_altitude(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) ->
         if notes.commanded is not None and phase is not None:
             height = -float(notes.commanded.points_ned_m[0, 2])
             axes.plot(
-                [phase.start_us * 1e-6, phase.end_us * 1e-6], [height, height], color=_COMMANDED, linewidth=4.5,
-                alpha=0.55, solid_capstyle="butt",
+                [phase.start_us * 1e-6, phase.end_us * 1e-6], [height, height], color=_COMMANDED,
+                linewidth=4.5, alpha=0.55, solid_capstyle="butt",
             )  # fmt: skip
         if score.estimate is not None:
             track = _shown(score.estimate, notes)

@@ -1,4 +1,6 @@
-"""What a flight's frames hold, as columns: raw payloads collected per message, decoded in one go with numpy."""
+"""What a flight's frames hold, as columns: raw payloads collected per message, decoded in one go with
+numpy.
+"""
 
 from collections import Counter
 from collections.abc import Callable

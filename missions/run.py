@@ -23,7 +23,8 @@ def create_run_folder(out: Path | None, mission: str, runs: Path = Path("runs"))
     """Make the folder of a new run.
 
     Args:
-        out: the folder asked for; it must not exist, or be empty. None: `runs/<mission>-<n>` with the next free number.
+        out: the folder asked for; it must not exist, or be empty. None: `runs/<mission>-<n>` with the next
+            free number.
         mission: name of the mission.
         runs: where numbered runs go.
 

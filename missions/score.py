@@ -1,9 +1,10 @@
 """How well a flight followed what was commanded: numbers from the recorded frames.
 
-Truth (HIL_STATE_QUATERNION, whoever of the system sent it) is the reference where there is any; otherwise the autopilot's own
-estimate is. The commanded path is laid out from where the vehicle truly stood when it was armed, since that is what
-"home" means to the person who put it there: a constant error of the receiver at start moves home and path alike. The same
-errors with home as the vehicle reports it are given as `..._absolute_m`.
+Truth (HIL_STATE_QUATERNION, whoever of the system sent it) is the reference where there is any; otherwise
+the autopilot's own estimate is. The commanded path is laid out from where the vehicle truly stood when it
+was armed, since that is what "home" means to the person who put it there: a constant error of the receiver
+at start moves home and path alike. The same errors with home as the vehicle reports it are given as
+`..._absolute_m`.
 """
 
 from dataclasses import dataclass
@@ -131,8 +132,8 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
 def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
     """Distance (n,) from each track point to the path, following the path onwards.
 
-    The nearest point is looked for near the one found before, 3 m back to 15 m ahead (more when far off), so that where a
-    path crosses itself the other branch doesn't count.
+    The nearest point is looked for near the one found before, 3 m back to 15 m ahead (more when far off),
+    so that where a path crosses itself the other branch doesn't count.
     """
     if len(path_ned_m) < 2 or not len(track_ned_m):
         return np.zeros(0)
@@ -156,7 +157,9 @@ def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
 
 
 def waypoint_misses_m(commanded: CommandedPath, track: Track) -> tuple[float, ...]:
-    """How close the track came to each waypoint, in their order; the track between two samples is straight."""
+    """How close the track came to each waypoint, in their order; the track between two samples is
+    straight.
+    """
     points = track.pos_ned_m
     if len(points) < 2:
         return ()

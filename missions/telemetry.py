@@ -66,7 +66,9 @@ class Battery:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gps:
-    """GPS receiver (GPS_RAW_INT): fix type (MAVLink GPS_FIX_TYPE, 3 is 3D), satellites, dilution (NaN: unknown)."""
+    """GPS receiver (GPS_RAW_INT): fix type (MAVLink GPS_FIX_TYPE, 3 is 3D), satellites, dilution
+    (NaN: unknown).
+    """
 
     time_us: int
     fix_type: int
@@ -168,7 +170,9 @@ class StatusTextAssembler:
         self._parts: dict[int, dict[int, str]] = {}
 
     def add(self, m: Any) -> StatusText | None:
-        """Take one message; the text when it is complete. A text whose end is lost is dropped at its next use."""
+        """Take one message; the text when it is complete. A text whose end is lost is dropped at its
+        next use.
+        """
         text = str(m.text)
         if not m.id:
             return StatusText(severity=m.severity, text=text.rstrip("\t"))

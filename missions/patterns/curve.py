@@ -1,5 +1,6 @@
 """What every pattern is: a plane curve, and its arc length."""
 
+import itertools
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -15,7 +16,9 @@ _MAX_CURVATURE_PER_M: Final = 1e3  # a cusp or a sharp corner: a turn on the spo
 
 
 class Curve(Protocol):
-    """A plane curve: a point for each parameter in 0..end, in metres north and east of the pattern's centre."""
+    """A plane curve: a point for each parameter in 0..end, in metres north and east of the pattern's
+    centre.
+    """
 
     @property
     def end(self) -> float:
@@ -36,7 +39,9 @@ class Curve(Protocol):
         ...
 
     def knots(self, spacing_m: float) -> Array:
-        """Increasing parameters from 0 to end, at most about `spacing_m` of path apart, with every joint in it."""
+        """Increasing parameters from 0 to end, at most about `spacing_m` of path apart, with every
+        joint in it.
+        """
         ...
 
 
@@ -52,9 +57,11 @@ def curvature_per_m(first: Array, second: Array) -> Array:
 
 
 def knots_by_length(curve: Curve, spacing_m: float, pieces: Array) -> Array:
-    """Knots of a curve whose smooth pieces are bounded by the parameters `pieces`: equal parts in each piece."""
+    """Knots of a curve whose smooth pieces are bounded by the parameters `pieces`: equal parts in
+    each piece.
+    """
     parts = [pieces[:1]]
-    for start, stop in zip(pieces[:-1], pieces[1:], strict=True):
+    for start, stop in itertools.pairwise(pieces):
         coarse = curve.points(np.linspace(start, stop, 17))
         length_m = float(np.hypot(*np.diff(coarse, axis=0).T).sum())
         count = max(2, int(np.ceil(length_m / spacing_m)))
@@ -72,7 +79,8 @@ class ArcLengthTable:
         points_m: north, east (n, 2).
         course_rad: direction of travel (n,), continuous (unwrapped), 0 north, positive to the east.
         curvature_per_m: signed curvature (n,).
-        stops: indices where the direction of travel jumps (a sharp corner, a cusp): a vehicle must stop there.
+        stops: indices where the direction of travel jumps (a sharp corner, a cusp): a vehicle must stop
+            there.
         closed: whether the curve is closed.
     """
 

@@ -18,13 +18,14 @@ def _checked(name: str, value_m: float) -> float:
 def sector(*, radius_m: float, heading_rad: float = 0.0, passes: int = 1) -> Polyline:
     """Sector search (VS): six sectors, all turns 120 degrees, each pass three times through the datum.
 
-    From the datum out along `heading_rad`, across, back through the datum and so on: legs of r, r, 2r, r, 2r, r, r.
-    Each further pass is turned 30 degrees to starboard, as the manual has it.
+    From the datum out along `heading_rad`, across, back through the datum and so on: legs of r, r, 2r, r,
+    2r, r, r. Each further pass is turned 30 degrees to starboard, as the manual has it.
     """
     r = _checked("sector search radius", radius_m)
     if passes < 1:
         raise PlanError(f"{passes} passes can't be flown; ask for at least 1")
-    # around the circle: out to 0, across to 60, through to 240, across to 300, through to 120, across to 180, home
+    # around the circle: out to 0, across to 60, through to 240, across to 300, through to 120, across to
+    # 180, home
     rim = [
         (r * math.cos(math.radians(d)), r * math.sin(math.radians(d))) for d in (0, 60, 240, 300, 120, 180)
     ]
@@ -40,8 +41,9 @@ def parallel_sweep(
 ) -> Polyline:
     """Parallel sweep (PS) of a rectangle: legs along its longer side, `spacing_m` apart.
 
-    It begins half a spacing inside one corner, and the legs keep half a spacing from all sides, so that every point is
-    within half a spacing of a leg. The spacing is reduced to a whole number of legs. Each further pass flies back the same legs.
+    It begins half a spacing inside one corner, and the legs keep half a spacing from all sides, so that
+    every point is within half a spacing of a leg. The spacing is reduced to a whole number of legs. Each
+    further pass flies back the same legs.
 
     Args:
         width_m: side across `heading_rad` (east for 0).
@@ -78,8 +80,8 @@ def expanding_square(
 ) -> Polyline:
     """Expanding square search (SS): from the datum outwards, all turns 90 degrees to starboard.
 
-    Legs of s, s, 2s, 2s, 3s, 3s, ... as long as they fit in the square `size_m`, then one last leg to close the outermost
-    square. Each further pass starts at the datum again, turned 45 degrees.
+    Legs of s, s, 2s, 2s, 3s, 3s, ... as long as they fit in the square `size_m`, then one last leg to
+    close the outermost square. Each further pass starts at the datum again, turned 45 degrees.
     """
     size = _checked("search area size", size_m)
     spacing = _checked("track spacing", spacing_m)

@@ -27,9 +27,9 @@ class Lissajous:
 
     Attributes:
         amplitude_x_m, amplitude_y_m: half the width (east) and half the height (north).
-        ratio_x, ratio_y: the frequencies in units of the fundamental. Whole numbers without common divisor for a
-            closed curve, which then closes at u = 2 pi; otherwise the curve is open, and 0..end is `open_turns` turns
-            of the slower axis.
+        ratio_x, ratio_y: the frequencies in units of the fundamental. Whole numbers without common divisor
+            for a closed curve, which then closes at u = 2 pi; otherwise the curve is open, and 0..end is
+            `open_turns` turns of the slower axis.
         phase_x_rad, phase_y_rad: p_x and p_y.
         open_turns: length of an open curve; not used for a closed one.
     """
@@ -49,7 +49,8 @@ class Lissajous:
         for name, value in (("x", self.ratio_x), ("y", self.ratio_y)):
             if not (math.isfinite(value) and value > 0.0):
                 raise PlanError(
-                    f"frequency {value:g} of axis {name} is not possible; ask for more than 0, as in --ratio 3:4"
+                    f"frequency {value:g} of axis {name} is not possible; "
+                    "ask for more than 0, as in --ratio 3:4"
                 )
         for value in (self.phase_x_rad, self.phase_y_rad):
             if not math.isfinite(value):
@@ -66,7 +67,8 @@ class Lissajous:
         phase_x_rad: float = 0.0,
         phase_y_rad: float = 0.0,
     ) -> "Lissajous":
-        """From the paper's w_x and w_y (rad/s). A ratio of small whole numbers (to 64) is found and closes the curve.
+        """From the paper's w_x and w_y (rad/s). A ratio of small whole numbers (to 64) is found and closes
+        the curve.
 
         The time for 0..2 pi of the parameter is then `natural_period_s(frequency_x_rad_s)`.
         """
@@ -97,7 +99,9 @@ class Lissajous:
 
     @property
     def retraced(self) -> bool:
-        """True for a closed curve that runs into two cusps and back over itself (both axes at rest at once)."""
+        """True for a closed curve that runs into two cusps and back over itself (both axes at rest at
+        once).
+        """
         if not self.closed:
             return False
         a, b = int(self.ratio_x), int(self.ratio_y)
@@ -127,7 +131,9 @@ class Lissajous:
 
 
 def reduced_ratio(x: float, y: float) -> tuple[float, float]:
-    """x : y as whole numbers without common divisor when they are such a ratio (to 64, 1e-6), otherwise (x/y, 1)."""
+    """x : y as whole numbers without common divisor when they are such a ratio (to 64, 1e-6),
+    otherwise (x/y, 1).
+    """
     fraction = Fraction(x / y).limit_denominator(_LARGEST_TERM)
     if 0 < fraction.numerator <= _LARGEST_TERM and abs(float(fraction) - x / y) <= 1e-6 * x / y:
         return float(fraction.numerator), float(fraction.denominator)
@@ -152,8 +158,10 @@ NAMED_PATTERNS: Final[Mapping[str, NamedPattern]] = MappingProxyType(
         "L4": NamedPattern(ratio_x=5, ratio_y=6, phase_x_rad=0.0),
     }
 )
-"""The patterns of the paper's Table I. L1 is the circle (section IV-A); the parameters of L2 to L4 stand only in its
-figure 2, which is not in the text, so they are chosen: the lemniscate (named in section II-C), then ratios n : n+1 of
+"""The patterns of the paper's Table I. L1 is the circle (section IV-A); the parameters of L2 to L4 stand
+only in its
+figure 2, which is not in the text, so they are chosen: the lemniscate (named in section II-C), then ratios
+    n : n+1 of
 growing order. With one odd and one even term and no phase the curves start in the centre, where the paper's
 drone starts, and never run back over themselves."""
 

@@ -9,8 +9,9 @@ import numpy as np
 from missions.errors import PlanError
 from missions.patterns.curve import Array, knots_by_length
 
-# Quintic Bezier corner: control points on the two legs at these fractions of the blend length from the corner. Three on
-# each leg make curvature zero where the blend meets the leg, so the path is curvature-continuous.
+# Quintic Bezier corner: control points on the two legs at these fractions of the blend length from the
+# corner. Three on each leg make curvature zero where the blend meets the leg, so the path is
+# curvature-continuous.
 _CONTROL: Final = (1.0, 0.7, 0.25)
 _BERNSTEIN: Final = np.array(  # power-basis coefficients (rows: powers 0..5) of the control points
     [
@@ -182,7 +183,8 @@ def _rounded_pieces(polyline: Polyline, corner_m: float) -> list[Array]:
             pieces.append(_line(start, vertices[k]))
             start = vertices[k]
             continue
-        # distance of the blend's middle from the corner, per blend length, by the control points' weights at t = 1/2
+        # distance of the blend's middle from the corner, per blend length, by the control points' weights at
+        # t = 1/2
         weight = (_CONTROL[0] + 5.0 * _CONTROL[1] + 10.0 * _CONTROL[2]) / 16.0
         blend_m = min(corner_m / (weight * math.sin(half_turn)), 0.48 * lengths[k - 1], 0.48 * lengths[k])
         corner = vertices[k]

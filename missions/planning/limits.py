@@ -1,7 +1,10 @@
 """What a vehicle can do, as a planner needs it, and refusing what it can't."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Final
 
 from missions.errors import PlanError
 
@@ -37,7 +40,9 @@ class VehicleLimits:
 
     @property
     def lateral_m_s2(self) -> float:
-        """Share of the acceleration for turning; with `tangential_m_s2` at once it makes the whole (0.8, 0.6, 1)."""
+        """Share of the acceleration for turning; with `tangential_m_s2` at once it makes the whole
+        (0.8, 0.6, 1).
+        """
         return 0.8 * self.acceleration_m_s2
 
     @property
@@ -49,20 +54,34 @@ class VehicleLimits:
         """Refuse a ground speed the vehicle can't fly."""
         if not (math.isfinite(speed_m_s) and 0.0 < speed_m_s <= self.speed_m_s):
             raise PlanError(
-                f"speed {speed_m_s:g} m/s is not in 0..{self.speed_m_s:g} m/s, the vehicle's range; change --speed"
+                f"speed {speed_m_s:g} m/s is not in 0..{self.speed_m_s:g} m/s, the vehicle's range; "
+                "change --speed"
             )
 
     def check_altitude(self, altitude_m: float) -> None:
         """Refuse an altitude above home outside the limits."""
         if not self.altitude_min_m <= altitude_m <= self.altitude_max_m:
             raise PlanError(
-                f"altitude {altitude_m:g} m is not in {self.altitude_min_m:g}..{self.altitude_max_m:g} m above home; "
-                "change --altitude"
+                f"altitude {altitude_m:g} m is not in {self.altitude_min_m:g}..{self.altitude_max_m:g} m "
+                "above home; change --altitude"
             )
 
     def check_reach(self, distance_m: float) -> None:
         """Refuse a pattern that leads too far from home."""
         if not distance_m <= self.reach_m:
             raise PlanError(
-                f"the pattern reaches {distance_m:.0f} m from home, more than {self.reach_m:g} m; make it smaller"
+                f"the pattern reaches {distance_m:.0f} m from home, more than {self.reach_m:g} m; "
+                "make it smaller"
             )
+
+
+WIDEST_LIMITS: Final = VehicleLimits(speed_m_s=20.0, acceleration_m_s2=5.0)
+"""What is refused for any vehicle; a vehicle's own limits are read from it later."""
+
+DEFAULT_LIMITS: Final[Mapping[str, VehicleLimits]] = MappingProxyType(
+    {
+        "px4": VehicleLimits(speed_m_s=12.0, acceleration_m_s2=3.0),
+        "ardupilot": VehicleLimits(speed_m_s=10.0, acceleration_m_s2=2.5),
+    }
+)
+"""By firmware, with its default parameters: MPC_XY_VEL_MAX and MPC_ACC_HOR; WPNAV_SPEED and WPNAV_ACCEL."""

@@ -48,9 +48,9 @@ def natural_trajectory(
     )
     if shortest > fundamental_period_s * (1.0 + 1e-9):
         raise PlanError(
-            f"period {fundamental_period_s:g} s needs {speed:.1f} m/s and {turning:.1f} m/s^2; the vehicle has "
-            f"{limits.speed_m_s:g} m/s and {limits.acceleration_m_s2:g} m/s^2: ask for --period {math.ceil(shortest)} or more, "
-            "or a smaller pattern"
+            f"period {fundamental_period_s:g} s needs {speed:.1f} m/s and {turning:.1f} m/s^2; "
+            f"the vehicle has {limits.speed_m_s:g} m/s and {limits.acceleration_m_s2:g} m/s^2: "
+            f"ask for --period {math.ceil(shortest)} or more, or a smaller pattern"
         )
     ramp_s = max(2.0, 1.5 * speed / (_SHARE_OF_LIMIT * limits.acceleration_m_s2))
     whole_s = curve.end / rate + ramp_s
@@ -62,7 +62,7 @@ def natural_trajectory(
         whole_s = min(whole_s, duration_s)
     if whole_s < 2.0 * ramp_s:  # a short arc: ramp up and straight down again
         ramp_s = 0.5 * whole_s
-    t = np.arange(int(math.ceil(whole_s / STEP_S)) + 1) * STEP_S
+    t = np.arange(math.ceil(whole_s / STEP_S) + 1) * STEP_S
     u, pace, change = _phase(np.minimum(t, whole_s), whole_s, ramp_s, rate)
     u = np.minimum(u, curve.end)
     return _trajectory(curve, u, pace, change, altitude_m, limits)

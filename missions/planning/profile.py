@@ -1,9 +1,10 @@
 """Speed along a path: as fast as asked, as slow as curvature needs, smooth in time.
 
-Between two stops: the speed limit from curvature and yaw rate, then a forward and a backward pass for the tangential
-acceleration (Bobrow, Dubowsky, Gibson 1985, for a point mass), then the distance flown, as a function of time, is averaged over a
-triangular window, which bounds jerk and makes starts and stops smooth. Averaging shifts speed along the path, so the
-result is checked, and the limits lowered where they were passed.
+Between two stops: the speed limit from curvature and yaw rate, then a forward and a backward pass for the
+    tangential
+acceleration (Bobrow, Dubowsky, Gibson 1985, for a point mass), then the distance flown, as a function of
+time, is averaged over a triangular window, which bounds jerk and makes starts and stops smooth. Averaging
+shifts speed along the path, so the result is checked, and the limits lowered where they were passed.
 """
 
 from dataclasses import dataclass
@@ -85,7 +86,7 @@ def _smoothed(grid: Array, squared: Array, smoothing_s: float) -> Profile:
     since = np.minimum(t, times[-1]) - times[k]
     span = times[k + 1] - times[k]
     arc = grid[k] + since * (speed[k] + 0.5 * (speed[k + 1] - speed[k]) * since / span)
-    half = max(1, int(round(0.5 * smoothing_s / STEP_S)))
+    half = max(1, round(0.5 * smoothing_s / STEP_S))
     box = np.full(half, 1.0 / half)
     kernel = np.convolve(box, box)
     padded = np.concatenate((np.full(2 * half, grid[0]), arc, np.full(2 * half, grid[-1])))

@@ -1,5 +1,6 @@
 """A path in time: position, velocity, acceleration and yaw for every moment."""
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Final
@@ -94,7 +95,8 @@ def plan_trajectory(
 ) -> Trajectory:
     """Fly a curve from rest to rest at constant altitude, nose along the path.
 
-    Speed is `speed_m_s` wherever curvature, yaw rate and acceleration allow; at sharp corners and cusps the vehicle stops and turns.
+    Speed is `speed_m_s` wherever curvature, yaw rate and acceleration allow; at sharp corners and cusps
+    the vehicle stops and turns.
 
     Args:
         curve: pattern around the origin of the local frame.
@@ -123,7 +125,9 @@ def line_trajectory(
     speed_m_s: float,
     limits: VehicleLimits,
 ) -> Trajectory:
-    """Straight from one point to another, from rest to rest; yaw along the way (0 for a climb on the spot)."""
+    """Straight from one point to another, from rest to rest; yaw along the way (0 for a climb on the
+    spot).
+    """
     start, stop = np.array(start_ned_m), np.array(stop_ned_m)
     distance = float(np.linalg.norm(stop - start))
     if distance < 1e-3:
@@ -155,7 +159,7 @@ class _Piece:
 def _plan_pieces(table: ArcLengthTable, end: int, speed_m_s: float, limits: VehicleLimits) -> list[_Piece]:
     bounds = [0, *(k for k in table.stops if k < end), end]
     pieces = []
-    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+    for first, last in itertools.pairwise(bounds):
         knots = slice(first, last + 1)
         curvature = table.curvature_per_m[knots].copy()
         curvature[0], curvature[-1] = curvature[min(1, last - first)], curvature[max(-2, first - last - 1)]
@@ -204,7 +208,11 @@ def _cut(
 
 
 def _assemble(curve: Curve, table: ArcLengthTable, pieces: list[_Piece], altitude_m: float) -> Trajectory:
-    positions, velocities, accelerations, yaws, yaw_rates = [], [], [], [], []
+    positions: list[Array] = []
+    velocities: list[Array] = []
+    accelerations: list[Array] = []
+    yaws: list[Array] = []
+    yaw_rates: list[Array] = []
     for piece in pieces:
         if piece.turn_s > 0.0 and positions:
             _append_turn(table, piece, positions, velocities, accelerations, yaws, yaw_rates)
@@ -243,7 +251,7 @@ def _append_turn(
     yaw_rates: list[Array],
 ) -> None:
     """Stand still and turn the nose from one course to the next, smoothly (cubic)."""
-    count = max(2, int(math.ceil(piece.turn_s / STEP_S)))
+    count = max(2, math.ceil(piece.turn_s / STEP_S))
     f = np.arange(1, count) / count
     start, stop = yaws[-1][-1], table.course_rad[piece.first]
     positions.append(np.repeat(positions[-1][-1:], count - 1, axis=0))

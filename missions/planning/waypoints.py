@@ -1,5 +1,6 @@
 """A curve as waypoints: close together where it bends, far apart where it is straight."""
 
+import itertools
 import math
 
 import numpy as np
@@ -54,7 +55,7 @@ def _cut_polyline(curve: Polyline, length_m: float | None) -> list[tuple[float, 
         return vertices
     kept = [vertices[0]]
     left = length_m
-    for (n0, e0), (n1, e1) in zip(vertices, vertices[1:], strict=False):
+    for (n0, e0), (n1, e1) in itertools.pairwise(vertices):
         leg = math.dist((n0, e0), (n1, e1))
         if leg >= left:
             f = max(left, 1e-3) / leg

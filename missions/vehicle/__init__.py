@@ -1,4 +1,6 @@
-"""What a mission may ask of a vehicle: one shape for PX4 and ArduPilot, over MAVLink only, on vehicle time."""
+"""What a mission may ask of a vehicle: one shape for PX4 and ArduPilot, over MAVLink only, on vehicle
+time.
+"""
 
 from missions.vehicle.adapter import Mode
 from missions.vehicle.setpoint import Setpoint

@@ -7,16 +7,42 @@ from typing import TYPE_CHECKING, Final
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import DEFAULT_LIMITS, VehicleLimits
 from missions.vehicle.adapter import Mode, ModeCommand
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
-_NAMES: Final = (
-    "Stabilize Acro Alt_Hold Auto Guided Loiter RTL Circle ? Land ? Drift ? Sport Flip AutoTune PosHold Brake "
-    "Throw Avoid_ADSB Guided_NoGPS Smart_RTL FlowHold Follow ZigZag SystemID AutoRotate Auto_RTL Turtle"
-).split()
+_NAMES: Final[Mapping[int, str]] = MappingProxyType(
+    {
+        0: "Stabilize",
+        1: "Acro",
+        2: "Alt Hold",
+        3: "Auto",
+        4: "Guided",
+        5: "Loiter",
+        6: "RTL",
+        7: "Circle",
+        9: "Land",
+        11: "Drift",
+        13: "Sport",
+        14: "Flip",
+        15: "AutoTune",
+        16: "PosHold",
+        17: "Brake",
+        18: "Throw",
+        19: "Avoid ADSB",
+        20: "Guided NoGPS",
+        21: "Smart RTL",
+        22: "FlowHold",
+        23: "Follow",
+        24: "ZigZag",
+        25: "SystemID",
+        26: "Autorotate",
+        27: "Auto RTL",
+        28: "Turtle",
+    }
+)
 _PREARM_CHECK: Final = 0x10000000
 _EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions
 _EKF_CONST_POS: Final = 0x80
@@ -26,7 +52,8 @@ class ArduCopter:
     """ArduPilot copter: sends nothing until asked, numbers home as mission item 0, speaks PARAM_FLOAT."""
 
     name = "ardupilot"
-    # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would obey (throttle low: descend)
+    # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would obey (throttle low:
+    # descend)
     modes: Mapping[Mode, int] = MappingProxyType(
         {
             Mode.HOLD: 17,
@@ -54,8 +81,7 @@ class ArduCopter:
     unset = 0.0  # NaN is refused
 
     def mode_name(self, custom_mode: int) -> str:
-        known = 0 <= custom_mode < len(_NAMES) and _NAMES[custom_mode] != "?"
-        return _NAMES[custom_mode] if known else f"mode {custom_mode}"
+        return _NAMES.get(custom_mode, f"mode {custom_mode}")
 
     def mode_command(self, mode: Mode) -> ModeCommand:
         return ModeCommand(main=self.modes[mode])
@@ -99,7 +125,7 @@ class ArduCopter:
         await vehicle.command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0)
 
     async def limits(self, vehicle: "Vehicle") -> VehicleLimits:
-        known = VehicleLimits(speed_m_s=10.0, acceleration_m_s2=2.5)
+        known = DEFAULT_LIMITS["ardupilot"]
         return VehicleLimits(
             speed_m_s=0.01 * await vehicle.parameter_or("WPNAV_SPEED", 100.0 * known.speed_m_s),
             acceleration_m_s2=0.01

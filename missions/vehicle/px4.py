@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import DEFAULT_LIMITS, VehicleLimits
 from missions.vehicle.adapter import Mode, ModeCommand
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ class Px4:
             await vehicle.arm()
 
     async def limits(self, vehicle: "Vehicle") -> VehicleLimits:
-        known = VehicleLimits()
+        known = DEFAULT_LIMITS["px4"]
         return VehicleLimits(
             speed_m_s=await vehicle.parameter_or("MPC_XY_VEL_MAX", known.speed_m_s),
             acceleration_m_s2=await vehicle.parameter_or("MPC_ACC_HOR", known.acceleration_m_s2),

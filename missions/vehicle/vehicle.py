@@ -31,8 +31,8 @@ _GROUND: Final = 1
 class Vehicle(VehicleView):
     """A vehicle over MAVLink, PX4 or ArduPilot: which one, its heartbeat says.
 
-    All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` says what was awaited and what was heard.
-    Heights are above home; local positions are NED metres from home.
+    All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` says what was awaited and
+    what was heard. Heights are above home; local positions are NED metres from home.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -189,8 +189,8 @@ class Vehicle(VehicleView):
     async def set_mode(self, mode: Mode, timeout_s: float = 8.0) -> None:
         """Switch the flight mode, and see it in a heartbeat: PX4 acknowledges modes before it knows.
 
-        A refusal is tried again until the deadline, since several pass by themselves (a mission that was just uploaded, an
-        estimator that settles).
+        A refusal is tried again until the deadline, since several pass by themselves (a mission that was
+        just uploaded, an estimator that settles).
         """
         target = self.adapter.modes[mode]
         asked = self.adapter.mode_command(mode)
@@ -348,8 +348,8 @@ class Vehicle(VehicleView):
     async def guided(self, rate_hz: float = 25.0) -> AsyncIterator[GuidedSession]:
         """Fly by streamed setpoints: `async with vehicle.guided() as g: await g.follow(source)`.
 
-        PX4 gets setpoints before and all the time in OFFBOARD; between two `follow` the last one is repeated. At the end
-        the vehicle holds.
+        PX4 gets setpoints before and all the time in OFFBOARD; between two `follow` the last one is
+        repeated. At the end the vehicle holds.
         """
         session = GuidedSession(self, rate_hz, await self.home_in_local_frame())
         try:
@@ -362,7 +362,8 @@ class Vehicle(VehicleView):
         """Follow streamed setpoints until the source ends, then hold.
 
         Args:
-            source: called with vehicle seconds since the first setpoint was due; a `Setpoint` NED from home, or None at the end.
+            source: called with vehicle seconds since the first setpoint was due; a `Setpoint` NED from
+                home, or None at the end.
             rate_hz: setpoints per vehicle second; PX4 needs more than 2.
         """
         async with self.guided(rate_hz) as session:
@@ -519,10 +520,12 @@ class Vehicle(VehicleView):
 
     @asynccontextmanager
     async def safe_on_exit(self, action: Mode = Mode.RETURN) -> AsyncIterator["Vehicle"]:
-        """Leave the vehicle safe: when the block fails, is cancelled or interrupted in flight, `action` is commanded.
+        """Leave the vehicle safe: when the block fails, is cancelled or interrupted in flight, `action` is
+        commanded.
 
         Args:
-            action: `Mode.RETURN` (then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is refused, the other two are tried.
+            action: `Mode.RETURN` (then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is refused, the
+                other two are tried.
         """
         try:
             yield self

@@ -1,0 +1,76 @@
+"""The command line: `flightstack`.
+
+Heavy modules (numba, JSBSim, matplotlib) are imported by the command that needs them, so that help and
+errors are quick.
+"""
+
+import importlib
+import sys
+from typing import Final
+
+import click
+
+_COMMANDS: Final = {
+    "fly": ("missions.cli_fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
+    "sitl": ("missions.cli_sitl", "sitl", "SITL for other people's clients."),
+}
+
+DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+class _Commands(click.Group):
+    """Commands that are imported when they are called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(_COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in _COMMANDS:
+            return None
+        module, name, _ = _COMMANDS[cmd_name]
+        command: click.Command = getattr(importlib.import_module(module), name)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if args and args[0] not in _COMMANDS and not args[0].startswith("-"):
+            raise click.UsageError(f"no command {args[0]!r}; there are {', '.join(_COMMANDS)}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, _, text) in _COMMANDS.items()])
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="flightstack")
+def command_line() -> None:
+    """MAVLink software-in-the-loop flights: missions, SITL, logs.
+
+    Exit codes: 0 done, 1 the mission failed, 2 usage, 130 interrupted by Ctrl-C.
+    """
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point: runs the command line and exits. Every error is one line on stderr."""
+    sys.exit(run_command_line(arguments))
+
+
+def run_command_line(arguments: list[str] | None = None) -> int:
+    """Run the command line and give the exit code back."""
+    try:
+        result = command_line.main(args=arguments, prog_name="flightstack", standalone_mode=False)
+    except click.exceptions.Exit as stop:
+        return int(stop.exit_code)
+    except click.Abort:
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    except click.ClickException as error:
+        message = " ".join(error.format_message().split())
+        click.echo(f"flightstack: {message}", err=True)
+        return int(error.exit_code)
+    except KeyboardInterrupt:
+        click.echo("interrupted", err=True)
+        return INTERRUPTED
+    return result if isinstance(result, int) else DONE
