@@ -7,7 +7,7 @@ Positions are local NED metres at the filter's origin.
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from autopilot_bridge.control.setpoint import SETPOINT_SIZE
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.navigation import layout as nav_layout
+from autopilot_bridge.navigation.health import NavigationHealth
 
 Array = NDArray[np.float64]
 
@@ -60,9 +61,13 @@ class ManualInput:
 
 @dataclass(frozen=True, slots=True)
 class WaypointReached:
-    """A mission item was completed (MISSION_ITEM_REACHED)."""
+    """A mission item was completed (MISSION_ITEM_REACHED).
+
+    `navigation` is False for DO_ and CONDITION_ items: ArduPilot reports them as reached, PX4 doesn't.
+    """
 
     seq: int
+    navigation: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,17 +119,6 @@ FlightEvent = (
     | TaskFinished
     | TouchedDown
 )
-
-
-class NavigationStatus(Protocol):
-    """What flight tasks ask of `navigation.NavigationHealth`."""
-
-    @property
-    def altitude_valid(self) -> bool: ...
-    @property
-    def velocity_valid(self) -> bool: ...
-    @property
-    def position_valid(self) -> bool: ...
 
 
 class FlightContext:
@@ -180,7 +174,7 @@ class FlightContext:
         self.time_us = 0
         self.dt_s = 1.0 / TASK_RATE_HZ
         self.nav: Array = np.full(nav_layout.NAV_SIZE, np.nan) if nav is None else nav
-        self.health: NavigationStatus | None = None
+        self.health: NavigationHealth | None = None
         self.setpoint: Array = np.full(SETPOINT_SIZE, np.nan) if setpoint is None else setpoint
         self.home_ned_m: Array = np.full(3, np.nan)
         self.home_yaw_rad = math.nan
@@ -203,17 +197,20 @@ class FlightContext:
     @property
     def position_valid(self) -> bool:
         """The horizontal position may be flown by."""
-        return self.health is not None and self.health.position_valid
+        health = self.health
+        return health is not None and (
+            health.position_horizontal_relative or health.position_horizontal_absolute
+        )
 
     @property
     def velocity_valid(self) -> bool:
         """The horizontal velocity may be flown by."""
-        return self.health is not None and self.health.velocity_valid
+        return self.health is not None and self.health.velocity_horizontal
 
     @property
     def altitude_valid(self) -> bool:
         """The vertical position and velocity may be flown by."""
-        return self.health is not None and self.health.altitude_valid
+        return self.health is not None and self.health.position_vertical_absolute
 
     @property
     def height_above_home_m(self) -> float:

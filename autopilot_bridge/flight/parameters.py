@@ -20,7 +20,7 @@ _MAY_BE_ZERO: Final = frozenset(
 
 
 class YawBehaviour(IntEnum):
-    """Where the nose points on the way to a target when nobody asked for a yaw (PX4 MPC_YAW_MODE 0/.., ArduPilot WP_YAW_BEHAVIOR)."""
+    """Where the nose points on the way when nobody asked for a yaw (MPC_YAW_MODE | WP_YAW_BEHAVIOR)."""
 
     KEEP = 0
     TOWARDS_TARGET = 1
@@ -51,6 +51,7 @@ class FlightParameters:
     yaw_behaviour: YawBehaviour = YawBehaviour.TOWARDS_TARGET  # MPC_YAW_MODE | WP_YAW_BEHAVIOR
     acceptance_radius_m: float = 2.0  # NAV_ACC_RAD | WPNAV_RADIUS
     acceptance_altitude_m: float = 0.8  # NAV_MC_ALT_RAD
+    use_waypoint_yaw: bool = True  # param4 of mission items turns the nose (PX4); ArduPilot ignores it
 
     takeoff_altitude_m: float = 2.5  # MIS_TAKEOFF_ALT
     takeoff_speed_m_s: float = 1.5  # MPC_TKO_SPEED | WPNAV_SPEED_UP
@@ -65,6 +66,7 @@ class FlightParameters:
     return_altitude_m: float = 30.0  # RTL_RETURN_ALT | RTL_ALT, above home
     return_descend_altitude_m: float = 10.0  # RTL_DESCEND_ALT | RTL_ALT_FINAL, above home
     return_loiter_time_s: float = 0.0  # RTL_LAND_DELAY | RTL_LOIT_TIME; negative (PX4 -1): hold, don't land
+    return_loiters_high: bool = False  # ArduPilot waits before it descends, PX4 at the descend altitude
     return_speed_m_s: float = 5.0  # MPC_XY_CRUISE | RTL_SPEED
     return_cone_half_angle_rad: float = math.radians(
         45.0
@@ -97,6 +99,8 @@ class FlightParameters:
             value = getattr(self, name)
             if name == "return_min_distance_m" and value == math.inf:
                 continue
+            if isinstance(value, bool):
+                continue
             if not math.isfinite(value):
                 raise ValueError(f"{name} = {value} is not a finite number")
             if name in ("return_loiter_time_s", "yaw_behaviour"):
@@ -106,6 +110,11 @@ class FlightParameters:
                     raise ValueError(f"{name} = {value} is negative; zero or more is accepted")
             elif value <= 0.0:
                 raise ValueError(f"{name} = {value} is not positive")
+        if self.land_fast_altitude_m < self.land_slow_altitude_m:
+            raise ValueError(
+                f"land_fast_altitude_m = {self.land_fast_altitude_m} is below "
+                f"land_slow_altitude_m = {self.land_slow_altitude_m}"
+            )
         if self.manual_expo > 1.0:
             raise ValueError(f"manual_expo = {self.manual_expo} is not in 0..1")
         if self.manual_deadzone >= 1.0:

@@ -1,0 +1,123 @@
+"""Fly to a place and hold there."""
+
+import math
+
+import numpy as np
+
+from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
+from autopilot_bridge.flight.ground import TakeoffRamp
+from autopilot_bridge.flight.motion import SmoothMotion
+from autopilot_bridge.flight.task import TaskStatus
+from autopilot_bridge.navigation import layout as nav_layout
+
+_WANTS_UP_M = 0.3
+
+
+class GotoTask:
+    """Fly straight to a place with limited speed, acceleration and jerk, then hold it. DONE on arrival.
+
+    From the ground it takes off when the place is above the vehicle (as PX4 does on DO_REPOSITION).
+
+    Args:
+        position_ned_m: place, (3,); NaN components mean the place where the vehicle comes to rest.
+        yaw_rad: heading; NaN: by the vehicle's yaw behaviour.
+        speed_m_s: None: the cruise speed.
+        acceptance_m: distance at which the place is reached; None: the parameter.
+    """
+
+    __slots__ = (
+        "_acceptance_m",
+        "_motion",
+        "_place",
+        "_ramp",
+        "_reached",
+        "_speed_m_s",
+        "_wanted",
+        "_yaw_rad",
+    )
+
+    def __init__(
+        self,
+        position_ned_m: Array,
+        *,
+        yaw_rad: float = math.nan,
+        speed_m_s: float | None = None,
+        acceptance_m: float | None = None,
+    ) -> None:
+        self._wanted: Array = np.array(position_ned_m, dtype=np.float64)
+        self._place: Array = self._wanted.copy()
+        self._yaw_rad = yaw_rad
+        self._speed_m_s = speed_m_s
+        self._acceptance_m = acceptance_m
+        self._motion: SmoothMotion | None = None
+        self._ramp: TakeoffRamp | None = None
+        self._reached = False
+
+    def set_target(
+        self,
+        ctx: FlightContext,
+        position_ned_m: Array,
+        *,
+        yaw_rad: float = math.nan,
+        speed_m_s: float | None = None,
+    ) -> None:
+        """Fly somewhere else from now on, without a stop in between."""
+        self._wanted[:] = position_ned_m
+        self._yaw_rad = yaw_rad
+        self._speed_m_s = speed_m_s
+        self._reached = False
+        if self._motion is not None:
+            self._begin(ctx, self._motion)
+
+    def set_speed(self, ctx: FlightContext, speed_m_s: float) -> None:
+        """Change the speed on the way (DO_CHANGE_SPEED)."""
+        self._speed_m_s = speed_m_s
+        if self._motion is not None:
+            self._motion.trajectory.set_limits(ctx.parameters, speed_m_s=speed_m_s)
+
+    def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
+        motion.trajectory.set_limits(ctx.parameters, speed_m_s=self._speed_m_s)
+        motion.begin_leg()
+        position, velocity = motion.trajectory.position_ned_m, motion.trajectory.velocity_ned_m_s
+        acc = ctx.parameters.acceleration_m_s2
+        stop_ahead = float(np.hypot(velocity[0], velocity[1])) / (2.0 * acc)
+        self._place[:] = np.where(np.isfinite(self._wanted), self._wanted, position + velocity * stop_ahead)
+
+    def activate(self, ctx: FlightContext) -> None:
+        ctx.phase = FlightPhase.CRUISE
+        self._reached = False
+        self._ramp = TakeoffRamp(ctx)
+        self._motion = SmoothMotion(ctx)
+        self._begin(ctx, self._motion)
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        motion, ramp = self._motion, self._ramp
+        if motion is None or ramp is None:
+            self.activate(ctx)
+            return self.update(ctx)
+        position = ctx.nav[nav_layout.POS_NED_M]
+        wants_up = float(position[2] - self._place[2]) > _WANTS_UP_M
+        if not ramp.update(ctx, wants_up, ctx.parameters.takeoff_speed_m_s):
+            motion.restart(ctx)
+            return TaskStatus.RUNNING
+        motion.synchronise(ctx)
+        motion.fly_to(ctx, self._place)
+        motion.steer(ctx, self._yaw_rad, self._place)
+        motion.write(ctx)
+        if not self._reached:
+            radius = ctx.parameters.acceptance_radius_m if self._acceptance_m is None else self._acceptance_m
+            away = math.dist(position, self._place)
+            if away < radius and ctx.position_valid and motion.stopped:
+                self._reached = True
+                ctx.events.append(TaskFinished("goto"))
+        return TaskStatus.DONE if self._reached else TaskStatus.RUNNING
+
+
+class RepositionTask(GotoTask):
+    """DO_REPOSITION: a `GotoTask` that holds the place for good and is never DONE."""
+
+    __slots__ = ()
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        super().update(ctx)
+        return TaskStatus.RUNNING

@@ -1,0 +1,97 @@
+"""Tasks that stay: idle on the ground, hold, brake."""
+
+import math
+
+import numpy as np
+
+from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
+from autopilot_bridge.flight.ground import TakeoffRamp
+from autopilot_bridge.flight.motion import SmoothMotion
+from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
+
+
+class IdleTask:
+    """Motors off while disarmed, at idle while armed."""
+
+    def activate(self, ctx: FlightContext) -> None:
+        ctx.phase = FlightPhase.CRUISE
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        clear_setpoint(ctx.setpoint, sp.IDLE if ctx.armed else sp.OFF)
+        return TaskStatus.RUNNING
+
+
+class HoldTask:
+    """Brake within the limits, then hold the place; or fly to a given place and hold that.
+
+    On the ground it rests with motors at idle. Without a position it stops by velocity, without that it flies level.
+
+    Args:
+        position_ned_m: place to hold, (3,); None: where the vehicle comes to rest.
+        yaw_rad: heading to hold; None: the present one.
+    """
+
+    __slots__ = ("_motion", "_ramp", "_target", "_yaw_rad")
+
+    def __init__(self, position_ned_m: Array | None = None, yaw_rad: float | None = None) -> None:
+        self._target = None if position_ned_m is None else np.array(position_ned_m, dtype=np.float64)
+        self._yaw_rad = math.nan if yaw_rad is None else yaw_rad
+        self._motion: SmoothMotion | None = None
+        self._ramp: TakeoffRamp | None = None
+
+    def activate(self, ctx: FlightContext) -> None:
+        ctx.phase = FlightPhase.CRUISE
+        self._motion = SmoothMotion(ctx)
+        self._ramp = TakeoffRamp(ctx)
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        motion, ramp = self._motion, self._ramp
+        if motion is None or ramp is None:
+            self.activate(ctx)
+            return self.update(ctx)
+        if not ramp.update(ctx, False, 0.0):
+            motion.restart(ctx)
+            return TaskStatus.RUNNING
+        motion.synchronise(ctx)
+        if self._target is None:
+            motion.brake(ctx)
+        else:
+            motion.fly_to(ctx, self._target)
+        motion.steer(ctx, motion.heading.yaw_rad if math.isnan(self._yaw_rad) else self._yaw_rad)
+        motion.write(ctx)
+        return TaskStatus.RUNNING
+
+
+class BrakeTask:
+    """Stop as hard as the limits allow and hold (ArduPilot BRAKE); DONE when stopped."""
+
+    __slots__ = ("_done", "_motion", "_ramp")
+
+    def __init__(self) -> None:
+        self._motion: SmoothMotion | None = None
+        self._ramp: TakeoffRamp | None = None
+        self._done = False
+
+    def activate(self, ctx: FlightContext) -> None:
+        ctx.phase = FlightPhase.CRUISE
+        self._done = False
+        self._motion = SmoothMotion(ctx)
+        self._ramp = TakeoffRamp(ctx)
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        motion, ramp = self._motion, self._ramp
+        if motion is None or ramp is None:
+            self.activate(ctx)
+            return self.update(ctx)
+        if not ramp.update(ctx, False, 0.0):
+            motion.restart(ctx)
+            return TaskStatus.RUNNING
+        motion.synchronise(ctx)
+        motion.brake(ctx)
+        motion.steer(ctx, motion.heading.yaw_rad)
+        motion.write(ctx)
+        if motion.stopped and not self._done:
+            self._done = True
+            ctx.events.append(TaskFinished("brake"))
+        return TaskStatus.DONE if self._done else TaskStatus.RUNNING

@@ -1,0 +1,385 @@
+"""Flying an uploaded plan (MAVLink mission protocol), passing waypoints without stopping where that is allowed."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+
+from autopilot_bridge.flight.context import (
+    Array,
+    FlightContext,
+    FlightPhase,
+    HomeChangeRequested,
+    MissionFinished,
+    MissionModeRequested,
+    WaypointReached,
+    WaypointStarted,
+)
+from autopilot_bridge.flight.corners import Point, passing_speed, turn_angle, turn_in_distance
+from autopilot_bridge.flight.ground import TakeoffRamp
+from autopilot_bridge.flight.hold import HoldTask
+from autopilot_bridge.flight.land import LandTask
+from autopilot_bridge.flight.motion import SmoothMotion
+from autopilot_bridge.flight.orbit import OrbitTask
+from autopilot_bridge.flight.plan_reading import (
+    Command,
+    is_navigation,
+    is_passed_through,
+    is_waypoint,
+    jump_target,
+    target_of,
+)
+from autopilot_bridge.flight.return_home import ReturnTask
+from autopilot_bridge.flight.takeoff import TakeoffTask
+from autopilot_bridge.flight.task import FlightTask, TaskStatus
+from autopilot_bridge.flight.trajectory import SPEED, SPEED_DOWN, SPEED_UP
+from autopilot_bridge.flight.yaw import wrap_pi
+from autopilot_bridge.mission_plan import MissionItem, MissionStore
+from autopilot_bridge.navigation import layout as nav_layout
+
+_LOOK_AHEAD_ITEMS: Final = 40
+_LOOK_AHEAD_M: Final = 150.0
+_YAW_REACHED_RAD: Final = math.radians(5.0)
+_MAX_INSTANT_ITEMS: Final = 200  # per update: breaks loops of DO_JUMP without anything to fly in between
+
+
+@dataclass(slots=True)
+class _Leg:
+    """The leg being flown to a waypoint."""
+
+    target: Array
+    radius_m: float
+    yaw_rad: float
+    passing_m_s: float  # 0: stop there
+    turn_in_m: float
+    hold_s: float
+    waited_s: float = 0.0
+    arrived: bool = False
+
+
+class MissionTask:
+    """Executes the items of a store, from its current one; DONE (and holding) after the last.
+
+    A new plan or another current item, seen in the store, takes effect at the next update. Waypoints without a hold
+    time are passed at the speed their corner, the acceptance radius and the legs behind them allow. DO_ items act at
+    once; those for equipment the vehicle doesn't have are passed over. NAV_RETURN_TO_LAUNCH is flown here and also
+    reported as `MissionModeRequested`.
+
+    Args:
+        store: the plan; its `current` is kept up to date.
+        first_item: 1 where item 0 is home (ArduPilot).
+    """
+
+    __slots__ = (
+        "_finished",
+        "_first_item",
+        "_jumps",
+        "_leg",
+        "_motion",
+        "_ramp",
+        "_seq",
+        "_speed_m_s",
+        "_store",
+        "_sub",
+        "_version",
+        "_wait_left_s",
+        "_yaw_rad",
+    )
+
+    def __init__(self, store: MissionStore, *, first_item: int = 0) -> None:
+        self._store = store
+        self._first_item = first_item
+        self._version = -1
+        self._seq = -1
+        self._sub: FlightTask | None = None
+        self._leg: _Leg | None = None
+        self._motion: SmoothMotion | None = None
+        self._ramp: TakeoffRamp | None = None
+        self._jumps: dict[int, int] = {}
+        self._speed_m_s: float | None = None
+        self._yaw_rad = math.nan
+        self._wait_left_s = 0.0
+        self._finished = False
+
+    def activate(self, ctx: FlightContext) -> None:
+        ctx.phase = FlightPhase.CRUISE
+        self._motion = SmoothMotion(ctx, speed_m_s=self._speed_m_s)
+        self._ramp = TakeoffRamp(ctx)
+        self._restart(ctx)
+
+    def _restart(self, ctx: FlightContext) -> None:
+        """(Re-)read the plan and begin its current item."""
+        self._version = self._store.version
+        self._finished = False
+        self._jumps.clear()
+        self._begin(ctx, max(self._store.current, self._first_item), None)
+
+    # -- items ---------------------------------------------------------------------------------------------------
+
+    def _begin(self, ctx: FlightContext, seq: int, came_from: Array | None) -> None:
+        """Make `seq` the current item, running through items that take no time."""
+        items = self._store.items
+        self._sub = None
+        self._leg = None
+        self._wait_left_s = 0.0
+        for _ in range(_MAX_INSTANT_ITEMS):
+            if seq >= len(items):
+                self._finish(ctx)
+                return
+            item = items[seq]
+            self._seq = self._store.current = seq
+            ctx.events.append(WaypointStarted(seq))
+            if is_navigation(item) or item.command in (Command.CONDITION_DELAY, Command.CONDITION_YAW):
+                if self._begin_timed(ctx, item, came_from):
+                    return
+                seq += 1
+                continue
+            seq = self._act(ctx, item, seq)
+        self._finish(ctx)
+
+    def _finish(self, ctx: FlightContext) -> None:
+        if not self._finished:
+            ctx.events.append(MissionFinished())
+        self._finished = True
+        self._leg = None
+        self._set_sub(ctx, HoldTask())
+
+    def _set_sub(self, ctx: FlightContext, task: FlightTask) -> None:
+        self._sub = task
+        task.activate(ctx)
+
+    def _act(self, ctx: FlightContext, item: MissionItem, seq: int) -> int:
+        """A DO_ item: do it, and give the next sequence number."""
+        if item.command == Command.DO_JUMP:
+            target = jump_target(item, self._store.items)
+            left = self._jumps.get(seq, round(item.param2) if math.isfinite(item.param2) else 0)
+            if target is not None and target >= self._first_item and left != 0:
+                self._jumps[seq] = left - 1 if left > 0 else left
+                return target
+        elif item.command == Command.DO_CHANGE_SPEED:
+            self._change_speed(ctx, round(item.param1) if math.isfinite(item.param1) else 1, item.param2)
+        elif item.command == Command.DO_SET_HOME:
+            here = item.param1 == 1.0
+            place = ctx.nav[nav_layout.POS_NED_M] if here else target_of(item, ctx)
+            if place is not None:
+                ctx.events.append(HomeChangeRequested(float(place[0]), float(place[1]), float(place[2])))
+        ctx.events.append(WaypointReached(seq, navigation=False))
+        return seq + 1
+
+    def _change_speed(self, ctx: FlightContext, kind: int, speed_m_s: float) -> None:
+        motion = self._motion
+        if motion is None or not math.isfinite(speed_m_s):
+            return
+        if speed_m_s == -2.0 and kind in (0, 1):
+            self._speed_m_s = None
+            motion.trajectory.set_limits(ctx.parameters)
+        elif speed_m_s > 0.0:
+            if kind in (0, 1):
+                self._speed_m_s = speed_m_s
+                motion.trajectory.limits[SPEED] = min(speed_m_s, ctx.parameters.max_speed_m_s)
+            elif kind == 2:
+                motion.trajectory.limits[SPEED_UP] = speed_m_s
+            elif kind == 3:
+                motion.trajectory.limits[SPEED_DOWN] = speed_m_s
+
+    def _begin_timed(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
+        """Begin an item that takes time; False when there is nothing to do."""
+        command = item.command
+        if command in (Command.CONDITION_DELAY, Command.NAV_DELAY):
+            self._wait_left_s = item.param1 if math.isfinite(item.param1) else 0.0
+            self._set_sub(ctx, HoldTask())
+            return self._wait_left_s > 0.0
+        if command == Command.CONDITION_YAW:
+            self._yaw_rad = self._condition_yaw(ctx, item)
+            self._set_sub(ctx, HoldTask(yaw_rad=self._yaw_rad))
+            return True
+        if command == Command.NAV_RETURN_TO_LAUNCH:
+            ctx.events.append(MissionModeRequested(command))
+            self._set_sub(ctx, ReturnTask())
+            return True
+        target = target_of(item, ctx)
+        if target is None:
+            return False
+        if command in (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF):
+            base = float(ctx.home_ned_m[2])
+            base = float(ctx.nav[nav_layout.POS_NED_M][2]) if math.isnan(base) else base
+            self._set_sub(ctx, TakeoffTask(base - float(target[2])))
+            return True
+        if command in (Command.NAV_LAND, Command.NAV_VTOL_LAND):
+            self._set_sub(ctx, LandTask(target, self._item_yaw(ctx, item)))
+            return True
+        if command == Command.NAV_LOITER_TURNS:
+            turns = item.param1 if math.isfinite(item.param1) and item.param1 > 0.0 else 1.0
+            radius = item.param3 if math.isfinite(item.param3) else 0.0
+            speed = self._speed_m_s or ctx.parameters.orbit_speed_m_s
+            task = OrbitTask(target, abs(radius) or None, math.copysign(speed, radius), turns=turns)
+            self._set_sub(ctx, task)
+            return True
+        return self._begin_leg(ctx, item, target, came_from)
+
+    def _condition_yaw(self, ctx: FlightContext, item: MissionItem) -> float:
+        angle = math.radians(item.param1) if math.isfinite(item.param1) else 0.0
+        if item.param4 == 1.0:
+            direction = -1.0 if item.param3 < 0.0 else 1.0
+            return wrap_pi(float(ctx.nav[27]) + direction * angle)
+        return wrap_pi(angle)
+
+    def _item_yaw(self, ctx: FlightContext, item: MissionItem) -> float | None:
+        if not ctx.parameters.use_waypoint_yaw or not math.isfinite(item.param4):
+            return None
+        return math.radians(item.param4)
+
+    def _begin_leg(
+        self, ctx: FlightContext, item: MissionItem, target: Array, came_from: Array | None
+    ) -> bool:
+        """A waypoint, or a loiter at a place."""
+        motion = self._motion
+        if motion is None:
+            return False
+        waypoint = is_waypoint(item)
+        radius = ctx.parameters.acceptance_radius_m
+        if waypoint and math.isfinite(item.param2) and item.param2 > 0.0:
+            radius = item.param2
+        hold_s = 0.0
+        if waypoint or item.command == Command.NAV_LOITER_TIME:
+            hold_s = item.param1 if math.isfinite(item.param1) else 0.0
+        elif item.command == Command.NAV_LOITER_UNLIM:
+            hold_s = math.inf
+        yaw = self._item_yaw(ctx, item)
+        if yaw is not None:
+            self._yaw_rad = math.nan
+        if self._sub is not None or came_from is None:
+            motion.restart(ctx)
+        motion.trajectory.limits[SPEED] = min(
+            self._speed_m_s or ctx.parameters.cruise_speed_m_s, ctx.parameters.max_speed_m_s
+        )
+        if came_from is None:
+            motion.begin_leg()
+        else:
+            motion.set_leg_start(came_from)
+        start = motion.trajectory.position_ned_m if came_from is None else came_from
+        speed, turn_in = self._corner(ctx, item, start, target, radius)
+        self._leg = _Leg(target, radius, self._yaw_rad if yaw is None else yaw, speed, turn_in, hold_s)
+        return True
+
+    def _corner(
+        self, ctx: FlightContext, item: MissionItem, start: Array, target: Array, radius: float
+    ) -> tuple[float, float]:
+        """(speed at which the waypoint may be passed, distance before it at which the turn begins)."""
+        if not is_passed_through(item):
+            return 0.0, 0.0
+        path: list[Point] = [_point(start), _point(target)]
+        radii = [radius, radius]
+        length_m = 0.0
+        for later in self._store.items[self._seq + 1 : self._seq + 1 + _LOOK_AHEAD_ITEMS]:
+            if not is_navigation(later):
+                if later.command in (Command.DO_JUMP, Command.CONDITION_DELAY, Command.CONDITION_YAW):
+                    break
+                continue
+            place = target_of(later, ctx) if is_waypoint(later) else None
+            if place is None:
+                break
+            path.append(_point(place))
+            own = later.param2 if math.isfinite(later.param2) else 0.0
+            radii.append(own if own > 0.0 else ctx.parameters.acceptance_radius_m)
+            length_m += math.dist(path[-2], path[-1])
+            if not is_passed_through(later) or length_m > _LOOK_AHEAD_M:
+                break
+        speed = min(passing_speed(path, radii, ctx.parameters), ctx.parameters.max_speed_m_s)
+        if speed <= 0.0:
+            return 0.0, 0.0
+        speed = min(speed, self._speed_m_s or ctx.parameters.cruise_speed_m_s)
+        angle = turn_angle(path[0], path[1], path[2])
+        p = ctx.parameters
+        turn_in = turn_in_distance(angle, speed, p.corner_acceleration_m_s2, p.jerk_m_s3)
+        return speed, min(turn_in, 0.9 * radius, 0.5 * math.dist(path[1], path[2]))
+
+    # -- flying --------------------------------------------------------------------------------------------------
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        motion, ramp = self._motion, self._ramp
+        if motion is None or ramp is None:
+            self.activate(ctx)
+            return self.update(ctx)
+        if self._store.version != self._version:
+            self._restart(ctx)
+        elif self._store.current != self._seq and not self._finished:
+            self._begin(ctx, max(self._store.current, self._first_item), None)
+        if self._sub is not None:
+            self._fly_sub(ctx, self._sub)
+        elif self._leg is not None:
+            self._fly_leg(ctx, motion, ramp, self._leg)
+        return TaskStatus.DONE if self._finished else TaskStatus.RUNNING
+
+    def _fly_sub(self, ctx: FlightContext, task: FlightTask) -> None:
+        before = len(ctx.events)
+        status = task.update(ctx)
+        # the sub-task's own end is not the mission's
+        ctx.events[before:] = [e for e in ctx.events[before:] if type(e).__name__ != "TaskFinished"]
+        if self._finished:
+            return
+        item = self._store.items[self._seq]
+        if item.command in (Command.CONDITION_DELAY, Command.NAV_DELAY):
+            self._wait_left_s -= ctx.dt_s
+            done = self._wait_left_s <= 0.0
+        elif item.command == Command.CONDITION_YAW:
+            done = abs(wrap_pi(float(ctx.nav[27]) - self._yaw_rad)) < _YAW_REACHED_RAD
+        else:
+            done = status is TaskStatus.DONE
+        if done:
+            self._complete(ctx, item, None)
+
+    def _complete(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> None:
+        """The current item is done: report, and go on."""
+        ctx.events.append(WaypointReached(self._seq, navigation=is_navigation(item)))
+        last = self._seq + 1 >= len(self._store.items)
+        if last or not item.autocontinue:
+            self._finish(ctx)
+        else:
+            self._begin(ctx, self._seq + 1, came_from)
+
+    def _fly_leg(self, ctx: FlightContext, motion: SmoothMotion, ramp: TakeoffRamp, leg: _Leg) -> None:
+        if not ramp.update(ctx, True, ctx.parameters.takeoff_speed_m_s):
+            motion.restart(ctx)
+            return
+        motion.synchronise(ctx)
+        motion.fly_to(ctx, leg.target, 0.0 if leg.arrived else leg.passing_m_s)
+        motion.steer(ctx, leg.yaw_rad, leg.target)
+        motion.write(ctx)
+        item = self._store.items[self._seq]
+        vehicle = ctx.nav[nav_layout.POS_NED_M]
+        point = motion.trajectory.position_ned_m
+        away = _flat_distance(vehicle, leg.target)
+        level = abs(float(vehicle[2] - leg.target[2])) < ctx.parameters.acceptance_altitude_m
+        inside = ctx.position_valid and away <= leg.radius_m and level
+        if leg.passing_m_s > 0.0 and not leg.arrived:
+            ahead = self._ahead(motion, leg)
+            if inside and ahead <= leg.turn_in_m + float(motion.trajectory.limits[SPEED]) * ctx.dt_s:
+                self._complete(ctx, item, leg.target)
+            elif ahead < -leg.radius_m:
+                leg.passing_m_s = 0.0  # missed: come back to it
+                motion.begin_leg()
+            return
+        if not leg.arrived and inside and (motion.stopped or _flat_distance(point, leg.target) < 0.3):
+            leg.arrived = True
+        if leg.arrived:
+            leg.waited_s += ctx.dt_s
+            if leg.waited_s >= leg.hold_s:
+                self._complete(ctx, item, leg.target)
+
+    def _ahead(self, motion: SmoothMotion, leg: _Leg) -> float:
+        """Distance of the waypoint ahead of the moving point, along its course; negative when passed."""
+        point, velocity = motion.trajectory.position_ned_m, motion.trajectory.velocity_ned_m_s
+        north, east = float(leg.target[0] - point[0]), float(leg.target[1] - point[1])
+        speed = math.hypot(float(velocity[0]), float(velocity[1]))
+        if speed < 0.1:
+            return math.hypot(north, east)
+        return (north * float(velocity[0]) + east * float(velocity[1])) / speed
+
+
+def _flat_distance(a: Array, b: Array) -> float:
+    return math.hypot(float(a[0] - b[0]), float(a[1] - b[1]))
+
+
+def _point(v: Array) -> Point:
+    return float(v[0]), float(v[1]), float(v[2])

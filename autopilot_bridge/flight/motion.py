@@ -1,0 +1,143 @@
+"""Smooth motion as most tasks need it: trajectory generator, heading, and what to do without a position."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.parameters import YawBehaviour
+from autopilot_bridge.flight.task import clear_setpoint
+from autopilot_bridge.flight.trajectory import TrajectoryGenerator
+from autopilot_bridge.flight.yaw import YawSteering
+from autopilot_bridge.navigation import layout as nav_layout
+
+_CONTINUE_WITHIN_M: Final = 2.0  # a running trajectory this close to the vehicle is taken over as it is
+_CONTINUE_WITHIN_M_S: Final = 2.0
+_TURN_DISTANCE_M: Final = 2.0  # the nose turns only to targets farther than this
+_MIN_COURSE_SPEED_M_S: Final = 0.7
+_NAV_YAW: Final = 27
+
+
+class SmoothMotion:
+    """Moves the setpoint smoothly and writes it, degrading to velocity or level flight without a position.
+
+    Attributes:
+        trajectory: the moving point.
+        heading: the moving heading.
+    """
+
+    __slots__ = ("_height_resets", "_leg_start", "_position_resets", "_synchronised", "heading", "trajectory")
+
+    def __init__(self, ctx: FlightContext, *, speed_m_s: float | None = None) -> None:
+        self.trajectory = TrajectoryGenerator(ctx.parameters, speed_m_s=speed_m_s)
+        self.heading = YawSteering()
+        self._leg_start: Array = np.zeros(3)
+        self._position_resets = 0
+        self._height_resets = 0
+        self._synchronised = False
+        self.restart(ctx)
+
+    def restart(self, ctx: FlightContext) -> None:
+        """Take over from the trajectory flown until now, or from the vehicle's own state."""
+        setpoint, nav = ctx.setpoint, ctx.nav
+        position, velocity = nav[nav_layout.POS_NED_M], nav[nav_layout.VEL_NED_M_S]
+        old = setpoint[0:9]
+        if (
+            setpoint[sp.LEVEL] == sp.TRAJECTORY
+            and math.isfinite(float(old.sum()))
+            and float(np.abs(old[0:3] - position).max()) < _CONTINUE_WITHIN_M
+            and float(np.abs(old[3:6] - velocity).max()) < _CONTINUE_WITHIN_M_S
+        ):
+            self.trajectory.reset(old[0:3].copy(), old[3:6].copy(), old[6:9].copy())
+        else:
+            self.trajectory.reset(position, velocity)
+        if setpoint[sp.LEVEL] == sp.TRAJECTORY and math.isfinite(float(setpoint[sp.YAW_RAD])):
+            rate = float(setpoint[sp.YAW_RATE_RAD_S])
+            self.heading.reset(float(setpoint[sp.YAW_RAD]), rate if math.isfinite(rate) else 0.0)
+        else:
+            self.heading.reset(float(nav[_NAV_YAW]), float(nav[nav_layout.RATES_FRD_RAD_S][2]))
+        self._leg_start[:] = self.trajectory.position_ned_m
+        self._synchronised = ctx.position_valid
+        if ctx.health is not None:
+            self._position_resets = ctx.health.position_resets
+            self._height_resets = ctx.health.height_resets
+
+    def synchronise(self, ctx: FlightContext) -> None:
+        """Follow jumps of the filter's estimate, and start afresh where a position comes back."""
+        health = ctx.health
+        if health is None:
+            return
+        if health.position_resets != self._position_resets or health.height_resets != self._height_resets:
+            jump = health.position_reset_ned_m
+            moved = self.trajectory.position_ned_m
+            if health.position_resets != self._position_resets:
+                moved[0] += jump[0]
+                moved[1] += jump[1]
+            if health.height_resets != self._height_resets:
+                moved[2] += jump[2]
+            self._position_resets = health.position_resets
+            self._height_resets = health.height_resets
+        if ctx.position_valid and not self._synchronised:
+            self.trajectory.position_ned_m[0:2] = ctx.nav[nav_layout.POS_NED_M][0:2]
+            self.trajectory.velocity_ned_m_s[0:2] = ctx.nav[nav_layout.VEL_NED_M_S][0:2]
+            self.trajectory.acceleration_ned_m_s2[0:2] = 0.0
+        self._synchronised = ctx.position_valid
+
+    def begin_leg(self) -> None:
+        """The next leg starts where the moving point is."""
+        self._leg_start[:] = self.trajectory.position_ned_m
+
+    def fly_to(self, ctx: FlightContext, end_ned_m: Array, end_speed_m_s: float = 0.0) -> None:
+        """One tick along the leg to `end_ned_m`."""
+        self.trajectory.wait_for(ctx.nav[nav_layout.POS_NED_M], ctx.parameters.trajectory_error_max_m)
+        self.trajectory.follow_leg(self._leg_start, end_ned_m, end_speed_m_s, ctx.dt_s)
+
+    def set_leg_start(self, start_ned_m: Array) -> None:
+        """The leg to be flown starts at a given point (the waypoint before)."""
+        self._leg_start[:] = start_ned_m
+
+    def brake(self, ctx: FlightContext) -> None:
+        """One tick towards standing still."""
+        self.trajectory.stretch = 1.0
+        self.trajectory.track_velocity(0.0, 0.0, 0.0, ctx.dt_s)
+
+    @property
+    def stopped(self) -> bool:
+        """The moving point stands still."""
+        return bool(
+            np.abs(self.trajectory.velocity_ned_m_s).max() < 0.05
+            and np.abs(self.trajectory.acceleration_ned_m_s2).max() < 0.1
+        )
+
+    def steer(self, ctx: FlightContext, yaw_rad: float, target_ned_m: Array | None = None) -> None:
+        """One tick of the heading: to `yaw_rad`, or by the vehicle's yaw behaviour where that is NaN."""
+        wanted = yaw_rad
+        if math.isnan(wanted):
+            wanted = self.heading.yaw_rad
+            behaviour = ctx.parameters.yaw_behaviour
+            if behaviour == YawBehaviour.TOWARDS_TARGET and target_ned_m is not None:
+                north = float(target_ned_m[0] - self.trajectory.position_ned_m[0])
+                east = float(target_ned_m[1] - self.trajectory.position_ned_m[1])
+                if math.hypot(north, east) > _TURN_DISTANCE_M:
+                    wanted = math.atan2(east, north)
+            elif behaviour == YawBehaviour.ALONG_TRACK:
+                north, east = (float(v) for v in self.trajectory.velocity_ned_m_s[0:2])
+                if math.hypot(north, east) > _MIN_COURSE_SPEED_M_S:
+                    wanted = math.atan2(east, north)
+        self.heading.turn_to(wanted, ctx.parameters, ctx.dt_s)
+
+    def write(self, ctx: FlightContext) -> None:
+        """Write the control setpoint, leaving out what the filter doesn't know."""
+        setpoint = ctx.setpoint
+        clear_setpoint(setpoint, sp.TRAJECTORY)
+        self.trajectory.write(setpoint)
+        setpoint[sp.YAW_RAD] = self.heading.yaw_rad
+        setpoint[sp.YAW_RATE_RAD_S] = self.heading.rate_rad_s
+        if not ctx.position_valid:
+            setpoint[0:2] = math.nan
+            setpoint[3:5] = 0.0 if ctx.velocity_valid else math.nan
+            setpoint[6:8] = 0.0
+        if not ctx.altitude_valid:
+            setpoint[2] = math.nan

@@ -1,0 +1,95 @@
+"""What a mission item means for a multicopter: commands, frames, targets."""
+
+import math
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.navigation import layout as nav_layout
+
+
+class Command(IntEnum):
+    """MAV_CMD numbers the mission task acts on."""
+
+    NAV_WAYPOINT = 16
+    NAV_LOITER_UNLIM = 17
+    NAV_LOITER_TURNS = 18
+    NAV_LOITER_TIME = 19
+    NAV_RETURN_TO_LAUNCH = 20
+    NAV_LAND = 21
+    NAV_TAKEOFF = 22
+    NAV_LOITER_TO_ALT = 31
+    NAV_SPLINE_WAYPOINT = 82
+    NAV_VTOL_TAKEOFF = 84
+    NAV_VTOL_LAND = 85
+    NAV_DELAY = 93
+    NAV_LAST = 95
+    CONDITION_DELAY = 112
+    CONDITION_YAW = 115
+    DO_JUMP = 177
+    DO_CHANGE_SPEED = 178
+    DO_SET_HOME = 179
+
+
+_GLOBAL: Final = frozenset({0, 5})  # MAV_FRAME_GLOBAL, _INT: above mean sea level
+_RELATIVE: Final = frozenset({3, 6, 10, 11})  # above home; terrain is taken as level with home
+_LOCAL_NED: Final = 1
+_WAYPOINTS: Final = frozenset({Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT})
+
+
+def is_navigation(item: MissionItem) -> bool:
+    """The item moves or holds the vehicle (MAV_CMD_NAV_*), so that it ends when that is done."""
+    return item.command <= Command.NAV_LAST
+
+
+def is_waypoint(item: MissionItem) -> bool:
+    """The item is a place to fly to or through."""
+    return item.command in _WAYPOINTS
+
+
+def is_passed_through(item: MissionItem) -> bool:
+    """The vehicle needs not stop there."""
+    return is_waypoint(item) and not item.param1 > 0.0 and item.autocontinue
+
+
+def target_of(item: MissionItem, ctx: FlightContext) -> Array | None:
+    """Place of an item in local NED, (3,); None when it can't be known (no frame, no home, nonsense).
+
+    Latitude and longitude 0, or NaN, mean "here", as autopilots take them for take-off, land and loiter items.
+    """
+    here = ctx.nav[nav_layout.POS_NED_M]
+    if item.frame == _LOCAL_NED:
+        target = np.array([item.x, item.y, item.z])
+        return np.where(np.isfinite(target), target, here)
+    frame = ctx.frame
+    if frame is None:
+        return None
+    home_down = float(ctx.home_ned_m[2])
+    if item.frame in _GLOBAL:
+        alt_m = item.z
+    elif item.frame in _RELATIVE:
+        alt_m = frame.origin.alt_m + item.z - (0.0 if math.isnan(home_down) else home_down)
+    else:
+        return None
+    if (item.x == 0.0 and item.y == 0.0) or not (math.isfinite(item.x) and math.isfinite(item.y)):
+        north, east = float(here[0]), float(here[1])
+        _, _, down = frame.ned_from_geodetic(frame.origin.lat_deg, frame.origin.lon_deg, alt_m)
+    else:
+        if not (-90.0 <= item.x <= 90.0 and -180.0 <= item.y <= 180.0):
+            return None
+        north, east, down = frame.ned_from_geodetic(item.x, item.y, alt_m)
+    if not math.isfinite(down):
+        down = float(here[2])
+    return np.array([north, east, down])
+
+
+def jump_target(item: MissionItem, items: Sequence[MissionItem]) -> int | None:
+    """Sequence number a DO_JUMP leads to; None when there is no such item."""
+    if not math.isfinite(item.param1):
+        return None
+    target = round(item.param1)
+    return target if 0 <= target < len(items) else None

@@ -1,0 +1,238 @@
+"""Jerk-limited motion along straight legs, online: position, velocity and acceleration to feed the control laws.
+
+Two nested laws per tick, horizontally on the vector (so that path and limits don't depend on the axes) and
+vertically on the scalar: a velocity wanted from the geometry of the leg (braking distance to its end speed,
+cross-track correction), and an acceleration that brings the velocity there under acceleration and jerk limits,
+a = sqrt(2 j |dv|) towards it, the time-optimal surface of the double integrator (Bryson and Ho, 1975, section 3.9).
+The idea of running such a smoother in front of the position loop is PX4's (`PositionSmoothing`).
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from autopilot_bridge.flight.parameters import FlightParameters
+
+Array = NDArray[np.float64]
+
+# state: position, velocity, acceleration in NED
+_SIZE: Final = 9
+# limits
+SPEED: Final = 0  # along a leg, horizontal
+SPEED_UP: Final = 1
+SPEED_DOWN: Final = 2
+ACC: Final = 3
+ACC_UP: Final = 4
+ACC_DOWN: Final = 5
+JERK: Final = 6
+GAIN: Final = 7
+LIMITS_SIZE: Final = 8
+
+_SURFACE_SHARE: Final = 0.8  # of the jerk, used by the switching surface; the rest absorbs the 50 Hz grid
+_BRAKE_SHARE: Final = 0.8  # of the acceleration, used for the braking profile
+_VELOCITY_GAIN_1_S: Final = 7.0
+
+
+@njit(cache=True)
+def braking_speed(distance: float, end_speed: float, acc: float, jerk: float, gain: float) -> float:
+    """Speed at `distance` before a point to be passed at `end_speed`.
+
+    Far out the square-root profile of constant deceleration, shortened by the way needed to build that
+    deceleration up from full acceleration; near a stop the linear law `gain * distance`.
+    """
+    a = _BRAKE_SHARE * acc
+    if distance <= 0.0:
+        return end_speed
+    # v^2/(2a) + v a/j = d + ve^2/(2a) + ve a/j  (deceleration built up at limited jerk)
+    b = a * a / jerk
+    v = -b + math.sqrt(b * b + 2.0 * a * distance + end_speed * end_speed + 2.0 * b * end_speed)
+    return min(v, end_speed + gain * distance)
+
+
+@njit(cache=True)
+def _room(distance: float, speed: float, acc: float, jerk: float) -> float:
+    """Distance left for braking once a present acceleration towards the point has been taken back."""
+    if acc <= 0.0 or speed <= 0.0:
+        return distance
+    return max(0.0, distance - (speed + acc * acc / (3.0 * jerk)) * acc / jerk)
+
+
+@njit(cache=True)
+def _approach2(s: Array, vx: float, vy: float, acc_max: float, jerk: float, dt: float) -> None:
+    """Horizontal velocity of the state towards (vx, vy)."""
+    dvx, dvy = vx - s[3], vy - s[4]
+    size = math.sqrt(dvx * dvx + dvy * dvy)
+    ax, ay = 0.0, 0.0
+    if size > 1e-9:
+        want = min(acc_max, math.sqrt(2.0 * _SURFACE_SHARE * jerk * size), _VELOCITY_GAIN_1_S * size)
+        ax, ay = want * dvx / size, want * dvy / size
+    jx, jy = ax - s[6], ay - s[7]
+    change = math.sqrt(jx * jx + jy * jy)
+    if change > jerk * dt:
+        jx *= jerk * dt / change
+        jy *= jerk * dt / change
+    for i, j in ((0, jx), (1, jy)):
+        a0 = s[6 + i]
+        a1 = a0 + j
+        s[i] += s[3 + i] * dt + (2.0 * a0 + a1) * dt * dt / 6.0
+        s[3 + i] += 0.5 * (a0 + a1) * dt
+        s[6 + i] = a1
+
+
+@njit(cache=True)
+def _approach1(s: Array, vz: float, up: float, down: float, jerk: float, dt: float) -> None:
+    """Vertical velocity of the state towards vz (NED down)."""
+    dv = vz - s[5]
+    want = min(math.sqrt(2.0 * _SURFACE_SHARE * jerk * abs(dv)), _VELOCITY_GAIN_1_S * abs(dv))
+    a = min(want, down) if dv > 0.0 else -min(want, up)
+    j = min(jerk * dt, max(-jerk * dt, a - s[8]))
+    a0 = s[8]
+    a1 = a0 + j
+    s[2] += s[5] * dt + (2.0 * a0 + a1) * dt * dt / 6.0
+    s[5] += 0.5 * (a0 + a1) * dt
+    s[8] = a1
+
+
+@njit(cache=True)
+def _track_velocity(s: Array, vx: float, vy: float, vz: float, lim: Array, dt: float) -> None:
+    _approach2(s, vx, vy, lim[ACC], lim[JERK], dt)
+    _approach1(s, vz, lim[ACC_UP], lim[ACC_DOWN], lim[JERK], dt)
+
+
+@njit(cache=True)
+def _follow_leg(s: Array, start: Array, end: Array, end_speed: float, lim: Array, dt: float) -> None:
+    """One tick along the straight leg start -> end, to be left at `end_speed` along the leg."""
+    lx, ly, lz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    flat = math.sqrt(lx * lx + ly * ly)
+    rx, ry = end[0] - s[0], end[1] - s[1]
+    remaining = math.sqrt(rx * rx + ry * ry)
+    gain = lim[GAIN]
+    # vertical speed that matches the leg's slope limits the horizontal speed too
+    speed = lim[SPEED]
+    v_limit_z = lim[SPEED_UP] if end[2] < s[2] else lim[SPEED_DOWN]
+    vx, vy = 0.0, 0.0
+    z_target, slope_rate = end[2], 0.0
+    if flat < 0.5 or remaining < 1e-6:
+        # a vertical leg, or a short one: straight to its end
+        if remaining > 1e-6:
+            rate, pull = (s[3] * rx + s[4] * ry) / remaining, (s[6] * rx + s[7] * ry) / remaining
+            room = _room(remaining, rate, pull, lim[JERK])
+            v = min(speed, braking_speed(room, 0.0, lim[ACC], lim[JERK], gain))
+            vx, vy = v * rx / remaining, v * ry / remaining
+    else:
+        ux, uy = lx / flat, ly / flat
+        slope = lz / flat
+        if abs(slope) > 1e-6:
+            leg_limit_z = lim[SPEED_UP] if lz < 0.0 else lim[SPEED_DOWN]
+            speed = min(speed, leg_limit_z / abs(slope))
+        along = rx * ux + ry * uy
+        cross = rx * uy - ry * ux  # distance to the leg, positive to its left
+        px, py = cross * uy, -cross * ux  # vector from the state to the leg
+        if along <= 0.0 and end_speed <= 0.0:
+            v = min(speed, braking_speed(remaining, 0.0, lim[ACC], lim[JERK], gain))
+            vx, vy = v * rx / remaining, v * ry / remaining
+        else:
+            room = _room(along, s[3] * ux + s[4] * uy, s[6] * ux + s[7] * uy, lim[JERK])
+            v = min(speed, braking_speed(room, end_speed, lim[ACC], lim[JERK], gain))
+            off = abs(cross)
+            v_cross = min(0.7 * max(v, 1.0), braking_speed(off, 0.0, lim[ACC], lim[JERK], gain))
+            v_along = math.sqrt(max(0.0, v * v - v_cross * v_cross))
+            vx, vy = v_along * ux, v_along * uy
+            if off > 1e-6:
+                vx += v_cross * px / off
+                vy += v_cross * py / off
+        part = min(1.0, max(0.0, 1.0 - along / flat))
+        z_target = start[2] + part * lz
+        if 0.0 < part < 1.0:
+            slope_rate = slope * (s[3] * ux + s[4] * uy)
+    ez = z_target - s[2]
+    acc_z = min(lim[ACC_UP], lim[ACC_DOWN])
+    sign = 1.0 if ez > 0.0 else -1.0
+    room = _room(abs(ez), s[5] * sign, s[8] * sign, lim[JERK])
+    v_z = min(v_limit_z, braking_speed(room, 0.0, acc_z, lim[JERK], gain))
+    vz = slope_rate + sign * v_z
+    vz = min(lim[SPEED_DOWN], max(-lim[SPEED_UP], vz))
+    _track_velocity(s, vx, vy, vz, lim, dt)
+
+
+class TrajectoryGenerator:
+    """A moving point with limited speed, acceleration and jerk.
+
+    Attributes:
+        position_ned_m, velocity_ned_m_s, acceleration_ned_m_s2: views of the state, (3,) each.
+        limits: float64 (8,), see the indices of this module; writable.
+    """
+
+    __slots__ = (
+        "_state",
+        "acceleration_ned_m_s2",
+        "limits",
+        "position_ned_m",
+        "stretch",
+        "velocity_ned_m_s",
+    )
+
+    def __init__(self, parameters: FlightParameters, *, speed_m_s: float | None = None) -> None:
+        self._state: Array = np.zeros(_SIZE)
+        self.position_ned_m: Array = self._state[0:3]
+        self.velocity_ned_m_s: Array = self._state[3:6]
+        self.acceleration_ned_m_s2: Array = self._state[6:9]
+        self.limits: Array = np.zeros(LIMITS_SIZE)
+        self.stretch = 1.0
+        self.set_limits(parameters, speed_m_s=speed_m_s)
+
+    def set_limits(self, parameters: FlightParameters, *, speed_m_s: float | None = None) -> None:
+        """Take the limits of the parameters; `speed_m_s` replaces the cruise speed, within the maximum."""
+        speed = parameters.cruise_speed_m_s if speed_m_s is None else speed_m_s
+        self.limits[:] = (
+            min(max(speed, 0.05), parameters.max_speed_m_s),
+            parameters.climb_speed_m_s,
+            parameters.descend_speed_m_s,
+            parameters.acceleration_m_s2,
+            parameters.acceleration_up_m_s2,
+            parameters.acceleration_down_m_s2,
+            parameters.jerk_m_s3,
+            parameters.trajectory_p_1_s,
+        )
+
+    def reset(
+        self, position_ned_m: Array, velocity_ned_m_s: Array, acceleration_ned_m_s2: Array | None = None
+    ) -> None:
+        """Start from a present state; acceleration beyond the limits is clipped."""
+        self._state[0:3] = position_ned_m
+        self._state[3:6] = velocity_ned_m_s
+        self._state[6:9] = 0.0
+        if acceleration_ned_m_s2 is not None:
+            ax, ay, az = (float(a) for a in acceleration_ned_m_s2)
+            size = math.hypot(ax, ay)
+            scale = min(1.0, self.limits[ACC] / size) if size > 0.0 else 0.0
+            self._state[6] = ax * scale
+            self._state[7] = ay * scale
+            self._state[8] = min(float(self.limits[ACC_DOWN]), max(-float(self.limits[ACC_UP]), az))
+        self.stretch = 1.0
+
+    def wait_for(self, vehicle_ned_m: Array, error_max_m: float) -> None:
+        """Slow the next tick down when the vehicle can't follow, to a stop at `error_max_m` (PX4 MPC_XY_ERR_MAX)."""
+        north = float(vehicle_ned_m[0]) - float(self._state[0])
+        east = float(vehicle_ned_m[1]) - float(self._state[1])
+        error = math.hypot(north, east)
+        free = 0.4 * error_max_m
+        self.stretch = min(1.0, max(0.0, (error_max_m - error) / (error_max_m - free)))
+
+    def follow_leg(self, start_ned_m: Array, end_ned_m: Array, end_speed_m_s: float, dt_s: float) -> None:
+        """One tick along a straight leg, passing its end at `end_speed_m_s` (0: stop there)."""
+        _follow_leg(self._state, start_ned_m, end_ned_m, end_speed_m_s, self.limits, dt_s * self.stretch)
+
+    def track_velocity(self, north_m_s: float, east_m_s: float, down_m_s: float, dt_s: float) -> None:
+        """One tick towards a velocity."""
+        _track_velocity(self._state, north_m_s, east_m_s, down_m_s, self.limits, dt_s)
+
+    def write(self, setpoint: Array) -> None:
+        """Write position, velocity and acceleration into the trajectory fields of a control setpoint."""
+        setpoint[0:9] = self._state
+        if self.stretch < 1.0:
+            setpoint[3:5] *= self.stretch
+            setpoint[6:8] *= self.stretch
