@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Final
 
 wall_time_s: Final = time.monotonic
-"""The wall clock: seconds from an arbitrary start. For pacing, silent peers and reports, never for a flight."""
+"""The wall clock, in seconds. For pacing, silent peers and reports of time spent; never for a flight."""
 
 
 def unix_time_us() -> int:
