@@ -1,10 +1,11 @@
 """Parameter tables as TOML files: one line per parameter, beside the flavour they belong to.
 
-    MPC_XY_CRUISE = { type = "float", default = 5.0, min = 3.0, max = 20.0, unit = "m/s", text = "Cruise speed" }
+    MPC_XY_CRUISE = { type = "float", default = 5.0, min = 3.0, max = 20.0, unit = "m/s", text = "Speed" }
     "RC#_TRIM" = { type = "float", default = 1500.0, instances = [1, 8], text = "Neutral pulse" }
 
-`type` is int8, int16, int32 or float. With `instances`, `#` in the name stands for each number from the first to the
-last, and `default` may be a list with one value for each. `reboot = true`: a change waits for the next boot.
+`type` is int8, int16, int32 or float. With `instances`, `#` in the name stands for each number from the first
+to the last, and `default` may be a list with one value for each. `reboot = true`: a change waits for the next
+boot.
 """
 
 import tomllib

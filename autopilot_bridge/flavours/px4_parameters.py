@@ -12,4 +12,4 @@ PX4_PARAMETERS: Final[tuple[ParameterDefinition, ...]] = tuple(
         key=lambda definition: definition.name,
     )
 )
-"""What a multicopter user of PX4 1.16 touches, about half of the firmware's table, sorted by name as in PX4."""
+"""What a multicopter user of PX4 1.16 touches, half of the firmware's table, sorted by name as in PX4."""

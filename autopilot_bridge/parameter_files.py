@@ -1,0 +1,162 @@
+"""Parameter files: QGroundControl's `.params` and the `.parm` of MAVProxy, ArduPilot and Mission Planner.
+
+`.params`: vehicle id, component id, name, value, MAV_PARAM_TYPE, separated by tabs. `.parm` (also `.param`):
+name and value, separated by spaces or a comma. In both, `#` starts a comment. The form of a line tells which
+of the two it is.
+"""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.parameters import ParameterDefinition, ParameterError, ParameterStore
+
+QGC_SUFFIX: Final = ".params"
+MAVPROXY_SUFFIXES: Final = (".parm", ".param")
+_QGC_COLUMNS: Final = 5
+_FORMS: Final = "'NAME VALUE' or QGroundControl's five columns 'vehicle component NAME VALUE type'"
+
+
+def parse_parameters(
+    text: str,
+    definitions: Iterable[ParameterDefinition],
+    *,
+    source: str = "parameters",
+    skip_unknown: bool = False,
+) -> dict[str, float]:
+    """The values in the text of a parameter file, checked against the firmware's table.
+
+    Args:
+        text: the file's content, in either format.
+        definitions: what the vehicle knows.
+        source: name of the file, for error messages.
+        skip_unknown: leave out names the vehicle doesn't know (a real vehicle's dump), else they are errors.
+
+    Raises:
+        ParameterError: a line is not understood, a name not known or given twice, or a value not acceptable.
+            The message gives the file, the line, the value and what is accepted.
+    """
+    store = ParameterStore(definitions)
+    values: dict[str, float] = {}
+    lines: dict[str, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        where = f"{source}, line {number}"
+        found = _split(line, where)
+        if found is None:
+            continue
+        name, value_text = found
+        if skip_unknown and name not in store:
+            continue
+        if name in lines:
+            raise ParameterError(f"{where}: {name} was set in line {lines[name]} already")
+        try:
+            definition = store.by_index(store.index_of(name))
+            value = definition.convert(_number(value_text, definition))
+            definition.check_range(value)
+        except ParameterError as error:
+            raise ParameterError(f"{where}: {error}") from None
+        lines[name] = number
+        values[name] = value
+    return values
+
+
+def read_parameter_file(
+    path: Path, definitions: Iterable[ParameterDefinition], *, skip_unknown: bool = False
+) -> dict[str, float]:
+    """The values in a parameter file; see `parse_parameters`.
+
+    Raises:
+        ParameterError: the file can't be read, or what it says is not acceptable.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ParameterError(f"can't read parameter file {path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ParameterError(
+            f"can't read parameter file {path}: byte {error.start} is not UTF-8 text; accepted: {_FORMS}"
+        ) from error
+    return parse_parameters(text, definitions, source=str(path), skip_unknown=skip_unknown)
+
+
+def format_mavproxy(values: Mapping[str, float]) -> str:
+    """Values as a `.parm` text."""
+    return "".join(f"{name:<16} {_text(value)}\n" for name, value in values.items())
+
+
+def format_qgc(
+    values: Mapping[str, float],
+    definitions: Iterable[ParameterDefinition],
+    *,
+    system_id: int = 1,
+    component_id: int = 1,
+) -> str:
+    """Values as a `.params` text; ParameterError for a name without definition."""
+    types = {definition.name: int(definition.type) for definition in definitions}
+    lines = [
+        "# Onboard parameters\n",
+        "#\n",
+        "# Vehicle-Id Component-Id Name Value Type\n",
+    ]
+    for name, value in values.items():
+        if name not in types:
+            raise ParameterError(f"no parameter {name!r}: its type for the file is not known")
+        lines.append(f"{system_id}\t{component_id}\t{name}\t{_text(value)}\t{types[name]}\n")
+    return "".join(lines)
+
+
+def write_parameter_file(path: Path, store: ParameterStore, *, changed_only: bool = False) -> None:
+    """Write a vehicle's parameters, in the format that the file's suffix names.
+
+    Raises:
+        ParameterError: the suffix names neither format, or the file can't be written.
+    """
+    values = store.changed() if changed_only else store.as_dict()
+    suffix = path.suffix.lower()
+    if suffix == QGC_SUFFIX:
+        text = format_qgc(values, store.definitions)
+    elif suffix in MAVPROXY_SUFFIXES:
+        text = format_mavproxy(values)
+    else:
+        accepted = ", ".join((QGC_SUFFIX, *MAVPROXY_SUFFIXES))
+        raise ParameterError(f"parameter file {path}: suffix {suffix!r}; accepted are {accepted}")
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ParameterError(f"can't write parameter file {path}: {error.strerror}") from error
+
+
+def _split(line: str, where: str) -> tuple[str, str] | None:
+    """Name and value in a line; None for an empty one."""
+    words = line.partition("#")[0].replace(",", " ").split()
+    if words and words[-1] == "@READONLY":  # a mark of MAVProxy
+        words.pop()
+    if not words:
+        return None
+    if len(words) == _QGC_COLUMNS:
+        return words[2], words[3]
+    if len(words) == 2:
+        return words[0], words[1]
+    raise ParameterError(f"{where}: {line.strip()!r} is not understood; accepted: {_FORMS}")
+
+
+def _number(text: str, definition: ParameterDefinition) -> float:
+    try:
+        return int(text, 0) if definition.is_integer else float(text)
+    except ValueError:
+        pass
+    try:
+        return float(text)
+    except ValueError:
+        raise ParameterError(
+            f"{definition.name} = {text}: not a number; accepted is {definition.accepted()}"
+        ) from None
+
+
+def _text(value: float) -> str:
+    """The shortest decimal that reads back as the same single-precision value."""
+    if isinstance(value, int):
+        return str(value)
+    return str(np.float32(value))
