@@ -1,0 +1,288 @@
+"""The vehicle API against scripted autopilots of both flavours."""
+
+import asyncio
+import math
+
+import pytest
+
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import CommandRejected, MissionError, VehicleTimeout
+from missions.telemetry import Attitude, Battery, LocalPosition, Position
+from missions.vehicle import Mode, Setpoint
+
+both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+
+
+@both
+def test_finds_the_firmware_from_the_heartbeat(flown, flavour):
+    async def script(vehicle, autopilot):
+        return vehicle.autopilot, vehicle.system_id, vehicle.home.alt_m
+
+    name, system_id, altitude = flown(script, flavour)
+    assert (name, system_id) == (flavour, 1)
+    assert altitude == pytest.approx(489.4)
+
+
+@both
+def test_takes_off_flies_and_lands(flown, flavour):
+    async def script(vehicle, autopilot):
+        await vehicle.takeoff(12.0)
+        assert vehicle.armed
+        height = vehicle.latest(Position).height_m
+        await vehicle.goto_ned(30.0, -20.0, -15.0)
+        there = list(autopilot.pos)
+        await vehicle.hold()
+        await vehicle.return_to_launch()
+        return height, there, vehicle.armed, autopilot.pos
+
+    height, there, armed, end = flown(script, flavour)
+    assert height == pytest.approx(12.0, abs=0.7)
+    assert there == pytest.approx([30.0, -20.0, -15.0], abs=1.0)
+    assert not armed
+    assert math.hypot(end[0], end[1]) < 0.5
+
+
+@both
+def test_ready_waits_for_the_checks(flown, flavour):
+    async def script(vehicle, autopilot):
+        return autopilot.time_us
+
+    def late(autopilot):
+        autopilot.ready_after_us = 12_000_000
+
+    assert 12_000_000 <= flown(script, flavour, setup=late) <= 13_500_000
+
+
+@both
+def test_not_ready_says_what_is_missing(flown, flavour):
+    async def script(vehicle, autopilot):
+        with pytest.raises(VehicleTimeout, match=r"missing: pre-arm checks.*last heard: mode"):
+            await vehicle.wait_ready(timeout_s=5.0)
+
+    def never(autopilot):
+        autopilot.ready_after_us = 10**12
+
+    flown(script, flavour, ready=False, setup=never)
+
+
+def test_no_heartbeat_says_that_nothing_was_heard(flown):
+    async def script(vehicle, autopilot):
+        autopilot.streams.clear()
+        with pytest.raises(VehicleTimeout, match=r"no heartbeat .* within 4 s; nothing was heard"):
+            await vehicle.wait_heartbeat(timeout_s=4.0)
+
+    flown(script, ready=False, setup=lambda a: a.streams.clear())
+
+
+@both
+def test_arming_is_tried_again_and_then_told_why(flown, flavour):
+    async def script(vehicle, autopilot):
+        autopilot.arm_refusals = 3
+        await vehicle.arm()
+        assert vehicle.armed
+        await vehicle.disarm()
+        autopilot.arm_refusals = 1000
+        with pytest.raises(CommandRejected, match=r"COMPONENT_ARM_DISARM.*Arming denied: Resolve"):
+            await vehicle.arm(timeout_s=4.0)
+
+    flown(script, flavour)
+
+
+def test_command_is_repeated_with_confirmation_until_answered(flown):
+    async def script(vehicle, autopilot):
+        autopilot.mute_commands.add(dialect.MAV_CMD_DO_SET_HOME)
+        with pytest.raises(VehicleTimeout, match="no answer to DO_SET_HOME after 5 attempts"):
+            await vehicle.command(dialect.MAV_CMD_DO_SET_HOME, 1.0)
+        sent = [c for command, c in autopilot.commands if command == dialect.MAV_CMD_DO_SET_HOME]
+        assert sent == [0, 1, 2, 3, 4]
+        with pytest.raises(CommandRejected, match="UNSUPPORTED") as refused:
+            await vehicle.command(31999)
+        assert refused.value.result == 3
+
+    flown(script)
+
+
+def test_px4_first_mode_acknowledgement_is_not_believed(flown):
+    async def script(vehicle, autopilot):
+        await vehicle.takeoff(5.0)
+        autopilot.refuse_modes.add("return")
+        with pytest.raises(CommandRejected, match="refused mode return: DO_SET_MODE: TEMPORARILY_REJECTED"):
+            await vehicle.set_mode(Mode.RETURN, timeout_s=4.0)
+        autopilot.refuse_modes.clear()
+        await vehicle.set_mode(Mode.RETURN)
+        assert vehicle.mode == "Return"
+
+    flown(script)
+
+
+@both
+def test_follows_setpoints_from_home_whatever_the_local_origin(flown, flavour):
+    async def script(vehicle, autopilot):
+        await vehicle.takeoff(10.0)
+        offset = await vehicle.home_in_local_frame()
+        assert offset == pytest.approx((1.5, -2.0, 0.3), abs=0.03)
+
+        def circle(t):
+            if t > 20.0:
+                return None
+            c, s = math.cos(0.3 * t), math.sin(0.3 * t)
+            return Setpoint(
+                position_ned_m=(10.0 * c, 10.0 * s, -10.0),
+                velocity_ned_m_s=(-3.0 * s, 3.0 * c, 0.0),
+                acceleration_ned_m_s2=(-0.9 * c, -0.9 * s, 0.0),
+                yaw_rad=0.5,
+            )
+
+        await vehicle.follow(circle, rate_hz=25.0)
+        end = circle(20.0).position_ned_m
+        assert math.dist(autopilot.pos, end) < 0.5
+        assert autopilot.kind == "hold"
+        times = [t for t, _ in autopilot.setpoints]
+        gaps = [b - a for a, b in zip(times, times[1:], strict=False)]
+        assert max(gaps) <= 60_000
+        assert sum(gaps) / len(gaps) == pytest.approx(40_000, rel=0.02)
+        assert not any("Failsafe" in text.text for text in vehicle.status_texts)
+        assert autopilot.setpoints[-1][1].type_mask == 0x800
+
+    flown(script, flavour)
+
+
+def test_leaving_guided_ends_the_following_with_an_error(flown):
+    async def script(vehicle, autopilot):
+        await vehicle.takeoff(10.0)
+
+        async def pilot():
+            await asyncio.sleep(5.0)
+            autopilot.mode = 0x00030000
+
+        task = asyncio.get_running_loop().create_task(pilot())
+        with pytest.raises(MissionError, match="left the guided mode for Position"):
+            await vehicle.follow(lambda t: Setpoint(position_ned_m=(0.0, 0.0, -10.0)) if t < 60 else None)
+        await task
+
+    flown(script)
+
+
+@both
+def test_mission_upload_download_clear_and_flight(flown, flavour):
+    async def script(vehicle, autopilot):
+        home = vehicle.home
+        points = [(home.lat_deg + 2e-4, home.lon_deg), (home.lat_deg + 2e-4, home.lon_deg + 3e-4)]
+        items = [vehicle.adapter.takeoff_item(home, 10.0)]
+        items += [MissionItem(command=16, x=lat, y=lon, z=10.0, param2=2.0) for lat, lon in points]
+        items.append(MissionItem(command=20, frame=2))
+        first = await vehicle.upload_mission(items)
+        assert first == (1 if flavour == "ardupilot" else 0)
+        back = await vehicle.download_mission()
+        assert [item.command for item in back] == [22, 16, 16, 20]
+        assert back[1].x == pytest.approx(points[0][0], abs=1e-7)
+        seen = []
+        await vehicle.start_mission()
+        await vehicle.wait_item_reached(first + 2, 120.0, seen.append)
+        assert max(seen) >= first + 2
+        await vehicle.wait_disarmed(120.0)
+        await vehicle.clear_mission()
+        assert autopilot.items == []
+
+    flown(script, flavour)
+
+
+def test_refused_mission_names_the_item(flown):
+    async def script(vehicle, autopilot):
+        items = [MissionItem(command=16, x=47.0, y=8.0, z=10.0)] * 4
+        with pytest.raises(CommandRejected, match=r"at item 2 \(command 16\): UNSUPPORTED"):
+            await vehicle.upload_mission(items)
+
+    def refuse(autopilot):
+        autopilot.mission_result = 3
+
+    flown(script, setup=refuse)
+
+
+@both
+def test_parameters_in_either_encoding(flown, flavour):
+    async def script(vehicle, autopilot):
+        assert await vehicle.parameter("COM_RC_LOSS_T") == 4.0
+        await vehicle.set_parameter("COM_RC_LOSS_T", 7.0)
+        assert autopilot.parameters["COM_RC_LOSS_T"][0] == 7
+        await vehicle.set_parameter("MPC_ACC_HOR", 4.5)
+        assert await vehicle.parameter("MPC_ACC_HOR") == 4.5
+        with pytest.raises(CommandRejected, match="kept MPC_ACC_HOR = 4.5 instead of 99"):
+            await vehicle.set_parameter("MPC_ACC_HOR", 99.0)
+        with pytest.raises(VehicleTimeout, match="did not answer for parameter NO_SUCH"):
+            await vehicle.parameter("NO_SUCH")
+
+    flown(script, flavour)
+
+
+@both
+@pytest.mark.parametrize("action", [Mode.RETURN, Mode.LAND, Mode.HOLD])
+def test_a_failing_script_leaves_the_vehicle_safe(flown, flavour, action):
+    async def script(vehicle, autopilot):
+        with pytest.raises(ZeroDivisionError):
+            async with vehicle.safe_on_exit(action):
+                await vehicle.takeoff(8.0)
+                raise ZeroDivisionError
+        return autopilot.kind
+
+    assert flown(script, flavour) == action.value
+
+
+def test_a_cancelled_script_leaves_the_vehicle_safe_even_if_the_first_choice_is_refused(flown):
+    async def script(vehicle, autopilot):
+        async def fly():
+            async with vehicle.safe_on_exit():
+                await vehicle.takeoff(8.0)
+                await asyncio.sleep(1000.0)
+
+        task = asyncio.get_running_loop().create_task(fly())
+        await asyncio.sleep(20.0)
+        autopilot.refuse_modes.add("return")
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+        return autopilot.kind
+
+    assert flown(script) == "land"
+
+
+def test_telemetry_in_si_units(flown):
+    async def script(vehicle, autopilot):
+        autopilot.yaw = 1.0
+        positions = []
+        async for position in vehicle.telemetry(Position):
+            positions.append(position)
+            if len(positions) == 5:
+                break
+        await asyncio.sleep(0.1)
+        assert positions[1].time_us - positions[0].time_us == pytest.approx(40_000, abs=1000)
+        assert vehicle.latest(Attitude).yaw_rad == pytest.approx(1.0)
+        battery = vehicle.latest(Battery)
+        assert battery.voltage_v == pytest.approx(16.2)
+        assert math.isnan(battery.current_a)
+        assert battery.remaining == 1.0
+        assert vehicle.latest(LocalPosition).pos_ned_m == pytest.approx((1.5, -2.0, 0.3))
+
+    flown(script)
+
+
+def test_heartbeats_are_sent_once_a_second(flown):
+    async def script(vehicle, autopilot):
+        before = autopilot.heartbeats_heard
+        await asyncio.sleep(10.0)
+        return autopilot.heartbeats_heard - before
+
+    assert flown(script) in (10, 11)
+
+
+def test_long_status_texts_are_joined(flown):
+    async def script(vehicle, autopilot):
+        text = "Preflight Fail: " + "a very long reason " * 5
+        for k in range(0, len(text), 50):
+            chunk = text[k : k + 50].encode()
+            autopilot.send(dialect.MAVLink_statustext_message(3, chunk, 7, k // 50))
+        await asyncio.sleep(0.1)
+        assert vehicle.status_texts[-1].text == text
+
+    flown(script)
