@@ -59,10 +59,10 @@ class MulticopterParameters:
     speed_up_max_m_s: float = 3.0  # MPC_Z_VEL_MAX_UP
     speed_down_max_m_s: float = 1.5  # MPC_Z_VEL_MAX_DN
     tilt_max_rad: float = math.radians(45.0)  # MPC_TILTMAX_AIR
-    thrust_min: float = 0.06  # MPC_THR_MIN
+    thrust_min: float = 0.08  # MPC_THR_MIN
     thrust_max: float = 1.0  # MPC_THR_MAX
     thrust_xy_margin: float = 0.3  # MPC_THR_XY_MARG
-    hover_thrust: float = 0.33  # MPC_THR_HOVER: start of the estimate
+    hover_thrust: float = 0.45  # MPC_THR_HOVER: start of the estimate
     use_hover_thrust_estimate: bool = True  # MPC_USE_HTE
     drag_compensation_cutoff_hz: float = 0.8  # no PX4 name: measured drag is fed forward below it; 0: off
 
@@ -98,7 +98,7 @@ class MulticopterParameters:
     yaw_torque_cutoff_hz: float = 2.0  # MC_YAW_TQ_CUTOFF; 0: off
 
     # motors
-    thrust_model_factor: float = 1.0  # THR_MDL_FAC, MOT_THST_EXPO: thrust = f c^2 + (1 - f) c
+    thrust_model_factor: float = 0.5  # THR_MDL_FAC, MOT_THST_EXPO: thrust = f c^2 + (1 - f) c
     motor_idle: float = 0.1  # lowest command of a running motor | MOT_SPIN_ARM
     rotor_time_constant_s: float = 0.035  # of the thrust, for the hover-thrust estimate
 

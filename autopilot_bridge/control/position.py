@@ -203,7 +203,9 @@ def vertical_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enter
     if controlled:
         at_min = up <= p[c.THRUST_MIN] and error >= 0.0
         at_max = up >= p[c.THRUST_MAX] and error <= 0.0
-        if not (at_min or at_max):
+        # before lift-off only upwards: the ground holds the vehicle back, not a lack of sinking
+        grounded = s[c.AIRBORNE] == 0.0 and error >= 0.0
+        if not (at_min or at_max or grounded):
             new = s[c.VEL_INTEGRAL + 2] + p[c.VEL_Z_I] * error * dt
             s[c.VEL_INTEGRAL + 2] = min(GRAVITY_M_S2, max(-GRAVITY_M_S2, new))
     return min(p[c.THRUST_MAX], max(0.0, up))

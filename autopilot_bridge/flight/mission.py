@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-
 from autopilot_bridge.flight.context import (
     Array,
     FlightContext,
