@@ -227,7 +227,7 @@ class MissionService:
             self._store_ardupilot_plan(mission_type, items, flying=flying)
             return
         store = self._stores[mission_type]
-        unchanged = bool(items) and checksum == store.plan_id and items == store.items
+        unchanged = bool(items) and checksum == store.plan_id and len(items) == len(store.items)
         if unchanged and flying:
             return  # PX4 flies on when the mission it flies is sent again
         self._replace(mission_type, items, checksum)
