@@ -1,4 +1,4 @@
-"""What the air does: steady wind, gusts, turbulence intensity, temperature. Parameters only; `Vehicle` applies them."""
+"""What the air does: steady wind, gusts, turbulence, temperature. Parameters; `Vehicle` applies them."""
 
 import math
 from dataclasses import dataclass, field

@@ -1,0 +1,319 @@
+"""One simulated vehicle: a JSBSim model in its air, stepped by actuator commands, writing its truth."""
+
+import math
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from flightsim import truth as t
+from flightsim.airframe import Airframe, load_airframe
+from flightsim.environment import CosineGust, Environment, Turbulence
+from flightsim.home import Home
+from flightsim.initial_state import InitialState, initialise, set_battery
+from flightsim.jsbsim_model import find_property, load_fdm
+from flightsim.magnetics import magnetic_field_ned_gauss
+from flightsim.rotations import quaternion_from_euler
+from flightsim.turbulence import DrydenTurbulence
+
+Array = NDArray[np.float64]
+
+_FT: Final = 0.3048
+_PA_PER_PSF: Final = 47.88025898033584
+_KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
+_MAGNETIC_REFRESH_S: Final = 10
+_SETTLE_S: Final = 1.0
+
+# What is read from JSBSim every step, in this order; `_write_truth` converts it.
+_STATE: Final = (
+    "position/lat-geod-rad",
+    "position/long-gc-rad",
+    "position/geod-alt-ft",
+    "velocities/v-north-fps",
+    "velocities/v-east-fps",
+    "velocities/v-down-fps",
+    "attitude/phi-rad",
+    "attitude/theta-rad",
+    "attitude/psi-rad",
+    "velocities/pi-rad_sec",
+    "velocities/qi-rad_sec",
+    "velocities/ri-rad_sec",
+    "accelerations/a-pilot-x-ft_sec2",
+    "accelerations/a-pilot-y-ft_sec2",
+    "accelerations/a-pilot-z-ft_sec2",
+    "atmosphere/P-psf",
+    "atmosphere/T-R",
+    "atmosphere/rho-slugs_ft3",
+    "atmosphere/total-wind-north-fps",
+    "atmosphere/total-wind-east-fps",
+    "atmosphere/total-wind-down-fps",
+    "position/h-agl-ft",
+    "velocities/vt-fps",
+    "forces/fbx-gear-lbs",
+    "forces/fby-gear-lbs",
+    "forces/fbz-gear-lbs",
+)
+_STATE_SIZE: Final = len(_STATE)
+
+
+class VehicleDivergedError(ArithmeticError):
+    """The simulated state is no longer finite: the commands or the physics rate do not suit the model."""
+
+
+class Vehicle:
+    """A JSBSim vehicle.
+
+    Attributes:
+        truth: (TRUTH_SIZE,) float64, layout in `flightsim.truth`; written in place by every step.
+        airframe: the model's description.
+        home: origin of the world.
+        environment: the air.
+        physics_rate_hz: steps per second.
+        load_warnings: what JSBSim had to say about the model; empty for a clean one.
+    """
+
+    __slots__ = (
+        "_fdm",
+        "_getters",
+        "_gusts",
+        "_initial",
+        "_magnetic_steps",
+        "_motor_effectiveness",
+        "_raw",
+        "_raw_view",
+        "_run",
+        "_seed_sequence",
+        "_set_actuators",
+        "_set_gust",
+        "_steps",
+        "_truth_extra",
+        "_turbulence",
+        "airframe",
+        "environment",
+        "home",
+        "load_warnings",
+        "physics_rate_hz",
+        "truth",
+    )
+
+    def __init__(
+        self,
+        model: str | Path = "iris",
+        *,
+        home: Home,
+        environment: Environment,
+        seed_sequence: np.random.SeedSequence,
+        physics_rate_hz: int = 250,
+        initial: InitialState | None = None,
+    ) -> None:
+        """Load the model and start it.
+
+        Args:
+            model: name of a model that comes with the package, or a path (see `load_airframe`).
+            home: origin of the world; the ground is level at its altitude.
+            environment: the air.
+            seed_sequence: the vehicle's own random stream (turbulence).
+            physics_rate_hz: 100 to 2000.
+            initial: how it starts; by default standing at home.
+
+        Raises:
+            AirframeError: the model cannot be used.
+            ValueError: rate out of range.
+        """
+        if not 100 <= physics_rate_hz <= 2000:
+            raise ValueError(f"physics rate {physics_rate_hz} Hz is not in 100..2000 Hz")
+        if 1_000_000 % physics_rate_hz:
+            raise ValueError(
+                f"physics rate {physics_rate_hz} Hz is not a whole number of microseconds; try 250 or 400"
+            )
+        self.airframe: Airframe = load_airframe(model)
+        self.home = home
+        self.environment = environment
+        self.physics_rate_hz = physics_rate_hz
+        self.truth: Array = np.zeros(t.TRUTH_SIZE)
+        self._seed_sequence = seed_sequence
+        self._truth_extra = np.array([index for index, _ in self.airframe.truth], dtype=np.int64)
+        self._raw = np.zeros(_STATE_SIZE + len(self.airframe.truth))
+        self._raw_view = self._raw.data  # its elements are set faster than the array's
+        self._magnetic_steps = _MAGNETIC_REFRESH_S * physics_rate_hz
+        self._initial = initial or InitialState()
+        self.reset(self._initial)
+
+    @property
+    def actuator_count(self) -> int:
+        """How many of the actuator commands the vehicle uses."""
+        return len(self.airframe.actuators)
+
+    @property
+    def steps(self) -> int:
+        """Physics steps since the start."""
+        return self._steps
+
+    def reset(self, initial: InitialState | None = None) -> None:
+        """Start again, with a fresh JSBSim instance and the random stream from its beginning.
+
+        Args:
+            initial: how to start; by default as at construction.
+        """
+        start = initial or self._initial
+        fdm, self.load_warnings = load_fdm(self.airframe, self.physics_rate_hz)
+        self._fdm = fdm
+        self._run = fdm.run
+        name = self.airframe.name
+        properties = (*_STATE, *(prop for _, prop in self.airframe.truth))
+        self._getters = tuple(
+            (i, find_property(fdm, prop, needed_by="the truth vector").get_double_value)
+            for i, prop in enumerate(properties)
+        )
+        self._set_actuators = tuple(
+            find_property(fdm, prop, needed_by=f"vehicle '{name}'").set_double_value
+            for prop in self.airframe.actuators
+        )
+        self._motor_effectiveness = tuple(
+            find_property(fdm, prop, needed_by=f"vehicle '{name}'") for prop in self.airframe.effectiveness
+        )
+        self._set_gust = tuple(
+            find_property(fdm, f"atmosphere/gust-{axis}-fps", needed_by="turbulence").set_double_value
+            for axis in ("north", "east", "down")
+        )
+        self._steps = 0
+        self._turbulence: DrydenTurbulence | None = None
+        self._gusts: list[CosineGust] = list(self.environment.gusts)
+        initialise(fdm, self.airframe, self.home, self.environment, start)
+        if start.height_m is None:
+            for _ in range(round(_SETTLE_S * self.physics_rate_hz)):
+                fdm.run()
+            set_battery(fdm, self.airframe, start.battery_remaining)
+        else:
+            fdm.suspend_integration()  # forces of this state, then the specific force out of them
+            fdm.run()
+            fdm.run()
+            fdm.resume_integration()
+        if self.environment.turbulence is not Turbulence.NONE:
+            self._turbulence = DrydenTurbulence(
+                wind_at_20_ft_m_s=self.environment.turbulence.wind_at_20_ft_m_s,
+                wind_ned_m_s=self.environment.wind_ned_m_s,
+                dt_s=1.0 / self.physics_rate_hz,
+                seed_sequence=self._seed_sequence,
+            )
+        self._observe()
+        self._refresh_magnetic_field()
+
+    def step(self, actuators: Array) -> None:
+        """Advance one physics step and write `truth`.
+
+        Args:
+            actuators: (MAX_ACTUATORS,) commands, motors 0..1, surfaces -1..1; those the vehicle has not are
+                ignored. They act from this step on: rotors follow in this step, the motion from the next one.
+
+        Raises:
+            VehicleDivergedError: the state is no longer finite.
+        """
+        turbulence = self._turbulence
+        if turbulence is not None:
+            truth = self.truth
+            turbulence.step(truth[t.HEIGHT_ABOVE_GROUND_M], truth[t.AIRSPEED_TRUE_M_S])
+            for set_gust, value in zip(self._set_gust, turbulence.velocity_ned_m_s.tolist(), strict=True):
+                set_gust(value / _FT)
+        for set_actuator, value in zip(self._set_actuators, actuators.tolist(), strict=False):
+            set_actuator(value)
+        if self._gusts:
+            self._start_due_gust()
+        self._run()
+        self._steps += 1
+        self._observe()
+        if self._steps % self._magnetic_steps == 0:
+            self._refresh_magnetic_field()
+
+    def motor_effectiveness(self, index: int) -> float:
+        """Effectiveness of an actuator: 1 sound, 0 failed."""
+        return float(self._effectiveness_node(index).get_double_value())
+
+    def set_motor_effectiveness(self, index: int, value: float) -> None:
+        """Weaken or fail an actuator in flight.
+
+        Args:
+            index: 0 is the first actuator.
+            value: 1 sound, 0 failed.
+        """
+        if not 0.0 <= value <= 1.0:
+            raise ValueError(f"motor effectiveness {value} is not in 0..1")
+        self._effectiveness_node(index).set_double_value(value)
+
+    def _effectiveness_node(self, index: int) -> Any:
+        if not 0 <= index < len(self._motor_effectiveness):
+            raise ValueError(
+                f"vehicle '{self.airframe.name}' has no actuator {index} that can fail; accepted are "
+                f"0 to {len(self._motor_effectiveness) - 1}"
+            )
+        return self._motor_effectiveness[index]
+
+    def _observe(self) -> None:
+        raw = self._raw_view
+        for i, get in self._getters:
+            raw[i] = get()
+        if not _write_truth(self._raw, self._truth_extra, self.truth):
+            raise VehicleDivergedError(
+                f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
+                f"({self._steps / self.physics_rate_hz:.3f} s): its state is not finite"
+            )
+
+    def _start_due_gust(self) -> None:
+        gust = self._gusts[0]
+        if self._steps < gust.start_s * self.physics_rate_hz:
+            return
+        del self._gusts[0]
+        speed = math.hypot(*gust.velocity_ned_m_s)
+        if speed == 0.0:
+            return
+        values = {
+            "startup-duration-sec": gust.rise_s,
+            "steady-duration-sec": gust.hold_s,
+            "end-duration-sec": gust.fall_s,
+            "magnitude-ft_sec": speed / _FT,
+            "frame": 3.0,  # local NED
+            "X-velocity-ft_sec": gust.velocity_ned_m_s[0],  # JSBSim takes the direction from these
+            "Y-velocity-ft_sec": gust.velocity_ned_m_s[1],
+            "Z-velocity-ft_sec": gust.velocity_ned_m_s[2],
+            "start": 1.0,
+        }
+        for name, value in values.items():
+            self._fdm.set_property_value(f"atmosphere/cosine-gust/{name}", value)
+
+    def _refresh_magnetic_field(self) -> None:
+        truth = self.truth
+        truth[t.MAG_NED_GAUSS] = magnetic_field_ned_gauss(
+            math.degrees(truth[t.LAT_RAD]),
+            math.degrees(truth[t.LON_RAD]),
+            float(truth[t.ALT_M]),
+            self.environment.decimal_year,
+        )
+
+
+@njit(cache=True)
+def _write_truth(raw: Array, extra: NDArray[np.int64], truth: Array) -> bool:
+    """Convert JSBSim's values (order of `_STATE`, then the model's own) to truth; False if not finite."""
+    truth[0] = raw[0]
+    truth[1] = raw[1]
+    for i in range(2, 6):
+        truth[i] = raw[i] * _FT
+    quaternion_from_euler(raw[6], raw[7], raw[8], truth[6:10])
+    for i in range(3):
+        truth[10 + i] = raw[9 + i]
+        truth[13 + i] = raw[12 + i] * _FT
+        truth[19 + i] = raw[18 + i] * _FT
+    truth[16] = raw[15] * _PA_PER_PSF
+    truth[17] = raw[16] / 1.8
+    truth[18] = raw[17] * _KG_M3_PER_SLUG_FT3
+    truth[25] = raw[21] * _FT
+    truth[26] = raw[22] * _FT
+    truth[31] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
+    total = 0.0
+    for i in range(_STATE_SIZE):
+        total += raw[i]
+    for i in range(extra.shape[0]):
+        truth[extra[i]] = raw[_STATE_SIZE + i]
+        total += raw[_STATE_SIZE + i]
+    return math.isfinite(total)
