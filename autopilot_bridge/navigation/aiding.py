@@ -47,6 +47,9 @@ Array = NDArray[np.float64]
 HAS_RANGE: Final = 64
 _SLOW_RATE_HZ: Final = 5  # position hold and rest updates (PX4: 5 Hz)
 _REPORT_RATE_HZ: Final = 10
+_GAP_US: Final = 2_000_000  # silence after which a sensor's refusal is counted from the beginning
+_CONTRADICTION_MEMORY_US: Final = 10_000_000
+_TOO_MANY_CONTRADICTIONS: Final = 4  # within that time of each other: the estimate is worth nothing
 _HELD_VELOCITY_M_S: Final = 2.0  # 1-sigma of the velocity when the position begins to be held in flight
 
 
@@ -61,6 +64,8 @@ class Aiding:
     __slots__ = (
         "_baro_known",
         "_clocks",
+        "_contradicted_us",
+        "_contradictions",
         "_gps_height_known",
         "_health",
         "_held",
@@ -110,6 +115,8 @@ class Aiding:
         self._gps_height_known = False
         self._rested = False
         self._held = False
+        self._contradictions = 0
+        self._contradicted_us = 0
         self._tick = 0
         self.at_rest = False
         obs = self._solution.obs
@@ -173,12 +180,12 @@ class Aiding:
         """Fuse what is pending (bits of `fusion` and `HAS_RANGE`) at `time_us`; returns what was accepted."""
         solution, clocks, health = self._solution, self._clocks, self._health
         slow = self._tick % self._slow_every == 0
-        has = 0
+        has = self._prepare_slow(time_us) if slow else 0
         gps_row = baro_row = mag_row = 0
         if pending & f.HAS_GPS:
             gps_row = self._prepare_gps(time_us)
             if gps_row >= 0:
-                has |= f.HAS_GPS
+                has = has & ~f.HAS_HOLD | f.HAS_GPS
         if pending & f.HAS_BARO:
             baro_row = self._prepare_baro(time_us)
             if baro_row >= 0:
@@ -187,8 +194,6 @@ class Aiding:
             mag_row = self._prepare_mag(time_us)
             if mag_row >= 0:
                 has |= f.HAS_MAG
-        if slow:
-            has |= self._prepare_slow(time_us)
         accepted = f.update(
             solution.p,
             solution.core,
@@ -221,7 +226,7 @@ class Aiding:
             health.height_above_ground_test_ratio = self._terrain.test_ratio
             health.position_vertical_agl = self._terrain.valid(time_us)
         self._tick += 1
-        return accepted
+        return f.UNSOUND if self._contradictions >= _TOO_MANY_CONTRADICTIONS else accepted
 
     def _prepare_gps(self, time_us: int) -> int:
         reading = self._readings.gps
@@ -237,7 +242,7 @@ class Aiding:
         assert self.frame is not None
         obs[f.GPS_POS : f.GPS_POS + 3] = self.frame.ned_from_geodetic(lat, lon, alt)
         obs[f.GPS_VEL : f.GPS_VEL + 3] = values[GPS_VEL_NED_M_S]
-        obs[f.GPS_DELAY_S] = (time_us - reading.time_us) * 1e-6
+        obs[f.GPS_DELAY_S] = max(0, time_us - reading.time_us) * 1e-6
         horizontal, vertical = p.gps_position_noise_m
         obs[f.GPS_POS_VAR] = obs[f.GPS_POS_VAR + 1] = horizontal * horizontal
         obs[f.GPS_POS_VAR + 2] = vertical * vertical
@@ -246,47 +251,62 @@ class Aiding:
             obs[f.GPS_VEL_VAR + i] = scale * noise * noise
         solution.set_gps_accuracy(float(values[GPS_EPH_M]), float(values[GPS_EPV_M]))
         clocks = self._clocks
-        if (
-            self._held
-            or clocks.horizontal_aid_us < 0
-            or time_us - clocks.gps_position_us > p.gps_timeout_s * 1e6
-        ):
-            self._reset_to_gps(row)
-        if not self._gps_height_known or time_us - clocks.gps_height_us > p.gps_timeout_s * 1e6:
+        timeout_us = p.gps_timeout_s * 1e6
+        if self._held or clocks.horizontal_aid_us < 0:
+            self._reset_to_gps(row, time_us)
+        elif time_us - min(clocks.gps_position_us, clocks.gps_velocity_us) > timeout_us:
+            self._contradicted(time_us)
+            self._reset_to_gps(row, time_us)
+        if not self._gps_height_known:
+            self._reset_height_to_gps(row, time_us)
+        elif clocks.gps_height_refused_us >= 0 and time_us - clocks.gps_height_refused_us > timeout_us:
+            self._contradicted(time_us)
             solution.forget_gps_height_error()
-            self._reset_height_to_gps(row)
+            self._reset_height_to_gps(row, time_us)
         return row
 
-    def _reset_to_gps(self, row: int) -> None:
+    def _contradicted(self, time_us: int) -> None:
+        """A sensor that seems good had to be obeyed against the filter's belief."""
+        if time_us - self._contradicted_us > _CONTRADICTION_MEMORY_US:
+            self._contradictions = 0
+        self._contradictions += 1
+        self._contradicted_us = time_us
+
+    def _reset_to_gps(self, row: int, time_us: int) -> None:
         """Horizontal position and velocity jump to the GPS; the update that follows gives them their
         variances."""
-        solution, obs, health = self._solution, self._solution.obs, self._health
+        solution, obs, health, clocks = self._solution, self._solution.obs, self._health, self._clocks
         step = obs[f.GPS_POS : f.GPS_POS + 3] - solution.past_position(row)
         change = obs[f.GPS_VEL : f.GPS_VEL + 3] - solution.past_velocity(row)
         solution.move_horizontally(float(step[0]), float(step[1]))
         solution.change_velocity(float(change[0]), float(change[1]), sigma_m_s=UNKNOWN_VELOCITY_M_S)
         self._held = False
+        clocks.horizontal_aid_us = clocks.gps_position_us = clocks.gps_velocity_us = time_us
         health.position_resets += 1
-        health.position_reset_ned_m = (float(step[0]), float(step[1]), 0.0)
+        health.position_reset_ne_m = (float(step[0]), float(step[1]))
         health.velocity_resets += 1
-        health.velocity_reset_ned_m_s = (float(change[0]), float(change[1]), 0.0)
+        health.velocity_reset_ne_m_s = (float(change[0]), float(change[1]))
 
-    def _reset_height_to_gps(self, row: int) -> None:
-        down = float(self._solution.obs[f.GPS_POS + 2] - self._solution.past_position(row)[2])
-        self._solution.move_vertically(down, with_baro=self._baro_known)
+    def _reset_height_to_gps(self, row: int, time_us: int) -> None:
+        solution, obs = self._solution, self._solution.obs
+        down = float(obs[f.GPS_POS + 2] - solution.past_position(row)[2])
+        solution.move_vertically(down, with_baro=self._baro_known)
+        solution.change_vertical_velocity(float(obs[f.GPS_VEL + 2] - solution.past_velocity(row)[2]))
+        self._clocks.gps_height_us = time_us
+        self._clocks.gps_height_refused_us = -1
         self._gps_height_known = True
         self._height_has_jumped(down)
 
     def _height_has_jumped(self, down_m: float) -> None:
         self._terrain.shift(down_m)
         self._health.height_resets += 1
-        self._health.position_reset_ned_m = (0.0, 0.0, down_m)
+        self._health.height_reset_down_m = down_m
 
     def _gps_fused(self, time_us: int, accepted: int) -> None:
         clocks, health, obs = self._clocks, self._health, self._solution.obs
         good = True
         if accepted & f.ACCEPTED_GPS_VEL:
-            clocks.horizontal_aid_us = time_us
+            clocks.gps_velocity_us = clocks.horizontal_aid_us = time_us
         else:
             good = False
         if accepted & f.ACCEPTED_GPS_POS:
@@ -295,6 +315,10 @@ class Aiding:
             good = False
         if accepted & f.ACCEPTED_GPS_HEIGHT:
             clocks.gps_height_us = clocks.height_us = time_us
+            clocks.gps_height_refused_us = -1
+        elif clocks.gps_height_refused_us < 0 or time_us - clocks.gps_judged_us > _GAP_US:
+            clocks.gps_height_refused_us = time_us
+        clocks.gps_judged_us = time_us
         if accepted & (f.ACCEPTED_GPS_VEL | f.ACCEPTED_GPS_POS):
             clocks.gps_us = time_us
         health.gps_glitch = not good
@@ -309,7 +333,7 @@ class Aiding:
         if row < 0 or not math.isfinite(height):
             return -1
         solution.obs[f.BARO_HEIGHT] = height
-        solution.obs[f.BARO_DELAY_S] = (time_us - reading.time_us + lag_us) * 1e-6
+        solution.obs[f.BARO_DELAY_S] = max(0, time_us - reading.time_us + lag_us) * 1e-6
         if not self._baro_known:
             self._baro_known = True
             solution.set_baro_offset(height + float(solution.past_position(row)[2]))
@@ -326,6 +350,8 @@ class Aiding:
         else:
             down = float(solution.core[X_BARO_OFFSET] - offset)
             solution.move_vertically(down, with_baro=False)
+            solution.change_vertical_velocity(-float(solution.core[X_VEL + 2]))
+            self._contradicted(time_us)
             self._height_has_jumped(down)
         clocks.baro_us = time_us
 
@@ -390,7 +416,7 @@ class Aiding:
             north, east = float(core[X_VEL]), float(core[X_VEL + 1])
             solution.change_velocity(-north, -east, sigma_m_s=_HELD_VELOCITY_M_S)
             self._health.velocity_resets += 1
-            self._health.velocity_reset_ned_m_s = (-north, -east, 0.0)
+            self._health.velocity_reset_ne_m_s = (-north, -east)
 
     def _update_terrain(self, time_us: int, has_range: bool, slow: bool) -> None:
         terrain, core = self._terrain, self._solution.core

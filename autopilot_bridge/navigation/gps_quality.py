@@ -1,6 +1,6 @@
 """Is the receiver's fix good enough to use? PX4's EKF2_REQ_* checks, with a time they must hold.
 
-One check more: from sample to sample the position must move about as the velocity says, or a receiver that
+One check more: over two seconds the position must move about as the velocity says, or a receiver that
 talks nonsense in good form would be believed once the filter has nothing else left.
 """
 
@@ -26,8 +26,9 @@ from flightsim.interface import (
 )
 
 _M_PER_DEG: Final = 111_200.0
-_ALLOWED_STEP_M: Final = 5.0
-_ALLOWED_STEP_SIGMAS: Final = 5.0
+_WINDOW_US: Final = 2_000_000
+_ALLOWED_M: Final = 1.5
+_ALLOWED_SIGMAS: Final = 4.0
 
 
 class GpsQuality:
@@ -38,11 +39,24 @@ class GpsQuality:
         good_since_us: time of the first sample of the present good series; -1 when the newest one failed.
     """
 
-    __slots__ = ("_last", "_last_measured_us", "_newest_us", "_parameters", "good", "good_since_us")
+    __slots__ = (
+        "_anchor",
+        "_anchor_us",
+        "_distrusted",
+        "_last",
+        "_last_us",
+        "_newest_us",
+        "_parameters",
+        "_travelled",
+        "good",
+        "good_since_us",
+    )
 
     def __init__(self, parameters: NavigationParameters) -> None:
         self._parameters = parameters
         self._last: NDArray[np.float64] = np.zeros(GPS_SIZE)
+        self._anchor: NDArray[np.float64] = np.zeros(GPS_SIZE)
+        self._travelled: NDArray[np.float64] = np.zeros(3)
         self.restart()
 
     def restart(self) -> None:
@@ -50,7 +64,9 @@ class GpsQuality:
         self.good = False
         self.good_since_us = -1
         self._newest_us = -1
-        self._last_measured_us = -1
+        self._last_us = -1
+        self._anchor_us = -1
+        self._distrusted = False
 
     def judge(self, values: NDArray[np.float64], measured_us: int, time_us: int) -> bool:
         """Take a sample received at `time_us`; True when it is good and the checks have held long enough."""
@@ -71,29 +87,47 @@ class GpsQuality:
             and abs(values[GPS_ALT_M]) <= 1.0e5
             and math.hypot(north, east, down) <= 1.0e3
         )
-        coherent = self._moves_as_it_says(values, measured_us)
-        self._last[:] = values
-        self._last_measured_us = measured_us if self.good else -1
-        self.good = self.good and coherent
+        if self.good and not self._moves_as_it_says(values, measured_us):
+            self.good = False
+            self._distrusted = True
         if not self.good:
             self.good_since_us = -1
+            self._anchor_us = -1
             return False
         if self.good_since_us < 0:
             self.good_since_us = time_us
-        return time_us - self.good_since_us >= round(p.gps_check_time_s * 1e6)
+        proven_us = time_us - self.good_since_us
+        if self._distrusted:
+            self._distrusted = proven_us < _WINDOW_US
+        return not self._distrusted and proven_us >= round(p.gps_check_time_s * 1e6)
 
     def _moves_as_it_says(self, values: NDArray[np.float64], measured_us: int) -> bool:
-        elapsed_s = (measured_us - self._last_measured_us) * 1e-6
-        if self._last_measured_us < 0 or not 0.0 < elapsed_s <= 2.0:
+        """Compare position with the velocity's integral since an anchor up to two seconds ago."""
+        last, anchor = self._last, self._anchor
+        elapsed_us = measured_us - self._last_us
+        if self._anchor_us < 0 or not 0 < elapsed_us <= _WINDOW_US:
+            self._set_anchor(values, measured_us)
             return True
-        last = self._last
-        north_m = (values[GPS_LAT_DEG] - last[GPS_LAT_DEG]) * _M_PER_DEG
-        dlon = (values[GPS_LON_DEG] - last[GPS_LON_DEG] + 180.0) % 360.0 - 180.0
+        self._travelled += 0.5e-6 * elapsed_us * (values[GPS_VEL_NED_M_S] + last[GPS_VEL_NED_M_S])
+        north_m = (values[GPS_LAT_DEG] - anchor[GPS_LAT_DEG]) * _M_PER_DEG
+        dlon = (values[GPS_LON_DEG] - anchor[GPS_LON_DEG] + 180.0) % 360.0 - 180.0
         east_m = dlon * _M_PER_DEG * math.cos(math.radians(values[GPS_LAT_DEG]))
-        up_m = values[GPS_ALT_M] - last[GPS_ALT_M]
-        mean = 0.5 * (values[GPS_VEL_NED_M_S] + last[GPS_VEL_NED_M_S]) * elapsed_s
-        allowed_m = _ALLOWED_STEP_SIGMAS * math.hypot(values[GPS_EPH_M], values[GPS_EPV_M]) + _ALLOWED_STEP_M
-        return math.hypot(north_m - mean[0], east_m - mean[1], up_m + mean[2]) <= allowed_m
+        down_m = anchor[GPS_ALT_M] - values[GPS_ALT_M]
+        north, east, down = self._travelled
+        allowed_m = _ALLOWED_SIGMAS * math.hypot(values[GPS_EPH_M], values[GPS_EPV_M]) + _ALLOWED_M
+        coherent = math.hypot(north_m - north, east_m - east, down_m - down) <= allowed_m
+        if measured_us - self._anchor_us >= _WINDOW_US:
+            self._set_anchor(values, measured_us)
+        else:
+            last[:] = values
+            self._last_us = measured_us
+        return coherent
+
+    def _set_anchor(self, values: NDArray[np.float64], measured_us: int) -> None:
+        self._anchor[:] = values
+        self._last[:] = values
+        self._anchor_us = self._last_us = measured_us
+        self._travelled[:] = 0.0
 
     def silent(self, time_us: int) -> None:
         """No sample lately: the receiver is not good."""

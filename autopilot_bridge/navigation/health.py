@@ -34,7 +34,8 @@ class NavigationHealth:
         attitude_accuracy_rad: 1-sigma of (tilt, yaw).
         time_since_gps_us: since a GPS sample was last fused; -1 when none ever was.
         position_resets, velocity_resets, height_resets, yaw_resets: how often the estimate has jumped.
-        position_reset_ned_m, velocity_reset_ned_m_s, yaw_reset_rad: size of the newest jump (new minus old).
+        position_reset_ne_m, velocity_reset_ne_m_s, height_reset_down_m, yaw_reset_rad: size of the newest
+            jump (new minus old): north and east, down, clockwise.
         filter_resets: restarts after the estimate had become unusable.
     """
 
@@ -51,6 +52,7 @@ class NavigationHealth:
         "gps_in_use",
         "gps_quality",
         "height_above_ground_test_ratio",
+        "height_reset_down_m",
         "height_resets",
         "magnetometer_in_use",
         "magnetometer_test_ratio",
@@ -58,7 +60,7 @@ class NavigationHealth:
         "position_horizontal_accuracy_m",
         "position_horizontal_relative",
         "position_horizontal_test_ratio",
-        "position_reset_ned_m",
+        "position_reset_ne_m",
         "position_resets",
         "position_vertical_absolute",
         "position_vertical_accuracy_m",
@@ -71,7 +73,7 @@ class NavigationHealth:
         "uninitialised",
         "velocity_accuracy_m_s",
         "velocity_horizontal",
-        "velocity_reset_ned_m_s",
+        "velocity_reset_ne_m_s",
         "velocity_resets",
         "velocity_test_ratio",
         "velocity_vertical",
@@ -86,8 +88,9 @@ class NavigationHealth:
         self.velocity_resets = 0
         self.height_resets = 0
         self.yaw_resets = 0
-        self.position_reset_ned_m = (0.0, 0.0, 0.0)
-        self.velocity_reset_ned_m_s = (0.0, 0.0, 0.0)
+        self.position_reset_ne_m = (0.0, 0.0)
+        self.velocity_reset_ne_m_s = (0.0, 0.0)
+        self.height_reset_down_m = 0.0
         self.yaw_reset_rad = 0.0
         self.clear()
 

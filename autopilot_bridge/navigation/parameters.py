@@ -126,7 +126,7 @@ class NavigationParameters:
     ground_clearance_m: float = 0.1
     no_aid_noise_m: float = 10.0
     at_rest_noise_m: float = 0.5
-    zero_velocity_noise_m_s: float = 0.05
+    zero_velocity_noise_m_s: float = 0.02
     zero_rate_noise_rad_s: float = 1.0e-3
     alignment_time_s: float = 0.5
     alignment_tilt_rad: float = 0.1

@@ -20,9 +20,12 @@ class Clocks:
     __slots__ = (
         "aligned_us",
         "baro_us",
+        "gps_height_refused_us",
         "gps_height_us",
+        "gps_judged_us",
         "gps_position_us",
         "gps_us",
+        "gps_velocity_us",
         "height_held",
         "height_us",
         "horizontal_aid_us",
@@ -34,8 +37,11 @@ class Clocks:
         self.aligned_us = -1
         self.baro_us = -1
         self.gps_height_us = -1
+        self.gps_height_refused_us = -1
+        self.gps_judged_us = -1
         self.gps_position_us = -1
         self.gps_us = -1
+        self.gps_velocity_us = -1
         self.height_us = -1
         self.horizontal_aid_us = -1
         self.mag_us = -1

@@ -47,6 +47,7 @@ Array = NDArray[np.float64]
 
 UNKNOWN_POSITION_M: Final = 100.0
 UNKNOWN_VELOCITY_M_S: Final = 10.0
+UNKNOWN_VERTICAL_VELOCITY_M_S: Final = 3.0
 UNKNOWN_HEIGHT_M: Final = 50.0
 
 
@@ -161,10 +162,10 @@ class Solution:
             cov.forget(self.p, ATT + i, p.alignment_tilt_rad**2 if i < 2 else yaw_sigma_rad**2)
             cov.forget(self.p, ACCEL_BIAS + i, p.accel_bias_m_s2**2)
         self.forget_mag_bias()
-        self.core[X_MAG_BIAS : X_MAG_BIAS + 3] = 0.0
 
     def forget_mag_bias(self) -> None:
         """The magnetometer's bias is as uncertain as at alignment."""
+        self.core[X_MAG_BIAS : X_MAG_BIAS + 3] = 0.0
         for i in range(3):
             cov.forget(self.p, MAG_BIAS + i, self._parameters.magnetometer_bias_gauss**2)
 
@@ -215,6 +216,11 @@ class Solution:
                     p[i, j] += UNKNOWN_HEIGHT_M**2
         else:
             cov.forget(p, POS + 2, UNKNOWN_HEIGHT_M**2)
+
+    def change_vertical_velocity(self, down_m_s: float) -> None:
+        """Vertical velocity jumps and is unknown around its new value."""
+        cov.shift(self.core, VEL, 0.0, 0.0, down_m_s)
+        cov.forget(self.p, VEL + 2, UNKNOWN_VERTICAL_VELOCITY_M_S**2)
 
     def forget_gps_height_error(self) -> None:
         """The slow error of GPS heights is unknown."""

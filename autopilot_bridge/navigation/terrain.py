@@ -5,6 +5,7 @@ from typing import Final
 
 from autopilot_bridge.navigation.parameters import NavigationParameters
 
+_MAX_RANGE_M: Final = 1.0e4
 _RESET_REFUSED_US: Final = 1_000_000  # refused for this long: the ground has another height here
 
 
@@ -62,9 +63,7 @@ class TerrainEstimator:
     def fuse(self, time_us: int, distance_m: float, cos_tilt: float, down_m: float) -> None:
         """A range along the body's down axis, taken at height `down_m`."""
         p = self._parameters
-        if not (math.isfinite(distance_m) and distance_m > 0.0) or cos_tilt < math.cos(
-            p.rangefinder_max_tilt_rad
-        ):
+        if not 0.0 < distance_m < _MAX_RANGE_M or cos_tilt < math.cos(p.rangefinder_max_tilt_rad):
             self.in_use = False
             return
         measured = down_m + distance_m * cos_tilt

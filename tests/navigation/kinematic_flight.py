@@ -36,6 +36,7 @@ class Lissajous:
 
     size_m: float = 40.0
     height_m: float = 15.0
+    swing_m: float = 4.0
     takeoff_s: float = 8.0
     figure_s: float = 16.0
     end_s: float = 1e9
@@ -49,7 +50,7 @@ class Lissajous:
             [
                 go * self.size_m * np.sin(2.0 * phase),
                 go * self.size_m * np.sin(phase),
-                -climb * self.height_m - go * 4.0 * np.sin(3.0 * phase),
+                -climb * self.height_m - go * self.swing_m * np.sin(3.0 * phase),
             ],
             axis=-1,
         )
