@@ -116,7 +116,7 @@ def check_fence(item: MissionItem) -> int:
         return int(mavlink.MAV_MISSION_INVALID_PARAM1)
     if item.command in CIRCLE_COMMANDS and not (item.param1 > 0.0 and math.isfinite(item.param1)):
         return int(mavlink.MAV_MISSION_INVALID_PARAM1)
-    return check_horizontal(item)
+    return check_horizontal(item) or check_finite(item)
 
 
 def check_rally(item: MissionItem) -> int:
@@ -125,7 +125,19 @@ def check_rally(item: MissionItem) -> int:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     if item.frame not in GEODETIC_FRAMES:
         return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
-    return check_horizontal(item) or check_altitude(item)
+    return check_horizontal(item) or check_altitude(item) or check_finite(item)
+
+
+def check_finite(item: MissionItem) -> int:
+    """No infinity anywhere: for items whose values are plain numbers."""
+    for value, result in (
+        (item.x, mavlink.MAV_MISSION_INVALID_PARAM5_X),
+        (item.y, mavlink.MAV_MISSION_INVALID_PARAM6_Y),
+        (item.z, mavlink.MAV_MISSION_INVALID_PARAM7),
+    ):
+        if math.isinf(value):
+            return int(result)
+    return check_params(item, nan_allowed=(True, True, True, True))
 
 
 def check_horizontal(item: MissionItem) -> int:

@@ -9,6 +9,7 @@ from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.services.mission_messages import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.mission_rules import (
     check_fence,
+    check_finite,
     check_params,
     check_position,
     check_rally,
@@ -113,7 +114,7 @@ class ArdupilotItemRules:
                 return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
             result = self._check_params(item) or check_position(item)
         elif item.command in PLAIN_COMMANDS:
-            result = self._check_params(item)
+            result = self._check_params(item) or check_finite(item)
         else:
             return int(mavlink.MAV_MISSION_UNSUPPORTED)
         return result or check_special(item, seq, count)

@@ -13,6 +13,7 @@ from autopilot_bridge.services.mission_rules import (
     CIRCLE_COMMANDS,
     POLYGON_COMMANDS,
     check_fence,
+    check_finite,
     check_params,
     check_position,
     check_rally,
@@ -94,7 +95,7 @@ class Px4ItemRules:
         if item.frame == mavlink.MAV_FRAME_MISSION:
             if item.command not in PLAIN_COMMANDS:
                 return int(mavlink.MAV_MISSION_UNSUPPORTED)
-            result = check_params(item, nan_allowed=_UNSET_EVERYWHERE)
+            result = check_finite(item)
         else:
             if item.command not in POSITION_COMMANDS:
                 return int(mavlink.MAV_MISSION_UNSUPPORTED)
