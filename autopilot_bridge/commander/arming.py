@@ -37,7 +37,7 @@ def shortfalls(mode: FlightMode, situation: Situation, parameters: CommanderPara
         reasons.append(Reason.POSITION)
     if Need.HOME in needs and not situation.home_set:
         reasons.append(Reason.HOME)
-    if Need.MANUAL_CONTROL in needs and situation.sticks_age_s > parameters.manual_loss_s:
+    if Need.MANUAL_CONTROL in needs and situation.sticks_age_s > parameters.stick_timeout_s:
         reasons.append(Reason.MANUAL_CONTROL)
     if Need.MISSION in needs and situation.mission_problem is not None:
         reasons.append(situation.mission_problem)

@@ -113,7 +113,6 @@ class FailsafeMonitor:
     def _conditions(
         self, situation: Situation, parameters: CommanderParameters
     ) -> Iterator[tuple[FailsafeKind, bool, FailsafeAction]]:
-        time_us = situation.time_us
         yield (
             FailsafeKind.OFFBOARD_LOST,
             situation.mode is FlightMode.OFFBOARD and situation.setpoint_age_s > parameters.offboard_loss_s,
@@ -121,12 +120,15 @@ class FailsafeMonitor:
         )
         yield (
             FailsafeKind.GCS_LOST,
-            0.0 < parameters.gcs_loss_s < situation.gcs_age_s < math.inf,
+            0.0 < parameters.gcs_loss_s < situation.gcs_age_s < math.inf
+            and situation.mode not in parameters.gcs_loss_exempt,
             parameters.gcs_loss_action,
         )
         yield (
             FailsafeKind.MANUAL_LOST,
-            situation.sticks_at_arming and 0.0 < parameters.manual_loss_s < situation.sticks_age_s,
+            situation.sticks_at_arming
+            and 0.0 < parameters.manual_loss_s < situation.sticks_age_s
+            and situation.mode not in parameters.manual_loss_exempt,
             parameters.manual_loss_action,
         )
         level = situation.battery_level

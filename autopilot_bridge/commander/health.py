@@ -52,11 +52,6 @@ class VehicleHealth:
     battery_used_ah: float = math.nan
     battery_remaining: float = math.nan
 
-    @property
-    def imu(self) -> bool:
-        """Both inertial sensors."""
-        return self.gyro and self.accelerometer
-
 
 class _Watch:
     """Freshness of one sensor: late samples and values that never change."""
@@ -98,16 +93,16 @@ class HealthMonitor:
         "_gps",
         "_imu",
         "_magnetometer",
-        "_navigation",
         "_rangefinder",
         "_readings",
         "health",
+        "navigation",
     )
 
     def __init__(self, readings: SensorReadings, navigation: NavigationHealth) -> None:
         self.health = VehicleHealth()
+        self.navigation = navigation
         self._readings = readings
-        self._navigation = navigation
         self._imu = _Watch(readings.imu, _STALE_US["imu"])
         self._barometer = _Watch(readings.barometer, _STALE_US["barometer"])
         self._magnetometer = _Watch(readings.magnetometer, _STALE_US["magnetometer"])
@@ -117,7 +112,7 @@ class HealthMonitor:
 
     def update(self, time_us: int) -> None:
         """Judge every source; called by the commander at 50 Hz."""
-        health, readings, navigation = self.health, self._readings, self._navigation
+        health, readings, navigation = self.health, self._readings, self.navigation
         imu_alive = self._imu.alive(time_us)
         values = readings.imu.values
         health.gyro = imu_alive and _within(values[interface.IMU_GYRO_FRD_RAD_S], _MAX_RATE_RAD_S)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, fields
 
 from autopilot_bridge.commander.events import FailsafeAction
+from autopilot_bridge.commander.modes import FlightMode
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,6 +14,8 @@ class CommanderParameters:
     Attributes:
         offboard_loss_s: age of the last setpoint at which OFFBOARD counts as lost.
         gcs_loss_s, manual_loss_s: the same for ground-station heartbeats and for sticks; 0 switches it off.
+        gcs_loss_exempt, manual_loss_exempt: commanded modes that fly on without that link.
+        stick_timeout_s: age at which stick input is forgotten.
         action_delay_s: hold this long before a link failsafe acts, so that a person can step in.
         battery_*_remaining: remaining fraction below which the level is reached; 0 switches it off.
         battery_*_v: voltage below which the level is reached after `battery_timer_s`; 0 switches it off.
@@ -31,8 +34,11 @@ class CommanderParameters:
     offboard_loss_action: FailsafeAction
     gcs_loss_s: float
     gcs_loss_action: FailsafeAction
+    gcs_loss_exempt: frozenset[FlightMode]
+    stick_timeout_s: float
     manual_loss_s: float
     manual_loss_action: FailsafeAction
+    manual_loss_exempt: frozenset[FlightMode]
     action_delay_s: float
     battery_low_remaining: float
     battery_critical_remaining: float

@@ -24,6 +24,9 @@ class CommanderPolicy:
         takeoff_mode: taking off is a mode of its own (PX4), not something GUIDED does (ArduPilot).
         reposition_mode: mode in which the vehicle flies to a commanded place.
         mission_return_is_mode: a return item of a mission changes the mode (PX4).
+        mission_waits_for_start: on the ground a mission starts on command only, not by being armed (ArduPilot).
+        mission_first_item: 1 where item 0 is home (ArduPilot).
+        reports_do_items: items that are done at once are reported as reached, too (ArduPilot).
         manual_control_always: sticks are there without anybody sending them (ArduPilot's simulated radio).
         recovers: the commanded mode comes back by itself when a failsafe condition clears (PX4);
             else a failsafe is a mode change like any other (ArduPilot).
@@ -52,6 +55,9 @@ class CommanderPolicy:
     takeoff_mode: FlightMode | None
     reposition_mode: FlightMode
     mission_return_is_mode: bool
+    mission_waits_for_start: bool
+    mission_first_item: int
+    reports_do_items: bool
     manual_control_always: bool
     recovers: bool
     fallback_land: FlightMode

@@ -1,1 +1,26 @@
 """What is PX4's and what is ArduPilot's: mode numbers, parameters, policies, texts, identity."""
+
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from autopilot_bridge.flavours.flavour import Flavour
+
+FLAVOUR_NAMES: Final = ("px4", "ardupilot")
+
+
+def get_flavour(name: str) -> "Flavour":
+    """The flavour of that name.
+
+    Raises:
+        ValueError: there is none; the message lists the names.
+    """
+    # imported on demand: a program flies one flavour, and each brings a parameter table of its own
+    if name == "px4":
+        from autopilot_bridge.flavours.px4 import PX4
+
+        return PX4
+    if name == "ardupilot":
+        from autopilot_bridge.flavours.ardupilot import ARDUPILOT
+
+        return ARDUPILOT
+    raise ValueError(f"no autopilot flavour {name!r}; accepted: {', '.join(FLAVOUR_NAMES)}")

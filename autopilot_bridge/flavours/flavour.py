@@ -1,4 +1,4 @@
-"""The shape of a flavour: everything in which one firmware differs from another, as data and small functions."""
+"""The shape of a flavour: everything in which one firmware differs from another, as data and functions."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,17 +9,11 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.control.parameters import MulticopterParameters
+from autopilot_bridge.flavours.texts import Notice
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 from autopilot_bridge.services.channel import AddressRule
-
-
-class Notice(NamedTuple):
-    """A text for the pilot: MAV_SEVERITY and what STATUSTEXT says."""
-
-    severity: int
-    text: str
 
 
 class ModeDisplay(NamedTuple):
@@ -30,7 +24,7 @@ class ModeDisplay(NamedTuple):
         armed: motors may turn.
         booted: the boot phase is over.
         landed: standing on the ground.
-        attitude_setpoints: the setpoint stream asks for positions, velocities or attitudes (not for body rates).
+        attitude_setpoints: the setpoint stream asks for positions, velocities or attitudes (no body rates).
         thrust_setpoints: the setpoint stream asks for attitudes or body rates, with thrust.
     """
 
@@ -89,12 +83,14 @@ class Flavour:
         base_mode: HEARTBEAT.base_mode.
         policy: what the commander follows.
         notices: the texts of an event; empty for events this firmware is silent about.
+        banner: texts that follow a parameter list request.
         identity: versions and capabilities.
         command_address: target ids of commands this firmware takes for its own, for a system id.
         parameter_definitions: the parameter table in listing order.
-        commander_parameters, flight_parameters, controller_parameters, navigation_parameters: typed parameters from
-            the store's current values; called again after a change. They clamp what a ground station may have set
-            beyond reason, and never raise.
+        airframe: parameter values of the iris frame that differ from the firmware's defaults.
+        commander_parameters, flight_parameters, controller_parameters, navigation_parameters: typed
+            parameters from the store's current values; called again after a change. They clamp what a ground
+            station may have set beyond reason, and never raise.
         text_needs_heartbeat: no STATUSTEXT on a channel before a heartbeat was received there.
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
@@ -108,9 +104,11 @@ class Flavour:
     base_mode: Callable[[ModeDisplay], int]
     policy: CommanderPolicy
     notices: Callable[[Event], tuple[Notice, ...]]
+    banner: tuple[Notice, ...]
     identity: Identity
     command_address: Callable[[int], AddressRule]
     parameter_definitions: Callable[[], tuple[ParameterDefinition, ...]]
+    airframe: Callable[[], Mapping[str, float]]
     commander_parameters: Callable[[ParameterStore], CommanderParameters]
     flight_parameters: Callable[[ParameterStore], FlightParameters]
     controller_parameters: Callable[[ParameterStore], MulticopterParameters]

@@ -1,0 +1,554 @@
+"""The commander: which mode is flown, whether motors may turn, what a failsafe does. Flavour-neutral.
+
+Everything it decides on comes from the navigation filter, the sensors, the parameters and people's requests.
+Requests answer with a `Verdict`; what happens is told in typed events, which flavours turn into texts.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from autopilot_bridge.commander.arming import arming_reasons, shortfalls
+from autopilot_bridge.commander.battery import BatteryMonitor
+from autopilot_bridge.commander.events import (
+    Armed,
+    ArmingDenied,
+    BatteryLevel,
+    BatteryWarning,
+    Booted,
+    Disarmed,
+    DisarmingDenied,
+    DisarmReason,
+    Event,
+    FailsafeAction,
+    HomeSet,
+    LandingDetected,
+    MissionFinished,
+    MissionItemReached,
+    ModeChanged,
+    ModeDenied,
+    NavigationReady,
+    SystemStatus,
+    TakeoffDetected,
+)
+from autopilot_bridge.commander.failsafe import FailsafeMonitor
+from autopilot_bridge.commander.geofence import Geofence
+from autopilot_bridge.commander.guidance import Guidance
+from autopilot_bridge.commander.health import HealthMonitor
+from autopilot_bridge.commander.home import Home
+from autopilot_bridge.commander.modes import LANDING_MODES, STICK_MODES, FlightMode
+from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.pilot import THROTTLE_HIGH, PilotInput
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.setpoints import SetpointStream
+from autopilot_bridge.commander.situation import Situation
+from autopilot_bridge.commander.tasks import TaskRunner
+from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
+from autopilot_bridge.flight import context as flight
+from autopilot_bridge.flight.context import FlightContext, LandedState
+from autopilot_bridge.flight.land_detector import LandDetector
+from autopilot_bridge.mission_plan import MissionStore
+from autopilot_bridge.navigation import layout as nav
+
+_CHECK_EVERY: Final = 5  # arming checks run at 10 Hz while disarmed
+
+_ACTION_MODES: Final = {
+    FailsafeAction.POSITION: FlightMode.POSITION,
+    FailsafeAction.ALTITUDE: FlightMode.ALTITUDE,
+    FailsafeAction.STABILIZED: FlightMode.STABILIZED,
+    FailsafeAction.HOLD: FlightMode.HOLD,
+    FailsafeAction.BRAKE: FlightMode.BRAKE,
+    FailsafeAction.RETURN: FlightMode.RETURN,
+    FailsafeAction.LAND: FlightMode.LAND,
+    FailsafeAction.DESCEND: FlightMode.DESCEND,
+    FailsafeAction.TERMINATE: FlightMode.TERMINATION,
+}
+
+
+class Commander:
+    """Owns mode, arming state, home and failsafes of one vehicle, and runs its flight task.
+
+    Args:
+        context: what flight tasks see; the autopilot shares its navigation state, setpoint and frame through it.
+        policy: the flavour's rules.
+        parameters: time-outs, thresholds, actions.
+        health: judge of sensors and navigation.
+        land_detector: writes `context.landed_state`.
+        thrust: the collective given by the motors, 0..1.
+        missions: the stored mission plan.
+        fence: the stored fence plan.
+        mission_problem: why the stored plan can't be flown; None when it can.
+
+    Attributes:
+        mode: the mode being flown, shown in HEARTBEAT.
+        commanded_mode: the mode last asked for; differs from `mode` during a failsafe that keeps it (PX4).
+        armed, armed_time_us: motors may turn, and since when.
+        pilot: sticks and ground-station heartbeats come in here.
+        setpoints: streamed setpoints come in here.
+        home: where to return to.
+        battery: warning level.
+        failsafes: conditions that are up.
+        tasks: the flight task being flown.
+        guidance: requests that send the vehicle somewhere.
+        mission_complete: the last item was done, and the mission mode was not left since.
+    """
+
+    def __init__(
+        self,
+        context: FlightContext,
+        *,
+        policy: CommanderPolicy,
+        parameters: CommanderParameters,
+        health: HealthMonitor,
+        land_detector: LandDetector,
+        thrust: Callable[[], float],
+        missions: MissionStore,
+        fence: MissionStore,
+        mission_problem: Callable[[], Reason | None],
+    ) -> None:
+        self.context = context
+        self.policy = policy
+        self.parameters = parameters
+        self.missions = missions
+        self.mode = policy.boot_mode
+        self.commanded_mode = policy.boot_mode
+        self.armed = False
+        self.armed_time_us = -1
+        self.terminated = False
+        self.mission_complete = False
+        self.pilot = PilotInput(built_in_radio=policy.manual_control_always)
+        self.setpoints = SetpointStream()
+        self.home = Home(context)
+        self.battery = BatteryMonitor()
+        self.failsafes = FailsafeMonitor(keeps_mode=policy.recovers)
+        self.tasks = TaskRunner(
+            context,
+            missions,
+            self.setpoints,
+            mission_waits=policy.mission_waits_for_start,
+            first_item=policy.mission_first_item,
+        )
+        self.guidance = Guidance(self)
+        self.situation = Situation(health=health.health, mode=policy.boot_mode)
+        self.arming_reasons: tuple[Reason, ...] = (Reason.BOOTING,)
+        self.preflight_since_us = 0
+        self._health = health
+        self._land_detector = land_detector
+        self._thrust = thrust
+        context.health = health.navigation
+        self._geofence = Geofence(fence)
+        self._mission_problem = mission_problem
+        self._mode_after_disarm = policy.boot_mode
+        self._events: list[Event] = []
+        self._ticks = 0
+        self._booted = False
+        self._flew = False
+        self._landed_since_us = 0
+        self._last_prearm_report_us = 0
+        self._sticks_at_command = flight.ManualInput()
+
+    # what others read
+
+    @property
+    def time_us(self) -> int:
+        """Vehicle time of the newest update."""
+        return self.situation.time_us
+
+    @property
+    def landed(self) -> bool:
+        """Standing on the ground, the land detector is sure."""
+        return self.context.on_ground
+
+    @property
+    def airborne(self) -> bool:
+        """Armed and off the ground."""
+        return self.armed and not self.context.on_ground
+
+    @property
+    def landed_state(self) -> LandedState:
+        """As EXTENDED_SYS_STATE shows it."""
+        return self.context.landed_state
+
+    @property
+    def booted(self) -> bool:
+        """The boot phase is over."""
+        return self._booted
+
+    @property
+    def armable(self) -> bool:
+        """The arming checks pass in the commanded mode."""
+        return not self.arming_reasons
+
+    @property
+    def failsafe_active(self) -> bool:
+        """A failsafe takes action (or, where the flavour says so, only warns)."""
+        if self.policy.critical_on_warning:
+            return self.failsafes.any
+        return self.failsafes.action(self.time_us, self.parameters) > FailsafeAction.WARN
+
+    @property
+    def mission_active(self) -> bool:
+        """The mission mode is being flown, armed or not."""
+        return self.mode is FlightMode.MISSION
+
+    @property
+    def battery_level(self) -> BatteryLevel:
+        """Battery warning level."""
+        return self.battery.level
+
+    @property
+    def system_status(self) -> SystemStatus:
+        """MAV_STATE for HEARTBEAT."""
+        if self.terminated:
+            return SystemStatus.FLIGHT_TERMINATION
+        if self.armed and self.failsafe_active:
+            return SystemStatus.CRITICAL
+        if self.armed and (self.policy.active_when_landed or not self.context.on_ground):
+            return SystemStatus.ACTIVE
+        if self.policy.standby_when_armable:
+            return SystemStatus.STANDBY if self.armable else SystemStatus.UNINIT
+        return SystemStatus.STANDBY if self._booted else SystemStatus.BOOT
+
+    def drain_events(self) -> list[Event]:
+        """Everything that happened since the last call, in order."""
+        events, self._events = self._events, []
+        return events
+
+    def emit(self, event: Event) -> None:
+        """Add an event of a service that acts for the commander (denied commands, reboot)."""
+        self._events.append(event)
+
+    # requests
+
+    def set_mode(self, mode: FlightMode) -> Verdict:
+        """Command a mode. On the ground almost any is taken; in flight it must be possible now."""
+        reason = self._mode_obstacle(mode)
+        if reason is not None:
+            self.emit(ModeDenied(time_us=self.time_us, mode=mode, reason=reason))
+            return Verdict(result=self.policy.mode_denied, reasons=(reason,))
+        self.failsafes.override()
+        self._command(mode)
+        self._select()
+        return ACCEPTED
+
+    def arm(self, *, forced: bool = False) -> Verdict:
+        """Let the motors turn, when every check passes."""
+        if self.armed:
+            return ACCEPTED
+        self._refresh()
+        reasons = arming_reasons(
+            self.commanded_mode, self.situation, self.policy, self.parameters, forced=forced
+        )
+        if reasons:
+            self.arming_reasons = reasons
+            booting = Reason.BOOTING in reasons
+            if not booting or self.policy.force_arm_skips_checks:
+                self.emit(ArmingDenied(time_us=self.time_us, mode=self.commanded_mode, reasons=reasons))
+            return Verdict(result=self.policy.arming_denied, reasons=reasons)
+        self.armed = True
+        self.armed_time_us = self.preflight_since_us = self.time_us
+        self.context.armed = True
+        self._flew = False
+        self.situation.sticks_at_arming = self.situation.sticks_age_s <= self.parameters.stick_timeout_s
+        self._sticks_at_command = self.context.sticks
+        if not self.home.commanded and self.home.set_here():
+            self._tell_home()
+        self.emit(Armed(time_us=self.time_us))
+        self.tasks.enter(self.mode)
+        return ACCEPTED
+
+    def disarm(self, *, forced: bool = False) -> Verdict:
+        """Stop the motors; in the air only when forced."""
+        if not self.armed:
+            return ACCEPTED
+        if not self.context.on_ground and not forced:
+            self.emit(DisarmingDenied(time_us=self.time_us))
+            return Verdict(result=self.policy.disarm_in_air_denied, reasons=(Reason.NOT_LANDED,))
+        self._disarm(DisarmReason.FORCED if forced else DisarmReason.COMMAND)
+        return ACCEPTED
+
+    def terminate(self) -> None:
+        """Flight termination: motors off, for good."""
+        self.terminated = True
+        if self.armed:
+            self._disarm(DisarmReason.TERMINATION)
+        self._enter(FlightMode.TERMINATION)
+        self.commanded_mode = FlightMode.TERMINATION
+
+    def check_arming(self) -> tuple[Reason, ...]:
+        """Run the arming checks now and announce what fails."""
+        self._refresh()
+        reasons = arming_reasons(self.commanded_mode, self.situation, self.policy, self.parameters)
+        self.arming_reasons = reasons
+        if reasons:
+            self.emit(
+                ArmingDenied(time_us=self.time_us, mode=self.commanded_mode, reasons=reasons, check_only=True)
+            )
+        return reasons
+
+    def set_home(self, lat_deg: float, lon_deg: float, alt_m: float) -> bool:
+        """Home is there from now on; False when that can't be."""
+        if not self.home.set(lat_deg, lon_deg, alt_m):
+            return False
+        self.home.commanded = True
+        self._tell_home()
+        return True
+
+    def set_home_here(self) -> bool:
+        """Home is where the vehicle is; False while that is not known."""
+        if not self.situation.position or not self.home.set_here():
+            return False
+        self.home.commanded = False
+        self._tell_home()
+        return True
+
+    # 50 Hz
+
+    def update(self, time_us: int) -> None:
+        """Advance everything by one 50 Hz period and write the control setpoint."""
+        self.situation.time_us = time_us
+        self.context.time_us = time_us
+        self._ticks += 1
+        if not self._booted and time_us >= self.policy.boot_s * 1e6:
+            self._booted = True
+            self.emit(Booted(time_us=time_us))
+        self._health.update(time_us)
+        self._land_detector.update(self.context, self._thrust())
+        self._refresh()
+        self._follow_home()
+        self._follow_landing()
+        self._follow_battery()
+        self._auto_disarm()
+        if not self.armed and self._ticks % _CHECK_EVERY == 0:
+            self.arming_reasons = arming_reasons(
+                self.commanded_mode, self.situation, self.policy, self.parameters
+            )
+            self._report_prearm()
+        self._events.extend(self.failsafes.update(self.situation, self.parameters))
+        self._take_over_by_sticks()
+        self._select()
+        self.tasks.update()
+        self._follow_task()
+
+    def _refresh(self) -> None:
+        """Bring the situation up to date."""
+        situation, context, parameters = self.situation, self.context, self.parameters
+        time_us = situation.time_us
+        context.sticks = self.pilot.sticks(time_us, parameters.stick_timeout_s)
+        situation.mode = self.commanded_mode
+        situation.armed = self.armed
+        situation.airborne = self.airborne
+        situation.ready = time_us >= self.policy.armable_s * 1e6
+        was_ready = situation.position
+        situation.position = situation.health.position and time_us >= self.policy.position_ready_s * 1e6
+        if situation.position and not was_ready:
+            self.emit(NavigationReady(time_us=time_us))
+        situation.setpoint_age_s = self.setpoints.age_s(time_us)
+        situation.setpoint_needs_position = self.setpoints.needs_position
+        situation.gcs_age_s = self.pilot.gcs_age_s(time_us)
+        situation.sticks_age_s = self.pilot.sticks_age_s(time_us, parameters.stick_timeout_s)
+        situation.throttle_high = context.sticks.valid and context.sticks.throttle > THROTTLE_HIGH
+        situation.home_set = self.home.position is not None
+        situation.mission_problem = self._mission_problem()
+        situation.battery_level = self.battery.level
+        roll, pitch, _ = context.nav[nav.EULER_RAD].tolist()
+        situation.tilt_rad = math.acos(max(-1.0, min(1.0, math.cos(roll) * math.cos(pitch))))
+        situation.terminated = self.terminated
+        home = tuple(context.home_ned_m.tolist()) if situation.home_set else None
+        situation.outside_fence = situation.position and self._geofence.breached(
+            tuple(context.nav[nav.POS_NED_M].tolist()), home, context.frame, parameters
+        )
+
+    def _mode_obstacle(self, mode: FlightMode) -> Reason | None:
+        if self.terminated:
+            return Reason.TERMINATED
+        if not self.armed:
+            return None if mode in self.policy.ground_modes else Reason.MODE_UNAVAILABLE
+        if mode not in self.policy.flown_modes:
+            return Reason.MODE_UNAVAILABLE
+        missing = shortfalls(mode, self.situation, self.parameters)
+        return missing[0] if missing else None
+
+    def _command(self, mode: FlightMode) -> None:
+        self.commanded_mode = self.situation.mode = mode
+        self.preflight_since_us = self.time_us
+        self._sticks_at_command = self.context.sticks
+        if mode in self.policy.kept_after_disarm:
+            self._mode_after_disarm = mode
+
+    def _select(self) -> None:
+        """Fly the commanded mode, or what the strongest failsafe asks for."""
+        if self.policy.recovers:
+            action = self.failsafes.action(self.time_us, self.parameters)
+        else:
+            action = max((action for _, action in self.failsafes.started), default=FailsafeAction.NONE)
+            self.failsafes.started.clear()
+        if not self.armed or action <= FailsafeAction.WARN:
+            self._enter(self.commanded_mode)
+        elif action is FailsafeAction.TERMINATE:
+            self.terminate()
+        elif action is FailsafeAction.DISARM or (not self.policy.recovers and self.context.on_ground):
+            self._disarm(DisarmReason.FAILSAFE)
+        else:
+            mode = self._failsafe_mode(action)
+            if not self.policy.recovers:
+                self._command(mode)
+            self._enter(mode)
+
+    def _failsafe_mode(self, action: FailsafeAction) -> FlightMode:
+        """The mode of an action, or the next safer one that can be flown now."""
+        situation = self.situation
+        mode = _ACTION_MODES[action]
+        if (
+            action is FailsafeAction.DESCEND
+            and self.commanded_mode in STICK_MODES
+            and self.context.sticks.valid
+        ):
+            return FlightMode.ALTITUDE  # the pilot lands it (PX4 COM_POSCTL_NAVL 0)
+        if mode is FlightMode.POSITION and not situation.position:
+            mode = FlightMode.ALTITUDE
+        if mode in STICK_MODES:
+            return mode
+        if mode is FlightMode.RETURN and not situation.home_set:
+            mode = FlightMode.LAND
+        return mode if situation.position else self.policy.fallback_land
+
+    def _enter(self, mode: FlightMode) -> None:
+        if mode is self.mode:
+            return
+        previous, self.mode = self.mode, mode
+        self.mission_complete = False
+        self.guidance.forget_speed()
+        self.emit(ModeChanged(time_us=self.time_us, mode=mode, previous=previous))
+        self.tasks.enter(mode)
+
+    def _disarm(self, reason: DisarmReason) -> None:
+        self.armed = False
+        self.context.armed = False
+        self.situation.armed = False
+        self.situation.sticks_at_arming = False
+        self.tasks.stop()
+        self._events.extend(self.failsafes.update(self.situation, self.parameters))
+        self.emit(Disarmed(time_us=self.time_us, reason=reason))
+        if self.policy.kept_after_disarm and self.commanded_mode not in self.policy.kept_after_disarm:
+            self.commanded_mode = self._mode_after_disarm
+        if not self.terminated:
+            self._enter(self.commanded_mode)
+
+    def _auto_disarm(self) -> None:
+        if not self.armed or not self.context.on_ground:
+            return
+        parameters, policy = self.parameters, self.policy
+        if self.tasks.lifting_off:
+            self.preflight_since_us = self.time_us
+            return
+        landing = policy.disarm_landed_everywhere or self.mode in LANDING_MODES or self.tasks.ends_on_ground
+        if self._flew and landing:
+            delay_s, since_us, reason = parameters.disarm_landed_s, self._landed_since_us, DisarmReason.LANDED
+        else:
+            since_us = max(self.preflight_since_us, self._landed_since_us)
+            delay_s = parameters.disarm_preflight_s + policy.preflight_disarm_extra_s
+            reason = DisarmReason.LANDED if self._flew else DisarmReason.PREFLIGHT_TIMEOUT
+            if parameters.disarm_preflight_s <= 0.0:
+                return
+        if delay_s > 0.0 and self.time_us - since_us >= delay_s * 1e6:
+            self._disarm(reason)
+
+    def _follow_home(self) -> None:
+        self.home.follow_frame()
+        if self.armed or self.home.commanded or self.time_us < self.policy.home_s * 1e6:
+            return
+        if not self.situation.health.position:
+            return
+        known = self.home.position is not None
+        # until the position is taken as good, home follows it; the altitude still settles
+        settling = not self.situation.position and self._ticks % 50 == 0 and self.home.moved_m() > 0.1
+        if (not known or settling) and self.home.set_here():
+            self._tell_home()
+
+    def _tell_home(self) -> None:
+        if self.home.position is not None:
+            self.emit(HomeSet(time_us=self.time_us, home=self.home.position))
+
+    def _follow_landing(self) -> None:
+        on_ground = self.context.on_ground
+        if not self.armed:
+            return
+        if not on_ground and not self._flew:
+            self._flew = True
+            self.emit(TakeoffDetected(time_us=self.time_us))
+        elif not on_ground:
+            self._landed_since_us = -1
+        elif self._flew and self._landed_since_us < 0:
+            self._landed_since_us = self.time_us
+            self.emit(LandingDetected(time_us=self.time_us))
+
+    def _follow_battery(self) -> None:
+        health = self.situation.health
+        if self.battery.update(health, self.parameters, self.time_us):
+            self.emit(
+                BatteryWarning(
+                    time_us=self.time_us,
+                    level=self.battery.level,
+                    voltage_v=health.battery_voltage_v,
+                    used_ah=health.battery_used_ah,
+                )
+            )
+
+    def _report_prearm(self) -> None:
+        interval_us = self.policy.prearm_report_s * 1e6
+        if interval_us <= 0.0 or not self._booted or not self.arming_reasons:
+            return
+        if self.time_us - self._last_prearm_report_us >= interval_us:
+            self._last_prearm_report_us = self.time_us
+            self.emit(
+                ArmingDenied(
+                    time_us=self.time_us,
+                    mode=self.commanded_mode,
+                    reasons=self.arming_reasons,
+                    check_only=True,
+                )
+            )
+
+    def _take_over_by_sticks(self) -> None:
+        """PX4 COM_RC_OVERRIDE: moved sticks end automatic flight."""
+        parameters, sticks = self.parameters, self.context.sticks
+        if not self.airborne or not sticks.valid or self.mode in STICK_MODES:
+            return
+        offboard = self.mode is FlightMode.OFFBOARD
+        if not (parameters.stick_override_offboard if offboard else parameters.stick_override):
+            return
+        before = self._sticks_at_command
+        travel = max(abs(sticks.roll - before.roll), abs(sticks.pitch - before.pitch))
+        if before.valid and travel > parameters.stick_override_threshold:
+            self.set_mode(FlightMode.POSITION if self.situation.position else FlightMode.ALTITUDE)
+
+    def _follow_task(self) -> None:
+        """Turn what the flight task tells into modes and events."""
+        events = self.context.events
+        if not events:
+            return
+        told = events[:]
+        events.clear()
+        for event in told:
+            if isinstance(event, flight.WaypointReached):
+                if event.navigation or self.policy.reports_do_items:
+                    self.emit(MissionItemReached(time_us=self.time_us, index=event.seq))
+            elif isinstance(event, flight.MissionFinished):
+                self.mission_complete = True
+                self.emit(MissionFinished(time_us=self.time_us))
+            elif isinstance(event, flight.MissionModeRequested):
+                if self.policy.mission_return_is_mode and self.mode is self.commanded_mode:
+                    self._command(FlightMode.RETURN)
+                    self._enter(FlightMode.RETURN)
+            elif isinstance(event, flight.HomeChangeRequested):
+                frame = self.context.frame
+                if frame is not None:
+                    self.set_home(*frame.geodetic_from_ned(event.north_m, event.east_m, event.down_m))
+            elif (
+                isinstance(event, flight.TaskFinished)
+                and self.mode is self.policy.takeoff_mode
+                and self.mode is self.commanded_mode
+            ):
+                self._command(FlightMode.HOLD)
+                self._enter(FlightMode.HOLD)

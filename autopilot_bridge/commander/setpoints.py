@@ -1,0 +1,45 @@
+"""The stream of setpoints that offboard (PX4) and guided (ArduPilot) flying follow, and its age."""
+
+import math
+
+from autopilot_bridge.flight.guided import GuidedKind, GuidedTask
+from autopilot_bridge.flight.offboard import OffboardKind, OffboardTask
+
+
+class SetpointStream:
+    """Newest streamed setpoint: the tasks that fly it, when it came, what it needs.
+
+    The stream is taken in every mode, since PX4 enters OFFBOARD only while one is running.
+
+    Attributes:
+        offboard: flies setpoints as they come (PX4).
+        guided: flies targets smoothly (ArduPilot).
+        needs_position: the newest setpoint can't be flown without a position.
+    """
+
+    __slots__ = ("_time_us", "guided", "needs_position", "offboard")
+
+    def __init__(self) -> None:
+        self.offboard = OffboardTask()
+        self.guided = GuidedTask()
+        self.needs_position = False
+        self._time_us = -1
+
+    def note(self, time_us: int, *, needs_position: bool) -> None:
+        """A setpoint was taken."""
+        self._time_us = time_us
+        self.needs_position = needs_position
+
+    def age_s(self, time_us: int) -> float:
+        """Since the newest setpoint; infinite when there is none."""
+        return (time_us - self._time_us) * 1e-6 if self._time_us >= 0 else math.inf
+
+    @property
+    def attitude_setpoints(self) -> bool:
+        """The offboard stream asks for positions, velocities or attitudes (PX4 shows it in base_mode)."""
+        return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
+
+    @property
+    def thrust_setpoints(self) -> bool:
+        """Guided flying follows attitudes (ArduPilot shows it in base_mode)."""
+        return self.guided.kind is GuidedKind.ATTITUDE

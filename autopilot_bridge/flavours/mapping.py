@@ -1,0 +1,72 @@
+"""Typed parameters from a firmware's named ones: tables of (field, name, factor, limits)."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple, TypeVar
+
+from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
+
+T = TypeVar("T")
+
+
+class FieldMap(NamedTuple):
+    """One field of a parameter class and the firmware parameter that sets it.
+
+    Attributes:
+        field: name in the parameter class.
+        name: the firmware's name.
+        factor: field = parameter x factor (centimetres, degrees, milliseconds).
+        low, high: limits of the field. A ground station can store anything; the vehicle must stay flyable.
+    """
+
+    field: str
+    name: str
+    factor: float = 1.0
+    low: float = 1e-3
+    high: float = 1e4
+
+
+def field_values(store: ParameterStore, table: Iterable[FieldMap]) -> dict[str, float]:
+    """Field values of every mapped parameter that the store has, clamped."""
+    return {
+        entry.field: clamp(store.get(entry.name) * entry.factor, entry.low, entry.high)
+        for entry in table
+        if entry.name in store
+    }
+
+
+def build(cls: type[T], store: ParameterStore, table: Iterable[FieldMap], **fixed: Any) -> T:
+    """An instance of a parameter class: mapped fields from the store, `fixed` ones, defaults for the rest."""
+    return cls(**{**field_values(store, table), **fixed})
+
+
+def airframe_overrides(
+    tuned: object, table: Iterable[FieldMap], definitions: Iterable[ParameterDefinition]
+) -> dict[str, float]:
+    """Parameters whose defaults differ from the `tuned` values of a parameter class, with those values.
+
+    What an airframe file of the firmware does: under these settings the mapping gives the tuned values.
+    """
+    defaults = {definition.name: definition.default for definition in definitions}
+    wanted = {entry.name: getattr(tuned, entry.field) / entry.factor for entry in table}
+    return {
+        name: value
+        for name, value in wanted.items()
+        if name in defaults and not math.isclose(value, defaults[name], rel_tol=1e-5, abs_tol=1e-9)
+    }
+
+
+def number(store: ParameterStore, name: str, default: float) -> float:
+    """Value of a parameter, or `default` when this table has none of that name or the value is unusable."""
+    value = store.get(name) if name in store else default
+    return value if math.isfinite(value) else default
+
+
+def integer(store: ParameterStore, name: str, default: int) -> int:
+    """The same as a whole number."""
+    return int(number(store, name, default))
+
+
+def clamp(value: float, low: float, high: float) -> float:
+    """`value` within low..high."""
+    return min(high, max(low, value))

@@ -1,0 +1,127 @@
+"""PX4 v1.16.1 for a multicopter (reference: PX4 v1.16.1, sections 3 to 9)."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.control.parameters import MulticopterParameters
+from autopilot_bridge.flavours import px4_mapping, px4_modes
+from autopilot_bridge.flavours.flavour import Flavour, Identity
+from autopilot_bridge.flavours.mapping import airframe_overrides
+from autopilot_bridge.flavours.px4_texts import notices
+from autopilot_bridge.parameters import ParameterDefinition
+from autopilot_bridge.services.channel import AddressRule
+
+_AUTOPILOT_COMPONENT: Final = 1
+
+_SELECTABLE: Final = frozenset(
+    {
+        *STICK_MODES - {FlightMode.POSHOLD},
+        FlightMode.HOLD,
+        FlightMode.TAKEOFF,
+        FlightMode.MISSION,
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.FOLLOW,
+        FlightMode.PRECISION_LAND,
+        FlightMode.ORBIT,
+        FlightMode.OFFBOARD,
+    }
+)
+_PREVENT_ARMING: Final = frozenset(
+    {
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.PRECISION_LAND,
+        FlightMode.FOLLOW,
+        FlightMode.ORBIT,
+        FlightMode.DESCEND,
+    }
+)
+
+POLICY: Final = CommanderPolicy(
+    boot_mode=FlightMode.HOLD,
+    heartbeat_start_s=1.1,
+    boot_s=2.1,
+    armable_s=4.14,
+    position_ready_s=4.14,
+    home_s=2.1,
+    armable_modes=_SELECTABLE - _PREVENT_ARMING,
+    ground_modes=_SELECTABLE,
+    flown_modes=_SELECTABLE - {FlightMode.FOLLOW},  # nobody to follow
+    kept_after_disarm=_SELECTABLE - _PREVENT_ARMING,
+    takeoff_mode=FlightMode.TAKEOFF,
+    reposition_mode=FlightMode.HOLD,
+    mission_return_is_mode=True,
+    mission_waits_for_start=False,
+    mission_first_item=0,
+    reports_do_items=False,
+    manual_control_always=False,
+    recovers=True,
+    fallback_land=FlightMode.DESCEND,
+    critical_on_warning=False,
+    active_when_landed=True,
+    standby_when_armable=True,
+    preflight_disarm_extra_s=1.0,
+    disarm_landed_everywhere=True,
+    prearm_report_s=0.0,
+    arming_denied=Result.TEMPORARILY_REJECTED,
+    mode_denied=Result.TEMPORARILY_REJECTED,
+    disarm_in_air_denied=Result.TEMPORARILY_REJECTED,
+    force_arm_skips_checks=False,
+)
+
+IDENTITY: Final = Identity(
+    product="PX4 Autopilot v1.16.1",
+    capabilities=0xE8FF,
+    flight_sw_version=0x011001FF,
+    middleware_sw_version=0x011001FF,
+    os_sw_version=0,
+    board_version=1,
+    vendor_id=0,
+    product_id=0,
+    uid=5283920058631409231,
+    flight_custom_version=(bytes.fromhex("94cb2012") + bytes(4))[::-1],
+    uid2=bytes(18),
+    answers_protocol_version=True,
+)
+
+
+def _parameter_definitions() -> tuple[ParameterDefinition, ...]:
+    from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
+
+    return tuple(PX4_PARAMETERS)
+
+
+def _airframe() -> Mapping[str, float]:
+    return airframe_overrides(MulticopterParameters(), px4_mapping.CONTROLLER, _parameter_definitions())
+
+
+def _command_address(system_id: int) -> AddressRule:
+    return AddressRule(system_id=system_id, component_ids=frozenset({_AUTOPILOT_COMPONENT}), any_system=False)
+
+
+PX4: Final = Flavour(
+    name="px4",
+    autopilot=12,  # MAV_AUTOPILOT_PX4
+    vehicle_type=2,  # MAV_TYPE_QUADROTOR
+    custom_modes=px4_modes.CUSTOM_MODES,
+    mode_names=px4_modes.MODE_NAMES,
+    base_mode=px4_modes.base_mode,
+    policy=POLICY,
+    notices=notices,
+    banner=(),
+    identity=IDENTITY,
+    command_address=_command_address,
+    parameter_definitions=_parameter_definitions,
+    airframe=_airframe,
+    commander_parameters=px4_mapping.commander_parameters,
+    flight_parameters=px4_mapping.flight_parameters,
+    controller_parameters=px4_mapping.controller_parameters,
+    navigation_parameters=px4_mapping.navigation_parameters,
+    text_needs_heartbeat=False,
+    heartbeat_on_mode_change=False,
+    bytewise_parameters=True,
+)

@@ -1,0 +1,105 @@
+"""What PX4 says about events (v1.16.1, reference sections 7 to 9).
+
+PX4 gives the reasons of a refused arming in EVENT messages, which need its metadata server to be read. Here they
+follow as plain texts, worded as PX4 words the events. The tab that marks a text as a copy of an EVENT is left out, so
+that ground stations show it.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+from autopilot_bridge.commander import events
+from autopilot_bridge.commander.events import BatteryLevel, DisarmReason, FailsafeAction
+from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.flavours.px4_modes import MODE_NAMES
+from autopilot_bridge.flavours.texts import Notice, Severity
+
+_REASONS: Final[Mapping[Reason, str]] = {
+    Reason.BOOTING: "System is starting up",
+    Reason.GYRO: "Gyro data missing or unhealthy",
+    Reason.ACCELEROMETER: "Accelerometer data missing or unhealthy",
+    Reason.BAROMETER: "Barometer data missing or unhealthy",
+    Reason.COMPASS: "Compass data missing or unhealthy",
+    Reason.GPS: "GNSS data fusion stopped or no 3D fix",
+    Reason.ATTITUDE: "Attitude estimate invalid",
+    Reason.ALTITUDE: "Altitude estimate invalid",
+    Reason.POSITION: "Position estimate invalid",
+    Reason.HOME: "Home position not set",
+    Reason.BATTERY_LOW: "Low battery",
+    Reason.BATTERY_FAILSAFE: "Critical battery",
+    Reason.MANUAL_CONTROL: "No manual control input",
+    Reason.GCS_LOST: "No connection to the ground control station",
+    Reason.MISSION_MISSING: "No valid mission available",
+    Reason.MISSION_INVALID: "Mission is not feasible",
+    Reason.NO_SETPOINTS: "No offboard signal",
+    Reason.MODE_NOT_ARMABLE: "Mode not suitable for takeoff",
+    Reason.OUTSIDE_FENCE: "Geofence violation",
+    Reason.TERMINATED: "Flight termination active",
+    Reason.LEANING: "Attitude too far from level",
+    Reason.THROTTLE_HIGH: "Throttle above center",
+}
+
+_DISARMED: Final[Mapping[DisarmReason, str]] = {
+    DisarmReason.COMMAND: "Disarmed by external command",
+    DisarmReason.FORCED: "Disarmed by external command",
+    DisarmReason.PREFLIGHT_TIMEOUT: "Disarmed by auto preflight disarming",
+    DisarmReason.LANDED: "Disarmed by landing",
+    DisarmReason.FAILSAFE: "Disarmed by failsafe",
+    DisarmReason.TERMINATION: "Disarmed by flight termination",
+}
+
+_COMMANDS: Final[Mapping[tuple[int, Reason], Notice]] = {
+    (300, Reason.MISSION_MISSING): Notice(Severity.CRITICAL, "Mission start denied! No valid mission"),
+    (300, Reason.MISSION_INVALID): Notice(Severity.CRITICAL, "Mission start denied! No valid mission"),
+    (400, Reason.BAD_PARAMETER): Notice(Severity.CRITICAL, "Unsupported ARM_DISARM param"),
+    (176, Reason.MODE_UNKNOWN): Notice(Severity.CRITICAL, "Unsupported auto mode"),
+}
+
+
+def notices(event: events.Event) -> tuple[Notice, ...]:
+    """The STATUSTEXTs of an event, in order."""
+    match event:
+        case events.Armed():
+            return (Notice(Severity.INFO, "Armed by external command"),)
+        case events.Disarmed(reason=reason):
+            return (Notice(Severity.INFO, _DISARMED[reason]),)
+        case events.ArmingDenied(reasons=reasons, check_only=check_only):
+            why = tuple(
+                Notice(Severity.CRITICAL, f"Preflight Fail: {describe(reason)}") for reason in reasons
+            )
+            if check_only:
+                return why
+            return (
+                Notice(Severity.CRITICAL, "Arming denied: Resolve system health failures first"),
+                *why,
+            )
+        case events.DisarmingDenied():
+            return (Notice(Severity.CRITICAL, "Disarming denied: not landed"),)
+        case events.ModeDenied(mode=mode) if mode is not None:
+            return (Notice(Severity.CRITICAL, f"Switching to {MODE_NAMES[mode]} is currently not available"),)
+        case events.CommandDenied(command=command, reason=reason):
+            known = _COMMANDS.get((command, reason))
+            return () if known is None else (known,)
+        case events.FailsafeActivated(action=action) if action > FailsafeAction.WARN:
+            return (Notice(Severity.CRITICAL, "Failsafe activated"),)
+        case events.FailsafeActivated(action=FailsafeAction.WARN):
+            return (Notice(Severity.CRITICAL, "Failsafe warning triggered"),)
+        case events.BatteryWarning(level=level):
+            text = {
+                BatteryLevel.LOW: "Low battery level, return advised",
+                BatteryLevel.CRITICAL: "Critical battery level, land now",
+                BatteryLevel.EMERGENCY: "Dangerous battery level, land immediately",
+            }.get(level)
+            return () if text is None else (Notice(Severity.CRITICAL, text),)
+        case events.TakeoffDetected():
+            return (Notice(Severity.INFO, "Takeoff detected"),)
+        case events.LandingDetected():
+            return (Notice(Severity.INFO, "Landing detected"),)
+        case events.MissionFinished():
+            return (Notice(Severity.INFO, "Mission finished, loitering"),)
+    return ()
+
+
+def describe(reason: Reason) -> str:
+    """One reason in PX4's words."""
+    return _REASONS.get(reason, reason.name.replace("_", " ").capitalize())

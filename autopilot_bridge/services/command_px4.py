@@ -1,0 +1,187 @@
+"""Commands as PX4 takes them (reference: PX4 v1.16.1, section 7)."""
+
+import math
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.events import CommandDenied
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.flavours import px4_modes
+from autopilot_bridge.services.channel import Source
+from autopilot_bridge.services.command_common import (
+    AMSL_FRAMES,
+    FORCE_NUMBER,
+    RELATIVE_FRAMES,
+    Command,
+    CommandHandlers,
+    CommandHooks,
+    flags,
+    on_earth,
+    whole,
+)
+
+_CUSTOM_MODE_FLAG = 1
+
+
+class Px4Commands(CommandHandlers):
+    """PX4's commands. Everything not in the table is UNSUPPORTED, as in the firmware."""
+
+    double_ack = frozenset({mavlink.MAV_CMD_DO_SET_MODE})
+
+    def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
+        super().__init__(commander, hooks)
+        self.table = {
+            **self.table,
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self.arm_disarm,
+            mavlink.MAV_CMD_DO_SET_MODE: self.set_mode,
+            mavlink.MAV_CMD_NAV_TAKEOFF: self.takeoff,
+            mavlink.MAV_CMD_DO_REPOSITION: self.reposition,
+            mavlink.MAV_CMD_DO_ORBIT: self.orbit,
+            mavlink.MAV_CMD_DO_CHANGE_SPEED: self.change_speed,
+            mavlink.MAV_CMD_DO_SET_HOME: self.set_home,
+            mavlink.MAV_CMD_MISSION_START: self.start_mission,
+            mavlink.MAV_CMD_DO_LAND_START: self.land_start,
+            mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.refuse,
+            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self.reboot_or_shutdown,
+            mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self.calibrate,
+            mavlink.MAV_CMD_PREFLIGHT_STORAGE: self.storage,
+            mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self.request_protocol_version,
+            mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self.silence,
+            mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self.silence,
+            mavlink.MAV_CMD_DO_VTOL_TRANSITION: self.silence,
+            mavlink.MAV_CMD_SET_CAMERA_MODE: self.silence,
+        }
+
+    def set_mode_message(self, base_mode: int, custom_mode: int) -> Result:
+        """SET_MODE: one real acknowledgement."""
+        return self._set_mode(base_mode, custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF)
+
+    def set_mode(self, command: Command, source: Source) -> Result:
+        """DO_SET_MODE: p1 base mode, p2 main mode, p3 sub mode."""
+        return self._set_mode(flags(command.p1), flags(command.p2), flags(command.p3))
+
+    def _set_mode(self, base_mode: int, main: int, sub: int) -> Result:
+        if not base_mode & _CUSTOM_MODE_FLAG:
+            return Result.ACCEPTED  # acknowledged, and nothing changes
+        mode = px4_modes.commanded_mode(main, sub)
+        if mode is not None:
+            return self.commander.set_mode(mode).result
+        if main != px4_modes.MAIN_AUTO:
+            return Result.ACCEPTED  # acknowledged, and nothing changes
+        self.commander.emit(
+            CommandDenied(
+                time_us=self.commander.time_us,
+                command=mavlink.MAV_CMD_DO_SET_MODE,
+                reason=Reason.MODE_UNKNOWN,
+            )
+        )
+        return Result.TEMPORARILY_REJECTED
+
+    def arm_disarm(self, command: Command, source: Source) -> Result | None:
+        """COMPONENT_ARM_DISARM: p1 rounded to 1 or 0; anything else is answered by a text alone."""
+        action = whole(command.p1)
+        forced = whole(command.p2) == FORCE_NUMBER
+        if action == 1:
+            return self.commander.arm(forced=forced).result
+        if action == 0:
+            return self.commander.disarm(forced=forced).result
+        self.deny(command, Reason.BAD_PARAMETER, Result.DENIED)
+        return None
+
+    def takeoff(self, command: Command, source: Source) -> Result:
+        """NAV_TAKEOFF: p4 yaw deg, altitude over mean sea level; none: MIS_TAKEOFF_ALT over home."""
+        relative = command.frame in RELATIVE_FRAMES
+        down_m = self.down_from(command.z, relative=relative)
+        return self.commander.guidance.takeoff(down_m=down_m, yaw_rad=math.radians(command.p4)).result
+
+    def reposition(self, command: Command, source: Source) -> Result:
+        """DO_REPOSITION: p1 speed, p2 bit 0 change mode, p4 yaw rad. The frame is not checked."""
+        if not flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
+            return Result.UNSUPPORTED
+        if not on_earth(command):
+            return Result.DENIED
+        north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
+        return self.commander.guidance.reposition(
+            north_m=north_m, east_m=east_m, down_m=down_m, yaw_rad=command.p4, speed_m_s=command.p1
+        ).result
+
+    def orbit(self, command: Command, source: Source) -> Result:
+        """DO_ORBIT: p1 radius (negative: counter-clockwise), p2 speed, p3 ORBIT_YAW_BEHAVIOUR, centre."""
+        if not on_earth(command) or (command.is_int and command.frame not in AMSL_FRAMES | RELATIVE_FRAMES):
+            return Result.DENIED
+        north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
+        return self.commander.guidance.orbit(
+            radius_m=command.p1,
+            speed_m_s=command.p2,
+            yaw_behaviour=whole(command.p3, 0) or 0,
+            north_m=north_m,
+            east_m=east_m,
+            down_m=down_m,
+        ).result
+
+    def change_speed(self, command: Command, source: Source) -> Result:
+        """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed; -1: the parameter's again."""
+        self.commander.guidance.change_speed(command.p2, kind=whole(command.p1, 1) or 0)
+        return Result.ACCEPTED
+
+    def set_home(self, command: Command, source: Source) -> Result:
+        """DO_SET_HOME: p1 = 1 here, else the given place."""
+        if whole(command.p1) == 1:
+            here = self.commander.set_home_here()
+            return Result.ACCEPTED if here else Result.TEMPORARILY_REJECTED
+        placed = self.commander.set_home(command.x, command.y, command.z)
+        return Result.ACCEPTED if placed else Result.TEMPORARILY_REJECTED
+
+    def start_mission(self, command: Command, source: Source) -> Result:
+        """MISSION_START: p1 first item. Changes the mode and arms."""
+        if self.commander.situation.mission_problem is not None:
+            return self.deny(command, Reason.MISSION_MISSING, Result.DENIED)
+        first = whole(command.p1)
+        if first is None or not -1 <= first < self.hooks.mission_item_count():
+            return Result.DENIED
+        if first > 0 and not self.hooks.set_current_item(first):
+            return Result.DENIED
+        if not self.commander.set_mode(FlightMode.MISSION).accepted:
+            return Result.DENIED
+        return Result.ACCEPTED if self.commander.arm().accepted else Result.DENIED
+
+    def land_start(self, command: Command, source: Source) -> Result:
+        """DO_LAND_START: go to the landing sequence of the mission; CANCELLED when it has none."""
+        items = self.commander.missions.items
+        start = next(
+            (i for i, item in enumerate(items) if item.command == mavlink.MAV_CMD_DO_LAND_START), None
+        )
+        if start is None or not self.hooks.set_current_item(start):
+            return Result.CANCELLED
+        return self.commander.set_mode(FlightMode.MISSION).result
+
+    def refuse(self, command: Command, source: Source) -> Result:
+        """DENIED, as the release does (flight termination is off by a circuit breaker)."""
+        return Result.DENIED
+
+    def reboot_or_shutdown(self, command: Command, source: Source) -> Result:
+        """PREFLIGHT_REBOOT_SHUTDOWN: PX4's SITL refuses to reboot, and takes a request to do nothing."""
+        return Result.DENIED if whole(command.p1, 0) else Result.ACCEPTED
+
+    def calibrate(self, command: Command, source: Source) -> Result:
+        """PREFLIGHT_CALIBRATION: gyro, pressure and level need no help; the guided ones are not emulated."""
+        if self.commander.armed:
+            return Result.TEMPORARILY_REJECTED
+        interactive = (command.p2, command.p4)
+        guided_accelerometer = whole(command.x, 0) in (1, 4)
+        if any(whole(value, 0) for value in interactive) or guided_accelerometer:
+            return Result.UNSUPPORTED
+        return Result.ACCEPTED
+
+    def storage(self, command: Command, source: Source) -> Result | None:
+        """PREFLIGHT_STORAGE: 0 and 1 load and save (parameters live in memory), 2 resets them."""
+        action = whole(command.p1, 0)
+        if action in (0, 1):
+            return Result.ACCEPTED
+        if action == 2 and not self.commander.armed:
+            for definition in self.hooks.parameters.definitions:
+                self.hooks.parameters.set(definition.name, definition.default, check_range=False)
+            return Result.ACCEPTED
+        return None

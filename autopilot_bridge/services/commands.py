@@ -1,0 +1,69 @@
+"""The MAVLink command protocol, autopilot side: COMMAND_LONG, COMMAND_INT, SET_MODE and their acknowledgements."""
+
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.services.channel import AddressRule, MavlinkMessage, Source
+from autopilot_bridge.services.command_ardupilot import ArduPilotCommands
+from autopilot_bridge.services.command_common import CommandHandlers, CommandHooks, command_from_message
+from autopilot_bridge.services.command_px4 import Px4Commands
+
+_COMMANDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT})
+_SET_MODE: Final = mavlink.MAVLINK_MSG_ID_SET_MODE
+_CANCEL: Final = mavlink.MAVLINK_MSG_ID_COMMAND_CANCEL
+_HANDLERS: Final = {"px4": Px4Commands, "ardupilot": ArduPilotCommands}
+
+
+class CommandService:
+    """Takes commands and acknowledges them, on the asking channel only.
+
+    Args:
+        handlers: the flavour's commands.
+        address: which targets are this autopilot.
+    """
+
+    def __init__(self, handlers: CommandHandlers, address: AddressRule) -> None:
+        self._handlers = handlers
+        self._address = address
+
+    @classmethod
+    def for_flavour(
+        cls, name: str, commander: Commander, hooks: CommandHooks, address: AddressRule
+    ) -> "CommandService":
+        """The command service of a flavour, by name."""
+        return cls(_HANDLERS[name](commander, hooks), address)
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Take COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL or SET_MODE; never raises on contents."""
+        message_id = message.get_msgId()
+        if message_id in _COMMANDS:
+            if self._address.accepts(message):
+                self._execute(message, source)
+            return True
+        if message_id == _SET_MODE:
+            if self._address.accepts(message):
+                result = self._handlers.set_mode_message(message.base_mode, message.custom_mode)
+                if result is not None:
+                    _acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
+            return True
+        return bool(message_id == _CANCEL)  # nothing here takes long enough to be cancelled
+
+    def tick(self, time_us: int) -> None:
+        """Nothing is pending between messages."""
+
+    def _execute(self, message: MavlinkMessage, source: Source) -> None:
+        command = command_from_message(message)
+        if command.id in self._handlers.double_ack:
+            _acknowledge(command.id, Result.ACCEPTED, source)
+        result = self._handlers.execute(command, source)
+        if result is not None:
+            _acknowledge(command.id, result, source)
+
+
+def _acknowledge(command: int, result: Result, source: Source) -> None:
+    source.channel.send(
+        mavlink.MAVLink_command_ack_message(command, int(result), 0, 0, source.system_id, source.component_id)
+    )

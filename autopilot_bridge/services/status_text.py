@@ -1,0 +1,80 @@
+"""STATUSTEXT: the texts a ground station shows, in chunks where they are long."""
+
+from collections.abc import Iterable
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.events import Event
+from autopilot_bridge.flavours.flavour import Flavour
+from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Source
+
+CHUNK_BYTES: Final = 50
+_MAX_CHUNKS: Final = 5
+_MAX_ID: Final = 0xFFFF
+
+
+class StatusTextService:
+    """Sends texts on all channels; keeps quiet on a channel that nobody greeted, where the flavour does.
+
+    Args:
+        flavour: words of events, and whether a heartbeat is awaited.
+        broadcast: all channels.
+    """
+
+    def __init__(self, flavour: Flavour, broadcast: Broadcast) -> None:
+        self._flavour = flavour
+        self._broadcast = broadcast
+        self._greeted: set[str] = set()
+        self._next_id = 1
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Note who is there; the heartbeat is left to others."""
+        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self._greeted.add(source.channel.name)
+        return False
+
+    def tick(self, time_us: int) -> None:
+        """Texts go out at once."""
+
+    def forget(self, channel: Channel) -> None:
+        """A channel was closed."""
+        self._greeted.discard(channel.name)
+
+    def tell(self, events: Iterable[Event]) -> None:
+        """Announce events in the flavour's words."""
+        for event in events:
+            for notice in self._flavour.notices(event):
+                self.announce(notice.severity, notice.text)
+
+    def tell_banner(self) -> None:
+        """Who this is, as after a parameter list request."""
+        for notice in self._flavour.banner:
+            self.announce(notice.severity, notice.text)
+
+    def announce(self, severity: int, text: str) -> None:
+        """Send a text (MAV_SEVERITY) on every channel that takes texts."""
+        channels = [channel for channel in self._broadcast.channels if self._listens(channel)]
+        if not channels:
+            return
+        for message in self._messages(int(severity), text):
+            for channel in channels:
+                channel.send(message)
+
+    def _listens(self, channel: Channel) -> bool:
+        return not self._flavour.text_needs_heartbeat or channel.name in self._greeted
+
+    def _messages(self, severity: int, text: str) -> list[MavlinkMessage]:
+        """One message, or the chunks of a long text: id and chunk_seq as in MAVLink's STATUSTEXT."""
+        data = text.encode("ascii", "replace")[: CHUNK_BYTES * _MAX_CHUNKS]
+        if len(data) <= CHUNK_BYTES:
+            return [mavlink.MAVLink_statustext_message(severity, data, 0, 0)]
+        text_id = self._next_id
+        self._next_id = 1 if text_id == _MAX_ID else text_id + 1
+        chunks = [data[start : start + CHUNK_BYTES] for start in range(0, len(data), CHUNK_BYTES)]
+        if len(chunks[-1]) == CHUNK_BYTES:
+            chunks.append(b"")  # a last chunk ends with a zero
+        return [
+            mavlink.MAVLink_statustext_message(severity, chunk, text_id, number)
+            for number, chunk in enumerate(chunks)
+        ]
