@@ -222,7 +222,8 @@ def _tell(result: "RunResult") -> int:
         return _FAILED
     click.echo(
         f"{result.outcome}: {summary['mission']} with {summary['autopilot']}, "
-        f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, {summary['speedup']:.0f} times real time"
+        f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, "
+        f"{summary['speedup']:.0f} times real time"
     )
     if summary["path_rms_error_m"] is not None:
         reference = summary["vehicles"][0]["error_reference"]

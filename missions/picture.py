@@ -7,8 +7,11 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
+from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar  # type: ignore[import-untyped]
 
+from autopilot_bridge.geodesy import LocalFrame
 from missions.notes import PATTERN, FlightNotes
 from missions.score import FlightScore, Track
 
@@ -70,8 +73,6 @@ def _offset(notes: FlightNotes, first: FlightNotes) -> tuple[float, float]:
     """North and east of this vehicle's home from the first one's."""
     if notes.commanded is None or first.commanded is None or notes is first:
         return 0.0, 0.0
-    from autopilot_bridge.geodesy import LocalFrame
-
     home = notes.commanded.origin
     north, east, _ = LocalFrame(first.commanded.origin).ned_from_geodetic(
         home.lat_deg, home.lon_deg, home.alt_m
@@ -82,10 +83,10 @@ def _offset(notes: FlightNotes, first: FlightNotes) -> tuple[float, float]:
 def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> None:
     first = flights[0][0]
     handles: list[Line2D] = []
+    team = len(flights) > 1
     for k, (notes, score) in enumerate(flights):
         north, east = _offset(notes, first)
         colour = _COLOURS[k % len(_COLOURS)]
-        name = f"vehicle {notes.system_id}: " if len(flights) > 1 else ""
         if notes.commanded is not None:
             path = notes.commanded.points_ned_m
             axes.plot(
@@ -96,25 +97,16 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
                 waypoints[:, 1] + east, waypoints[:, 0] + north, "o", color=_COMMANDED, markersize=3.2,
                 markerfacecolor="white", zorder=4,
             )  # fmt: skip
-        if score.truth is not None:
-            track = _shown(score.truth, notes)
-            axes.plot(
-                track.pos_ned_m[:, 1] + east,
-                track.pos_ned_m[:, 0] + north,
-                color=_TRUTH,
-                linewidth=0.9,
-                zorder=3,
-            )
-        if score.estimate is not None:
-            track = _shown(score.estimate, notes)
-            axes.plot(
-                track.pos_ned_m[:, 1] + east, track.pos_ned_m[:, 0] + north, color=colour, linewidth=1.6,
-                alpha=0.85, zorder=2,
-            )  # fmt: skip
+        for track, is_truth in ((score.estimate, False), (score.truth, True)):
+            if track is not None:
+                shown = _shown(track, notes).pos_ned_m
+                style = _truth_style(colour, team) if is_truth else _estimate_style(colour, team)
+                axes.plot(shown[:, 1] + east, shown[:, 0] + north, zorder=3 if is_truth else 2, **style)
         main = score.truth if score.truth is not None else score.estimate
         if main is not None and len(main.time_s) > 1:
-            _draw_marks(axes, _shown(main, notes), colour, north, east)
-        handles.append(Line2D([], [], color=colour, linewidth=1.6, label=f"{name}autopilot's estimate"))
+            _draw_marks(axes, _shown(main, notes), north, east)
+        label = f"vehicle {notes.system_id}" if team else "autopilot's estimate"
+        handles.append(Line2D([], [], color=colour, linewidth=1.6, label=label))
     handles.insert(0, Line2D([], [], color=_COMMANDED, linewidth=4.5, alpha=0.55, label="commanded"))
     if any(len(notes.commanded.waypoints_ned_m) for notes, _ in flights if notes.commanded):
         handles.insert(
@@ -123,23 +115,35 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
                 [], [], color=_COMMANDED, marker="o", markerfacecolor="white", linestyle="", label="waypoints"
             ),
         )
-    if any(score.truth is not None for _, score in flights):
-        handles.append(Line2D([], [], color=_TRUTH, linewidth=0.9, label="truth"))
+    if not team and flights[0][1].truth is not None:
+        handles.append(Line2D([], [], **_truth_style(_INK, team), label="truth"))
     handles.append(Line2D([], [], color=_INK, marker="$\u27a4$", markersize=9, linestyle="", label="heading"))
     handles.append(Line2D([], [], color="#15803d", marker="o", markersize=7, linestyle="", label="start"))
     handles.append(Line2D([], [], color="#b91c1c", marker="s", markersize=6, linestyle="", label="end"))
     axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(0.06)
+    axes.margins(0.06, 0.08)
     axes.set_xlabel("east of home, m", fontsize=9, color=_INK)
     axes.set_ylabel("north of home, m", fontsize=9, color=_INK)
+    one_row = len(handles) < 8
     axes.legend(
-        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07), ncols=min(len(handles), 7),
-        fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2,
+        handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07 if one_row else 1.1),
+        ncols=len(handles) if one_row else 4, fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2,
     )  # fmt: skip
-    _draw_scale(axes)
+    box = axes.dataLim
+    _draw_scale(axes, max(box.width, box.height, 1.0))
 
 
-def _draw_marks(axes: Any, track: Track, colour: str, north: float, east: float) -> None:
+def _truth_style(colour: str, team: bool) -> dict[str, Any]:
+    """Truth: a thin dark line; of a team, a line in the vehicle's colour."""
+    return {"color": colour if team else _TRUTH, "linewidth": 1.3 if team else 0.9}
+
+
+def _estimate_style(colour: str, team: bool) -> dict[str, Any]:
+    """The autopilot's estimate: a line in the vehicle's colour; of a team, a pale band below the truth."""
+    return {"color": colour, "linewidth": 3.0 if team else 1.6, "alpha": 0.3 if team else 0.85}
+
+
+def _draw_marks(axes: Any, track: Track, north: float, east: float) -> None:
     """Heading arrows evenly along the track, start and end."""
     steps = np.linalg.norm(np.diff(track.pos_ned_m[:, :2], axis=0), axis=1)
     arc = np.concatenate(([0.0], np.cumsum(steps)))
@@ -149,7 +153,7 @@ def _draw_marks(axes: Any, track: Track, colour: str, north: float, east: float)
         yaw = track.yaw_rad[where]
         axes.quiver(
             track.pos_ned_m[where, 1] + east, track.pos_ned_m[where, 0] + north, np.sin(yaw), np.cos(yaw),
-            color=_INK, scale=42, width=0.0042, headwidth=4.2, headlength=5.0, headaxislength=4.4,
+            color=_INK, scale=48, width=0.0038, headwidth=4.2, headlength=5.0, headaxislength=4.4,
             pivot="middle", zorder=6,
         )  # fmt: skip
     start, end = track.pos_ned_m[0], track.pos_ned_m[-1]
@@ -167,22 +171,17 @@ def _draw_marks(axes: Any, track: Track, colour: str, north: float, east: float)
     )
 
 
-def _draw_scale(axes: Any) -> None:
+def _draw_scale(axes: Any, span_m: float) -> None:
     """A bar of a round length in the lower right corner, in the axes' own scale."""
-    left, right = axes.get_xlim()
-    span = right - left
-    exponent = math.floor(math.log10(span / 4.0))
-    length = max(m * 10.0**exponent for m in (1, 2, 5) if m * 10.0**exponent <= span / 4.0)
-    bottom, top = axes.get_ylim()
-    y = bottom + 0.035 * (top - bottom)
-    x = right - 0.04 * span
-    axes.plot([x - length, x], [y, y], color=_INK, linewidth=3.0, solid_capstyle="butt", zorder=9)
-    axes.annotate(
-        f"{length:g} m", ((x - 0.5 * length), y), xytext=(0, 4), textcoords="offset points", ha="center",
-        fontsize=8, color=_INK, zorder=9,
+    exponent = math.floor(math.log10(span_m / 4.0))
+    length = max(m * 10.0**exponent for m in (1, 2, 5) if m * 10.0**exponent <= span_m / 4.0)
+    bar = AnchoredSizeBar(
+        axes.transData, length, f"{length:g} m", "lower right", pad=0.4, sep=4, frameon=True, color=_INK,
+        size_vertical=span_m * 0.004, label_top=True, fontproperties=FontProperties(size=8),
     )  # fmt: skip
-    axes.set_xlim(left, right)
-    axes.set_ylim(bottom, top)
+    bar.patch.set(edgecolor="none", facecolor="white", alpha=0.8)
+    bar.set_zorder(9)
+    axes.add_artist(bar)
 
 
 def _shade_pattern(axes: Any, notes: FlightNotes) -> None:
@@ -203,12 +202,12 @@ def _draw_altitude(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) ->
                 [phase.start_us * 1e-6, phase.end_us * 1e-6], [height, height], color=_COMMANDED,
                 linewidth=4.5, alpha=0.55, solid_capstyle="butt",
             )  # fmt: skip
-        if score.estimate is not None:
-            track = _shown(score.estimate, notes)
-            axes.plot(track.time_s, -track.pos_ned_m[:, 2], color=colour, linewidth=1.6, alpha=0.85)
-        if score.truth is not None:
-            track = _shown(score.truth, notes)
-            axes.plot(track.time_s, -track.pos_ned_m[:, 2], color=_TRUTH, linewidth=0.9)
+        team = len(flights) > 1
+        for track, is_truth in ((score.estimate, False), (score.truth, True)):
+            if track is not None:
+                shown = _shown(track, notes)
+                style = _truth_style(colour, team) if is_truth else _estimate_style(colour, team)
+                axes.plot(shown.time_s, -shown.pos_ned_m[:, 2], **style)
     axes.set_ylabel("height above\nhome, m", fontsize=9, color=_INK)
     axes.tick_params(labelbottom=False)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))

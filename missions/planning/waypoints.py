@@ -13,7 +13,7 @@ from missions.patterns.polyline import Polyline
 def waypoints_along(
     curve: Curve,
     *,
-    deviation_m: float = 0.5,
+    deviation_m: float = 0.3,
     spacing_min_m: float = 3.0,
     spacing_max_m: float = 25.0,
     length_m: float | None = None,

@@ -4,31 +4,26 @@ import asyncio
 import math
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from autopilot_bridge.mavlink import MAVLinkMessage, definition, dialect
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions import telemetry
-from missions.connection import AUTOPILOT_COMPONENT, Connection
-from missions.errors import CommandRejected, MissionError, VehicleTimeout
+from missions.connection import Connection
+from missions.errors import MissionError, VehicleTimeout
 from missions.planning.limits import VehicleLimits
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
+from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.guided import GuidedSession, SetpointSource
-from missions.vehicle.link_view import VehicleView, describe_ack
 
-_ACK_S: Final = 1.0
-_SENDINGS: Final = 5
-_MODE_AGAIN_S: Final = 1.5
-_ACCEPTED: Final = 0
-_TEMPORARILY_REJECTED: Final = 1
-_FAILED: Final = 4
-_IN_PROGRESS: Final = 5
 _GROUND: Final = 1
+_ACCEPTED: Final = 0
+_MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
-class Vehicle(VehicleView):
+class Vehicle(VehicleCommands):
     """A vehicle over MAVLink, PX4 or ArduPilot: which one, its heartbeat says.
 
     All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` says what was awaited and
@@ -75,180 +70,7 @@ class Vehicle(VehicleView):
         """What the vehicle's parameters allow a planner."""
         return await self.adapter.limits(self)
 
-    # sending
-
-    def send(self, message: MAVLinkMessage) -> None:
-        """Send any message."""
-        self.connection.send(message)
-
-    def _request_message(self, name: str) -> None:
-        self.send(
-            dialect.MAVLink_command_long_message(
-                self.system_id,
-                AUTOPILOT_COMPONENT,
-                dialect.MAV_CMD_REQUEST_MESSAGE,
-                0,
-                float(definition(name).message_id),
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-            )
-        )
-
-    async def request(self, name: str, timeout_s: float = 2.0) -> MAVLinkMessage:
-        """Have one message sent now (REQUEST_MESSAGE) and wait for it."""
-        with self.messages(name) as stream:
-            self._request_message(name)
-            try:
-                async with self.clock.timeout(timeout_s):
-                    return await anext(stream)
-            except TimeoutError:
-                raise VehicleTimeout(f"no {name} within {timeout_s:g} s of asking; {self.heard()}") from None
-
-    async def set_message_rate(self, name: str, rate_hz: float) -> None:
-        """Have a message streamed at a rate; a vehicle that refuses keeps what it had."""
-        interval_us = 1e6 / rate_hz
-        await self.try_command(
-            dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(definition(name).message_id), interval_us
-        )
-
-    async def command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> None:
-        """Send a COMMAND_LONG until it is answered.
-
-        Raises:
-            CommandRejected: the answer was not ACCEPTED.
-            VehicleTimeout: no answer to any of the attempts.
-        """
-        result = await self.try_command(command, *params, timeout_s=timeout_s)
-        self._require(command, result)
-
-    async def try_command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> int:
-        """As `command`, but gives the MAV_RESULT back."""
-        values = (*params, *(0.0,) * (7 - len(params)))
-
-        def message(attempt: int) -> MAVLinkMessage:
-            return dialect.MAVLink_command_long_message(
-                self.system_id, AUTOPILOT_COMPONENT, command, attempt, *values
-            )
-
-        return await self._send_command(command, message, timeout_s)
-
-    async def command_int(
-        self,
-        command: int,
-        frame: int,
-        params: tuple[float, float, float, float],
-        x: int,
-        y: int,
-        z: float,
-    ) -> None:
-        """Send a COMMAND_INT until it is answered; raises as `command`."""
-        message = dialect.MAVLink_command_int_message(
-            self.system_id, AUTOPILOT_COMPONENT, frame, command, 0, 0, *params, x, y, z
-        )
-        self._require(command, await self._send_command(command, lambda _attempt: message, _ACK_S))
-
-    async def _send_command(
-        self, command: int, message: Callable[[int], MAVLinkMessage], timeout_s: float
-    ) -> int:
-        with self.messages("COMMAND_ACK") as acks:
-            for attempt in range(_SENDINGS):
-                self.send(message(attempt))
-                wait_s = timeout_s
-                try:
-                    while True:
-                        ack = await self._next_ack(acks, command, wait_s)
-                        if ack.result != _IN_PROGRESS:
-                            return int(ack.result)
-                        wait_s = 10.0
-                except TimeoutError:
-                    continue
-        name = dialect.enums["MAV_CMD"].get(command)
-        raise VehicleTimeout(
-            f"no answer to {name.name.removeprefix('MAV_CMD_') if name else command} "
-            f"after {_SENDINGS} attempts; {self.heard()}"
-        )
-
-    async def _next_ack(self, acks: Any, command: int, timeout_s: float) -> Any:
-        async with self.clock.timeout(timeout_s):
-            while True:
-                ack = await anext(acks)
-                if ack.command == command and self.addressed_here(ack):
-                    return ack
-
-    def _require(self, command: int, result: int) -> None:
-        if result != _ACCEPTED:
-            ack = dialect.MAVLink_command_ack_message(command, result)
-            raise CommandRejected(f"the vehicle refused {describe_ack(ack)}; {self.heard()}", result)
-
-    # modes and arming
-
-    async def set_mode(self, mode: Mode, timeout_s: float = 8.0) -> None:
-        """Switch the flight mode, and see it in a heartbeat: PX4 acknowledges modes before it knows.
-
-        A refusal is tried again until the deadline, since several pass by themselves (a mission that was
-        just uploaded, an estimator that settles).
-        """
-        target = self.adapter.modes[mode]
-        asked = self.adapter.mode_command(mode)
-        refused: Any = None
-        with self.messages("COMMAND_ACK", "HEARTBEAT") as replies:
-            try:
-                async with self.clock.timeout(timeout_s):
-                    while True:
-                        self._send_mode(asked.main, asked.sub)
-                        sent_us = self.clock.time_us
-                        refused = None
-                        while True:
-                            left_s = _MODE_AGAIN_S - (self.clock.time_us - sent_us) * 1e-6
-                            reply = await self._next_within(replies, left_s)
-                            if reply is None:
-                                break
-                            if reply.get_type() == "HEARTBEAT":
-                                if reply.custom_mode == target:
-                                    return
-                            elif reply.command == dialect.MAV_CMD_DO_SET_MODE:
-                                refused = reply if reply.result != _ACCEPTED else refused
-            except TimeoutError:
-                pass
-        if refused is not None:
-            raise CommandRejected(
-                f"the vehicle refused mode {mode}: {describe_ack(refused)}; {self.heard()}",
-                int(refused.result),
-            )
-        raise VehicleTimeout(f"mode {mode} was not entered within {timeout_s:g} s; {self.heard()}")
-
-    async def _next_within(self, replies: Any, seconds: float) -> Any:
-        if seconds <= 0.0:
-            return None
-        try:
-            async with self.clock.timeout(seconds):
-                return await anext(replies)
-        except TimeoutError:
-            return None
-
-    def _send_mode(self, main: float, sub: float) -> None:
-        base = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (
-            dialect.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
-        )
-        self.send(
-            dialect.MAVLink_command_long_message(
-                self.system_id,
-                AUTOPILOT_COMPONENT,
-                dialect.MAV_CMD_DO_SET_MODE,
-                0,
-                float(base),
-                main,
-                sub,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-            )
-        )
+    # flying
 
     async def arm(self, timeout_s: float = 15.0) -> None:
         """Arm, and see it in a heartbeat; a refusal that may pass is tried again until the deadline."""
@@ -258,9 +80,8 @@ class Vehicle(VehicleView):
             result = await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             if result == _ACCEPTED:
                 break
-            may_pass = result in (_TEMPORARILY_REJECTED, _FAILED)
-            if not may_pass or self.clock.time_us >= end_us:
-                self._require(dialect.MAV_CMD_COMPONENT_ARM_DISARM, result)
+            if result not in _MAY_PASS or self.clock.time_us >= end_us:
+                self.require(dialect.MAV_CMD_COMPONENT_ARM_DISARM, result)
             await self.clock.sleep(1.0)
         await self.wait_until(lambda: self.armed, what="armed heartbeat", on=("HEARTBEAT",), timeout_s=5.0)
 
@@ -268,8 +89,6 @@ class Vehicle(VehicleView):
         """Disarm, and see it in a heartbeat. Refused in the air."""
         await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         await self.wait_disarmed(5.0)
-
-    # flying
 
     async def takeoff(self, altitude_m: float, timeout_s: float | None = None) -> None:
         """Arm if needed, take off, and wait until the height above home is reached and held."""
@@ -388,12 +207,6 @@ class Vehicle(VehicleView):
             what="landing",
             on=("EXTENDED_SYS_STATE",),
             timeout_s=timeout_s,
-        )
-
-    async def wait_disarmed(self, timeout_s: float = 300.0) -> None:
-        """Wait until the vehicle is disarmed."""
-        await self.wait_until(
-            lambda: not self.armed, what="disarmed heartbeat", on=("HEARTBEAT",), timeout_s=timeout_s
         )
 
     # frames

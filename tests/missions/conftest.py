@@ -1,5 +1,5 @@
-"""A scripted autopilot for mission tests: a point mass that speaks MAVLink as PX4 and ArduPilot do at the points that
-matter to a mission. It shares no code with the emulated autopilot.
+"""A scripted autopilot for mission tests: a point mass that speaks MAVLink as PX4 and ArduPilot do at the
+points that matter to a mission. It shares no code with the emulated autopilot.
 """
 
 import asyncio
@@ -59,8 +59,14 @@ class FakeAutopilot:
         self.setpoints = []
         self.items, self.current, self.speed = [], 0, 5.0
         self.upload_left = 0
-        self.parameters = {"MPC_XY_VEL_MAX": (12.0, 9), "MPC_ACC_HOR": (3.0, 9), "COM_RC_LOSS_T": (4, 6),
-                           "WPNAV_SPEED": (1000.0, 9), "WPNAV_ACCEL": (250.0, 9), "WPNAV_RADIUS": (200.0, 9)}  # fmt: skip
+        self.parameters = {
+            "MPC_XY_VEL_MAX": (12.0, 9),
+            "MPC_ACC_HOR": (3.0, 9),
+            "COM_RC_LOSS_T": (4, 6),
+            "WPNAV_SPEED": (1000.0, 9),
+            "WPNAV_ACCEL": (250.0, 9),
+            "WPNAV_RADIUS": (200.0, 9),
+        }
         self.mute_commands = set()  # MAV_CMDs that are not answered
         self.refuse_modes = set()  # kinds of mode that are refused
         self.arm_refusals = 0
@@ -255,7 +261,9 @@ class FakeAutopilot:
         if name == "HEARTBEAT":
             px4 = self.flavour == "px4"
             base = 1 | (128 if self.armed else 0)
-            self.send(d.MAVLink_heartbeat_message(2, 12 if px4 else 3, base, self.mode, 4 if self.armed else 3, 3))
+            self.send(
+                d.MAVLink_heartbeat_message(2, 12 if px4 else 3, base, self.mode, 4 if self.armed else 3, 3)
+            )
         elif name == "SYS_STATUS":
             ready = 0x10000000 if self.time_us >= self.ready_after_us else 0
             self.send(d.MAVLink_sys_status_message(ready, ready, ready, 0, 16200, -1, 100, 0, 0, 0, 0, 0, 0))
