@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.alignment import magnetic_heading_rad, tilt_from_accel
-from autopilot_bridge.navigation.earth import magnetic_field_ned_gauss, pressure_altitude_m
+from autopilot_bridge.navigation.earth import pressure_altitude_m
 from autopilot_bridge.navigation.gps_quality import GpsQuality
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -41,6 +41,7 @@ from flightsim.interface import (
     RANGE_DISTANCE_M,
     SensorReadings,
 )
+from flightsim.magnetics import magnetic_field_ned_gauss
 
 Array = NDArray[np.float64]
 

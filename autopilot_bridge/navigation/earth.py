@@ -1,11 +1,7 @@
-"""The Earth as the filter knows it: gravity, rotation, pressure altitude and magnetic field."""
+"""The Earth as the filter knows it: gravity, rotation and pressure altitude."""
 
 import math
 from typing import Final
-
-import numpy as np
-from numpy.typing import NDArray
-from pygeomag import GeoMag
 
 EARTH_RATE_RAD_S: Final = 7.292115e-5  # WGS84, NGA.STND.0036, table 3.1
 STANDARD_GRAVITY_M_S2: Final = 9.80665
@@ -13,7 +9,6 @@ _ISA_PRESSURE_PA: Final = 101325.0
 _ISA_TEMPERATURE_K: Final = 288.15
 _ISA_LAPSE_K_M: Final = 0.0065
 _ISA_EXPONENT: Final = 287.05287 * _ISA_LAPSE_K_M / STANDARD_GRAVITY_M_S2
-_TESLA_NANO_PER_GAUSS: Final = 1.0e5
 
 
 def normal_gravity_m_s2(lat_deg: float, alt_m: float) -> float:
@@ -40,12 +35,3 @@ def pressure_altitude_m(pressure_pa: float) -> float:
     if not 0.0 < pressure_pa < 2.0e5:
         return math.nan
     return _ISA_TEMPERATURE_K / _ISA_LAPSE_K_M * (1.0 - (pressure_pa / _ISA_PRESSURE_PA) ** _ISA_EXPONENT)
-
-
-def magnetic_field_ned_gauss(
-    lat_deg: float, lon_deg: float, alt_m: float, year: float
-) -> NDArray[np.float64]:
-    """Earth's field from the World Magnetic Model (NOAA WMM2025), NED, gauss, for a decimal year."""
-    model = GeoMag(coefficients_file="wmm/WMM_2025.COF")
-    field = model.calculate(lat_deg, lon_deg, alt_m / 1000.0, year, allow_date_outside_lifespan=True)
-    return np.array([field.x, field.y, field.z]) / _TESLA_NANO_PER_GAUSS

@@ -60,7 +60,7 @@ class NavigationParameters:
         magnetometer_timeout_s: refused or missing for this long: no longer in use.
         mag_ned_gauss: Earth's field to expect, NED. None: from the World Magnetic Model at the filter's
             origin.
-        magnetic_year: decimal year for the World Magnetic Model.
+        magnetic_year: decimal year for the World Magnetic Model, 2025.0 to 2030.0.
         rangefinder_noise_m, rangefinder_noise_fraction: 1-sigma, absolute and per metre.
         rangefinder_max_tilt_rad: the rangefinder isn't used beyond this tilt (RNG_SENS_TILT).
         terrain_walk_m_per_sqrt_s: random walk of the terrain's height (EKF2_TERR_NOISE: 5 m/s).
@@ -158,5 +158,9 @@ class NavigationParameters:
                     raise ValueError(
                         f"{field.name} {value} is not accepted: it must be finite and {accepted}"
                     )
+        if not 2025.0 <= self.magnetic_year <= 2030.0:
+            raise ValueError(
+                f"magnetic_year {self.magnetic_year} is not accepted: WMM2025 covers 2025 to 2030"
+            )
         if self.history_s > 10.0:
             raise ValueError(f"history_s {self.history_s} is too long: at most 10 s")

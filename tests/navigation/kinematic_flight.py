@@ -122,7 +122,7 @@ def fly(
     out = np.zeros((n, t.TRUTH_SIZE))
     position, vel = path(time_s), velocity(path, time_s)
     rotation = rotations(path, yaw, time_s)
-    h = 1e-3
+    h = 1e-4
     step = np.einsum(
         "nji,njk->nik", rotations(path, yaw, time_s - h), rotations(path, yaw, time_s + h)
     )  # about exp(2 h [w]x)

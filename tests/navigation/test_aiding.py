@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.navigation import layout
-from autopilot_bridge.navigation.earth import magnetic_field_ned_gauss
 from flightsim import truth as t
+from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.sensors.gps import RTK_FIX_AFTER_10_S, GpsParameters
 from flightsim.sensors.suite import SensorSuiteParameters

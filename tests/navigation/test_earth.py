@@ -2,12 +2,10 @@
 
 import math
 
-import numpy as np
 import pytest
 
 from autopilot_bridge.navigation.earth import (
     earth_rate_ned_rad_s,
-    magnetic_field_ned_gauss,
     normal_gravity_m_s2,
     pressure_altitude_m,
 )
@@ -46,18 +44,3 @@ def test_pressure_altitude(pressure_pa: float, altitude_m: float) -> None:
 @pytest.mark.parametrize("pressure_pa", [0.0, -5.0, math.nan, math.inf, 3e5])
 def test_pressures_that_make_no_sense(pressure_pa: float) -> None:
     assert math.isnan(pressure_altitude_m(pressure_pa))
-
-
-@pytest.mark.parametrize(
-    ("lat_deg", "lon_deg", "alt_m", "year", "field_nt"),
-    [  # WMM2025 report, test values
-        (80.0, 0.0, 0.0, 2025.0, (6521.6, 145.9, 54791.5)),
-        (0.0, 120.0, 0.0, 2025.0, (39677.8, -109.6, -10580.2)),
-        (-80.0, 240.0, 0.0, 2025.0, (6117.5, 15751.9, -52022.5)),
-    ],
-)
-def test_magnetic_field(
-    lat_deg: float, lon_deg: float, alt_m: float, year: float, field_nt: tuple[float, float, float]
-) -> None:
-    field = magnetic_field_ned_gauss(lat_deg, lon_deg, alt_m, year)
-    np.testing.assert_allclose(field * 1e5, field_nt, atol=0.1)

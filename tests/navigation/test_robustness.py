@@ -157,6 +157,7 @@ def test_rates_must_fit() -> None:
         ("gps_gate", -1.0),
         ("gps_position_noise_m", (0.2, math.nan)),
         ("history_s", 60.0),
+        ("magnetic_year", 2019.0),
         ("mag_ned_gauss", (0.0, 0.0, 0.0)),
         ("no_aid_timeout_s", math.inf),
     ],
