@@ -14,7 +14,12 @@ from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Source
 from autopilot_bridge.services.mission_download import MissionDownloads
 from autopilot_bridge.services.mission_feasibility import mission_problems
-from autopilot_bridge.services.mission_messages import ack_message, item_from_message, plan_checksum
+from autopilot_bridge.services.mission_messages import (
+    ack_message,
+    item_from_message,
+    plan_checksum,
+    send_extended,
+)
 from autopilot_bridge.services.mission_policy import INFO, MissionPolicy, Text
 from autopilot_bridge.services.mission_report import MissionProgress, MissionReport, NoProgress
 from autopilot_bridge.services.mission_rules import fence_excludes
@@ -189,7 +194,7 @@ class MissionService:
             self._say(texts.not_in_list)
             return
         if self.set_current(message.seq) and self._policy.acks_set_current:
-            source.channel.send(self._report.current_message())
+            send_extended(source.channel, self._report.current_message())
 
     def _take_guided_item(self, message: MavlinkMessage, source: Source) -> bool:
         if not self._policy.guided_items or message.current != _GUIDED_ITEM or self._on_guided_item is None:

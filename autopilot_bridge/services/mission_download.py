@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
-from autopilot_bridge.services.mission_messages import ack_message, count_message, item_message
+from autopilot_bridge.services.mission_messages import ack_message, count_message, item_message, send_extended
 from autopilot_bridge.services.mission_policy import MissionPolicy, Text
 from autopilot_bridge.services.mission_sessions import Download, Sessions, mission_type_of, same_partner
 
@@ -163,7 +163,7 @@ class MissionDownloads:
 
     def _count(self, to: Source, count: int, mission_type: MissionType) -> None:
         plan_id = self._stores[mission_type].plan_id if self._policy.plan_ids else 0
-        to.channel.send(count_message(to, count, mission_type, plan_id))
+        send_extended(to.channel, count_message(to, count, mission_type, plan_id))
 
     def _ack(self, to: Source, result: int, mission_type: int) -> None:
         to.channel.send(ack_message(to, result, mission_type))

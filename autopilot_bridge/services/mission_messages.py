@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
 
 GLOBAL_FRAMES: Final = frozenset((mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT))
 RELATIVE_FRAMES: Final = frozenset(
@@ -54,11 +54,12 @@ def _with_extensions(base: Any, names: tuple[str, ...]) -> Any:
             for name in names:
                 setattr(self, name, fields.get(name, 0))
 
+        def wire_payload(self) -> bytes:
+            return packer.pack(*[getattr(self, name) for name in self.ordered_fieldnames])
+
         def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
-            values = [getattr(self, name) for name in self.ordered_fieldnames]
-            packed: bytes = self._pack(
-                mav, self.crc_extra, packer.pack(*values), force_mavlink1=force_mavlink1
-            )
+            payload = self.wire_payload()
+            packed: bytes = self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
             return packed
 
     Extended.__name__ = base.__name__
@@ -70,6 +71,20 @@ _Ack: Final = _with_extensions(mavlink.MAVLink_mission_ack_message, ("opaque_id"
 _Current: Final = _with_extensions(
     mavlink.MAVLink_mission_current_message, ("mission_id", "fence_id", "rally_points_id")
 )
+
+
+def send_extended(channel: Channel, message: MavlinkMessage) -> None:
+    """Send a message with its extension fields.
+
+    An encoder that works from pymavlink's definitions would leave them out, so the packed payload goes to a
+    channel that takes one (`send_payload(message_id, payload)`).
+    """
+    wire_payload = getattr(message, "wire_payload", None)
+    send_payload = getattr(channel, "send_payload", None)
+    if wire_payload is None or send_payload is None:
+        channel.send(message)
+    else:
+        send_payload(type(message).id, wire_payload())
 
 
 def count_message(to: Source, count: int, mission_type: int, plan_id: int = 0) -> MavlinkMessage:

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionStore, MissionType
 from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, send_to_all
-from autopilot_bridge.services.mission_messages import current_message
+from autopilot_bridge.services.mission_messages import current_message, send_extended
 from autopilot_bridge.services.mission_policy import MissionPolicy
 
 REPEAT_INTERVAL_US: Final = 1_000_000
@@ -99,7 +99,8 @@ class MissionReport:
         if state != self._announced:
             self._announced = state
             if self._policy.sends_current_on_change and mission.items:
-                send_to_all(self._broadcast, self.current_message())
+                for channel in self._broadcast.channels:
+                    send_extended(channel, self.current_message())
         if self._repeats_left and time_us >= self._repeat_at_us:
             self._repeats_left -= 1
             self._repeat_at_us += REPEAT_INTERVAL_US

@@ -16,6 +16,7 @@ from autopilot_bridge.services.mission_messages import (
     item_from_message,
     message_checksum,
     request_message,
+    send_extended,
 )
 from autopilot_bridge.services.mission_policy import MissionPolicy, Text
 from autopilot_bridge.services.mission_rules import check_fence_polygons
@@ -234,7 +235,7 @@ class MissionUploads:
         )
 
     def _ack(self, to: Source, result: int, mission_type: int, plan_id: int = 0) -> None:
-        to.channel.send(ack_message(to, result, mission_type, plan_id))
+        send_extended(to.channel, ack_message(to, result, mission_type, plan_id))
 
     def _say(self, text: Text) -> None:
         if text is not None:

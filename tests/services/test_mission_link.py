@@ -54,6 +54,7 @@ class GroundStation:
         self.send = send
         self.items = [self._item(seq, altitude_m) for seq in range(size)]
         self.result: int | None = None
+        self.heard = False
         self.got: dict[int, Any] = {}
         self.total: int | None = None
         self.downloading = False
@@ -68,8 +69,11 @@ class GroundStation:
 
     def handle(self, message: Any, now_us: int) -> None:
         kind = message.get_type()
+        if self.done:
+            return
         if not self.downloading:
             if kind in ("MISSION_REQUEST", "MISSION_REQUEST_INT") and message.seq < len(self.items):
+                self.heard = True
                 self.send(self.items[message.seq])
             elif kind == "MISSION_ACK" and message.type != mavlink.MAV_MISSION_INVALID_SEQUENCE:
                 self.result = message.type
@@ -89,11 +93,11 @@ class GroundStation:
             return
         if self.downloading:
             self._ask(now_us)
-        elif self.result is None and now_us < GIVE_UP_US // 2:
-            self.asked_us = now_us
-            self.send(mavlink.MAVLink_mission_count_message(1, 1, len(self.items)))
         elif now_us >= GIVE_UP_US // 2:
             self.downloading = True
+        elif not self.heard:  # from then on it is the vehicle that repeats itself
+            self.asked_us = now_us
+            self.send(mavlink.MAVLink_mission_count_message(1, 1, len(self.items)))
 
     def _ask(self, now_us: int) -> None:
         self.asked_us = now_us

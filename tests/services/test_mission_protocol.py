@@ -585,6 +585,15 @@ def test_mission_current_on_the_wire_is_what_px4_sent() -> None:
     assert frame(0x5E, Vehicle("ardupilot").service.current_message()) == "fd0500005e01012a00000000000001f245"
 
 
+def test_plan_identifiers_pass_an_encoder_that_does_not_know_them(px4: Vehicle) -> None:
+    payloads: list[tuple[int, bytes]] = []
+    px4.channel.send_payload = lambda number, payload: payloads.append((number, payload))  # type: ignore[attr-defined]
+    px4.tell(count(1))
+    px4.tell(item(0, TAKEOFF))
+    plan_id = px4.stores[MissionType.MISSION].plan_id
+    assert payloads == [(mavlink.MAVLINK_MSG_ID_MISSION_ACK, b"\xff\xbe\0\0" + plan_id.to_bytes(4, "little"))]
+
+
 def test_a_receiver_without_the_extensions_understands_them() -> None:
     packer = mavlink.MAVLink(None, 1, 1)
     message = current_message(seq=3, total=9, state=0, mode=0, mission_id=7, fence_id=8, rally_id=9)
