@@ -1,4 +1,4 @@
-"""Battery warning level: remaining charge or voltage against thresholds; the level only rises while powered."""
+"""Battery warning level: remaining charge or voltage against thresholds. It only rises while powered."""
 
 from autopilot_bridge.commander.events import BatteryLevel
 from autopilot_bridge.commander.health import VehicleHealth
@@ -6,7 +6,7 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 
 
 class BatteryMonitor:
-    """Follows the battery. A voltage must stay low for `battery_timer_s`, so that sag under load is forgiven."""
+    """Follows the battery. Voltage must stay low for `battery_timer_s`: sag under load is forgiven."""
 
     __slots__ = ("_critical_since_us", "_low_since_us", "level")
 

@@ -69,7 +69,8 @@ class Commander:
     """Owns mode, arming state, home and failsafes of one vehicle, and runs its flight task.
 
     Args:
-        context: what flight tasks see; the autopilot shares its navigation state, setpoint and frame through it.
+        context: what flight tasks see; the autopilot shares its navigation state, setpoint and frame
+            through it.
         policy: the flavour's rules.
         parameters: time-outs, thresholds, actions.
         health: judge of sensors and navigation.
@@ -77,7 +78,7 @@ class Commander:
         thrust: the collective given by the motors, 0..1.
         missions: the stored mission plan.
         fence: the stored fence plan.
-        mission_problem: why the stored plan can't be flown; None when it can.
+        mission_valid: whether the stored plan can be flown (asked only when there is one).
 
     Attributes:
         mode: the mode being flown, shown in HEARTBEAT.
@@ -104,7 +105,7 @@ class Commander:
         thrust: Callable[[], float],
         missions: MissionStore,
         fence: MissionStore,
-        mission_problem: Callable[[], Reason | None],
+        mission_valid: Callable[[], bool],
     ) -> None:
         self.context = context
         self.policy = policy
@@ -135,9 +136,8 @@ class Commander:
         self._health = health
         self._land_detector = land_detector
         self._thrust = thrust
-        context.health = health.navigation
         self._geofence = Geofence(fence)
-        self._mission_problem = mission_problem
+        self._mission_valid = mission_valid
         self._mode_after_disarm = policy.boot_mode
         self._events: list[Event] = []
         self._ticks = 0
@@ -358,6 +358,11 @@ class Commander:
         situation.outside_fence = situation.position and self._geofence.breached(
             tuple(context.nav[nav.POS_NED_M].tolist()), home, context.frame, parameters
         )
+
+    def _mission_problem(self) -> Reason | None:
+        if len(self.missions.items) <= self.policy.mission_first_item:
+            return Reason.MISSION_MISSING
+        return None if self._mission_valid() else Reason.MISSION_INVALID
 
     def _mode_obstacle(self, mode: FlightMode) -> Reason | None:
         if self.terminated:

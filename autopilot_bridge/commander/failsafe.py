@@ -1,7 +1,8 @@
 """Failsafes: conditions with a time-out and an action each, and which action wins.
 
-PX4 keeps the commanded mode in mind and flies the strongest action while its condition lasts (some actions stay
-until a person chooses a mode). ArduPilot changes the mode once and does not change it back. Both read this monitor.
+PX4 keeps the commanded mode in mind and flies the strongest action while its condition lasts (some actions
+stay until a person chooses a mode). ArduPilot changes the mode once and does not change it back. Both read
+this monitor.
 """
 
 import math

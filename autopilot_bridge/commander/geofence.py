@@ -1,7 +1,7 @@
 """The geofence: a cylinder around home, and the polygons and circles of the uploaded fence plan.
 
-Plan items as in the MAVLink mission protocol (MAV_MISSION_TYPE_FENCE): vertices of one polygon follow each other
-and carry their number in param1; circles carry the radius in param1.
+Plan items as in the MAVLink mission protocol (MAV_MISSION_TYPE_FENCE): vertices of one polygon follow each
+other and carry their number in param1; circles carry the radius in param1.
 """
 
 import math
@@ -107,7 +107,7 @@ class Geofence:
 
 
 def inside_polygon(point: Point, vertices: tuple[Point, ...]) -> bool:
-    """Even-odd rule: whether the ray from the point towards growing second coordinate crosses an odd number of edges."""
+    """Even-odd rule: does a ray from the point cross an odd number of edges?"""
     north, east = point
     inside = False
     previous = vertices[-1]

@@ -28,7 +28,7 @@ _MIN_TAKEOFF_M: Final = 0.3
 
 
 class Guidance:
-    """Carries out requests for movement through modes and flight tasks. Positions are local NED, NaN: as it is."""
+    """Carries out requests for movement. Positions are local NED metres; NaN: as it is."""
 
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
@@ -47,8 +47,8 @@ class Guidance:
     def takeoff(self, *, down_m: float, yaw_rad: float) -> Verdict:
         """Climb straight up to a height; NaN: the parameter's height over home.
 
-        Where taking off is a mode of its own it can be commanded before arming. Elsewhere the vehicle must be armed,
-        on the ground, in the mode that flies to places.
+        Where taking off is a mode of its own it can be commanded before arming. Elsewhere the vehicle must
+        be armed, on the ground, in the mode that flies to places.
         """
         commander = self._commander
         height_m = self._height_over_home(down_m)
@@ -162,7 +162,7 @@ class Guidance:
         return verdict
 
     def change_speed(self, speed_m_s: float, *, kind: int) -> None:
-        """DO_CHANGE_SPEED until the next mode: SPEED_TYPE 0, 1 over ground, 2 climb, 3 descent; < 0: parameters."""
+        """DO_CHANGE_SPEED until the next mode: SPEED_TYPE 0 and 1 cruise, 2 climb, 3 descent; <= 0: reset."""
         context, limits = self._commander.context, self._parameters
         if not math.isfinite(speed_m_s):
             return

@@ -7,12 +7,11 @@ filter says of itself.
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.navigation.health import NavigationHealth
 from flightsim import interface
 from flightsim.interface import Reading, SensorReadings
 
@@ -31,6 +30,19 @@ _FIELD_GAUSS: Final = (0.1, 1.2)
 _GPS_MIN_SATELLITES: Final = 6
 _GPS_MAX_EPH_M: Final = 5.0
 _FIX_3D: Final = 3
+
+
+class NavigationStatus(Protocol):
+    """What the commander asks the navigation filter about itself."""
+
+    @property
+    def attitude_valid(self) -> bool: ...
+    @property
+    def altitude_valid(self) -> bool: ...
+    @property
+    def velocity_valid(self) -> bool: ...
+    @property
+    def position_valid(self) -> bool: ...
 
 
 @dataclass(slots=True)
@@ -99,7 +111,7 @@ class HealthMonitor:
         "navigation",
     )
 
-    def __init__(self, readings: SensorReadings, navigation: NavigationHealth) -> None:
+    def __init__(self, readings: SensorReadings, navigation: NavigationStatus) -> None:
         self.health = VehicleHealth()
         self.navigation = navigation
         self._readings = readings
@@ -132,10 +144,10 @@ class HealthMonitor:
             and bool(gps[interface.GPS_EPH_M] <= _GPS_MAX_EPH_M)
         )
         health.rangefinder = self._rangefinder.alive(time_us)
-        health.attitude = navigation.attitude
-        health.altitude = navigation.position_vertical_absolute
-        health.velocity = navigation.velocity_horizontal
-        health.position = navigation.position_horizontal_absolute
+        health.attitude = navigation.attitude_valid
+        health.altitude = navigation.altitude_valid
+        health.velocity = navigation.velocity_valid
+        health.position = navigation.position_valid
         battery = readings.battery.values
         health.battery = self._battery.alive(time_us) and bool(battery[interface.BATTERY_VOLTAGE_V] > 0.0)
         health.battery_voltage_v = float(battery[interface.BATTERY_VOLTAGE_V])

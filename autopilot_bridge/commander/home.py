@@ -42,7 +42,7 @@ class Home:
         return self.set(lat_deg, lon_deg, alt_m, yaw_rad=float(context.nav[nav.EULER_RAD][2]))
 
     def set(self, lat_deg: float, lon_deg: float, alt_m: float, *, yaw_rad: float = math.nan) -> bool:
-        """Home is there; False when that is no place on Earth or the vehicle does not know where it is itself."""
+        """Home is there; False for no place on Earth, or while the vehicle does not know its own."""
         if self._context.frame is None:
             return False
         try:

@@ -14,8 +14,8 @@ class PilotInput:
     """Newest sticks and the time they came.
 
     Args:
-        built_in_radio: without any sender the sticks are centred and the throttle is down (ArduPilot's SITL); else
-            there are no sticks (PX4).
+        built_in_radio: without any sender the sticks are centred and the throttle is down (ArduPilot's
+            SITL); else there are no sticks (PX4).
     """
 
     __slots__ = ("_built_in_radio", "_gcs_time_us", "_sticks", "_time_us", "radio_failed_since_us")

@@ -20,11 +20,13 @@ class CommanderPolicy:
         armable_modes: modes in which arming is allowed.
         ground_modes: modes that can be chosen while disarmed.
         flown_modes: modes that can be entered in flight.
-        kept_after_disarm: a disarm goes back to the last commanded mode of these (PX4); empty: the mode stays.
+        kept_after_disarm: a disarm goes back to the last commanded mode of these (PX4); empty: the mode
+            stays.
         takeoff_mode: taking off is a mode of its own (PX4), not something GUIDED does (ArduPilot).
         reposition_mode: mode in which the vehicle flies to a commanded place.
         mission_return_is_mode: a return item of a mission changes the mode (PX4).
-        mission_waits_for_start: on the ground a mission starts on command only, not by being armed (ArduPilot).
+        mission_waits_for_start: on the ground a mission starts on command only, not by being armed
+            (ArduPilot).
         mission_first_item: 1 where item 0 is home (ArduPilot).
         reports_do_items: items that are done at once are reported as reached, too (ArduPilot).
         manual_control_always: sticks are there without anybody sending them (ArduPilot's simulated radio).
@@ -35,8 +37,8 @@ class CommanderPolicy:
         active_when_landed: system status is ACTIVE as soon as armed (PX4), not only in the air.
         standby_when_armable: system status is UNINIT while not armable in the commanded mode (PX4).
         preflight_disarm_extra_s: added to the automatic disarming before takeoff (PX4: spool-up).
-        disarm_landed_everywhere: the short disarm after landing works in every mode (PX4), not only in the ones
-            that land by themselves.
+        disarm_landed_everywhere: the short disarm after landing works in every mode (PX4), not only in the
+            ones that land by themselves.
         prearm_report_s: interval at which failing arming checks are announced unasked; 0: never.
         arming_denied, mode_denied, disarm_in_air_denied: results of refused requests.
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.

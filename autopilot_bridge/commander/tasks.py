@@ -79,6 +79,15 @@ class TaskRunner:
         """The task lands by itself, and a landing ends the flight."""
         return isinstance(self.task, LandTask | ReturnTask | MissionTask)
 
+    @property
+    def orbit(self) -> tuple[float, float, float, float] | None:
+        """(radius m, negative counter-clockwise; centre north, east, down m) while circling, else None."""
+        task = self.task
+        if not isinstance(task, OrbitTask) or not task.circling:
+            return None
+        north_m, east_m, down_m = (float(value) for value in task.centre_ned_m)
+        return math.copysign(task.radius_m, task.velocity_m_s), north_m, east_m, down_m
+
     def prepare(self, mode: FlightMode, source: TaskSource) -> None:
         """The next entry of `mode` flies this task instead of its usual one."""
         self._prepared = (mode, source)

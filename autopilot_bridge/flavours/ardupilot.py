@@ -1,6 +1,5 @@
 """ArduCopter 4.6.3 (reference: ArduPilot 4.6.3, sections 1, 3 and 6)."""
 
-from collections.abc import Mapping
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
@@ -8,11 +7,11 @@ from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours import ardupilot_mapping, ardupilot_modes
+from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
 from autopilot_bridge.flavours.ardupilot_texts import notices
 from autopilot_bridge.flavours.flavour import Flavour, Identity
 from autopilot_bridge.flavours.mapping import airframe_overrides
 from autopilot_bridge.flavours.texts import Notice, Severity
-from autopilot_bridge.parameters import ParameterDefinition
 from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rule
 
 _FLOWN: Final = frozenset(
@@ -40,7 +39,7 @@ _GROUND_ONLY: Final = frozenset(
         FlightMode.ZIGZAG,
     }
 )
-"""Accepted on the ground as the firmware does; not flown by this emulation, so neither armed in nor entered in flight."""
+"""Accepted on the ground as the firmware does; not flown here, so not armed in or entered in flight."""
 
 POLICY: Final = CommanderPolicy(
     boot_mode=FlightMode.STABILIZED,
@@ -100,16 +99,6 @@ IDENTITY: Final = Identity(
 )
 
 
-def _parameter_definitions() -> tuple[ParameterDefinition, ...]:
-    from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
-
-    return tuple(ARDUPILOT_PARAMETERS)
-
-
-def _airframe() -> Mapping[str, float]:
-    return airframe_overrides(MulticopterParameters(), ardupilot_mapping.CONTROLLER, _parameter_definitions())
-
-
 def _command_address(system_id: int) -> AddressRule:
     return ardupilot_address_rule(system_id)
 
@@ -130,8 +119,8 @@ ARDUPILOT: Final = Flavour(
     ),
     identity=IDENTITY,
     command_address=_command_address,
-    parameter_definitions=_parameter_definitions,
-    airframe=_airframe,
+    parameter_definitions=lambda: ARDUPILOT_PARAMETERS,
+    airframe=airframe_overrides(MulticopterParameters(), ardupilot_mapping.CONTROLLER, ARDUPILOT_PARAMETERS),
     commander_parameters=ardupilot_mapping.commander_parameters,
     flight_parameters=ardupilot_mapping.flight_parameters,
     controller_parameters=ardupilot_mapping.controller_parameters,

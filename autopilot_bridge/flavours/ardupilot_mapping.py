@@ -1,4 +1,4 @@
-"""ArduCopter parameters to the typed parameters of the commander, the flight tasks, the control laws, the filter."""
+"""ArduCopter parameters to the typed parameters of commander, flight tasks, control laws and filter."""
 
 import math
 from collections.abc import Mapping
@@ -18,8 +18,8 @@ _CENTIDEGREE: Final = math.radians(0.01)
 _DEG: Final = math.radians(1.0)
 _NEVER_S: Final = 1e9
 
-# A return over the remembered path is not flown here: where the firmware would fall back to RTL or LAND without one,
-# so do these tables.
+# A return over the remembered path is not flown here: where the firmware would fall back to RTL or LAND
+# without one, so do these tables.
 _GCS: Final = {
     1: FailsafeAction.RETURN,
     2: FailsafeAction.RETURN,

@@ -108,7 +108,7 @@ class Flavour:
     identity: Identity
     command_address: Callable[[int], AddressRule]
     parameter_definitions: Callable[[], tuple[ParameterDefinition, ...]]
-    airframe: Callable[[], Mapping[str, float]]
+    airframe: Mapping[str, float]
     commander_parameters: Callable[[ParameterStore], CommanderParameters]
     flight_parameters: Callable[[ParameterStore], FlightParameters]
     controller_parameters: Callable[[ParameterStore], MulticopterParameters]

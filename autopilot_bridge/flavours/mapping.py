@@ -45,15 +45,22 @@ def airframe_overrides(
 ) -> dict[str, float]:
     """Parameters whose defaults differ from the `tuned` values of a parameter class, with those values.
 
-    What an airframe file of the firmware does: under these settings the mapping gives the tuned values.
+    What an airframe file of the firmware does: under these settings the mapping gives the tuned values, as
+        far
+    as the firmware's ranges allow.
     """
-    defaults = {definition.name: definition.default for definition in definitions}
-    wanted = {entry.name: getattr(tuned, entry.field) / entry.factor for entry in table}
-    return {
-        name: value
-        for name, value in wanted.items()
-        if name in defaults and not math.isclose(value, defaults[name], rel_tol=1e-5, abs_tol=1e-9)
-    }
+    known = {definition.name: definition for definition in definitions}
+    overrides = {}
+    for entry in table:
+        definition = known.get(entry.name)
+        if definition is None:
+            continue
+        low = -math.inf if definition.minimum is None else definition.minimum
+        high = math.inf if definition.maximum is None else definition.maximum
+        value = clamp(getattr(tuned, entry.field) / entry.factor, low, high)
+        if not math.isclose(value, definition.default, rel_tol=1e-5, abs_tol=1e-9):
+            overrides[entry.name] = value
+    return overrides
 
 
 def number(store: ParameterStore, name: str, default: float) -> float:

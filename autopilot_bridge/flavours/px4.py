@@ -1,6 +1,5 @@
 """PX4 v1.16.1 for a multicopter (reference: PX4 v1.16.1, sections 3 to 9)."""
 
-from collections.abc import Mapping
 from typing import Final
 
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
@@ -10,8 +9,8 @@ from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours import px4_mapping, px4_modes
 from autopilot_bridge.flavours.flavour import Flavour, Identity
 from autopilot_bridge.flavours.mapping import airframe_overrides
+from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
 from autopilot_bridge.flavours.px4_texts import notices
-from autopilot_bridge.parameters import ParameterDefinition
 from autopilot_bridge.services.channel import AddressRule
 
 _AUTOPILOT_COMPONENT: Final = 1
@@ -89,16 +88,6 @@ IDENTITY: Final = Identity(
 )
 
 
-def _parameter_definitions() -> tuple[ParameterDefinition, ...]:
-    from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
-
-    return tuple(PX4_PARAMETERS)
-
-
-def _airframe() -> Mapping[str, float]:
-    return airframe_overrides(MulticopterParameters(), px4_mapping.CONTROLLER, _parameter_definitions())
-
-
 def _command_address(system_id: int) -> AddressRule:
     return AddressRule(system_id=system_id, component_ids=frozenset({_AUTOPILOT_COMPONENT}), any_system=False)
 
@@ -115,8 +104,8 @@ PX4: Final = Flavour(
     banner=(),
     identity=IDENTITY,
     command_address=_command_address,
-    parameter_definitions=_parameter_definitions,
-    airframe=_airframe,
+    parameter_definitions=lambda: PX4_PARAMETERS,
+    airframe=airframe_overrides(MulticopterParameters(), px4_mapping.CONTROLLER, PX4_PARAMETERS),
     commander_parameters=px4_mapping.commander_parameters,
     flight_parameters=px4_mapping.flight_parameters,
     controller_parameters=px4_mapping.controller_parameters,

@@ -1,4 +1,4 @@
-"""PX4 parameters to the typed parameters of the commander, the flight tasks, the control laws and the filter."""
+"""PX4 parameters to the typed parameters of commander, flight tasks, control laws and filter."""
 
 import math
 from typing import Final

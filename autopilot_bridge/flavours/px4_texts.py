@@ -1,8 +1,8 @@
 """What PX4 says about events (v1.16.1, reference sections 7 to 9).
 
-PX4 gives the reasons of a refused arming in EVENT messages, which need its metadata server to be read. Here they
-follow as plain texts, worded as PX4 words the events. The tab that marks a text as a copy of an EVENT is left out, so
-that ground stations show it.
+PX4 gives the reasons of a refused arming in EVENT messages, which need its metadata server to be read.
+Here they follow as plain texts, worded as PX4 words the events. The tab that marks a text as a copy of an
+EVENT is left out, so that ground stations show it.
 """
 
 from collections.abc import Mapping

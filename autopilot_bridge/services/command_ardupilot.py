@@ -213,7 +213,7 @@ class ArduPilotCommands(CommandHandlers):
         return Result.ACCEPTED if self.reboot() is Result.ACCEPTED else Result.FAILED
 
     def calibrate(self, command: Command, source: Source) -> Result:
-        """PREFLIGHT_CALIBRATION: gyro and pressure are in order; nothing asked for, or more, is unsupported."""
+        """PREFLIGHT_CALIBRATION: gyro and pressure are in order; nothing or more is unsupported."""
         asked = [command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z]
         wanted = {index for index, value in enumerate(asked) if whole(value, 0)}
         if not wanted or not wanted <= {0, 2}:

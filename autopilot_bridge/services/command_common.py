@@ -1,7 +1,7 @@
-"""Commands as both firmwares understand them: one shape for COMMAND_LONG and COMMAND_INT, and shared handlers.
+"""Commands as both firmwares understand them: one shape for LONG and INT, and shared handlers.
 
-Source: MAVLink command protocol (mavlink.io/en/services/command.html). A handler answers with a `Result` for the
-COMMAND_ACK, or None where the firmware stays silent.
+Source: MAVLink command protocol (mavlink.io/en/services/command.html). A handler answers with a `Result`
+for the COMMAND_ACK, or None where the firmware stays silent.
 """
 
 import math
@@ -105,7 +105,7 @@ def command_from_message(message: MavlinkMessage) -> Command:
 
 
 def whole(value: float, default: int | None = None) -> int | None:
-    """A parameter that carries a whole number (rounded, half away from zero); `default` for NaN and infinity."""
+    """A parameter that carries a whole number, rounded half away from zero; `default` if not finite."""
     if not math.isfinite(value):
         return default
     return math.floor(value + 0.5) if value >= 0.0 else math.ceil(value - 0.5)

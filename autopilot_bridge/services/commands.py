@@ -1,4 +1,4 @@
-"""The MAVLink command protocol, autopilot side: COMMAND_LONG, COMMAND_INT, SET_MODE and their acknowledgements."""
+"""The MAVLink command protocol, autopilot side: COMMAND_LONG, COMMAND_INT, SET_MODE, acknowledgements."""
 
 from typing import Final
 
@@ -13,7 +13,7 @@ from autopilot_bridge.services.command_px4 import Px4Commands
 
 _COMMANDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT})
 _SET_MODE: Final = mavlink.MAVLINK_MSG_ID_SET_MODE
-_CANCEL: Final = mavlink.MAVLINK_MSG_ID_COMMAND_CANCEL
+_CANCEL: Final = 80  # COMMAND_CANCEL, which not every release of the dialect knows
 _HANDLERS: Final = {"px4": Px4Commands, "ardupilot": ArduPilotCommands}
 
 

@@ -18,17 +18,17 @@ _MIDDLE_US: Final = 1500
 _HALF_RANGE_US: Final = 500.0
 
 
-class ManualControlService:
+class ManualService:
     """Turns stick messages into the commander's pilot input.
 
     Args:
         commander: whose pilot this is.
         system_id: messages for other vehicles are left alone.
-        gcs_system_id: only this system's heartbeats count as a ground station's (ArduPilot SYSID_MYGCS); None: every
-            heartbeat of type MAV_TYPE_GCS (PX4).
+        gcs_system_id: only this system's heartbeats count as a ground station's (ArduPilot SYSID_MYGCS);
+            None: every heartbeat of type MAV_TYPE_GCS (PX4).
     """
 
-    def __init__(self, commander: Commander, *, system_id: int, gcs_system_id: int | None) -> None:
+    def __init__(self, commander: Commander, *, system_id: int, gcs_system_id: int | None = None) -> None:
         self._commander = commander
         self._system_id = system_id
         self._gcs_system_id = gcs_system_id

@@ -1,7 +1,7 @@
 """Streamed setpoints: SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET.
 
-PX4 flies them in OFFBOARD as they come and counts the good ones as a sign of life (reference: PX4, section 9).
-ArduPilot flies them smoothly in GUIDED (reference: ArduPilot, section 6). Neither acknowledges them.
+PX4 flies them in OFFBOARD as they come and counts the good ones as a sign of life (reference: PX4, section
+9). ArduPilot flies them smoothly in GUIDED (reference: ArduPilot, section 6). Neither acknowledges them.
 """
 
 import math
@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.flight.guided import GuidedTask
-from autopilot_bridge.services.channel import AddressRule, MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Source
 from autopilot_bridge.services.setpoint_frames import (
     ACCELERATION_BITS,
     FORCE_BIT,
@@ -57,58 +57,41 @@ _ARDUPILOT_BODY_FRAMES: Final = frozenset({mavlink.MAV_FRAME_BODY_NED, mavlink.M
 
 
 class SetpointService:
-    """What both flavours share: which messages, and for whom.
+    """Hands setpoints to the commander's stream.
 
     Args:
+        flavour: name of the flavour whose rules apply.
         commander: owns the setpoint stream.
-        address: which targets are this autopilot; both firmwares take system 0 here.
     """
 
-    def __init__(self, commander: Commander, address: AddressRule) -> None:
-        self.commander = commander
-        self._address = AddressRule(
-            system_id=address.system_id, component_ids=address.component_ids, any_system=True
-        )
-
-    @staticmethod
-    def for_flavour(name: str, commander: Commander, address: AddressRule) -> "SetpointService":
-        """The setpoint service of a flavour, by name."""
-        return {"px4": Px4Setpoints, "ardupilot": ArduPilotSetpoints}[name](commander, address)
+    def __init__(self, flavour: str, commander: Commander) -> None:
+        self._rules: Px4Setpoints | ArduPilotSetpoints = _RULES[flavour](commander)
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take one setpoint; bad ones are ignored, as the flavour does."""
         message_id = message.get_msgId()
-        if message_id not in (_LOCAL, _GLOBAL, _ATTITUDE):
+        if message_id == _LOCAL:
+            self._rules.on_local(message, time_us)
+        elif message_id == _GLOBAL:
+            self._rules.on_global(message, time_us)
+        elif message_id == _ATTITUDE:
+            self._rules.on_attitude(message, time_us)
+        else:
             return False
-        if self._address.accepts(message):
-            if message_id == _LOCAL:
-                self.on_local(message, time_us)
-            elif message_id == _GLOBAL:
-                self.on_global(message, time_us)
-            else:
-                self.on_attitude(message, time_us)
         return True
 
     def tick(self, time_us: int) -> None:
         """Nothing is pending: time-outs belong to the commander and to the guided task."""
 
-    def on_local(self, message: MavlinkMessage, time_us: int) -> None:
-        """SET_POSITION_TARGET_LOCAL_NED."""
-        raise NotImplementedError
 
-    def on_global(self, message: MavlinkMessage, time_us: int) -> None:
-        """SET_POSITION_TARGET_GLOBAL_INT."""
-        raise NotImplementedError
-
-    def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
-        """SET_ATTITUDE_TARGET."""
-        raise NotImplementedError
-
-
-class Px4Setpoints(SetpointService):
+class Px4Setpoints:
     """PX4: components are ignored one by one; a setpoint that controls nothing does not count."""
 
+    def __init__(self, commander: Commander) -> None:
+        self.commander = commander
+
     def on_local(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_POSITION_TARGET_LOCAL_NED."""
         mask = message.type_mask
         position = position_of((message.x, message.y, message.z), mask)
         velocity = velocity_of((message.vx, message.vy, message.vz), mask)
@@ -124,6 +107,7 @@ class Px4Setpoints(SetpointService):
         self._take(message, position, velocity, acceleration, time_us)
 
     def on_global(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_POSITION_TARGET_GLOBAL_INT."""
         mask = message.type_mask
         relative = _PX4_GLOBAL_FRAMES.get(message.coordinate_frame)
         if relative is None:
@@ -155,6 +139,7 @@ class Px4Setpoints(SetpointService):
         stream.note(time_us, needs_position=target.has_position or target.has_velocity)
 
     def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         thrust = message.thrust
         if mask & _THROTTLE_BIT or not math.isfinite(thrust):
@@ -174,10 +159,14 @@ class Px4Setpoints(SetpointService):
         stream.note(time_us, needs_position=False)
 
 
-class ArduPilotSetpoints(SetpointService):
+class ArduPilotSetpoints:
     """ArduPilot: position, velocity and acceleration are taken or ignored whole; only GUIDED listens."""
 
+    def __init__(self, commander: Commander) -> None:
+        self.commander = commander
+
     def on_local(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_POSITION_TARGET_LOCAL_NED."""
         guided = self._guided()
         if guided is None:
             return
@@ -205,6 +194,7 @@ class ArduPilotSetpoints(SetpointService):
         self._follow(guided, Target(position, velocity, acceleration, yaw, yaw_rate), mask)
 
     def on_global(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_POSITION_TARGET_GLOBAL_INT."""
         guided = self._guided()
         if guided is None:
             return
@@ -257,6 +247,7 @@ class ArduPilotSetpoints(SetpointService):
             guided.set_hold(context)
 
     def on_attitude(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_ATTITUDE_TARGET."""
         mask = message.type_mask
         guided = self._guided()
         if guided is None or mask & _THROTTLE_BIT or not math.isfinite(message.thrust):
@@ -280,6 +271,9 @@ class ArduPilotSetpoints(SetpointService):
         if commander.mode not in GUIDED_MODES or commander.mode is FlightMode.OFFBOARD:
             return None
         return commander.guidance.guided()
+
+
+_RULES: Final = {"px4": Px4Setpoints, "ardupilot": ArduPilotSetpoints}
 
 
 def _whole(bits: Triple | tuple[int, int, int], type_mask: int, values: Triple) -> Triple | None:

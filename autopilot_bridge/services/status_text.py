@@ -1,6 +1,5 @@
 """STATUSTEXT: the texts a ground station shows, in chunks where they are long."""
 
-from collections.abc import Iterable
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -41,16 +40,17 @@ class StatusTextService:
         """A channel was closed."""
         self._greeted.discard(channel.name)
 
-    def tell(self, events: Iterable[Event]) -> None:
-        """Announce events in the flavour's words."""
-        for event in events:
-            for notice in self._flavour.notices(event):
-                self.announce(notice.severity, notice.text)
-
-    def tell_banner(self) -> None:
-        """Who this is, as after a parameter list request."""
-        for notice in self._flavour.banner:
+    def tell(self, event: Event) -> None:
+        """Announce an event in the flavour's words."""
+        for notice in self._flavour.notices(event):
             self.announce(notice.severity, notice.text)
+
+    def banner(self, channel: Channel) -> None:
+        """Who this is, as after a parameter list request on a channel."""
+        if self._listens(channel):
+            for notice in self._flavour.banner:
+                for message in self._messages(int(notice.severity), notice.text):
+                    channel.send(message)
 
     def announce(self, severity: int, text: str) -> None:
         """Send a text (MAV_SEVERITY) on every channel that takes texts."""
