@@ -32,16 +32,22 @@ class LandDetectorParameters:
 
 
 class LandDetector:
-    """Judges the landed state at the task rate; starts on the ground."""
+    """Judges the landed state at the task rate.
+
+    Args:
+        parameters: thresholds.
+        on_ground: where the vehicle starts.
+
+    Attributes:
+        state: newest judgement.
+    """
 
     __slots__ = ("_contact_s", "_landed_s", "_maybe_s", "_parameters", "state")
 
-    def __init__(self, parameters: LandDetectorParameters | None = None) -> None:
+    def __init__(self, parameters: LandDetectorParameters | None = None, *, on_ground: bool = True) -> None:
         self._parameters = LandDetectorParameters() if parameters is None else parameters
-        self._contact_s = math.inf
-        self._maybe_s = math.inf
-        self._landed_s = math.inf
-        self.state = LandedState.ON_GROUND
+        self._contact_s = self._maybe_s = self._landed_s = math.inf if on_ground else 0.0
+        self.state = LandedState.ON_GROUND if on_ground else LandedState.IN_AIR
 
     def update(self, ctx: FlightContext, thrust: float) -> LandedState:
         """Judge, and write `landed_state`, `ground_contact` and `maybe_landed` of the context.

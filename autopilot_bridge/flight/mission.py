@@ -291,7 +291,7 @@ class MissionTask:
         angle = turn_angle(path[0], path[1], path[2])
         p = ctx.parameters
         turn_in = turn_in_distance(angle, speed, p.corner_acceleration_m_s2, p.jerk_m_s3)
-        return speed, min(turn_in, 0.9 * radius, 0.5 * math.dist(path[1], path[2]))
+        return speed, min(turn_in, 0.75 * radius, 0.5 * math.dist(path[1], path[2]))
 
     # -- flying --------------------------------------------------------------------------------------------------
 

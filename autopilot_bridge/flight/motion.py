@@ -28,7 +28,15 @@ class SmoothMotion:
         heading: the moving heading.
     """
 
-    __slots__ = ("_height_resets", "_leg_start", "_position_resets", "_synchronised", "heading", "trajectory")
+    __slots__ = (
+        "_height_resets",
+        "_leg_start",
+        "_position_resets",
+        "_synchronised",
+        "_yaw_resets",
+        "heading",
+        "trajectory",
+    )
 
     def __init__(self, ctx: FlightContext, *, speed_m_s: float | None = None) -> None:
         self.trajectory = TrajectoryGenerator(ctx.parameters, speed_m_s=speed_m_s)
@@ -36,6 +44,7 @@ class SmoothMotion:
         self._leg_start: Array = np.zeros(3)
         self._position_resets = 0
         self._height_resets = 0
+        self._yaw_resets = 0
         self._synchronised = False
         self.restart(ctx)
 
@@ -63,22 +72,24 @@ class SmoothMotion:
         if ctx.health is not None:
             self._position_resets = ctx.health.position_resets
             self._height_resets = ctx.health.height_resets
+            self._yaw_resets = ctx.health.yaw_resets
 
     def synchronise(self, ctx: FlightContext) -> None:
         """Follow jumps of the filter's estimate, and start afresh where a position comes back."""
         health = ctx.health
         if health is None:
             return
-        if health.position_resets != self._position_resets or health.height_resets != self._height_resets:
-            jump = health.position_reset_ned_m
-            moved = self.trajectory.position_ned_m
-            if health.position_resets != self._position_resets:
-                moved[0] += jump[0]
-                moved[1] += jump[1]
-            if health.height_resets != self._height_resets:
-                moved[2] += jump[2]
+        moved = self.trajectory.position_ned_m
+        if health.position_resets != self._position_resets:
             self._position_resets = health.position_resets
+            moved[0] += health.position_reset_ne_m[0]
+            moved[1] += health.position_reset_ne_m[1]
+        if health.height_resets != self._height_resets:
             self._height_resets = health.height_resets
+            moved[2] += health.height_reset_down_m
+        if health.yaw_resets != self._yaw_resets:
+            self._yaw_resets = health.yaw_resets
+            self.heading.reset(self.heading.yaw_rad + health.yaw_reset_rad, self.heading.rate_rad_s)
         if ctx.position_valid and not self._synchronised:
             self.trajectory.position_ned_m[0:2] = ctx.nav[nav_layout.POS_NED_M][0:2]
             self.trajectory.velocity_ned_m_s[0:2] = ctx.nav[nav_layout.VEL_NED_M_S][0:2]

@@ -1,6 +1,7 @@
 """Vertical take-off."""
 
 import math
+from typing import Final
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.flight.trajectory import SPEED_UP
 from autopilot_bridge.navigation import layout as nav_layout
+
+_ARRIVAL_SPEED_M_S: Final = 0.5
 
 
 class TakeoffTask:
@@ -77,7 +80,8 @@ class TakeoffTask:
         motion.steer(ctx, motion.heading.yaw_rad if math.isnan(self._yaw_rad) else self._yaw_rad)
         motion.write(ctx)
         error = abs(float(ctx.nav[nav_layout.POS_NED_M][2]) - float(self._place[2]))
-        if not self._arrived and error < 0.6 * ctx.parameters.acceptance_altitude_m and motion.stopped:
+        slow = abs(float(motion.trajectory.velocity_ned_m_s[2])) < _ARRIVAL_SPEED_M_S
+        if not self._arrived and error < 0.6 * ctx.parameters.acceptance_altitude_m and slow:
             self._arrived = True
             ctx.phase = FlightPhase.CRUISE
             ctx.events.append(TaskFinished("takeoff"))

@@ -5,6 +5,7 @@ PX4 flies them in OFFBOARD as they come and counts the good ones as a sign of li
 """
 
 import math
+from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -273,7 +274,10 @@ class ArduPilotSetpoints:
         return commander.guidance.guided()
 
 
-_RULES: Final = {"px4": Px4Setpoints, "ardupilot": ArduPilotSetpoints}
+_RULES: Final[Mapping[str, type[Px4Setpoints] | type[ArduPilotSetpoints]]] = {
+    "px4": Px4Setpoints,
+    "ardupilot": ArduPilotSetpoints,
+}
 
 
 def _whole(bits: Triple | tuple[int, int, int], type_mask: int, values: Triple) -> Triple | None:

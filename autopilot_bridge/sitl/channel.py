@@ -1,8 +1,14 @@
-"""A link as an autopilot's MAVLink channel: its own parser and its own sequence numbers."""
+"""A link as an autopilot's MAVLink channel: a parser for each peer and its own sequence numbers."""
 
-from autopilot_bridge.links import Link
-from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser
+from dataclasses import fields
+from typing import Final
+
+from autopilot_bridge.links import Link, PeerId
+from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, ParserCounters
 from autopilot_bridge.services.channel import MavlinkMessage
+
+_MAX_PARSERS: Final = 64
+_MEMORY_PEER: Final[PeerId] = ("memory", 0)
 
 
 class LinkChannel:
@@ -14,13 +20,14 @@ class LinkChannel:
         system_id, component_id: the autopilot's.
     """
 
-    __slots__ = ("_encoder", "_parsers", "link", "name")
+    __slots__ = ("_encoder", "_parsers", "_retired", "link", "name")
 
     def __init__(self, name: str, link: Link, *, system_id: int, component_id: int = 1) -> None:
         self.name = name
         self.link = link
         self._encoder = FrameEncoder(system_id, component_id)
-        self._parsers: dict[object, FrameParser] = {}
+        self._parsers: dict[PeerId, FrameParser] = {}
+        self._retired = ParserCounters()
 
     @property
     def congested(self) -> bool:
@@ -28,9 +35,17 @@ class LinkChannel:
         return self.link.congested
 
     @property
-    def parsers(self) -> tuple[FrameParser, ...]:
-        """One parser per peer; their counters account for every byte received."""
-        return tuple(self._parsers.values())
+    def counters(self) -> ParserCounters:
+        """Where every received byte went, over all peers; `sources` is left out."""
+        total = ParserCounters()
+        for counters in (self._retired, *(parser.counters for parser in self._parsers.values())):
+            _add(total, counters)
+        return total
+
+    @property
+    def pending_bytes(self) -> int:
+        """Bytes of frames that are not complete yet."""
+        return sum(parser.pending_bytes for parser in self._parsers.values())
 
     def send(self, message: MavlinkMessage) -> None:
         """Frame a message and send it."""
@@ -48,8 +63,23 @@ class LinkChannel:
         """Every good frame that has arrived."""
         frames: list[Frame] = []
         for peer, data in self.link.receive():
-            parser = self._parsers.get(peer)
-            if parser is None:
-                parser = self._parsers[peer] = FrameParser()
-            frames += parser.feed(data)
+            frames += self.parse(data, peer)
         return frames
+
+    def parse(self, data: bytes, peer: PeerId = _MEMORY_PEER) -> list[Frame]:
+        """The good frames in bytes of one peer, which may come in any pieces."""
+        parser = self._parsers.get(peer)
+        if parser is None:
+            if len(self._parsers) >= _MAX_PARSERS:  # peers come and go: the oldest has had its say
+                oldest = self._parsers.pop(next(iter(self._parsers)))
+                _add(self._retired, oldest.counters)
+                self._retired.bytes_junk += oldest.pending_bytes
+            parser = self._parsers[peer] = FrameParser()
+        return parser.feed(data)
+
+
+def _add(total: ParserCounters, more: ParserCounters) -> None:
+    for field in fields(ParserCounters):
+        value = getattr(more, field.name)
+        if isinstance(value, int):
+            setattr(total, field.name, getattr(total, field.name) + value)

@@ -1,14 +1,13 @@
 """What a SITL world holds: vehicles, place, air and seed. Data only; `Sitl` builds it."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from flightsim.environment import Environment
+from flightsim.home import Home
 
 FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: the moment of boot unless asked otherwise, so that equal flights give equal logs."""
@@ -17,46 +16,29 @@ TEAM_SPACING_M: Final = 5.0
 MAX_VEHICLES: Final = 250
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Home:
-    """Where the first vehicle stands.
-
-    Attributes:
-        position: latitude and longitude in degrees, ground height above mean sea level in metres.
-        heading_deg: where the noses point, clockwise from true north.
-    """
-
-    position: GeodeticPosition
-    heading_deg: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.heading_deg):
-            raise ValueError(f"heading {self.heading_deg} deg is not a finite number")
-
-    @classmethod
-    def parse(cls, text: str) -> "Home":
-        """Home from "lat,lon,alt,heading" as ArduPilot's SITL writes it (heading may be left out)."""
-        parts = text.split(",")
-        try:
-            numbers = [float(part) for part in parts]
-        except ValueError:
-            numbers = []
-        if len(numbers) not in (3, 4):
-            raise ValueError(f"home {text!r} is not 'lat,lon,alt[,heading]', for example 47.3977,8.5456,489,0")
-        position = GeodeticPosition(lat_deg=numbers[0], lon_deg=numbers[1], alt_m=numbers[2])
-        return cls(position=position, heading_deg=numbers[3] if len(numbers) == 4 else 0.0)
-
-
 HOMES: Final[Mapping[str, Home]] = MappingProxyType(
     {
-        "px4": Home(position=GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)),
-        "ardupilot": Home(
-            position=GeodeticPosition(lat_deg=-35.3632621, lon_deg=149.1652374, alt_m=584.0),
-            heading_deg=353.0,
-        ),
+        "px4": Home(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4),
+        "ardupilot": Home(lat_deg=-35.3632621, lon_deg=149.1652374, alt_m=584.0, heading_deg=353.0),
     }
 )
 """Where each firmware's own SITL stands: Zurich and Canberra."""
+
+
+def parse_home(text: str) -> Home:
+    """Home from "lat,lon,alt[,heading]", as ArduPilot's SITL writes it.
+
+    Raises:
+        ValueError: the text is not that, or a number is out of range.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (3, 4):
+        raise ValueError(f"home {text!r} is not 'lat,lon,alt[,heading]', for example 47.3977,8.5456,489,0")
+    heading_deg = numbers[3] if len(numbers) == 4 else 0.0
+    return Home(lat_deg=numbers[0], lon_deg=numbers[1], alt_m=numbers[2], heading_deg=heading_deg)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,14 +49,14 @@ class VehicleSpecification:
         system_id: MAVLink system id, 1..250.
         model: name of one of our models, or a path.
         flavour: "px4" or "ardupilot".
-        offset_ned_m: where it stands, from home.
+        offset_ne_m: where it stands, north and east of home.
         parameters: autopilot parameters that differ from the flavour's defaults.
     """
 
     system_id: int = 1
     model: str | Path = "iris"
     flavour: str = "px4"
-    offset_ned_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    offset_ne_m: tuple[float, float] = (0.0, 0.0)
     parameters: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -132,7 +114,7 @@ def team(
             system_id=index + 1,
             model=model,
             flavour=flavour,
-            offset_ned_m=(0.0, TEAM_SPACING_M * index, 0.0),
+            offset_ne_m=(0.0, TEAM_SPACING_M * index),
             parameters=parameters,
         )
         for index in range(count)

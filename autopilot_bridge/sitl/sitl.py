@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from autopilot_bridge.autopilot import Autopilot
+from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flavours import get_flavour
 from autopilot_bridge.links import Link, MemoryLink, memory_pair
 from autopilot_bridge.mavlink import Frame
@@ -15,9 +16,14 @@ from autopilot_bridge.routing import Router
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TruthEncoder
-from flightsim.random_streams import RandomStreams
-from flightsim.sensors import SensorSuite, SensorSuiteParameters
-from flightsim.world import World
+from flightsim.sensors import (
+    FIX_AT_BOOT,
+    RTK_FIX_AFTER_10_S,
+    GpsParameters,
+    SensorSuite,
+    SensorSuiteParameters,
+)
+from flightsim.world import World, WorldParameters
 
 TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a frame of truth."""
@@ -38,12 +44,12 @@ class SitlVehicle:
     def __init__(
         self, specification: VehicleSpecification, index: int, configuration: SitlConfiguration, world: World
     ) -> None:
-        streams = RandomStreams(configuration.seed)
+        streams = world.streams
         flavour = get_flavour(specification.flavour)
         self.specification = specification
-        self.vehicle = world.add_vehicle(specification.model, offset_ned_m=specification.offset_ned_m)
+        self.vehicle = world.add_vehicle(specification.model, offset_ne_m=specification.offset_ne_m)
         self.sensors = SensorSuite(
-            SensorSuiteParameters(),
+            SensorSuiteParameters(gps=_gps(specification.flavour)),
             physics_rate_hz=configuration.physics_rate_hz,
             truth=self.vehicle.truth,
             seeds=lambda name: streams.child("vehicle", index, "sensor", name),
@@ -55,11 +61,19 @@ class SitlVehicle:
             physics_rate_hz=configuration.physics_rate_hz,
             parameters=specification.parameters,
             unix_epoch_us=configuration.unix_epoch_us,
-            faults=self.sensors.faults,
+            inject_failure=self._inject_failure,
         )
         self.channels: list[LinkChannel] = []
-        self._router = Router()
+        self._router: Router[LinkChannel] = Router()
         self.truth_encoder = TruthEncoder(specification.system_id)
+
+    def _inject_failure(self, unit: int, failure: int, instance: int) -> Result:
+        """MAV_CMD_INJECT_FAILURE on the vehicle's sensors."""
+        try:
+            self.sensors.faults.inject(unit, failure, instance=instance)
+        except ValueError:
+            return Result.UNSUPPORTED
+        return Result.ACCEPTED
 
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
@@ -78,6 +92,7 @@ class SitlVehicle:
             name = f"{role}{len(self.channels)} {link.description}"
         channel = LinkChannel(name, link, system_id=self.specification.system_id)
         self.channels.append(channel)
+        self._router.add(channel)
         self.autopilot.add_channel(channel, role=role)
         return channel
 
@@ -85,7 +100,7 @@ class SitlVehicle:
         """Take a link away; the link itself is closed too."""
         self.channels.remove(channel)
         self.autopilot.remove_channel(channel)
-        self._router.forget(channel)
+        self._router.remove(channel)
         channel.link.close()
 
     def poll(self) -> None:
@@ -93,14 +108,21 @@ class SitlVehicle:
         for channel in self.channels:
             frames = channel.receive()
             if frames:
-                self._take(channel, frames)
+                self.take(channel, frames)
 
-    def _take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
+    def take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
+        """Hand frames that came in on a channel to the autopilot and to the channels they are meant for."""
+        own = self.specification.system_id
         for frame in frames:
             self.autopilot.receive(frame, channel)
-            if len(self.channels) > 1:
-                for other in self._router.route(frame, channel, self.channels):
+            if len(self.channels) > 1 and (frame.target_system != own or frame.target_component > 1):
+                for other in self._router.route(frame, channel):
                     other.send_frame(frame.raw)
+
+
+def _gps(flavour: str) -> GpsParameters:
+    """The receiver, with the start-up that the firmware's own SITL shows."""
+    return GpsParameters(fix_timeline=RTK_FIX_AFTER_10_S if flavour == "ardupilot" else FIX_AT_BOOT)
 
 
 class Sitl:
@@ -115,13 +137,13 @@ class Sitl:
 
     def __init__(self, configuration: SitlConfiguration) -> None:
         self.configuration = configuration
-        place = configuration.place
         self.world = World(
-            physics_rate_hz=configuration.physics_rate_hz,
-            home=place.position,
-            heading_deg=place.heading_deg,
-            environment=configuration.environment,
-            seed=configuration.seed,
+            WorldParameters(
+                seed=configuration.seed,
+                physics_rate_hz=configuration.physics_rate_hz,
+                home=configuration.place,
+                environment=configuration.environment,
+            )
         )
         self.vehicles = tuple(
             SitlVehicle(specification, index, configuration, self.world)
@@ -171,9 +193,9 @@ class Sitl:
     def connect(self, index: int, *, role: str = "onboard") -> MemoryLink:
         """A memory link to vehicle `index`; the returned end is the client's."""
         vehicle = self.vehicles[index]
-        ours, theirs = memory_pair()
+        ours, theirs = memory_pair(f"vehicle{index + 1}", f"client{index + 1}")
         channel = vehicle.open(ours, role=role)
-        ours.on_receive = lambda: vehicle._take(channel, channel.receive())
+        ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
 
     def on_truth(self, listener: TruthListener) -> None:

@@ -27,7 +27,7 @@ class TelemetrySources:
     Attributes:
         heartbeat: field values of HEARTBEAT in definition order.
         sys_status: (present, enabled, health) sensor bits of SYS_STATUS.
-        mission_current: field values of MISSION_CURRENT.
+        mission_current: packed payload of MISSION_CURRENT.
         autopilot_version: field values of AUTOPILOT_VERSION.
         battery_level: MAV_BATTERY_CHARGE_STATE.
         hover_thrust: collective at hover, 0..1.
@@ -41,7 +41,7 @@ class TelemetrySources:
     readings: SensorReadings
     heartbeat: Callable[[], Values]
     sys_status: Callable[[], tuple[int, int, int]]
-    mission_current: Callable[[], Values]
+    mission_current: Callable[[], bytes]
     autopilot_version: Callable[[], Values]
     battery_level: Callable[[], int]
     unix_epoch_us: int

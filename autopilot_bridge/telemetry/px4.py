@@ -174,7 +174,7 @@ class Px4Messages(CommonMessages):
             return None
         pose = [NAN] * 21
         velocity = [NAN] * 21
-        variances = navigation.variances.tolist()
+        variances = navigation.covariance.diagonal().tolist()
         for index, diagonal in enumerate((0, 6, 11)):
             pose[diagonal] = variances[6 + index]
             velocity[diagonal] = variances[3 + index]

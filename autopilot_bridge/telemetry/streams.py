@@ -12,8 +12,8 @@ from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.packing import values_packer
 
 Values = tuple[object, ...]
-Builder = Callable[[], Values | None]
-"""Field values of one message in the order of its XML definition; None: nothing to say now."""
+Builder = Callable[[], Values | bytes | None]
+"""Field values of one message in the order of its definition, or its packed payload; None: nothing to say now."""
 
 MICROSECONDS: Final = 1_000_000
 
@@ -39,6 +39,10 @@ class PayloadCache:
     def __contains__(self, message_id: int) -> bool:
         return message_id in self._builders
 
+    def forget(self) -> None:
+        """Build anew even within this step: something has changed."""
+        self._payloads.clear()
+
     def payload(self, message_id: int, time_us: int) -> bytes | None:
         """Packed payload of a message at this step, or None when there is nothing to say."""
         if time_us != self.time_us:
@@ -49,7 +53,7 @@ class PayloadCache:
         except KeyError:
             pass
         values = self._builders[message_id]()
-        payload = None if values is None else self._packers[message_id](values)
+        payload = values if values is None or isinstance(values, bytes) else self._packers[message_id](values)
         self._payloads[message_id] = payload
         return payload
 
@@ -103,6 +107,13 @@ class StreamTable:
             interval_us = max(interval_us, self._step_us)
             self._start(message_id, interval_us, time_us + interval_us)
         self.next_due_us = self._heap[0][0] if self._heap else self.NEVER
+
+    def delay(self, message_id: int, due_us: int) -> None:
+        """Have the next message of a running stream sent at `due_us`."""
+        if message_id in self._intervals_us:
+            self._heap = [entry for entry in self._heap if entry[1] != message_id]
+            heapq.heapify(self._heap)
+            self._start(message_id, self._intervals_us[message_id], due_us)
 
     def set_default(self, message_id: int, interval_us: int, time_us: int) -> None:
         """Change the default of a stream (-1: none) and run it so, as a stream-rate parameter does."""

@@ -100,7 +100,9 @@ async def fly_px4(url: str) -> None:
         assert len((await mission.download_mission()).mission_items) == len(plan.mission_items)
         await mission.start_mission()
         await first(
-            mission.subscribe_mission_progress(), lambda p: p.total > 0 and p.current == p.total, "mission end"
+            mission.subscribe_mission_progress(),
+            lambda p: p.total > 0 and p.current == p.total,
+            "mission end",
         )
         await action.hold()
         await action.return_to_launch()
@@ -136,7 +138,9 @@ def test_synchronous_interface_flies(flavour: str) -> None:
                 telemetry.set_rate_position(10.0)
                 telemetry.set_rate_position_velocity_ned(10.0)
                 telemetry.set_rate_in_air(5.0)
-            until("armable", lambda: telemetry.health().is_armable and telemetry.health().is_global_position_ok)
+            until(
+                "armable", lambda: telemetry.health().is_armable and telemetry.health().is_global_position_ok
+            )
             action.set_takeoff_altitude(8.0)
             if flavour == "ardupilot":
                 action.hold()
@@ -147,7 +151,9 @@ def test_synchronous_interface_flies(flavour: str) -> None:
             action.goto_location(
                 here.latitude_deg, here.longitude_deg + 2e-4, here.absolute_altitude_m, float("nan")
             )
-            until("goto", lambda: abs(telemetry.position().longitude_deg - here.longitude_deg - 2e-4) < 1.5e-5)
+            until(
+                "goto", lambda: abs(telemetry.position().longitude_deg - here.longitude_deg - 2e-4) < 1.5e-5
+            )
             offboard = Offboard(system)
             offboard.set_position_ned(PositionNedYaw(8.0, 0.0, -10.0, 0.0))
             offboard.start()

@@ -71,9 +71,7 @@ class Client:
             number = main << 16 | sub << 24
         self.until(
             f"mode {name}",
-            lambda m: (
-                m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1 and m.custom_mode == number
-            ),
+            lambda m: m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1 and m.custom_mode == number,
             each,
         )
 
@@ -88,12 +86,12 @@ class Client:
         )
         self.until("global position", lambda m: m.get_type() == "GLOBAL_POSITION_INT")
 
-    def at(self, north_m: float, east_m: float, height_m: float, within_m: float = 1.0) -> Callable[[Any], bool]:
+    def at(
+        self, north_m: float, east_m: float, height_m: float, within_m: float = 1.0
+    ) -> Callable[[Any], bool]:
         """Matches LOCAL_POSITION_NED near a point."""
         goal = (north_m, east_m, -height_m)
-        return lambda m: (
-            m.get_type() == "LOCAL_POSITION_NED" and math.dist((m.x, m.y, m.z), goal) < within_m
-        )
+        return lambda m: m.get_type() == "LOCAL_POSITION_NED" and math.dist((m.x, m.y, m.z), goal) < within_m
 
     def send_position(self, north_m: float, east_m: float, height_m: float) -> None:
         """SET_POSITION_TARGET_LOCAL_NED, position only."""
@@ -181,9 +179,7 @@ def test_offboard_positions_and_return(client: Client) -> None:
     if client.flavour == "px4":
         client.set_mode("offboard", each=lambda: client.send_position(0.0, 0.0, 12.0))
     for goal in ((15.0, 0.0, 12.0), (15.0, 10.0, 12.0)):
-        client.until(
-            f"position {goal}", client.at(*goal), each=lambda goal=goal: client.send_position(*goal)
-        )
+        client.until(f"position {goal}", client.at(*goal), each=lambda goal=goal: client.send_position(*goal))
     client.set_mode("rtl")
     client.landed_and_disarmed()
 
@@ -210,8 +206,6 @@ def test_uploaded_mission_and_landing(client: Client) -> None:
         client.set_mode("mission")
         client.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
     last = len(items) - 1
-    client.until(
-        "last item reached", lambda m: m.get_type() == "MISSION_ITEM_REACHED" and m.seq == last
-    )
+    client.until("last item reached", lambda m: m.get_type() == "MISSION_ITEM_REACHED" and m.seq == last)
     client.command(mavlink.MAV_CMD_NAV_LAND)
     client.landed_and_disarmed()

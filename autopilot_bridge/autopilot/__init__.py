@@ -1,0 +1,5 @@
+"""The emulated autopilot: sensor readings and MAVLink frames in, motor commands and MAVLink messages out. Sans-IO."""
+
+from autopilot_bridge.autopilot.autopilot import Autopilot, AutopilotChannel
+
+__all__ = ["Autopilot", "AutopilotChannel"]

@@ -1,0 +1,369 @@
+"""The emulated autopilot, composed: navigation, control, commander and MAVLink services around sensor readings.
+
+Execution order of a physics step: navigation filter; every fifth step (50 Hz) the slow loop (commander with its flight
+task, services, events); control laws; streams that are due. Nothing here sleeps, opens or reads a clock.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.autopilot.firmware import FIRMWARES
+from autopilot_bridge.autopilot.status import NavigationJudgement, StatusReport
+from autopilot_bridge.commander import events
+from autopilot_bridge.commander.commander import Commander
+from autopilot_bridge.commander.health import HealthMonitor
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.control import MulticopterController
+from autopilot_bridge.flavours.flavour import Flavour
+from autopilot_bridge.flight import FlightContext, LandDetector
+from autopilot_bridge.mavlink import Frame, decode
+from autopilot_bridge.mission_plan import MissionType
+from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Service, Source
+from autopilot_bridge.services.command_common import CommandHooks
+from autopilot_bridge.services.commands import CommandService
+from autopilot_bridge.services.manual import ManualService
+from autopilot_bridge.services.message_interval import MessageIntervalService
+from autopilot_bridge.services.mission import MissionService, new_stores
+from autopilot_bridge.services.parameters import ParameterService
+from autopilot_bridge.services.setpoints import SetpointService
+from autopilot_bridge.services.status_text import StatusTextService
+from autopilot_bridge.services.timesync import TimeSyncService
+from autopilot_bridge.telemetry.ardupilot import STREAM_GROUPS, STREAM_RATE_PARAMETERS, ArdupilotMessages
+from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
+from autopilot_bridge.telemetry.px4 import Px4Messages
+from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable, Values
+from autopilot_bridge.telemetry.view import TelemetryView
+from flightsim.interface import IMU_ACCEL_FRD_M_S2, SensorReadings
+
+SLOW_RATE_HZ: Final = 50
+_COMPONENT: Final = 1
+_ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
+
+FailureHook = Callable[[int, int, int], Result]
+
+
+class AutopilotChannel(Channel, Protocol):
+    """A channel that takes packed payloads too."""
+
+    def send_payload(self, message_id: int, payload: bytes) -> None:
+        """Frame the payload and send it."""
+
+
+class _Progress:
+    """The mission being flown, as the mission protocol sees it."""
+
+    __slots__ = ("_commander", "complete")
+
+    def __init__(self, commander: Commander) -> None:
+        self._commander = commander
+        self.complete = False
+
+    @property
+    def active(self) -> bool:
+        """The mission mode is chosen."""
+        return self._commander.mode is FlightMode.MISSION
+
+
+class Autopilot:
+    """One vehicle's autopilot.
+
+    Args:
+        flavour: which firmware it emulates.
+        system_id: MAVLink system id; the component id is 1.
+        readings: the vehicle's sensors, written before each `step`.
+        physics_rate_hz: calls of `step` per second.
+        parameters: values that differ from the flavour's defaults.
+        unix_epoch_us: Unix time of boot.
+        inject_failure: takes MAV_CMD_INJECT_FAILURE; None: not supported.
+
+    Attributes:
+        actuators: motor commands of the newest step (flightsim.interface).
+        commander, navigation, controller, parameters, context: the parts, for tests and benchmarks.
+
+    Raises:
+        ParameterError: an override names an unknown parameter or is out of its range.
+        ValueError: the physics rate is no multiple of 50 Hz.
+    """
+
+    def __init__(
+        self,
+        flavour: Flavour,
+        *,
+        system_id: int,
+        readings: SensorReadings,
+        physics_rate_hz: int,
+        parameters: Mapping[str, float] | None = None,
+        unix_epoch_us: int = 0,
+        inject_failure: FailureHook | None = None,
+    ) -> None:
+        if physics_rate_hz % SLOW_RATE_HZ:
+            raise ValueError(f"physics rate {physics_rate_hz} Hz is not a multiple of {SLOW_RATE_HZ} Hz")
+        firmware = FIRMWARES[flavour.name]
+        self.flavour = flavour
+        self.system_id = system_id
+        self.channels: list[AutopilotChannel] = []
+        self._firmware = firmware
+        self._readings = readings
+        self._address = firmware.address(system_id)
+        self._step_us = MICROSECONDS // physics_rate_hz
+        self._divisor = physics_rate_hz // SLOW_RATE_HZ
+        self._until_slow = self._divisor
+        self._time_us = 0
+
+        self.parameters = ParameterStore(
+            flavour.parameter_definitions(), {**flavour.airframe, **(parameters or {})}
+        )
+        self.navigation = NavigationFilter(
+            flavour.navigation_parameters(self.parameters), readings=readings, physics_rate_hz=physics_rate_hz
+        )
+        self.controller = MulticopterController(
+            flavour.controller_parameters(self.parameters),
+            physics_rate_hz=physics_rate_hz,
+            nav=self.navigation.state,
+        )
+        self.context = FlightContext(
+            nav=self.navigation.state,
+            setpoint=self.controller.setpoint,
+            parameters=flavour.flight_parameters(self.parameters),
+        )
+        self.context.health = self.navigation.health
+        stores = new_stores()
+        self.commander = Commander(
+            self.context,
+            policy=flavour.policy,
+            parameters=flavour.commander_parameters(self.parameters),
+            health=HealthMonitor(readings, NavigationJudgement(self.navigation)),
+            land_detector=LandDetector(),
+            thrust=lambda: self.controller.thrust,
+            missions=stores[MissionType.MISSION],
+            fence=stores[MissionType.FENCE],
+            mission_valid=lambda: self.missions.mission_valid(),
+        )
+        self._progress = _Progress(self.commander)
+        self._texts = StatusTextService(flavour, self)
+        self.missions = MissionService(
+            firmware.missions,
+            stores,
+            self,
+            self._texts.announce,
+            home=lambda: self.commander.home.position,
+            progress=self._progress,
+            on_plan_changed=self._on_plan_changed,
+        )
+        self._status = StatusReport(flavour, self.commander)
+        self._view = TelemetryView(self.context, self.navigation.state, readings)
+        self._messages = self._build_messages(unix_epoch_us)
+        self._cache = PayloadCache(self._messages.builders())
+        self._tables: dict[str, StreamTable] = {}
+        self._table_list: list[StreamTable] = []
+        self.intervals = MessageIntervalService(
+            firmware.intervals, self._tables, self._cache, self._texts.announce, self._on_demand()
+        )
+        hooks = CommandHooks(
+            intervals=self.intervals,
+            parameters=self.parameters,
+            announce=self._texts.announce,
+            set_current_item=self.missions.set_current,
+            mission_item_count=lambda: len(stores[MissionType.MISSION].items),
+            inject_failure=inject_failure,
+        )
+        self._services: tuple[Service, ...] = (
+            SetpointService(flavour.name, self.commander),
+            ManualService(
+                self.commander,
+                system_id=system_id,
+                gcs_system_id=255 if flavour.name == "ardupilot" else None,
+            ),
+            CommandService.for_flavour(
+                flavour.name, self.commander, hooks, flavour.command_address(system_id)
+            ),
+            ParameterService(
+                self.parameters,
+                firmware.parameters,
+                self,
+                on_list=lambda channel: self._texts.banner(channel),
+            ),
+            self.missions,
+            TimeSyncService(self, answers_ping=firmware.answers_ping),
+            self.intervals,
+            self._texts,
+        )
+        self.parameters.subscribe(self._on_parameter)
+
+    # the simulator's side
+
+    @property
+    def actuators(self) -> NDArray[np.float64]:
+        """Motor commands (MAX_ACTUATORS,), written in place."""
+        return self.controller.actuators
+
+    def step(self, time_us: int) -> None:
+        """One physics step, after the readings were written."""
+        self._time_us = time_us
+        self.navigation.step(time_us)
+        self._until_slow -= 1
+        if self._until_slow == 0:
+            self._until_slow = self._divisor
+            self._slow(time_us)
+        self.controller.step()
+        for table in self._table_list:
+            if table.next_due_us <= time_us:
+                self._view.refresh(time_us)
+                table.tick(time_us)
+
+    # the link's side
+
+    def add_channel(self, channel: AutopilotChannel, *, role: str) -> None:
+        """Start the default streams of a role ("onboard" or "gcs") on one more channel.
+
+        Raises:
+            ValueError: unknown role, or a channel of that name is there already.
+        """
+        rates_hz = self._firmware.rates_hz.get(role)
+        if rates_hz is None:
+            accepted = ", ".join(self._firmware.rates_hz)
+            raise ValueError(f"channel role {role!r} is unknown; accepted: {accepted}")
+        if channel.name in self._tables:
+            raise ValueError(f"a channel named {channel.name!r} is open already")
+        table = StreamTable(self._cache, channel, rates_hz, physics_step_us=self._step_us)
+        first_us = max(self._time_us, round(self.flavour.policy.heartbeat_start_s * 1e6))
+        table.delay(mavlink.MAVLINK_MSG_ID_HEARTBEAT, first_us)
+        self.channels.append(channel)
+        self._tables[channel.name] = table
+        self._table_list = list(self._tables.values())
+        self._apply_stream_rates(len(self._tables) - 1)
+
+    def remove_channel(self, channel: AutopilotChannel) -> None:
+        """Stop everything on a channel."""
+        self.channels.remove(channel)
+        del self._tables[channel.name]
+        self._table_list = list(self._tables.values())
+
+    def receive(self, frame: Frame, channel: AutopilotChannel) -> None:
+        """Take one frame from a channel. Contents are untrusted and never raise."""
+        if frame.system_id == self.system_id and frame.component_id == _COMPONENT:
+            return
+        message = decode(frame)
+        if frame.message_id not in _ALWAYS_ANSWERED and not self._address.accepts(message):
+            return
+        source = Source(channel, frame.system_id, frame.component_id)
+        for service in self._services:
+            if service.handle(message, source, self._time_us):
+                return
+
+    # inside
+
+    def _slow(self, time_us: int) -> None:
+        context, navigation = self.context, self.navigation
+        context.frame = navigation.frame
+        context.hover_thrust = self.controller.hover_thrust
+        self._view.vibration.update(self._readings.imu.values[IMU_ACCEL_FRD_M_S2], 1.0 / SLOW_RATE_HZ)
+        self.commander.update(time_us)
+        navigation.vehicle_at_rest = context.on_ground and not self.commander.tasks.lifting_off
+        self._view.refresh(time_us)
+        for service in self._services:
+            service.tick(time_us)
+        for event in self.commander.drain_events():
+            self._follow(event)
+
+    def _follow(self, event: events.Event) -> None:
+        """What the rest of the autopilot makes of something that happened to the vehicle."""
+        self._texts.tell(event)
+        match event:
+            case events.MissionItemReached(index=index):
+                self.missions.item_reached(index)
+            case events.MissionFinished():
+                self._progress.complete = True
+            case events.ModeChanged(mode=mode):
+                if mode is not FlightMode.MISSION:
+                    self._progress.complete = False
+                if self.flavour.heartbeat_on_mode_change:
+                    self._push(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+            case events.HomeSet():
+                self._push_position()
+            case events.Armed() if self._firmware.position_pushed_at_arm:
+                self._push_position()
+
+    def _push(self, message_id: int) -> None:
+        """Send a message on every channel at once, streams aside."""
+        self._cache.forget()
+        payload = self._cache.payload(message_id, self._time_us)
+        if payload is not None:
+            for channel in self.channels:
+                channel.send_payload(message_id, payload)
+
+    def _push_position(self) -> None:
+        self._push(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+        self._push(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+
+    def _on_parameter(self, name: str, value: float) -> None:
+        flavour, store = self.flavour, self.parameters
+        self.controller.set_parameters(flavour.controller_parameters(store))
+        self.context.parameters = flavour.flight_parameters(store)
+        self.commander.parameters = flavour.commander_parameters(store)
+        if name.startswith("SR") and name[2:3].isdigit():
+            self._apply_stream_rates(int(name[2]))
+
+    def _apply_stream_rates(self, index: int) -> None:
+        """ArduPilot's SRn_* parameters: rates of the stream groups of channel n."""
+        if index >= len(self._table_list):
+            return
+        for group, ending in STREAM_RATE_PARAMETERS.items():
+            name = f"SR{index}_{ending}"
+            if name not in self.parameters:
+                continue
+            rate_hz = self.parameters.get(name)
+            interval_us = round(MICROSECONDS / rate_hz) if rate_hz > 0 else -1
+            for message_id in STREAM_GROUPS[group]:
+                self._table_list[index].set_default(message_id, interval_us, self._time_us)
+
+    def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
+        sources = TelemetrySources(
+            view=self._view,
+            context=self.context,
+            navigation=self.navigation,
+            controller=self.controller,
+            readings=self._readings,
+            heartbeat=self._status.heartbeat,
+            sys_status=self._status.sys_status,
+            mission_current=self._mission_current,
+            autopilot_version=self._status.autopilot_version,
+            battery_level=lambda: int(self.commander.battery_level),
+            unix_epoch_us=unix_epoch_us,
+        )
+        if self.flavour.name == "px4":
+            return Px4Messages(
+                sources, current_mode=self._status.current_mode, orbit=lambda: self.commander.tasks.orbit
+            )
+        return ArdupilotMessages(sources)
+
+    def _on_plan_changed(self, mission_type: MissionType) -> None:
+        if mission_type is MissionType.MISSION:
+            self._progress.complete = False
+
+    def _mission_current(self) -> bytes:
+        return self.missions.current_message().wire_payload()
+
+    def _on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
+        if self.flavour.name != "px4":
+            return {}
+        return {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES: self._send_available_modes}
+
+    def _send_available_modes(self, channel: Channel, index: float) -> None:
+        """AVAILABLE_MODES (435): one mode by index from 1, or all of them for 0."""
+        modes: Sequence[tuple[FlightMode, int]] = sorted(
+            self.flavour.custom_modes.items(), key=lambda item: item[1]
+        )
+        for number, (mode, custom_mode) in enumerate(modes, start=1):
+            if index in (0, number):
+                name = self.flavour.mode_names.get(mode, mode.value).encode()
+                channel.send(
+                    mavlink.MAVLink_available_modes_message(len(modes), number, 0, custom_mode, 0, name[:34])
+                )

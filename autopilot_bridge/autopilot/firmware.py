@@ -1,0 +1,85 @@
+"""What differs between the flavours in the autopilot's messages and services, gathered in one table."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rule, px4_address_rule
+from autopilot_bridge.services.message_interval import IntervalPolicy
+from autopilot_bridge.services.mission_policy import (
+    ARDUPILOT_MISSION_POLICY,
+    PX4_MISSION_POLICY,
+    MissionPolicy,
+)
+from autopilot_bridge.services.parameters import (
+    ARDUPILOT_PARAMETER_POLICY,
+    PX4_PARAMETER_POLICY,
+    ParameterPolicy,
+)
+from autopilot_bridge.telemetry import ardupilot, px4
+
+_ARDUPILOT_MAX_RATE_HZ: Final = 0.8 * 400.0  # of SCHED_LOOP_RATE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Firmware:
+    """Services of one flavour.
+
+    Attributes:
+        address: which targets are this autopilot, for everything but commands.
+        parameters, missions, intervals: habits of the services.
+        rates_hz: streams that run from the start, by role of the channel.
+        answers_ping: PING requests are answered.
+        position_pushed_at_arm: HOME_POSITION and GPS_GLOBAL_ORIGIN are sent once more at every arming.
+    """
+
+    address: Callable[[int], AddressRule]
+    parameters: ParameterPolicy
+    missions: MissionPolicy
+    intervals: IntervalPolicy
+    rates_hz: Mapping[str, Mapping[int, float]]
+    answers_ping: bool
+    position_pushed_at_arm: bool
+
+
+FIRMWARES: Final[Mapping[str, Firmware]] = MappingProxyType(
+    {
+        "px4": Firmware(
+            address=px4_address_rule,
+            parameters=PX4_PARAMETER_POLICY,
+            missions=PX4_MISSION_POLICY,
+            intervals=IntervalPolicy(
+                unknown_set=Result.FAILED,
+                unknown_get=Result.ACCEPTED,
+                unknown_request=Result.DENIED,
+                fixed=frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT}),
+                refuse_running=True,
+            ),
+            rates_hz=MappingProxyType({"onboard": px4.ONBOARD_RATES_HZ, "gcs": px4.GCS_RATES_HZ}),
+            answers_ping=True,
+            position_pushed_at_arm=False,
+        ),
+        "ardupilot": Firmware(
+            address=ardupilot_address_rule,
+            parameters=ARDUPILOT_PARAMETER_POLICY,
+            missions=ARDUPILOT_MISSION_POLICY,
+            intervals=IntervalPolicy(
+                unknown_set=Result.DENIED,
+                unknown_get=Result.FAILED,
+                unknown_request=Result.FAILED,
+                not_requestable=ardupilot.NOT_REQUESTABLE,
+                max_rate_hz=_ARDUPILOT_MAX_RATE_HZ,
+                groups=ardupilot.STREAM_GROUPS,
+                unknown_text="No ap_message for mavlink id ({})",
+                too_fast_text="Requested rate for message ID {} too fast. Increase SCHED_LOOP_RATE",
+            ),
+            rates_hz=MappingProxyType({"onboard": ardupilot.START_RATES_HZ, "gcs": ardupilot.START_RATES_HZ}),
+            answers_ping=False,
+            position_pushed_at_arm=True,
+        ),
+    }
+)

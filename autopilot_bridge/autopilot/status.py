@@ -1,0 +1,161 @@
+"""What the autopilot says of its own state: HEARTBEAT, SYS_STATUS, AUTOPILOT_VERSION, as each flavour fills them."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.commander import Commander
+from autopilot_bridge.commander.health import VehicleHealth
+from autopilot_bridge.flavours.flavour import Flavour, Identity, ModeDisplay
+from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.telemetry.streams import Values
+
+MAVLINK_VERSION: Final = 3
+PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorBits:
+    """SYS_STATUS bits of a healthy vehicle, from the reference pages; broken sensors are taken out of `health`."""
+
+    present: int
+    enabled: int
+    enabled_armed: int
+    health: int
+    health_armed: int
+
+
+SENSOR_BITS: Final = {
+    "px4": SensorBits(
+        present=0x0300402F,
+        enabled=0x0301402F,
+        enabled_armed=0x0301402F,
+        health=0x1320C83F,
+        health_armed=0x1320C83F,
+    ),
+    "ardupilot": SensorBits(
+        present=0x5371FC2F,
+        enabled=0x52619C2F,
+        enabled_armed=0x5361FC2F,
+        health=0x57719C2F,
+        health_armed=0x5771FC2F,
+    ),
+}
+
+
+class NavigationJudgement:
+    """The filter's health in the four words the commander asks for."""
+
+    __slots__ = ("_navigation",)
+
+    def __init__(self, navigation: NavigationFilter) -> None:
+        self._navigation = navigation
+
+    @property
+    def attitude_valid(self) -> bool:
+        """Roll and pitch are good."""
+        return self._navigation.health.attitude
+
+    @property
+    def altitude_valid(self) -> bool:
+        """The height is good."""
+        return self._navigation.health.position_vertical_absolute
+
+    @property
+    def velocity_valid(self) -> bool:
+        """The horizontal velocity is good."""
+        return self._navigation.health.velocity_horizontal
+
+    @property
+    def position_valid(self) -> bool:
+        """The horizontal position is good, on Earth."""
+        return self._navigation.health.position_horizontal_absolute
+
+
+class StatusReport:
+    """Fields of the status messages.
+
+    Args:
+        flavour: whose habits.
+        commander: mode, arming, failsafes.
+    """
+
+    def __init__(self, flavour: Flavour, commander: Commander) -> None:
+        self._flavour = flavour
+        self._commander = commander
+        self._bits = SENSOR_BITS[flavour.name]
+        self._boot_us = round(flavour.policy.boot_s * 1e6)
+
+    def heartbeat(self) -> Values:
+        """HEARTBEAT (0)."""
+        commander, flavour = self._commander, self._flavour
+        setpoints = commander.setpoints
+        display = ModeDisplay(
+            mode=commander.mode,
+            armed=commander.armed,
+            booted=commander.booted,
+            landed=commander.landed,
+            attitude_setpoints=setpoints.attitude_setpoints,
+            thrust_setpoints=setpoints.thrust_setpoints,
+        )
+        return (
+            flavour.vehicle_type,
+            flavour.autopilot,
+            flavour.base_mode(display),
+            flavour.custom_modes[commander.mode],
+            int(commander.system_status),
+            MAVLINK_VERSION,
+        )
+
+    def current_mode(self) -> Values:
+        """CURRENT_MODE (436): what is flown and what was asked for."""
+        modes = self._flavour.custom_modes
+        return (0, modes[self._commander.mode], modes[self._commander.commanded_mode])
+
+    def sys_status(self) -> tuple[int, int, int]:
+        """(present, enabled, health) of SYS_STATUS (1)."""
+        commander, bits = self._commander, self._bits
+        if commander.time_us < self._boot_us:
+            return (0, 0, 0)
+        health = bits.health_armed if commander.armed else bits.health
+        for bit, works in _sensors(commander.situation.health):
+            if not works:
+                health &= ~bit
+        if not (commander.armed or commander.armable):
+            health &= ~PREARM_CHECK
+        return (bits.present, bits.enabled_armed if commander.armed else bits.enabled, health)
+
+    def autopilot_version(self) -> Values:
+        """AUTOPILOT_VERSION (148)."""
+        return autopilot_version(self._flavour.identity)
+
+
+def _sensors(health: VehicleHealth) -> tuple[tuple[int, bool], ...]:
+    return (
+        (mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO, health.gyro),
+        (mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL, health.accelerometer),
+        (mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG, health.magnetometer),
+        (mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, health.barometer),
+        (mavlink.MAV_SYS_STATUS_SENSOR_GPS, health.gps and health.position),
+        (mavlink.MAV_SYS_STATUS_AHRS, health.attitude),
+        (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY, health.battery),
+    )
+
+
+def autopilot_version(identity: Identity) -> Values:
+    """Field values of AUTOPILOT_VERSION (148)."""
+    return (
+        identity.capabilities,
+        identity.flight_sw_version,
+        identity.middleware_sw_version,
+        identity.os_sw_version,
+        identity.board_version,
+        identity.flight_custom_version,
+        bytes(8),
+        bytes(8),
+        identity.vendor_id,
+        identity.product_id,
+        identity.uid,
+        identity.uid2,
+    )

@@ -1,0 +1,26 @@
+"""SITL: the runner that steps worlds and autopilots together, embedded or for clients on real links."""
+
+from autopilot_bridge.sitl.configuration import (
+    HOMES,
+    SitlConfiguration,
+    VehicleSpecification,
+    parse_home,
+    team,
+)
+from autopilot_bridge.sitl.ports import Port, default_ports
+from autopilot_bridge.sitl.server import PaceReport, SitlServer
+from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
+
+__all__ = [
+    "HOMES",
+    "PaceReport",
+    "Port",
+    "Sitl",
+    "SitlConfiguration",
+    "SitlServer",
+    "SitlVehicle",
+    "VehicleSpecification",
+    "default_ports",
+    "parse_home",
+    "team",
+]

@@ -1,0 +1,136 @@
+"""SITL for other people's clients: opens links, keeps pace with the wall clock, runs until told to stop."""
+
+import contextlib
+import select
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from autopilot_bridge.clock import RealTimeClock
+from autopilot_bridge.links import open_link
+from autopilot_bridge.sitl.ports import Port, default_ports
+from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
+
+_FREE_RUN_POLL_US: Final = 20_000
+_POLL_WALL_S: Final = 0.004
+_WAIT_S: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PaceReport:
+    """How well the server keeps pace.
+
+    Attributes:
+        time_us: vehicle time.
+        speedup: simulated seconds per wall second since the last report.
+        slipped_s: wall seconds given up in all because the machine was too slow.
+    """
+
+    time_us: int
+    speedup: float
+    slipped_s: float
+
+
+class SitlServer:
+    """Runs a `Sitl` for clients on real links.
+
+    Args:
+        sitl: the world.
+        speedup: simulated seconds per wall second; None: as fast as the machine can.
+        monotonic: wall clock, seconds.
+    """
+
+    def __init__(self, sitl: Sitl, *, speedup: float | None, monotonic: Callable[[], float]) -> None:
+        self.sitl = sitl
+        self._monotonic = monotonic
+        self._clock = (
+            None if speedup is None else RealTimeClock(speedup, monotonic=monotonic, wait=self._wait)
+        )
+        poll_us = _FREE_RUN_POLL_US if speedup is None else round(_POLL_WALL_S * speedup * 1e6)
+        sitl.poll_every(min(poll_us, _FREE_RUN_POLL_US))
+
+    def open(self, ports: Sequence[Sequence[Port]] | None = None) -> list[tuple[SitlVehicle, Port, str]]:
+        """Open the links of every vehicle.
+
+        Args:
+            ports: links per vehicle; None: where clients of each flavour look for them.
+
+        Returns:
+            (vehicle, port, address as opened) of every link.
+
+        Raises:
+            LinkError: a port is busy or a device missing; links opened before are closed again.
+        """
+        opened: list[tuple[SitlVehicle, Port, str]] = []
+        with contextlib.ExitStack() as undo:
+            undo.callback(self.sitl.close)
+            for index, vehicle in enumerate(self.sitl.vehicles):
+                chosen = (
+                    default_ports(vehicle.specification.flavour, index) if ports is None else ports[index]
+                )
+                for port in chosen:
+                    link = open_link(port.address, monotonic=self._monotonic)
+                    vehicle.open(link, role=port.role)
+                    opened.append((vehicle, port, link.description))
+            undo.pop_all()
+        return opened
+
+    def wait_for_client(self, stopped: Callable[[], bool]) -> bool:
+        """Wait until somebody has connected to the first link (ArduPilot's `tcp:0:wait`); False when stopped."""
+        link = self.sitl.vehicles[0].channels[0].link
+        while not link.peers:
+            if stopped():
+                return False
+            with contextlib.suppress(InterruptedError):
+                select.select(link.filenos(), (), (), _WAIT_S)
+            self.sitl.vehicles[0].poll()
+        return True
+
+    def run(
+        self,
+        stopped: Callable[[], bool],
+        *,
+        report: Callable[[PaceReport], None] | None = None,
+        report_every_s: float = 1.0,
+        until_us: int | None = None,
+    ) -> None:
+        """Advance until `stopped()` or until vehicle time `until_us`."""
+        sitl, clock, monotonic = self.sitl, self._clock, self._monotonic
+        last_s, last_us = monotonic(), sitl.time_us
+        while not stopped() and (until_us is None or sitl.time_us < until_us):
+            sitl.advance()
+            if clock is not None:
+                clock.wait_until(sitl.time_us)
+            if report is None:
+                continue
+            now_s = monotonic()
+            if now_s - last_s >= report_every_s:
+                speed = (sitl.time_us - last_us) * 1e-6 / (now_s - last_s)
+                report(PaceReport(time_us=sitl.time_us, speedup=speed, slipped_s=self.slipped_s))
+                last_s, last_us = now_s, sitl.time_us
+
+    @property
+    def slipped_s(self) -> float:
+        """Wall seconds given up in all."""
+        return 0.0 if self._clock is None else self._clock.slipped_s
+
+    def _wait(self, seconds: float) -> None:
+        """Sleep, but hand over at once what arrives meanwhile: replies should not wait for the next step."""
+        deadline_s = self._monotonic() + seconds
+        while True:
+            left_s = deadline_s - self._monotonic()
+            if left_s <= 0.0:
+                return
+            descriptors = [
+                number
+                for vehicle in self.sitl.vehicles
+                for channel in vehicle.channels
+                for number in channel.link.filenos()
+            ]
+            try:
+                ready, _, _ = select.select(descriptors, (), (), left_s)
+            except (InterruptedError, ValueError, OSError):  # a descriptor went away between the two calls
+                return
+            if ready:
+                for vehicle in self.sitl.vehicles:
+                    vehicle.poll()

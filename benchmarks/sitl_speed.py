@@ -1,0 +1,170 @@
+"""How fast the whole SITL runs: simulated seconds per wall second, beside JSBSim alone on the same model.
+
+    python benchmarks/sitl_speed.py [--seconds 120]
+
+One process, warm (everything compiled and flown once before the clock starts). A quadrotor hovers and flies
+streamed setpoints at 250 Hz physics under the px4 flavour; its default onboard telemetry goes over a memory link and, with
+the truth, into a log, as `flightstack fly` does it. Then the same for 2, 4 and 8 vehicles in one world, and where the
+time of one vehicle goes.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
+from autopilot_bridge.tlog import TlogWriter
+
+PHYSICS_RATE_HZ = 250
+SETPOINT_INTERVAL_US = 20_000
+
+
+class Flight:
+    """A team in the air with a client on each vehicle, everything logged."""
+
+    def __init__(self, vehicles: int, log: Path) -> None:
+        self.sitl = Sitl(
+            SitlConfiguration(vehicles=team(vehicles, model="iris", flavour="px4", parameters={}), seed=1)
+        )
+        self.log = TlogWriter(log)
+        self.frames = 0
+        self.links = [self.sitl.connect(index) for index in range(vehicles)]
+        self.encoder = FrameEncoder(255, 190)
+        for link in self.links:
+            link.on_receive = self._record
+        self.sitl.on_truth(lambda time_us, frame: self.log.write(time_us, frame))
+        self._next_setpoint_us = 0
+
+    def _record(self, frame: bytes) -> None:
+        self.frames += 1
+        self.log.write(self.sitl.time_us, frame)
+
+    def take_off(self) -> None:
+        """Arm, take off, enter OFFBOARD."""
+        self.run(8.0)
+        for index, link in enumerate(self.links):
+            command = mavlink.MAVLink_command_long_message
+            link.send(self.encoder.encode(command(index + 1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)))
+        self.run(0.5, setpoints=True)
+        for index, link in enumerate(self.links):
+            link.send(self.encoder.encode(command(index + 1, 1, 176, 0, 1, 6, 0, 0, 0, 0, 0)))
+        self.run(12.0, setpoints=True)
+        for vehicle in self.sitl.vehicles:
+            height_m = -float(vehicle.autopilot.navigation.state[12])
+            assert height_m > 8.0, f"vehicle {vehicle.specification.system_id} is at {height_m:.1f} m"
+
+    def run(self, seconds: float, *, setpoints: bool = False) -> None:
+        """Advance by vehicle seconds."""
+        sitl = self.sitl
+        end_us = sitl.time_us + round(seconds * 1e6)
+        while sitl.time_us < end_us:
+            if setpoints and sitl.time_us >= self._next_setpoint_us:
+                self._next_setpoint_us = sitl.time_us + SETPOINT_INTERVAL_US
+                self._send_setpoints()
+            sitl.advance()
+
+    def _send_setpoints(self) -> None:
+        for index, link in enumerate(self.links):
+            message = mavlink.MAVLink_set_position_target_local_ned_message(
+                0, index + 1, 1, mavlink.MAV_FRAME_LOCAL_NED, 0xDF8, 0.0, 5.0 * index, -10.0, *(0.0,) * 8
+            )
+            link.send(self.encoder.encode(message))
+
+    def close(self) -> None:
+        """Close links and log."""
+        self.sitl.close()
+        self.log.close()
+
+
+def timed(action: Callable[[], object]) -> float:
+    """Wall seconds of a call."""
+    start_s = time.perf_counter()
+    action()
+    return time.perf_counter() - start_s
+
+
+def repeated(step: Callable[[], object], count: int) -> float:
+    """Microseconds per call."""
+
+    def loop() -> None:
+        for _ in range(count):
+            step()
+
+    return timed(loop) / count * 1e6
+
+
+def jsbsim_alone(seconds: float) -> float:
+    """Simulated seconds per wall second of JSBSim's own `run` on our model, hovering."""
+    sitl = Sitl(SitlConfiguration())
+    run = sitl.vehicles[0].vehicle._fdm.run  # the bare library call
+    return 1e6 / PHYSICS_RATE_HZ / repeated(run, round(seconds * PHYSICS_RATE_HZ))
+
+
+def where_time_goes(flight: Flight, seconds: float) -> dict[str, float]:
+    """Microseconds per physics step of each part, called by itself on the flying vehicle."""
+    vehicle = flight.sitl.vehicles[0]
+    autopilot = vehicle.autopilot
+    count = round(seconds * PHYSICS_RATE_HZ)
+    step_us = flight.sitl.step_us
+    clock = [flight.sitl.time_us]
+
+    def timed_step(step: Callable[[int], object]) -> Callable[[], None]:
+        def advance() -> None:
+            clock[0] += step_us
+            step(clock[0])
+
+        return advance
+
+    parts = {
+        "JSBSim": repeated(vehicle.vehicle._fdm.run, count),
+        "vehicle (JSBSim included)": repeated(lambda: vehicle.vehicle.step(autopilot.actuators), count),
+        "sensors": repeated(timed_step(vehicle.sensors.step), count),
+        "navigation filter": repeated(timed_step(autopilot.navigation.step), count),
+        "control laws": repeated(autopilot.controller.step, count),
+    }
+    return parts
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--seconds", type=float, default=120.0, help="vehicle seconds per measurement")
+    seconds = parser.parse_args().seconds
+    with tempfile.TemporaryDirectory() as folder:
+        base = jsbsim_alone(seconds)
+        print(f"JSBSim alone, one quadrotor, {PHYSICS_RATE_HZ} Hz: {base:6.0f} simulated s per wall s")
+        print(
+            f"{'vehicles':>8} {'sim s / wall s':>15} {'vehicle s / wall s':>19} {'of JSBSim alone':>16} {'messages/s':>11}"
+        )
+        for vehicles in (1, 2, 4, 8):
+            flight = Flight(vehicles, Path(folder) / f"{vehicles}.tlog")
+            flight.take_off()
+            before = flight.frames
+            wall_s = timed(lambda flight=flight: flight.run(seconds, setpoints=True))
+            speed = seconds / wall_s
+            rate = (flight.frames - before) / seconds / vehicles
+            print(
+                f"{vehicles:>8} {speed:>15.0f} {speed * vehicles:>19.0f} {speed * vehicles / base:>15.0%} {rate:>11.0f}"
+            )
+            if vehicles == 1:
+                one = flight
+                step_us = wall_s / seconds / PHYSICS_RATE_HZ * 1e6
+            else:
+                flight.close()
+        parts = where_time_goes(one, seconds)
+        print(f"\none vehicle: {step_us:.1f} us per physics step, of which")
+        for name, cost_us in parts.items():
+            print(f"  {name:<28} {cost_us:5.1f} us")
+        measured = sum(cost for name, cost in parts.items() if name != "JSBSim")
+        print(f"  {'slow loop, MAVLink, log':<28} {step_us - measured:5.1f} us (the rest)")
+        one.close()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""`flightstack sitl`: vehicles for other people's clients."""
+
+import signal
+import sys
+from types import FrameType
+
+import click
+
+from autopilot_bridge.errors import BridgeError
+
+
+def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...], count: int):  # type: ignore[no-untyped-def]
+    """Links per vehicle from the options; None when the flavour's own are to be opened."""
+    from autopilot_bridge.links import parse_address
+    from autopilot_bridge.sitl import Port
+
+    if not links and not gcs_links:
+        return None
+    if count > 1:
+        raise click.UsageError("--link and --gcs-link name links of one vehicle; leave them out with --count")
+    chosen = [Port(parse_address(link), "onboard") for link in links]
+    chosen += [Port(parse_address(link), "gcs") for link in gcs_links]
+    return [chosen]
+
+
+@click.command()
+@click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
+@click.option("--model", default="iris", show_default=True, help="One of our models, or a path.")
+@click.option("--count", type=click.IntRange(1, 250), default=1, show_default=True, help="Vehicles.")
+@click.option(
+    "--speedup",
+    type=click.FloatRange(min=0.0),
+    default=1.0,
+    show_default=True,
+    help="Simulated seconds per wall second; 0: as fast as possible.",
+)
+@click.option("--link", "links", multiple=True, help="Link with onboard streams instead of the usual ports.")
+@click.option("--gcs-link", "gcs_links", multiple=True, help="Link with ground-station streams.")
+@click.option("--home", help="lat,lon,alt[,heading]; default: where the firmware's own SITL stands.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--wind", default="0", show_default=True, help="Speed in m/s, with @DEG where it comes from.")
+@click.option(
+    "--turbulence",
+    type=click.Choice(["none", "light", "moderate", "severe"]),
+    default="none",
+    show_default=True,
+)
+@click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
+@click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
+@click.option(
+    "--duration", type=click.FloatRange(min=0.0), help="Stop after so many seconds of vehicle time."
+)
+def sitl(
+    autopilot: str,
+    model: str,
+    count: int,
+    speedup: float,
+    links: tuple[str, ...],
+    gcs_links: tuple[str, ...],
+    home: str | None,
+    seed: int,
+    wind: str,
+    turbulence: str,
+    params: str | None,
+    no_wait: bool,
+    duration: float | None,
+) -> None:
+    """SITL for other people's clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
+
+    Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
+    """
+    click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
+    from autopilot_bridge.clock.pacing import wall_time_s
+    from autopilot_bridge.sitl import PaceReport, Sitl, SitlConfiguration, SitlServer, parse_home, team
+    from flightsim.environment import Environment
+    from missions.options import parameters_from_file, parse_wind
+
+    stop: list[int] = []
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        stop.append(number)
+
+    try:
+        ports = _ports(links, gcs_links, count)
+        wind_speed_m_s, wind_from_deg = parse_wind(wind)
+        world = Sitl(
+            SitlConfiguration(
+                vehicles=team(
+                    count,
+                    model=model,
+                    flavour=autopilot,
+                    parameters={} if params is None else parameters_from_file(params),
+                ),
+                home=None if home is None else parse_home(home),
+                environment=Environment.from_wind(
+                    speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
+                ),
+                seed=seed,
+            )
+        )
+        server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
+        opened = server.open(ports)
+    except (ValueError, OSError, BridgeError) as error:
+        raise click.ClickException(str(error)) from error
+    signal.signal(signal.SIGINT, on_signal)
+    signal.signal(signal.SIGTERM, on_signal)
+    for vehicle, port, address in opened:
+        system_id = vehicle.specification.system_id
+        click.echo(f"vehicle {system_id} ({autopilot} {vehicle.specification.model}): {address} {port.role}")
+    click.echo("ready, Ctrl-C ends it")
+    sys.stdout.flush()
+    waits = autopilot == "ardupilot" and ports is None and not no_wait
+    if waits:
+        click.echo(f"waiting for a client on {opened[0][2]}", err=True)
+        if not server.wait_for_client(lambda: bool(stop)):
+            return
+
+    def report(pace: PaceReport) -> None:
+        click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
+
+    try:
+        server.run(
+            lambda: bool(stop),
+            report=report if sys.stderr.isatty() else None,
+            until_us=None if duration is None else round(duration * 1e6),
+        )
+    finally:
+        world.close()
+    lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
+    click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")

@@ -1,0 +1,114 @@
+"""An embedded SITL: the world in this process, on virtual time, one memory link per vehicle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from autopilot_bridge.clock import VirtualTimeLoop
+from autopilot_bridge.links import Link
+from autopilot_bridge.sitl import Sitl, SitlConfiguration, parse_home, team
+from autopilot_bridge.sitl.configuration import FIXED_EPOCH_UNIX_US
+from autopilot_bridge.sitl.sitl import TruthListener
+from flightsim.environment import Environment
+
+MAX_FLIGHT_S = 24 * 3600.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EmbeddedConfiguration:
+    """A world for a mission to fly in.
+
+    Attributes:
+        vehicles: how many, with system ids 1, 2, ...
+        model: one of our models by name, or a path.
+        flavour: "px4" or "ardupilot".
+        seed: one seed makes one flight.
+        physics_rate_hz: steps per second of vehicle time.
+        speedup: simulated seconds per wall second at most; None: as fast as the machine can.
+        wind_speed_m_s, wind_from_deg: steady wind.
+        turbulence: "none", "light", "moderate" or "severe".
+        parameters: autopilot parameters that differ from the flavour's defaults.
+        home: "lat,lon,alt[,heading]"; None: where the flavour's own SITL stands.
+        max_flight_s: vehicle time after which a run that has not ended fails.
+    """
+
+    vehicles: int = 1
+    model: str | Path = "iris"
+    flavour: str = "px4"
+    seed: int = 0
+    physics_rate_hz: int = 250
+    speedup: float | None = None
+    wind_speed_m_s: float = 0.0
+    wind_from_deg: float = 0.0
+    turbulence: str = "none"
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    home: str | None = None
+    max_flight_s: float = MAX_FLIGHT_S
+
+    def __post_init__(self) -> None:
+        if self.speedup is not None and not 0.0 < self.speedup < float("inf"):
+            raise ValueError(f"speed factor {self.speedup} is not accepted; give a number above 0")
+
+
+class EmbeddedSitl:
+    """A world, the event loop whose time it is, and a link to each vehicle.
+
+    Attributes:
+        sitl: the world.
+        loop: run the mission on it (`autopilot_bridge.clock.run`).
+        links: the missions' ends, one per vehicle.
+    """
+
+    log_epoch_unix_us = FIXED_EPOCH_UNIX_US
+
+    def __init__(self, configuration: EmbeddedConfiguration) -> None:
+        self.sitl = Sitl(
+            SitlConfiguration(
+                vehicles=team(
+                    configuration.vehicles,
+                    model=configuration.model,
+                    flavour=configuration.flavour,
+                    parameters=configuration.parameters,
+                ),
+                home=None if configuration.home is None else parse_home(configuration.home),
+                environment=Environment.from_wind(
+                    speed_m_s=configuration.wind_speed_m_s,
+                    from_deg=configuration.wind_from_deg,
+                    turbulence=configuration.turbulence,
+                ),
+                seed=configuration.seed,
+                physics_rate_hz=configuration.physics_rate_hz,
+            )
+        )
+        self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
+        sitl = self.sitl
+        self.loop = VirtualTimeLoop(
+            sitl.advance,
+            lambda: sitl.time_us,
+            speedup=configuration.speedup,
+            max_time_us=round(configuration.max_flight_s * 1e6),
+        )
+
+    @property
+    def time_us(self) -> int:
+        """Vehicle time, microseconds since boot."""
+        return self.sitl.time_us
+
+    def on_truth(self, listener: TruthListener) -> None:
+        """Have frames of truth delivered at 50 Hz, for the log and the score."""
+        self.sitl.on_truth(listener)
+
+    def close(self) -> None:
+        """Close every link."""
+        self.sitl.close()
+        for link in self.links:
+            link.close()
+
+
+def open_embedded(configuration: EmbeddedConfiguration) -> EmbeddedSitl:
+    """Build the world; nothing moves before the loop runs.
+
+    Raises:
+        ValueError: a value that the message names, with what is accepted.
+    """
+    return EmbeddedSitl(configuration)
