@@ -39,7 +39,8 @@ class MulticopterParameters:
     """Parameters of `MulticopterController`.
 
     Torques and thrust are normalised as in PX4: 1 is what the motors can give at most. Defaults are PX4's where
-    PX4 has them, except the horizontal position loop and the thrust curve, which are tuned for the iris model.
+    PX4 has them, except the horizontal position loop, the yaw
+    rate loop and the thrust curve, which are tuned for the iris model.
 
     Raises:
         ValueError: a field is not finite or outside its range.
@@ -88,8 +89,8 @@ class MulticopterParameters:
     rate_pitch_ff: float = 0.0  # MC_PITCHRATE_FF
     rate_pitch_k: float = 1.0  # MC_PITCHRATE_K
     rate_pitch_integral_max: float = 0.3  # MC_PR_INT_LIM
-    rate_yaw_p: float = 0.2  # MC_YAWRATE_P
-    rate_yaw_i: float = 0.1  # MC_YAWRATE_I
+    rate_yaw_p: float = 0.45  # MC_YAWRATE_P
+    rate_yaw_i: float = 0.15  # MC_YAWRATE_I
     rate_yaw_d: float = 0.0  # MC_YAWRATE_D
     rate_yaw_ff: float = 0.0  # MC_YAWRATE_FF
     rate_yaw_k: float = 1.0  # MC_YAWRATE_K

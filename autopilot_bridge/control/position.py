@@ -224,10 +224,6 @@ def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, ent
         pull = GRAVITY_M_S2 * s[c.THRUST_GIVEN] / hover
         s[c.BUMP] = -zx * pull + s[c.DRAG] - ax
         s[c.BUMP + 1] = -zy * pull + s[c.DRAG + 1] - ay
-        size = math.sqrt(s[c.BUMP] * s[c.BUMP] + s[c.BUMP + 1] * s[c.BUMP + 1])
-        if size > 10.0:
-            s[c.BUMP] *= 10.0 / size
-            s[c.BUMP + 1] *= 10.0 / size
     up = vertical_control(nav, sp, p, s, dt, entering)
     ax += s[c.BUMP]
     ay += s[c.BUMP + 1]

@@ -138,7 +138,12 @@ def _follow_leg(s: Array, start: Array, end: Array, end_speed: float, lim: Array
             room = _room(along, s[3] * ux + s[4] * uy, s[6] * ux + s[7] * uy, lim[JERK])
             v = min(speed, braking_speed(room, end_speed, lim[ACC], lim[JERK], gain))
             off = abs(cross)
-            v_cross = min(0.7 * max(v, 1.0), braking_speed(off, 0.0, lim[ACC], lim[JERK], gain))
+            closing, pull = 0.0, 0.0
+            if off > 1e-6:
+                closing = (s[3] * px + s[4] * py) / off
+                pull = (s[6] * px + s[7] * py) / off
+            back = _room(off, closing, pull, lim[JERK])
+            v_cross = min(0.7 * max(v, 1.0), braking_speed(back, 0.0, 0.7 * lim[ACC], lim[JERK], gain))
             v_along = math.sqrt(max(0.0, v * v - v_cross * v_cross))
             vx, vy = v_along * ux, v_along * uy
             if off > 1e-6:

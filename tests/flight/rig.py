@@ -64,7 +64,9 @@ class Rig:
         self.ctx.home_ned_m[:] = 0.0
         self.ctx.home_yaw_rad = 0.0
         self.ctx.armed = True
-        self.detector = LandDetector()
+        self.detector = LandDetector(on_ground=height_m is None)
+        self.ctx.landed_state = self.detector.state
+        self.ctx.ground_contact = self.ctx.maybe_landed = height_m is None
         self.slow_steps = physics_rate_hz // 50
         self._steps = 0
         self.task: FlightTask | None = None

@@ -1,0 +1,96 @@
+"""Cost of the control laws: `MulticopterController.step` per physics step and flight tasks per 50 Hz update.
+
+python benchmarks/control.py
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from autopilot_bridge.control import MulticopterController
+from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.flight import (
+    FlightContext,
+    GotoTask,
+    HoldTask,
+    LandDetector,
+    LandedState,
+    MissionTask,
+    OffboardTask,
+    OrbitTask,
+)
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mission_plan import MissionItem, MissionStore
+from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.navigation.layout import NAV_SIZE
+
+
+def mean_us(call: Callable[[], object], repeats: int) -> float:
+    """Mean time of a call, microseconds; the best of five rounds."""
+    call()
+    best = float("inf")
+    for _ in range(5):
+        start = time.perf_counter()
+        for _ in range(repeats):
+            call()
+        best = min(best, time.perf_counter() - start)
+    return best / repeats * 1e6
+
+
+def flying_context() -> FlightContext:
+    """A context of a vehicle that hovers at the origin."""
+    nav = np.zeros(NAV_SIZE)
+    nav[0] = 1.0
+    nav[24] = -9.81
+    ctx = FlightContext(nav=nav)
+    health = NavigationHealth()
+    health.position_horizontal_absolute = health.velocity_horizontal = True
+    health.position_vertical_absolute = health.velocity_vertical = True
+    ctx.health = health
+    ctx.home_ned_m[:] = 0.0
+    ctx.armed = True
+    ctx.landed_state = LandedState.IN_AIR
+    ctx.frame = LocalFrame(GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=490.0))
+    return ctx
+
+
+def main() -> None:
+    """Print one line per measurement."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--repeats", type=int, default=20_000)
+    repeats = parser.parse_args().repeats
+    ctx = flying_context()
+    controller = MulticopterController(physics_rate_hz=250.0, nav=ctx.nav)
+    controller.setpoint[:] = np.nan
+    controller.setpoint[sp.POS_NED_M] = 0.0
+    controller.setpoint[sp.YAW_RAD] = 0.0
+    controller.setpoint[sp.LEVEL] = sp.TRAJECTORY
+    lines = [("controller.step", mean_us(controller.step, 5 * repeats))]
+
+    assert ctx.frame is not None
+    lat, lon, _ = ctx.frame.geodetic_from_ned(500.0, 0.0, 0.0)
+    store = MissionStore()
+    store.replace((MissionItem(command=16, x=lat, y=lon, z=10.0),), 1)
+    offboard = OffboardTask()
+    offboard.set_trajectory((0.0, 0.0, -1.0))
+    tasks = {
+        "HoldTask": HoldTask(),
+        "GotoTask": GotoTask(np.array([500.0, 0.0, -10.0])),
+        "MissionTask": MissionTask(store),
+        "OrbitTask": OrbitTask(np.zeros(3), 20.0, 3.0),
+        "OffboardTask": offboard,
+    }
+    for name, task in tasks.items():
+        task.activate(ctx)
+        lines.append((f"{name}.update", mean_us(lambda task=task: task.update(ctx), repeats)))  # type: ignore[misc]
+    detector = LandDetector(on_ground=False)
+    lines.append(("LandDetector.update", mean_us(lambda: detector.update(ctx, 0.45), repeats)))
+    for name, us in lines:
+        sys.stdout.write(f"{name:24s} {us:8.2f} us\n")
+
+
+if __name__ == "__main__":
+    main()
