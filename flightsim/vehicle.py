@@ -18,6 +18,8 @@ from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.rotations import quaternion_from_euler
 from flightsim.turbulence import DrydenTurbulence
 
+__all__ = ["InitialState", "Vehicle", "VehicleDivergedError"]
+
 Array = NDArray[np.float64]
 
 _FT: Final = 0.3048
