@@ -278,8 +278,7 @@ class Commander:
     def check_arming(self) -> tuple[Reason, ...]:
         """Run the arming checks now and announce what fails."""
         self._refresh()
-        reasons = arming_reasons(self.commanded_mode, self.situation, self.policy, self.parameters)
-        self.arming_reasons = reasons
+        reasons = self._check_arming()
         if reasons:
             self.emit(
                 ArmingDenied(time_us=self.time_us, mode=self.commanded_mode, reasons=reasons, check_only=True)
@@ -319,16 +318,20 @@ class Commander:
         self._follow_landing()
         self._follow_battery()
         self._auto_disarm()
-        if not self.armed and self._ticks % _CHECK_EVERY == 0:
-            self.arming_reasons = arming_reasons(
-                self.commanded_mode, self.situation, self.policy, self.parameters
-            )
+        if not self.armed and self._ticks % _CHECK_EVERY == 1:
+            self._check_arming()
             self._report_prearm()
         self._events.extend(self.failsafes.update(self.situation, self.parameters))
         self._take_over_by_sticks()
         self._select()
         self.tasks.update()
         self._follow_task()
+
+    def _check_arming(self) -> tuple[Reason, ...]:
+        self.arming_reasons = arming_reasons(
+            self.commanded_mode, self.situation, self.policy, self.parameters
+        )
+        return self.arming_reasons
 
     def _refresh(self) -> None:
         """Bring the situation up to date."""
@@ -380,6 +383,8 @@ class Commander:
         self._sticks_at_command = self.context.sticks
         if mode in self.policy.kept_after_disarm:
             self._mode_after_disarm = mode
+        if not self.armed:
+            self._check_arming()
 
     def _select(self) -> None:
         """Fly the commanded mode, or what the strongest failsafe asks for."""

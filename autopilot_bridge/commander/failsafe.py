@@ -79,7 +79,7 @@ class FailsafeMonitor:
                 if active.present:
                     events.append(FailsafeCleared(time_us=time_us, kind=kind))
                 active.present = False
-                latched = kind in _LATCHING and active.action >= FailsafeAction.RETURN
+                latched = self._keeps_mode and kind in _LATCHING and active.action >= FailsafeAction.RETURN
                 if not latched or active.overridden or not situation.armed:
                     del self._active[kind]
         return events

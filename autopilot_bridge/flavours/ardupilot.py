@@ -80,6 +80,7 @@ POLICY: Final = CommanderPolicy(
     arming_denied=Result.FAILED,
     mode_denied=Result.FAILED,
     disarm_in_air_denied=Result.FAILED,
+    gcs_needed_to_arm=False,
     force_arm_skips_checks=True,
 )
 

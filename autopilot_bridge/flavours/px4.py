@@ -69,6 +69,7 @@ POLICY: Final = CommanderPolicy(
     arming_denied=Result.TEMPORARILY_REJECTED,
     mode_denied=Result.TEMPORARILY_REJECTED,
     disarm_in_air_denied=Result.TEMPORARILY_REJECTED,
+    gcs_needed_to_arm=True,
     force_arm_skips_checks=False,
 )
 

@@ -69,8 +69,6 @@ FLIGHT: Final = (
     FieldMap("spoolup_time_s", "COM_SPOOLUP_TIME", low=0.0, high=30.0),
     FieldMap("land_speed_m_s", "MPC_LAND_SPEED", low=0.2, high=3.0),
     FieldMap("land_descend_speed_m_s", "MPC_Z_V_AUTO_DN", low=0.2, high=4.0),
-    FieldMap("land_slow_altitude_m", "MPC_LAND_ALT2", low=0.1, high=100.0),
-    FieldMap("land_fast_altitude_m", "MPC_LAND_ALT1", low=0.1, high=100.0),
     FieldMap("return_altitude_m", "RTL_RETURN_ALT", low=0.1, high=500.0),
     FieldMap("return_descend_altitude_m", "RTL_DESCEND_ALT", low=0.0, high=500.0),
     FieldMap("return_loiter_time_s", "RTL_LAND_DELAY", low=-1.0, high=3600.0),
@@ -84,7 +82,7 @@ FLIGHT: Final = (
     FieldMap("manual_yaw_rate_rad_s", "MPC_MAN_Y_MAX", _DEG, low=0.01, high=7.0),
     FieldMap("acro_rate_rad_s", "MC_ACRO_R_MAX", _DEG, low=0.1, high=30.0),
     FieldMap("acro_yaw_rate_rad_s", "MC_ACRO_Y_MAX", _DEG, low=0.1, high=30.0),
-    FieldMap("manual_throttle_min", "MPC_MANTHR_MIN", low=0.0, high=0.9),
+    FieldMap("manual_throttle_min", "MPC_MANTHR_MIN", low=0.01, high=0.9),
     FieldMap("manual_deadzone", "MPC_HOLD_DZ", low=0.0, high=0.9),
     FieldMap("manual_expo", "MPC_XY_MAN_EXPO", low=0.0, high=1.0),
 )
@@ -195,7 +193,16 @@ def flight_parameters(store: ParameterStore) -> FlightParameters:
     """MPC_*, MIS_*, RTL_*, NAV_*."""
     yaw_mode = integer(store, "MPC_YAW_MODE", 0)
     yaw = {0: YawBehaviour.TOWARDS_TARGET, 3: YawBehaviour.ALONG_TRACK, 4: YawBehaviour.TOWARDS_TARGET}
-    return build(FlightParameters, store, FLIGHT, yaw_behaviour=yaw.get(yaw_mode, YawBehaviour.KEEP))
+    slow_m = clamp(number(store, "MPC_LAND_ALT2", 5.0), 0.1, 100.0)
+    fast_m = clamp(number(store, "MPC_LAND_ALT1", 10.0), slow_m, 100.0)
+    return build(
+        FlightParameters,
+        store,
+        FLIGHT,
+        yaw_behaviour=yaw.get(yaw_mode, YawBehaviour.KEEP),
+        land_slow_altitude_m=slow_m,
+        land_fast_altitude_m=fast_m,
+    )
 
 
 def controller_parameters(store: ParameterStore) -> MulticopterParameters:
