@@ -336,6 +336,7 @@ class Autopilot:
             mission_current=self._mission_current,
             autopilot_version=self._status.autopilot_version,
             battery_level=lambda: int(self.commander.battery_level),
+            position_ready=lambda: self.commander.situation.position,
             unix_epoch_us=unix_epoch_us,
         )
         if self.flavour.name == "px4":

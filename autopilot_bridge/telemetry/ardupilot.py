@@ -177,7 +177,7 @@ class ArdupilotMessages(CommonMessages):
         """EKF_STATUS_REPORT (193); variances are innovation test ratios, 1 at the gate."""
         health = self.sources.navigation.health
         return (
-            ekf_flags(health),
+            ekf_flags(health, position_ready=self.sources.position_ready()),
             finite(health.velocity_test_ratio),
             finite(health.position_horizontal_test_ratio),
             finite(health.position_vertical_test_ratio),
@@ -236,21 +236,23 @@ def finite(value: float) -> float:
     return value if math.isfinite(value) else 0.0
 
 
-def ekf_flags(health: NavigationHealth) -> int:
-    """EKF_STATUS_FLAGS of the filter's health; 831 (0x33F) is ready."""
+def ekf_flags(health: NavigationHealth, *, position_ready: bool) -> int:
+    """EKF_STATUS_FLAGS of the filter's health; 167 before the position is taken into use, 831 when it is."""
     if not health.attitude:
         return int(_M.EKF_UNINITIALIZED)
+    horizontal = position_ready and health.position_horizontal_absolute
+    waiting = health.constant_position or not position_ready
     flags = 0
     for bit, is_set in (
         (_M.EKF_ATTITUDE, health.attitude),
-        (_M.EKF_VELOCITY_HORIZ, health.velocity_horizontal or health.constant_position),
+        (_M.EKF_VELOCITY_HORIZ, health.velocity_horizontal or waiting),
         (_M.EKF_VELOCITY_VERT, health.velocity_vertical),
-        (_M.EKF_POS_HORIZ_REL, health.position_horizontal_relative),
-        (_M.EKF_POS_HORIZ_ABS, health.position_horizontal_absolute),
+        (_M.EKF_POS_HORIZ_REL, position_ready and health.position_horizontal_relative),
+        (_M.EKF_POS_HORIZ_ABS, horizontal),
         (_M.EKF_POS_VERT_ABS, health.position_vertical_absolute),
-        (_M.EKF_CONST_POS_MODE, health.constant_position),
-        (_M.EKF_PRED_POS_HORIZ_REL, health.predicted_position_horizontal_relative),
-        (_M.EKF_PRED_POS_HORIZ_ABS, health.predicted_position_horizontal_absolute),
+        (_M.EKF_CONST_POS_MODE, waiting),
+        (_M.EKF_PRED_POS_HORIZ_REL, horizontal),
+        (_M.EKF_PRED_POS_HORIZ_ABS, horizontal),
         (_M.EKF_GPS_GLITCHING, health.gps_glitch),
     ):
         if is_set:

@@ -30,7 +30,7 @@ class TelemetrySources:
         mission_current: packed payload of MISSION_CURRENT.
         autopilot_version: field values of AUTOPILOT_VERSION.
         battery_level: MAV_BATTERY_CHARGE_STATE.
-        hover_thrust: collective at hover, 0..1.
+        position_ready: the position may be flown on (the boot timeline is over and the filter has one).
         unix_epoch_us: Unix time of boot, microseconds.
     """
 
@@ -44,6 +44,7 @@ class TelemetrySources:
     mission_current: Callable[[], bytes]
     autopilot_version: Callable[[], Values]
     battery_level: Callable[[], int]
+    position_ready: Callable[[], bool]
     unix_epoch_us: int
 
 
