@@ -68,7 +68,8 @@ class FlightNotes:
     def end(self, time_us: int) -> None:
         """End the phase that is going on."""
         if self._open is not None:
-            self.phases.append(Phase(name=self._open[0], start_us=self._open[1], end_us=time_us))
+            if time_us > self._open[1]:
+                self.phases.append(Phase(name=self._open[0], start_us=self._open[1], end_us=time_us))
             self._open = None
 
     def phase(self, name: str) -> Phase | None:

@@ -19,6 +19,7 @@ _COMMANDED: Final = "#9aa3af"
 _COLOURS: Final = ("#1769aa", "#c2410c", "#15803d", "#7c3aed", "#b91c1c", "#0e7490")
 _TRUTH: Final = "#111827"
 _INK: Final = "#1f2937"
+_LEAST_SPAN_M: Final = 10.0
 _GRID: Final = "#e5e7eb"
 _PHASE: Final = "#f3f4f6"
 
@@ -129,6 +130,9 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
         handles=handles, loc="upper center", bbox_to_anchor=(0.5, 1.07 if one_row else 1.1),
         ncols=len(handles) if one_row else 4, fontsize=8, frameon=False, handlelength=1.6, columnspacing=1.2,
     )  # fmt: skip
+    middle = axes.dataLim.get_points().mean(axis=0) if axes.dataLim.width >= 0.0 else np.zeros(2)
+    axes.update_datalim([middle - _LEAST_SPAN_M / 2, middle + _LEAST_SPAN_M / 2])
+    axes.autoscale_view()
     box = axes.dataLim
     _draw_scale(axes, max(box.width, box.height, 1.0))
 

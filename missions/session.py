@@ -300,6 +300,7 @@ async def _prepare(vehicle: Vehicle, request: RunRequest) -> None:
 
 
 async def _fly_one(mission: Mission, vehicle: Vehicle, options: FlightOptions, request: RunRequest) -> None:
+    vehicle.notes.begin("flight", vehicle.clock.time_us)  # until the mission names a phase of its own
     async with vehicle.safe_on_exit(request.on_failure):
         await mission.fly(vehicle, options)
         vehicle.notes.progress = 1.0

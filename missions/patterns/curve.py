@@ -12,6 +12,7 @@ from missions.errors import PlanError
 Array = NDArray[np.float64]
 
 _CUSP_SPEED: Final = 1e-9
+_SHARPEST_RAD: Final = 0.6  # of turn between two knots; more is a corner for a vehicle, however round it is
 _MAX_CURVATURE_PER_M: Final = 1e3  # a cusp or a sharp corner: a turn on the spot for any vehicle
 
 
@@ -137,7 +138,8 @@ def _stops(course: Array, curvature: Array, arc: Array) -> tuple[int, ...]:
     size = np.abs(curvature)
     size = np.where(size >= _MAX_CURVATURE_PER_M, 0.0, size)
     explained = np.maximum(size[:-1], size[1:]) * np.diff(arc)
-    jumps = np.nonzero(np.abs(np.diff(course)) > 3.0 * explained + 0.05)[0] + 1
+    turn = np.abs(np.diff(course))
+    jumps = np.nonzero((turn > 3.0 * explained + 0.05) | (turn > _SHARPEST_RAD))[0] + 1
     cusps = np.nonzero(np.abs(curvature) >= _MAX_CURVATURE_PER_M)[0]
     inner = set(jumps.tolist()) | set(cusps.tolist())
     # a cusp shows in both intervals beside it: keep the first of neighbouring ones

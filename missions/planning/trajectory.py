@@ -14,6 +14,7 @@ from missions.planning.limits import VehicleLimits
 from missions.planning.profile import STEP_S, Profile, speed_profile
 
 _BISECTIONS: Final = 14
+_SAME_COURSE_RAD: Final = 0.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,8 +111,9 @@ def plan_trajectory(
     """
     limits.check_speed(speed_m_s)
     limits.check_altitude(altitude_m)
+    coarse = curve.points(np.linspace(0.0, curve.end, 1000))
+    limits.check_reach(float(np.hypot(*coarse.T).max()))
     table = ArcLengthTable.of(curve)
-    limits.check_reach(float(np.hypot(*table.points_m.T).max()))
     pieces = _plan_pieces(table, len(table.arc_m) - 1, speed_m_s, limits)
     if duration_s is not None and _duration_s(pieces) > duration_s:
         pieces = _cut(table, pieces, speed_m_s, limits, duration_s)
@@ -148,25 +150,48 @@ def line_trajectory(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Piece:
-    """One stretch between stops: its profile, the knots it runs over, and the turn on the spot before it."""
+    """One stretch between stops.
+
+    Attributes:
+        profile: distance, speed and acceleration in time.
+        first, last: the knots it runs over.
+        arc_m, course_rad, curvature_per_m: of these knots, as seen from inside the stretch.
+        turn_s: time for the turn on the spot before it.
+    """
 
     profile: Profile
     first: int
     last: int
+    arc_m: Array
+    course_rad: Array
+    curvature_per_m: Array
     turn_s: float
 
 
 def _plan_pieces(table: ArcLengthTable, end: int, speed_m_s: float, limits: VehicleLimits) -> list[_Piece]:
     bounds = [0, *(k for k in table.stops if k < end), end]
-    pieces = []
+    pieces: list[_Piece] = []
     for first, last in itertools.pairwise(bounds):
         knots = slice(first, last + 1)
-        curvature = table.curvature_per_m[knots].copy()
-        curvature[0], curvature[-1] = curvature[min(1, last - first)], curvature[max(-2, first - last - 1)]
-        profile = speed_profile(table.arc_m[knots], curvature, speed_m_s, limits)
-        turn = abs(table.course_rad[first] - table.course_rad[first - 1]) if first else 0.0
+        arc = table.arc_m[knots]
+        curvature, course = table.curvature_per_m[knots].copy(), table.course_rad[knots].copy()
+        if len(arc) > 2:  # a stop belongs to neither side: its curvature and course are the turn's
+            curvature[0], curvature[-1] = curvature[1], curvature[-2]
+            if abs(course[1] - course[0]) > _SAME_COURSE_RAD:
+                course[0] = course[1]
+            if abs(course[-1] - course[-2]) > _SAME_COURSE_RAD:
+                course[-1] = course[-2]
+        turn = abs(course[0] - pieces[-1].course_rad[-1]) if pieces else 0.0
         pieces.append(
-            _Piece(profile=profile, first=first, last=last, turn_s=1.5 * turn / limits.yaw_rate_rad_s)
+            _Piece(
+                profile=speed_profile(arc, curvature, speed_m_s, limits),
+                first=first,
+                last=last,
+                arc_m=arc,
+                course_rad=course,
+                curvature_per_m=curvature,
+                turn_s=1.5 * turn / limits.yaw_rate_rad_s,
+            )
         )
     return pieces
 
@@ -215,14 +240,10 @@ def _assemble(curve: Curve, table: ArcLengthTable, pieces: list[_Piece], altitud
     yaw_rates: list[Array] = []
     for piece in pieces:
         if piece.turn_s > 0.0 and positions:
-            _append_turn(table, piece, positions, velocities, accelerations, yaws, yaw_rates)
+            _append_turn(piece, positions, velocities, accelerations, yaws, yaw_rates)
         arc, speed, push = piece.profile.arc_m, piece.profile.speed_m_s, piece.profile.acceleration_m_s2
-        # inside the piece: the last knot of it already carries the next piece's course
-        knots = slice(
-            piece.first, max(piece.last, piece.first + 2) if piece.last < len(table.arc_m) - 1 else None
-        )
-        course = np.interp(arc, table.arc_m[knots], table.course_rad[knots])
-        bend = np.interp(arc, table.arc_m[knots], table.curvature_per_m[knots])
+        course = np.interp(arc, piece.arc_m, piece.course_rad)
+        bend = np.interp(arc, piece.arc_m, piece.curvature_per_m)
         points = curve.points(table.parameter_at(arc))
         along = np.stack((np.cos(course), np.sin(course), np.zeros_like(course)), axis=1)
         across = np.stack((-np.sin(course), np.cos(course), np.zeros_like(course)), axis=1)
@@ -242,7 +263,6 @@ def _assemble(curve: Curve, table: ArcLengthTable, pieces: list[_Piece], altitud
 
 
 def _append_turn(
-    table: ArcLengthTable,
     piece: _Piece,
     positions: list[Array],
     velocities: list[Array],
@@ -253,7 +273,7 @@ def _append_turn(
     """Stand still and turn the nose from one course to the next, smoothly (cubic)."""
     count = max(2, math.ceil(piece.turn_s / STEP_S))
     f = np.arange(1, count) / count
-    start, stop = yaws[-1][-1], table.course_rad[piece.first]
+    start, stop = yaws[-1][-1], piece.course_rad[0]
     positions.append(np.repeat(positions[-1][-1:], count - 1, axis=0))
     velocities.append(np.zeros((count - 1, 3)))
     accelerations.append(np.zeros((count - 1, 3)))

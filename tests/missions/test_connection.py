@@ -1,0 +1,176 @@
+"""Connections: streams, laziness, recording, and real links with the vehicle's own time."""
+
+import asyncio
+import socket
+import threading
+
+import pytest
+
+from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
+from autopilot_bridge.links import memory_pair, open_link
+from autopilot_bridge.mavlink import FrameEncoder, dialect
+from missions.connection import ONBOARD_COMPUTER, Connection
+from missions.errors import LinkClosed
+from missions.library import find_mission
+from missions.options import FlightOptions, Via
+from missions.session import RunRequest, fly
+
+
+class Recording:
+    def __init__(self):
+        self.frames = []
+
+    def record(self, frame, time_us):
+        self.frames.append((time_us, frame))
+
+
+def on_memory(script, **arguments):
+    """Run `script(connection, send)` on virtual time; `send` sends as an autopilot."""
+    now = [0]
+
+    def advance():
+        now[0] += 1000
+
+    async def main():
+        ours, theirs = memory_pair()
+        encoder = FrameEncoder(1, 1)
+        async with Connection(ours, LoopClock(), **arguments) as connection:
+            return await script(connection, lambda m: theirs.send(encoder.encode(m)))
+
+    return run(main(), VirtualTimeLoop(advance, lambda: now[0], max_time_us=100_000_000))
+
+
+def attitude(k):
+    return dialect.MAVLink_attitude_message(k, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_stream_gives_every_message_in_order():
+    async def script(connection, send):
+        with connection.messages("ATTITUDE") as stream:
+            for k in range(100):
+                send(attitude(k))
+                send(dialect.MAVLink_system_time_message(0, k))
+            assert [(await anext(stream)).time_boot_ms for _ in range(100)] == list(range(100))
+            assert stream.take() is None
+        send(attitude(7))
+        assert stream.take() is None  # closed
+
+    on_memory(script)
+
+
+def test_a_slow_reader_loses_the_oldest_and_counts_them():
+    async def script(connection, send):
+        with connection.messages("ATTITUDE") as stream:
+            for k in range(5000):
+                send(attitude(k))
+            assert stream.dropped == 5000 - 4096
+            assert (await anext(stream)).time_boot_ms == 5000 - 4096
+
+    on_memory(script)
+
+
+def test_latest_is_decoded_once_and_only_when_asked():
+    async def script(connection, send):
+        assert connection.latest("ATTITUDE", 1) is None
+        send(attitude(1))
+        send(attitude(2))
+        newest = connection.latest("ATTITUDE", 1)
+        assert newest.time_boot_ms == 2
+        assert connection.latest("ATTITUDE", 1) is newest
+        assert connection.latest("ATTITUDE", 2) is None
+        assert connection.latest("ATTITUDE", 1, component_id=2) is None
+
+    on_memory(script)
+
+
+def test_both_directions_are_recorded_with_vehicle_time():
+    recording = Recording()
+
+    async def script(connection, send):
+        await asyncio.sleep(2.5)
+        send(attitude(1))
+        own = [t for t, frame in recording.frames if frame[5:7] == bytes((255, 190))]
+        assert own == pytest.approx([0, 1_000_000, 2_000_000], abs=2000)
+        assert recording.frames[-1][0] == pytest.approx(2_500_000, abs=2000)
+
+    on_memory(script, recorder=recording)
+
+
+def test_identity_of_an_onboard_computer():
+    recording = Recording()
+
+    async def script(connection, send):
+        await asyncio.sleep(0.1)
+        assert recording.frames[0][1][5:7] == bytes((1, 191))
+
+    on_memory(script, recorder=recording, identity=ONBOARD_COMPUTER)
+
+
+def test_garbage_is_counted_and_does_no_harm():
+    async def script(connection, send):
+        connection._link.on_receive(b"\xfd\x09garbage" * 50)
+        send(attitude(3))
+        assert connection.latest("ATTITUDE", 1).time_boot_ms == 3
+        (parser,) = connection.parsers.values()
+        assert parser.counters.bytes_dropped > 400
+
+    on_memory(script)
+
+
+def test_sending_after_the_end_says_so():
+    async def script(connection, send):
+        await connection.close()
+        with pytest.raises(LinkClosed):
+            connection.send(attitude(1))
+
+    on_memory(script)
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class Elsewhere(threading.Thread):
+    """A scripted autopilot on a real link, some tens of times faster than real time."""
+
+    def __init__(self, autopilot):
+        super().__init__(daemon=True)
+        self.autopilot, self.end = autopilot, threading.Event()
+
+    def run(self):
+        time_us = 0
+        while not self.end.wait(0.0004):
+            for _peer, data in self.autopilot.link.receive():
+                self.autopilot.receive(data)
+            time_us += 20_000
+            self.autopilot.step(time_us)
+        self.autopilot.link.close()
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("kind", ["udp", "tcp"])
+def test_the_same_mission_flies_a_vehicle_elsewhere(make_sitl, tmp_path, kind, flavour):
+    port = free_port()
+    theirs, ours = {
+        "udp": (f"udpout:127.0.0.1:{port}", f"udpin:127.0.0.1:{port}"),
+        "tcp": (f"tcpin:127.0.0.1:{port}", f"tcp:127.0.0.1:{port}"),
+    }[kind]
+    autopilot = make_sitl(flavour, truth=False).autopilots[0]
+    autopilot.link = open_link(theirs)
+    elsewhere = Elsewhere(autopilot)
+    elsewhere.start()
+    try:
+        options = FlightOptions(pattern="L1", width_m=30.0, height_m=30.0, via=Via.WAYPOINTS)
+        out = tmp_path / "run"
+        request = RunRequest(options=options, connect=[ours], out=out, parameters={"MPC_ACC_HOR": 2.5})
+        result = fly(find_mission("lissajous"), request)
+    finally:
+        elsewhere.end.set()
+        elsewhere.join()
+    assert result.outcome == "completed", result.reason
+    assert result.summary["autopilot"] == flavour
+    assert result.summary["vehicles"][0]["error_reference"] == "estimate"
+    assert result.summary["path_rms_error_m"] < 1.0
+    assert autopilot.parameters["MPC_ACC_HOR"][0] == 2.5

@@ -1,0 +1,149 @@
+"""Scoring a flight from its frames: against made-up flights whose errors are known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import FrameEncoder, dialect
+from missions.notes import PATTERN, CommandedPath, FlightNotes
+from missions.records import FlightRecords
+from missions.score import Track, path_errors_m, score, waypoint_misses_m
+
+HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
+
+
+def straight_path(length=100.0):
+    n = np.linspace(0.0, length, 401)
+    return np.column_stack((n, np.zeros_like(n), np.full_like(n, -10.0)))
+
+
+def test_distance_to_the_path_and_not_to_its_ends():
+    track = np.array([(10.0, 0.3, -10.0), (20.0, -0.4, -10.0), (30.0, 0.3, -9.6)])
+    assert path_errors_m(straight_path(), track) == pytest.approx([0.3, 0.4, 0.5], abs=1e-9)
+
+
+def test_another_branch_of_a_crossing_path_does_not_count():
+    t = np.linspace(0.0, 2 * math.pi, 2000)
+    eight = np.column_stack((50.0 * np.sin(2 * t), 50.0 * np.sin(t), np.full_like(t, -10.0)))
+    lost = eight[900:1100].copy()  # through the crossing, then flown along the other branch's direction
+    lost[:, 1] *= -1.0
+    errors = path_errors_m(eight, np.vstack((eight[:900], lost)))
+    assert errors[:900].max() < 1e-9
+    assert errors[-1] > 5.0
+
+
+def test_every_sample_of_a_flight_on_the_path_is_on_it():
+    path = straight_path()
+    assert path_errors_m(path, path[::7]).max() < 1e-9
+    assert len(path_errors_m(path[:1], path)) == 0
+    assert len(path_errors_m(path, path[:0])) == 0
+
+
+def test_waypoint_misses_between_samples_and_in_order():
+    n = np.arange(0.0, 60.0, 5.0)
+    there = np.column_stack((n, np.full_like(n, 0.7), np.full_like(n, -10.0)))
+    back = there[::-1] + np.array((0.0, 1.0, 0.0))
+    pos = np.vstack((there, back))
+    track = Track(time_s=np.arange(len(pos)) * 1.0, pos_ned_m=pos, yaw_rad=np.zeros(len(pos)))
+    commanded = CommandedPath(
+        origin=HOME,
+        points_ned_m=straight_path(),
+        waypoints_ned_m=np.array([(12.0, 0.0, -10.0), (50.0, 0.0, -10.0), (12.0, 0.0, -10.0)]),
+        acceptance_m=2.0,
+    )
+    assert waypoint_misses_m(commanded, track) == pytest.approx((0.7, 0.7, 1.7), abs=1e-6)
+
+
+def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=0.0, truth=True):
+    """A flight 10 m up along a straight path.
+
+    It is off the commanded path by `offset_ned` while flying, and the autopilot's frame is off the true one by `gps_ned` all the time.
+    """
+    records = FlightRecords()
+    autopilot, simulator = FrameEncoder(1, 1), FrameEncoder(1, 240)
+    frame = LocalFrame(HOME)
+    for k in range(0, 2001):
+        t_us = k * 20_000
+        n = min(max(0.0, (t_us * 1e-6 - 5.0) * 4.0), 100.0)
+        height = min(10.0, 10.0 * t_us * 1e-6 / 4.0)
+        share = height / 10.0
+        pos = np.array((n, 0.0, -height)) + share * np.array(offset_ned)
+        if truth:
+            lat, lon, alt = frame.geodetic_from_ned(*(pos - np.array(gps_ned)))
+            records.add(
+                simulator.encode(
+                    dialect.MAVLink_hil_state_quaternion_message(
+                        t_us, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, round(lat * 1e7), round(lon * 1e7),
+                        round(alt * 1e3), 0, 0, 0, 0, 0, 0, 0, 0,
+                    )
+                )
+            )  # fmt: skip
+        if k % 5 == 0:
+            lat, lon, alt = frame.geodetic_from_ned(*pos)
+            t_ms = t_us // 1000
+            message = dialect.MAVLink_global_position_int_message
+            records.add(
+                autopilot.encode(
+                    message(t_ms, round(lat * 1e7), round(lon * 1e7), round(alt * 1e3), round(-pos[2] * 1e3),
+                            0, 0, 0, 0xFFFF)
+                )
+            )  # fmt: skip
+            records.add(
+                autopilot.encode(dialect.MAVLink_attitude_message(t_ms, roll_error, 0.0, 0.0, 0, 0, 0))
+            )
+    notes = FlightNotes(system_id=1, autopilot="px4")
+    notes.begin("takeoff", 0)
+    notes.begin(PATTERN, 5_000_000)
+    notes.end(30_000_000)
+    notes.commanded = CommandedPath(
+        origin=HOME, points_ned_m=straight_path(), waypoints_ned_m=np.zeros((0, 3)), acceptance_m=2.0
+    )
+    return records, notes
+
+
+def test_a_perfect_flight_scores_zero():
+    result = score(*make_flight())
+    assert result.path_rms_error_m < 0.01  # degE7 is a centimetre
+    assert result.distance_m == pytest.approx(110.0, abs=0.5)
+    assert result.max_attitude_error_deg == pytest.approx(0.0, abs=1e-6)
+    assert result.reference == "truth"
+
+
+def test_a_known_error_is_found():
+    result = score(*make_flight(offset_ned=(0.0, 0.3, -0.4), roll_error=math.radians(2.0)))
+    assert result.path_rms_error_m == pytest.approx(0.5, abs=0.01)
+    assert result.path_max_error_m == pytest.approx(0.5, abs=0.02)
+    assert result.path_rms_error_estimate_m == pytest.approx(0.5, abs=0.01)
+    assert result.max_attitude_error_deg == pytest.approx(2.0, abs=1e-3)
+
+
+def test_a_constant_receiver_error_moves_home_and_path_alike():
+    result = score(*make_flight(gps_ned=(1.0, -2.0, 3.0)))
+    assert result.path_rms_error_m < 0.01
+    assert result.path_rms_error_absolute_m == pytest.approx(2.0, abs=0.1)
+
+
+def test_without_truth_the_estimate_is_scored():
+    result = score(*make_flight(offset_ned=(0.0, 0.3, 0.0), truth=False))
+    assert result.reference == "estimate"
+    assert result.path_rms_error_m == pytest.approx(0.3, abs=0.01)
+    assert result.max_attitude_error_deg is None
+
+
+def test_nothing_recorded_scores_nothing():
+    result = score(FlightRecords(), FlightNotes(system_id=1))
+    assert result.path_rms_error_m is None
+    assert result.distance_m == 0.0
+
+
+def test_records_count_and_decode_columns():
+    records, _ = make_flight()
+    counts = records.message_counts
+    assert counts == {"ATTITUDE": 401, "GLOBAL_POSITION_INT": 401, "HIL_STATE_QUATERNION": 2001}
+    table = records.table("HIL_STATE_QUATERNION", 1)
+    assert table["time_usec"][-1] == 40_000_000
+    assert table["attitude_quaternion"].shape == (2001, 4)
+    assert len(records.table("HIL_STATE_QUATERNION", 2)) == 0
+    assert len(records.table("ATTITUDE", 1, 240)) == 0

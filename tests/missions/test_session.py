@@ -1,0 +1,320 @@
+"""Whole runs against scripted autopilots: folder, log, summary, picture, outcomes; and the command line."""
+
+import json
+import os
+import signal
+import struct
+import subprocess
+import sys
+import types
+
+import pytest
+from click.testing import CliRunner
+from pymavlink import mavutil
+
+from missions import cli, cli_fly
+from missions.errors import MissionError, PlanError
+from missions.library import MISSIONS, find_mission
+from missions.options import FlightOptions, Via, parameters_from_file, parse_pair, parse_wind
+from missions.records import FlightRecords
+from missions.run import create_run_folder
+from missions.session import RunRequest, fly
+
+REQUIRED = {
+    "mission", "vehicle", "autopilot", "seed", "outcome", "sim_time_s", "wall_time_s", "speedup",
+    "distance_m", "path_rms_error_m", "path_max_error_m", "max_attitude_error_deg", "message_counts",
+    "versions",
+}  # fmt: skip
+
+
+@pytest.fixture
+def embedded(monkeypatch, make_sitl):
+    """Embedded worlds are scripted autopilots; gives the list of those that were opened."""
+    opened = []
+    module = types.ModuleType("missions.embedded")
+
+    class EmbeddedConfiguration:
+        def __init__(self, **values):
+            self.__dict__.update(values)
+
+    def open_embedded(configuration):
+        opened.append(make_sitl(configuration.flavour, configuration.vehicles))
+        return opened[-1]
+
+    module.EmbeddedConfiguration = EmbeddedConfiguration
+    module.open_embedded = open_embedded
+    monkeypatch.setitem(sys.modules, "missions.embedded", module)
+    return opened
+
+
+def small(**changes):
+    return FlightOptions(**({"width_m": 40.0, "height_m": 30.0, "pattern": "L2"} | changes))
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("via", list(Via))
+@pytest.mark.parametrize("name", MISSIONS)
+def test_every_mission_on_both_firmwares_by_both_ways(embedded, tmp_path, name, via, flavour):
+    request = RunRequest(
+        options=small(via=via), autopilot=flavour, out=tmp_path / "run", seed=7, picture=False
+    )
+    result = fly(find_mission(name), request)
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert result.outcome == summary["outcome"] == "completed", result.reason
+    assert set(summary) >= REQUIRED
+    assert summary["autopilot"] == flavour
+    assert summary["path_rms_error_m"] < (0.05 if via is Via.SETPOINTS else 1.0)
+    assert summary["message_counts"]["HIL_STATE_QUATERNION"] > 1000
+    vehicle = embedded[0].autopilots[0]
+    assert not vehicle.armed
+    assert abs(vehicle.pos[0]) < 1.0
+    assert abs(vehicle.pos[1]) < 1.0
+    if via is Via.WAYPOINTS:
+        waypoints = summary["vehicles"][0]["waypoints"]
+        assert waypoints["passed"] == waypoints["count"]
+    phases = [phase["name"] for phase in summary["vehicles"][0]["phases"]]
+    assert phases[-2:] == ["pattern", "return"]
+
+
+def test_log_is_read_by_pymavlink_and_holds_both_directions_and_truth(embedded, tmp_path):
+    fly(find_mission("sector"), RunRequest(options=small(), out=tmp_path / "run"))
+    log = mavutil.mavlink_connection(str(tmp_path / "run" / "flight.tlog"))
+    senders, first = set(), None
+    while (message := log.recv_match()) is not None:
+        assert message.get_type() != "BAD_DATA"
+        first = first or message._timestamp
+        senders.add((message.get_srcSystem(), message.get_srcComponent()))
+    assert senders == {(1, 1), (1, 240), (255, 190)}
+    assert first == pytest.approx(1_735_689_600.0, abs=1.0)
+    counts = json.loads((tmp_path / "run" / "summary.json").read_text())["message_counts"]
+    assert FlightRecords.from_tlog(tmp_path / "run" / "flight.tlog").message_counts == counts
+
+
+def test_picture_is_a_png_of_some_size(embedded, tmp_path):
+    fly(find_mission("lissajous"), RunRequest(options=small(vehicles=2), out=tmp_path / "run"))
+    data = (tmp_path / "run" / "track.png").read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    width, height = struct.unpack(">II", data[16:24])
+    assert width > 1000
+    assert height > 1000
+
+
+def test_same_flight_same_log(embedded, tmp_path):
+    for name in ("a", "b"):
+        options = small(via=Via.SETPOINTS, vehicles=2)
+        fly(find_mission("lissajous"), RunRequest(options=options, out=tmp_path / name, picture=False))
+    logs = [(tmp_path / name / "flight.tlog").read_bytes() for name in ("a", "b")]
+    assert logs[0] == logs[1]
+
+
+@pytest.mark.parametrize("via", list(Via))
+def test_a_team_shares_the_pattern_in_layers(embedded, tmp_path, via):
+    options = small(via=via, vehicles=2, pattern="L1")
+    result = fly(find_mission("lissajous"), RunRequest(options=options, out=tmp_path / "run", picture=False))
+    assert result.outcome == "completed", result.reason
+    blocks = result.summary["vehicles"]
+    assert [block["system_id"] for block in blocks] == [1, 2]
+    records = FlightRecords.from_tlog(tmp_path / "run" / "flight.tlog")
+    a, b = (records.table("HIL_STATE_QUATERNION", k) for k in (1, 2))
+    times = [{p["name"]: p for p in block["phases"]}["pattern"] for block in blocks]
+    start = max(p["start_s"] for p in times)
+    end = min(p["end_s"] for p in times)
+    both = (a["time_usec"] * 1e-6 > start + 2.0) & (a["time_usec"] * 1e-6 < end)
+    assert (abs(a["alt"] - b["alt"])[both] > 3500).all()  # millimetres
+    north = abs(a["lat"].astype(float) - b["lat"])[both] * 0.0111
+    assert north.max() > 20.0  # on opposite sides of the circle
+    centre = [(t["lat"][both].min() + t["lat"][both].max()) / 2 for t in (a, b)]
+    assert abs(centre[0] - centre[1]) * 0.0111 < 1.5
+
+
+def test_search_time_ends_the_pattern(embedded, tmp_path):
+    for via in Via:
+        options = small(via=via, search_time_s=90.0)
+        out = tmp_path / str(via)
+        result = fly(find_mission("lissajous"), RunRequest(options=options, out=out, picture=False))
+        assert result.outcome == "completed", result.reason
+        phases = {p["name"]: p for p in result.summary["vehicles"][0]["phases"]}
+        assert phases["pattern"]["end_s"] - phases["pattern"]["start_s"] == pytest.approx(90.0, abs=8.0)
+
+
+def test_a_failing_mission_returns_the_vehicle_and_keeps_the_log(embedded, tmp_path):
+    class Broken:
+        name = "broken"
+
+        def check(self, options, limits):
+            pass
+
+        async def fly(self, vehicle, options):
+            await vehicle.takeoff(10.0)
+            raise MissionError("the camera fell off")
+
+    result = fly(Broken(), RunRequest(options=small(), out=tmp_path / "run"))
+    assert (result.outcome, result.reason) == ("failed", "the camera fell off")
+    assert embedded[0].autopilots[0].kind == "return"
+    assert result.summary["outcome"] == "failed"
+    assert (tmp_path / "run" / "flight.tlog").stat().st_size > 10_000
+
+
+def test_an_interrupted_mission_returns_the_vehicle_and_keeps_the_log(embedded, tmp_path):
+    sent = []
+
+    def press(flight):
+        if flight.clock.time_us > 30_000_000 and not sent:
+            sent.append(True)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"), press)
+    assert result.outcome == "interrupted"
+    assert embedded[0].autopilots[0].kind == "return"
+    assert FlightRecords.from_tlog(tmp_path / "run" / "flight.tlog").message_counts["HEARTBEAT"] > 50
+    assert (tmp_path / "run" / "track.png").exists()
+
+
+def test_users_own_mission(embedded, tmp_path):
+    script = tmp_path / "my_mission.py"
+    script.write_text(
+        "async def fly(vehicle, options):\n"
+        "    await vehicle.takeoff(float(options.arguments['height']))\n"
+        "    await vehicle.goto_ned(10.0, 0.0, -8.0)\n"
+        "    await vehicle.return_to_launch()\n"
+    )
+    out = CliRunner().invoke(
+        cli_fly.fly, [str(script), "--arg", "height=8", "--out", str(tmp_path / "run")], standalone_mode=False
+    )
+    assert out.exception is None, out.exception
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["mission"], summary["outcome"]) == ("my_mission", "completed")
+    assert summary["path_rms_error_m"] is None
+    assert summary["distance_m"] > 25.0
+
+
+def test_run_folders_are_numbered_and_never_overwritten(tmp_path):
+    assert create_run_folder(None, "x", tmp_path / "runs").name == "x-1"
+    assert create_run_folder(None, "x", tmp_path / "runs").name == "x-2"
+    given = tmp_path / "given"
+    assert create_run_folder(given, "x") == given
+    (given / "something").write_text("mine")
+    with pytest.raises(PlanError, match="not empty"):
+        create_run_folder(given, "x")
+
+
+# command line
+
+
+def command_line(capsys, *arguments):
+    code = cli.run_command_line(list(arguments))
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_a_flight_from_the_command_line(embedded, tmp_path, capsys):
+    code, out, err = command_line(
+        capsys, "fly", "lissajous", "--pattern", "L1", "--size", "40x30", "--via", "setpoints",
+        "--out", str(tmp_path / "run"), "--no-picture",
+    )  # fmt: skip
+    assert code == 0
+    assert err == ""  # quiet in a pipe
+    lines = out.splitlines()
+    assert lines[0].startswith("completed: lissajous with px4")
+    assert lines[1].startswith("path error 0.0")
+    assert lines[-1] == f"run: {tmp_path / 'run'}"
+
+
+def test_a_failed_flight_exits_1_with_one_line(embedded, tmp_path, capsys, monkeypatch, make_sitl):
+    class Deaf(make_sitl):
+        def advance(self):
+            self.time_us += 20_000
+
+    monkeypatch.setattr(sys.modules["missions.embedded"], "open_embedded", lambda c: Deaf())
+    code, _out, err = command_line(capsys, "fly", "sector", "--out", str(tmp_path / "run"))
+    assert code == 1
+    assert len(err.splitlines()) == 1
+    assert "no heartbeat of a PX4 or ArduPilot autopilot within 15 s; nothing was heard" in err
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["outcome"] == "failed"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["fly", "lisajous"], "mission 'lisajous' is not known; there are lissajous, sector"),
+        (["fly", "missing.py"], "mission file missing.py does not exist"),
+        (["fly", "lissajous", "--speed", "50"], r"speed 50 m/s is not in 0..12 m/s"),
+        (["fly", "lissajous", "--speed", "11", "--autopilot", "ardupilot"], "0..10 m/s"),
+        (["fly", "lissajous", "--altitude", "1000"], "altitude 1000 m is not in 1.5..120 m"),
+        (["fly", "lissajous", "--size", "0"], "is empty"),
+        (["fly", "lissajous", "--size", "tall"], "--size 'tall' is not one or two numbers"),
+        (["fly", "parallel-sweep", "--size", "20", "--spacing", "30"], "spacing below 20 m"),
+        (["fly", "lissajous", "--pattern", "L7"], "'L7' is not known; there are L1"),
+        (["fly", "lissajous", "--via", "setpoints", "--period", "5"], "ask for --period"),
+        (["fly", "lissajous", "--period", "500"], "--period needs --via setpoints"),
+        (["fly", "sector", "--via", "setpoints", "--period", "500"], "--period is for lissajous"),
+        (["fly", "lissajous", "--periods", "-1"], "--periods -1 is not possible"),
+        (["fly", "lissajous", "--wind", "gale"], "wind 'gale' is not SPEED"),
+        (["fly", "lissajous", "--wind", "99@0"], "0..40 m/s"),
+        (["fly", "lissajous", "--params", "none.parm"], "parameter file none.parm can't be read"),
+        (["fly", "lissajous", "--connect", "nonsense"], "connection 'nonsense'"),
+        (["fly", "lissajous", "--connect", "udpin:127.0.0.1:1", "--vehicles", "2"], "1 connections for 2"),
+        (["fly", "lissajous", "--rate", "1"], "--rate 1 Hz"),
+        (["fly", "lissajous", "--arg", "x"], "--arg 'x' is not NAME=VALUE"),
+        (["fly", "lissajous", "--no-such"], "--no-such"),
+        (["fly"], "Missing argument"),
+        (["walk"], "no command 'walk'; there are fly, sitl"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(capsys, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = command_line(capsys, *arguments)
+    assert code == 2
+    assert out == ""
+    assert len(err.splitlines()) == 1
+    assert message in err
+    assert list(tmp_path.iterdir()) == []  # nothing was begun
+
+
+def test_a_full_run_folder_is_refused(capsys, tmp_path):
+    (tmp_path / "old").write_text("x")
+    code, _out, err = command_line(capsys, "fly", "lissajous", "--out", str(tmp_path))
+    assert code == 2
+    assert "not empty" in err
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "MPC_XY_CRUISE 7\n# comment\nMPC_ACC_HOR=2.5 # inline\n",
+        "MPC_XY_CRUISE,7\nMPC_ACC_HOR,2.5\n",
+        "# QGC\n1\t1\tMPC_XY_CRUISE\t7.0\t9\n1\t1\tMPC_ACC_HOR\t2.5\t9\n",
+    ],
+)
+def test_parameter_files_of_three_kinds(tmp_path, text):
+    path = tmp_path / "p.parm"
+    path.write_text(text)
+    assert parameters_from_file(path) == {"MPC_XY_CRUISE": 7.0, "MPC_ACC_HOR": 2.5}
+
+
+@pytest.mark.parametrize(
+    "text", ["FINE 1\nBROKEN\n", "X nan\n", "A_NAME_LONGER_THAN_16 1\n", "A 1 2 3 4 5\n"]
+)
+def test_bad_parameter_files_name_the_line(tmp_path, text):
+    path = tmp_path / "p.parm"
+    path.write_text(text)
+    with pytest.raises(PlanError, match=r"line \d"):
+        parameters_from_file(path)
+
+
+def test_small_parsers():
+    assert parse_wind("5@270") == (5.0, 270.0)
+    assert parse_wind("3.5") == (3.5, 0.0)
+    assert parse_pair("100x80", "--size", "x,") == (100.0, 80.0)
+    assert parse_pair("3:4", "--ratio", ":/,") == (3.0, 4.0)
+    assert parse_pair("60", "--size", "x,") == (60.0, 60.0)
+
+
+def test_help_does_not_import_what_flying_needs():
+    code = (
+        "import sys; from missions.cli import run_command_line; run_command_line(['fly', '--help']);"
+        "heavy = {'numba', 'jsbsim', 'matplotlib', 'scipy', 'pymavlink'} & set(sys.modules);"
+        "sys.exit(f'imported {heavy}' if heavy else 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
