@@ -66,7 +66,9 @@ def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
 
 @njit(cache=True)
 def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
-    """Thrust setpoint of the levels below TRAJECTORY; NaN asks for the vertical part of the trajectory fields."""
+    """Thrust setpoint of the levels below TRAJECTORY; NaN asks for the vertical part of the trajectory
+    fields.
+    """
     if math.isfinite(sp[_THRUST]):
         s[c.VEL_INTEGRAL + 2] = 0.0
         s[c.BUMP + 2] = 0.0
@@ -170,11 +172,12 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
 class MulticopterController:
     """Cascaded control of a quad-X: position, velocity, attitude, body rates, mixing.
 
-    The setpoint's level chooses where the cascade starts. What a setpoint leaves open (NaN) is filled as follows,
-    so that no NaN reaches a motor: an axis with neither position, velocity nor acceleration stands still; NaN yaw
-    holds by yaw rate; a NaN or zero attitude is level flight at the present heading; NaN rates are zero; NaN thrust
-    at levels RATES and ATTITUDE means that the vertical part of the trajectory fields is flown. Position and
-    velocity loops leave out what the navigation state doesn't know; without attitude or rates the motors idle.
+    The setpoint's level chooses where the cascade starts. What a setpoint leaves open (NaN) is filled as
+    follows, so that no NaN reaches a motor: an axis with neither position, velocity nor acceleration stands
+    still; NaN yaw holds by yaw rate; a NaN or zero attitude is level flight at the present heading; NaN
+    rates are zero; NaN thrust at levels RATES and ATTITUDE means that the vertical part of the trajectory
+    fields is flown. Position and velocity loops leave out what the navigation state doesn't know; without
+    attitude or rates the motors idle.
 
     Args:
         parameters: gains and limits.

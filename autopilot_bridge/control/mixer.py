@@ -1,8 +1,10 @@
-"""Control allocation of a quad-X: collective thrust and torques to motors, with desaturation, and the thrust curve.
+"""Control allocation of a quad-X: collective thrust and torques to motors, with desaturation, and the
+thrust curve.
 
-Normalised as PX4 normalises its effectiveness matrix: unit roll or pitch torque moves each motor by 1/sqrt(2), unit
-yaw and unit thrust by 1. Desaturation in the order of PX4 with airmode off (`ControlAllocationSequentialDesaturation`):
-thrust gives way first (only downwards), then roll and pitch, and yaw is mixed last into what is left.
+Normalised as PX4 normalises its effectiveness matrix: unit roll or pitch torque moves each motor by
+1/sqrt(2), unit yaw and unit thrust by 1. Desaturation in the order of PX4 with airmode off
+(`ControlAllocationSequentialDesaturation`): thrust gives way first (only downwards), then roll and pitch,
+and yaw is mixed last into what is left.
 """
 
 import math
@@ -20,7 +22,8 @@ PITCH: Final = 1
 YAW: Final = 2
 COLLECTIVE: Final = 3
 _A: Final = 1.0 / math.sqrt(2.0)
-# motors: front right CCW, rear left CCW, front left CW, rear right CW (PX4 quad x); columns roll, pitch, yaw, thrust
+# motors: front right CCW, rear left CCW, front left CW, rear right CW (PX4 quad x); columns roll, pitch,
+# yaw, thrust
 ALLOCATION: Final[Array] = np.array(
     [[-_A, _A, 1.0, 1.0], [_A, -_A, 1.0, 1.0], [_A, _A, -1.0, 1.0], [-_A, -_A, -1.0, 1.0]]
 )
@@ -83,7 +86,9 @@ def allocate(roll: float, pitch: float, yaw: float, thrust: float, motor: Array,
 
 @njit(cache=True)
 def command_from_thrust(thrust: float, factor: float) -> float:
-    """Motor command c that gives the normalised thrust: thrust = factor c^2 + (1 - factor) c (PX4 THR_MDL_FAC)."""
+    """Motor command c that gives the normalised thrust: thrust = factor c^2 + (1 - factor) c (PX4
+    THR_MDL_FAC).
+    """
     thrust = min(1.0, max(0.0, thrust))
     if factor < 1e-6:
         return thrust

@@ -1,4 +1,6 @@
-"""Gains and limits of the multicopter control laws, one field per PX4 parameter (its name stands beside the field)."""
+"""Gains and limits of the multicopter control laws, one field per PX4 parameter (its name stands beside the
+field).
+"""
 
 import math
 from dataclasses import dataclass, fields
@@ -38,9 +40,9 @@ _MAY_BE_ZERO: Final = frozenset(
 class MulticopterParameters:
     """Parameters of `MulticopterController`.
 
-    Torques and thrust are normalised as in PX4: 1 is what the motors can give at most. Defaults are PX4's where
-    PX4 has them, except the horizontal position loop, the yaw
-    rate loop and the thrust curve, which are tuned for the iris model.
+    Torques and thrust are normalised as in PX4: 1 is what the motors can give at most. Defaults are PX4's
+    where PX4 has them, except the horizontal position loop, the yaw rate loop and the thrust curve, which
+    are tuned for the iris model.
 
     Raises:
         ValueError: a field is not finite or outside its range.

@@ -1,10 +1,11 @@
 """Position and velocity control of a multicopter: trajectory setpoint to thrust vector and attitude.
 
-The structure PX4 publishes (Multicopter Position Control; `PositionControl`): position P gives a velocity, velocity
-PID gives an acceleration, feed-forward adds at both places, the acceleration becomes a thrust vector under tilt and
-thrust limits with the vertical first, and the integrator follows what was really given (tracking anti-windup).
-Added to it: drag, which the accelerometer measures directly across the thrust axis, is fed forward below a cut-off
-(Kai, Allibert, Hua, Hamel, "Nonlinear feedback control of quadrotors exploiting first-order drag effects", 2017).
+The structure PX4 publishes (Multicopter Position Control; `PositionControl`): position P gives a velocity,
+velocity PID gives an acceleration, feed-forward adds at both places, the acceleration becomes a thrust
+vector under tilt and thrust limits with the vertical first, and the integrator follows what was really
+given (tracking anti-windup). Added to it: drag, which the accelerometer measures directly across the
+thrust axis, is fed forward below a cut-off (Kai, Allibert, Hua, Hamel, "Nonlinear feedback control of
+quadrotors exploiting first-order drag effects", 2017).
 """
 
 import math
@@ -51,7 +52,8 @@ def lowpass_gain(dt: float, cutoff_hz: float) -> float:
 
 @njit(cache=True)
 def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
-    """One step of the scalar Kalman filter on hover thrust (PX4's idea, with the force along the thrust axis).
+    """One step of the scalar Kalman filter on hover thrust (PX4's idea, with the force along the thrust
+    axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
     """

@@ -1,8 +1,8 @@
 """Layout of the control setpoint: what a flight task asks of the control laws.
 
 One preallocated float64 array, written by the active flight task, read by the control kernels. At level
-`TRAJECTORY` NaN means "not controlled here" as in PX4's TrajectorySetpoint: position feeds velocity, velocity feeds
-acceleration, and given velocity and acceleration add as feed-forward.
+`TRAJECTORY` NaN means "not controlled here" as in PX4's TrajectorySetpoint: position feeds velocity,
+velocity feeds acceleration, and given velocity and acceleration add as feed-forward.
 """
 
 from typing import Final
@@ -14,7 +14,7 @@ YAW_RAD: Final = 9  # NaN: hold by yaw rate only
 YAW_RATE_RAD_S: Final = 10
 Q_NED_FROM_FRD: Final = slice(11, 15)  # level ATTITUDE
 RATES_FRD_RAD_S: Final = slice(15, 18)  # level RATES; feed-forward at level ATTITUDE (NaN: none)
-THRUST: Final = 18  # collective, 0..1 (levels ATTITUDE and RATES)
+THRUST: Final = 18  # collective, 0..1 (levels ATTITUDE and RATES); NaN: the vertical part of the trajectory
 LEVEL: Final = 19
 SETPOINT_SIZE: Final = 20
 

@@ -1,7 +1,8 @@
 """Targets from outside, flown smoothly: ArduPilot's GUIDED.
 
-Position targets need not be repeated; velocity, acceleration and attitude targets expire after GUID_TIMEOUT and the
-vehicle stops. Attitude thrust is a climb rate: 0.5 holds the height, 1 is the full climb speed (GUID_OPTIONS 0).
+Position targets need not be repeated; velocity, acceleration and attitude targets expire after GUID_TIMEOUT
+and the vehicle stops. Attitude thrust is a climb rate: 0.5 holds the height, 1 is the full climb speed
+(GUID_OPTIONS 0).
 """
 
 import math

@@ -25,7 +25,8 @@ class IdleTask:
 class HoldTask:
     """Brake within the limits, then hold the place; or fly to a given place and hold that.
 
-    On the ground it rests with motors at idle. Without a position it stops by velocity, without that it flies level.
+    On the ground it rests with motors at idle. Without a position it stops by velocity, without that it
+    flies level.
 
     Args:
         position_ned_m: place to hold, (3,); None: where the vehicle comes to rest.

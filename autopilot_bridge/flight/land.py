@@ -29,8 +29,9 @@ def descent_speed(height_m: float, parameters: FlightParameters) -> float:
 class LandTask:
     """Land here, or at a given place. DONE on the ground, with motors at idle and a `TouchedDown` event.
 
-    The place is held by position, or by velocity when there is no position, or the vehicle sinks level when there
-    is neither. Ground contact levels the vehicle, and thrust is taken away before the landing is believed.
+    The place is held by position, or by velocity when there is no position, or the vehicle sinks level when
+    there is neither. Ground contact levels the vehicle, and thrust is taken away before the landing is
+    believed.
 
     Args:
         position_ned_m: place to land at, (3,) (down is ignored); None: where the vehicle comes to rest.

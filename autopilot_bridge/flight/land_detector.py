@@ -58,7 +58,8 @@ class LandDetector:
         """
         p = self._parameters
         if not ctx.armed:
-            # motors don't turn: an unforced disarm happens on the ground only; a forced one in the air is falling
+            # motors don't turn: an unforced disarm happens on the ground only; a forced one in the air is
+            # falling
             if self.state is not LandedState.ON_GROUND and self._falling(ctx):
                 return self._store(ctx, False, False)
             self._contact_s = self._maybe_s = self._landed_s = math.inf

@@ -1,4 +1,6 @@
-"""Flying an uploaded plan (MAVLink mission protocol), passing waypoints without stopping where that is allowed."""
+"""Flying an uploaded plan (MAVLink mission protocol), passing waypoints without stopping where that is
+allowed.
+"""
 
 import math
 from dataclasses import dataclass
@@ -59,10 +61,10 @@ class _Leg:
 class MissionTask:
     """Executes the items of a store, from its current one; DONE (and holding) after the last.
 
-    A new plan or another current item, seen in the store, takes effect at the next update. Waypoints without a hold
-    time are passed at the speed their corner, the acceptance radius and the legs behind them allow. DO_ items act at
-    once; those for equipment the vehicle doesn't have are passed over. NAV_RETURN_TO_LAUNCH is flown here and also
-    reported as `MissionModeRequested`.
+    A new plan or another current item, seen in the store, takes effect at the next update. Waypoints
+    without a hold time are passed at the speed their corner, the acceptance radius and the legs behind them
+    allow. DO_ items act at once; those for equipment the vehicle doesn't have are passed over.
+    NAV_RETURN_TO_LAUNCH is flown here and also reported as `MissionModeRequested`.
 
     Args:
         store: the plan; its `current` is kept up to date.
@@ -113,7 +115,8 @@ class MissionTask:
         self._jumps.clear()
         self._begin(ctx, max(self._store.current, self._first_item), None)
 
-    # -- items ---------------------------------------------------------------------------------------------------
+    # -- items
+    # ---------------------------------------------------------------------------------------------------
 
     def _begin(self, ctx: FlightContext, seq: int, came_from: Array | None) -> None:
         """Make `seq` the current item, running through items that take no time."""
@@ -293,7 +296,8 @@ class MissionTask:
         turn_in = turn_in_distance(angle, speed, p.corner_acceleration_m_s2, p.jerk_m_s3)
         return speed, min(turn_in, 0.75 * radius, 0.5 * math.dist(path[1], path[2]))
 
-    # -- flying --------------------------------------------------------------------------------------------------
+    # -- flying
+    # --------------------------------------------------------------------------------------------------
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         motion, ramp = self._motion, self._ramp

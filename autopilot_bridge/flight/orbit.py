@@ -44,7 +44,8 @@ class OrbitTask:
     """Fly to the nearest point of a circle, then around it at constant speed; DONE after `turns`, if given.
 
     Args:
-        centre_ned_m: centre and height, (3,); NaN components: of the place where the task starts; None: one radius
+        centre_ned_m: centre and height, (3,); NaN components: of the place where the task starts; None: one
+        radius
             ahead, so that the circle starts here (ArduPilot CIRCLE).
         radius_m: None: the parameter. Its sign is ignored.
         velocity_m_s: ground speed, positive clockwise seen from above; None: the parameter. Limited by the
@@ -181,10 +182,15 @@ class OrbitTask:
         acceleration = trajectory.acceleration_ned_m_s2
         # what is left of the way onto the circle dies out smoothly
         fade = math.exp(-dt)
-        for axis, circle in ((0, r * c), (1, r * s), (2, 0.0)):
-            before = self.centre_ned_m[axis] + r * (math.cos, math.sin, _zero)[axis](self._phase_rad - step)
-            left = (position[axis] - before) * fade
-            position[axis] = self.centre_ned_m[axis] + circle + left
+        before = self._phase_rad - step
+        north, east, down = (float(x) for x in self.centre_ned_m)
+        left_north = (float(position[0]) - north - r * math.cos(before)) * fade
+        left_east = (float(position[1]) - east - r * math.sin(before)) * fade
+        position[:] = (
+            north + r * c + left_north,
+            east + r * s + left_east,
+            down + (float(position[2]) - down) * fade,
+        )
         velocity[:] = (-v * s, v * c, 0.0)
         acceleration[:] = (-along * s - v * v / r * c, along * c - v * v / r * s, 0.0)
 
@@ -202,7 +208,3 @@ class OrbitTask:
         if behaviour is OrbitYaw.HOLD_INITIAL:
             return self._initial_yaw
         return motion.heading.yaw_rad
-
-
-def _zero(_angle_rad: float) -> float:
-    return 0.0

@@ -1,4 +1,6 @@
-"""Limits and habits of flight, in the meaning shared by PX4 (MPC_*, RTL_*, MIS_*) and ArduPilot (WPNAV_*, RTL_*)."""
+"""Limits and habits of flight, in the meaning shared by PX4 (MPC_*, RTL_*, MIS_*) and ArduPilot (WPNAV_*,
+RTL_*).
+"""
 
 import math
 from dataclasses import dataclass, fields

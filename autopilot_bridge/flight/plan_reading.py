@@ -59,7 +59,8 @@ def is_passed_through(item: MissionItem) -> bool:
 def target_of(item: MissionItem, ctx: FlightContext) -> Array | None:
     """Place of an item in local NED, (3,); None when it can't be known (no frame, no home, nonsense).
 
-    Latitude and longitude 0, or NaN, mean "here", as autopilots take them for take-off, land and loiter items.
+    Latitude and longitude 0, or NaN, mean "here", as autopilots take them for take-off, land and loiter
+    items.
     """
     here = ctx.nav[nav_layout.POS_NED_M]
     if item.frame == _LOCAL_NED:

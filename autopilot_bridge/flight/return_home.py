@@ -35,10 +35,7 @@ def return_height(distance_m: float, height_m: float, parameters: FlightParamete
     if p.return_cone_half_angle_rad > 0.0 and distance_m <= p.return_min_distance_m:
         tangent = math.tan(p.return_cone_half_angle_rad)
         floor = min(wanted, p.return_descend_altitude_m)
-        if tangent < 1e6:
-            wanted = min(wanted, max(distance_m / tangent, floor))
-        else:
-            wanted = floor
+        wanted = min(wanted, max(distance_m / tangent, floor))
     return max(height_m + p.return_climb_min_m, wanted)
 
 

@@ -18,8 +18,9 @@ class TaskStatus(IntEnum):
 class FlightTask(Protocol):
     """One kind of flying.
 
-    `activate` is called once, when the commander makes the task the active one; `update` every 20 ms while it is.
-    A task that can't do its work (no position) degrades to what can be held and never writes nonsense.
+    `activate` is called once, when the commander makes the task the active one; `update` every 20 ms while
+    it is. A task that can't do its work (no position) degrades to what can be held and never writes
+    nonsense.
     """
 
     def activate(self, ctx: FlightContext) -> None:

@@ -1,10 +1,12 @@
-"""Jerk-limited motion along straight legs, online: position, velocity and acceleration to feed the control laws.
+"""Jerk-limited motion along straight legs, online: position, velocity and acceleration to feed the control
+laws.
 
 Two nested laws per tick, horizontally on the vector (so that path and limits don't depend on the axes) and
 vertically on the scalar: a velocity wanted from the geometry of the leg (braking distance to its end speed,
-cross-track correction), and an acceleration that brings the velocity there under acceleration and jerk limits,
-a = sqrt(2 j |dv|) towards it, the time-optimal surface of the double integrator (Bryson and Ho, 1975, section 3.9).
-The idea of running such a smoother in front of the position loop is PX4's (`PositionSmoothing`).
+cross-track correction), and an acceleration that brings the velocity there under acceleration and jerk
+limits, a = sqrt(2 j |dv|) towards it, the time-optimal surface of the double integrator (Bryson and Ho,
+1975, section 3.9). The idea of running such a smoother in front of the position loop is PX4's
+(`PositionSmoothing`).
 """
 
 import math
@@ -220,7 +222,9 @@ class TrajectoryGenerator:
         self.stretch = 1.0
 
     def wait_for(self, vehicle_ned_m: Array, error_max_m: float) -> None:
-        """Slow the next tick down when the vehicle can't follow, to a stop at `error_max_m` (PX4 MPC_XY_ERR_MAX)."""
+        """Slow the next tick down when the vehicle can't follow, to a stop at `error_max_m` (PX4
+        MPC_XY_ERR_MAX).
+        """
         north = float(vehicle_ned_m[0]) - float(self._state[0])
         east = float(vehicle_ned_m[1]) - float(self._state[1])
         error = math.hypot(north, east)

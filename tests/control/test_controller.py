@@ -270,7 +270,7 @@ def test_gains_can_be_replaced_in_flight() -> None:
 
 
 def test_motor_failure_of_authority_does_not_wind_up() -> None:
-    rig, task = hovering()
+    rig, _ = hovering()
     rig.vehicle.set_motor_effectiveness(0, 0.85)
     log = rig.run(6.0)
     assert np.abs(positions(log) - [0.0, 0.0, -20.0]).max() < 1.0

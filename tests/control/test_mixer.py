@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.control.mixer import ALLOCATION, allocate, command_from_thrust
 
-# front right, rear left, front left, rear right: (forward, right) of the rotor, +1 counterclockwise (torque on the
+# front right, rear left, front left, rear right: (forward, right) of the rotor, +1 counterclockwise (torque
+# on the
 # body clockwise, positive about down)
 ROTORS = ((1.0, 1.0, 1.0), (-1.0, -1.0, 1.0), (1.0, -1.0, -1.0), (-1.0, 1.0, -1.0))
 
@@ -54,7 +55,7 @@ def test_motors_stay_in_range_and_thrust_never_rises(
 
 
 def test_yaw_gives_way_to_roll() -> None:
-    motor, unallocated = mix(0.4, 0.0, 1.0, 0.5)
+    _, unallocated = mix(0.4, 0.0, 1.0, 0.5)
     assert abs(unallocated[0]) < 0.05
     assert unallocated[2] > 0.5
 

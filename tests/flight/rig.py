@@ -1,6 +1,7 @@
 """Closed loop for tests of control laws and flight tasks: iris model, perfect navigation, controller, task.
 
-The navigation filter has its own tests; here its place is taken by the truth, so that what is measured is the control.
+The navigation filter has its own tests; here its place is taken by the truth, so that what is measured is
+the control.
 """
 
 import math
