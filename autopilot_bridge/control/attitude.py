@@ -63,9 +63,7 @@ def quaternion_from_thrust_axis(zx: float, zy: float, zz: float, yaw: float, q: 
 
 @njit(cache=True)
 def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_sp: Array, w: Array) -> None:
-    """rate_sp (3,) FRD from the attitude error; `yaw_rate_ff` is about the NED down axis. `w` (8,) is
-    scratch.
-    """
+    """rate_sp (3,) FRD from the attitude error; `yaw_rate_ff` about NED down; `w` (8,) is scratch."""
     ex, ey, ez = body_z_of(q)
     dx, dy, dz = body_z_of(q_sp)
     # reduced attitude: shortest rotation, in NED, from the present to the wanted thrust axis
@@ -121,9 +119,7 @@ def limit_rates(rate_sp: Array, p: Array) -> None:
 
 @njit(cache=True)
 def rate_control(rates: Array, rate_sp: Array, p: Array, s: Array, dt: float, integrate: bool) -> None:
-    """RATE_INTEGRAL, RATE_DERIVATIVE and UNALLOCATED of the state `s` in; torques into UNALLOCATED (then
-    mixed).
-    """
+    """Torques of the rate PID, left in UNALLOCATED of the state `s` for the mixer."""
     alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
     for i in range(3):
         g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i

@@ -66,9 +66,7 @@ def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
 
 @njit(cache=True)
 def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
-    """Thrust setpoint of the levels below TRAJECTORY; NaN asks for the vertical part of the trajectory
-    fields.
-    """
+    """Thrust setpoint below level TRAJECTORY; NaN flies the vertical part of the trajectory fields."""
     if math.isfinite(sp[_THRUST]):
         s[c.VEL_INTEGRAL + 2] = 0.0
         s[c.BUMP + 2] = 0.0

@@ -1,5 +1,4 @@
-"""Control allocation of a quad-X: collective thrust and torques to motors, with desaturation, and the
-thrust curve.
+"""Control allocation of a quad-X with desaturation, and the motors' thrust curve.
 
 Normalised as PX4 normalises its effectiveness matrix: unit roll or pitch torque moves each motor by
 1/sqrt(2), unit yaw and unit thrust by 1. Desaturation in the order of PX4 with airmode off
@@ -32,7 +31,7 @@ _YAW_MARGIN: Final = 0.15  # of the range, kept for yaw when thrust is full (PX4
 
 @njit(cache=True)
 def _desaturation_gain(motor: Array, axis: int, upper: float) -> float:
-    """Step along `axis` that brings the worst motors back into 0..upper (sum of the extremes on both sides)."""
+    """Step along `axis` that brings the worst motors back into 0..upper (sum of both ends)."""
     gain_min = 0.0
     gain_max = 0.0
     for i in range(MOTORS):
@@ -86,9 +85,7 @@ def allocate(roll: float, pitch: float, yaw: float, thrust: float, motor: Array,
 
 @njit(cache=True)
 def command_from_thrust(thrust: float, factor: float) -> float:
-    """Motor command c that gives the normalised thrust: thrust = factor c^2 + (1 - factor) c (PX4
-    THR_MDL_FAC).
-    """
+    """Motor command c with thrust = factor c^2 + (1 - factor) c (PX4 THR_MDL_FAC)."""
     thrust = min(1.0, max(0.0, thrust))
     if factor < 1e-6:
         return thrust

@@ -1,6 +1,4 @@
-"""Gains and limits of the multicopter control laws, one field per PX4 parameter (its name stands beside the
-field).
-"""
+"""Gains and limits of the multicopter control laws; PX4's parameter stands beside each field."""
 
 import math
 from dataclasses import dataclass, fields

@@ -3,7 +3,9 @@
 The structure PX4 publishes (Multicopter Position Control; `PositionControl`): position P gives a velocity,
 velocity PID gives an acceleration, feed-forward adds at both places, the acceleration becomes a thrust
 vector under tilt and thrust limits with the vertical first, and the integrator follows what was really
-given (tracking anti-windup). Added to it: drag, which the accelerometer measures directly across the
+given (tracking anti-windup).
+
+Added to it: drag, which the accelerometer measures directly across the
 thrust axis, is fed forward below a cut-off (Kai, Allibert, Hua, Hamel, "Nonlinear feedback control of
 quadrotors exploiting first-order drag effects", 2017).
 """
@@ -52,8 +54,7 @@ def lowpass_gain(dt: float, cutoff_hz: float) -> float:
 
 @njit(cache=True)
 def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
-    """One step of the scalar Kalman filter on hover thrust (PX4's idea, with the force along the thrust
-    axis).
+    """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
     """
@@ -215,7 +216,7 @@ def vertical_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enter
 
 @njit(cache=True)
 def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
-    """One step of the position loop: Q_SETPOINT, THRUST_SETPOINT and YAW_RATE_FF from a trajectory setpoint."""
+    """One step of the position loop: writes Q_SETPOINT, THRUST_SETPOINT and YAW_RATE_FF."""
     _velocity_setpoint(nav, sp, p, s)
     ax, error_x, control_x = _acceleration_axis(0, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)
     ay, error_y, control_y = _acceleration_axis(1, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)

@@ -1,6 +1,4 @@
-"""Flight tasks: each flies one kind of flying by writing the control setpoint. Flavour-neutral,
-deterministic.
-"""
+"""Flight tasks: each flies one kind of flying by writing the control setpoint. Flavour-neutral."""
 
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState, ManualInput
 from autopilot_bridge.flight.goto import GotoTask, RepositionTask

@@ -14,9 +14,7 @@ _REVERSAL_RAD: Final = math.radians(150.0)
 
 
 def turn_angle(before: Point, corner: Point, after: Point) -> float:
-    """Horizontal change of course at a corner, 0 (straight on) to pi; 0 where a leg has no horizontal
-    length.
-    """
+    """Horizontal change of course at a corner, 0 (straight on) to pi; 0 beside a vertical leg."""
     n1, e1 = corner[0] - before[0], corner[1] - before[1]
     n2, e2 = after[0] - corner[0], after[1] - corner[1]
     if math.hypot(n1, e1) < 0.1 or math.hypot(n2, e2) < 0.1:
@@ -37,9 +35,7 @@ def corner_speed(angle_rad: float, tangent_m: float, acceleration_m_s2: float) -
 
 
 def turn_in_distance(angle_rad: float, speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
-    """Distance before the corner at which a turn flown at `speed_m_s` begins, the time to build it up
-    included.
-    """
+    """Distance before the corner at which a turn at `speed_m_s` begins, its build-up included."""
     if angle_rad < _STRAIGHT_RAD:
         return 0.0
     arc = speed_m_s * speed_m_s / acceleration_m_s2 * math.tan(0.5 * min(angle_rad, _REVERSAL_RAD))

@@ -1,6 +1,4 @@
-"""Flying an uploaded plan (MAVLink mission protocol), passing waypoints without stopping where that is
-allowed.
-"""
+"""Flying an uploaded plan (MAVLink mission protocol), through its waypoints without needless stops."""
 
 import math
 from dataclasses import dataclass
@@ -114,9 +112,6 @@ class MissionTask:
         self._finished = False
         self._jumps.clear()
         self._begin(ctx, max(self._store.current, self._first_item), None)
-
-    # -- items
-    # ---------------------------------------------------------------------------------------------------
 
     def _begin(self, ctx: FlightContext, seq: int, came_from: Array | None) -> None:
         """Make `seq` the current item, running through items that take no time."""
@@ -295,9 +290,6 @@ class MissionTask:
         p = ctx.parameters
         turn_in = turn_in_distance(angle, speed, p.corner_acceleration_m_s2, p.jerk_m_s3)
         return speed, min(turn_in, 0.75 * radius, 0.5 * math.dist(path[1], path[2]))
-
-    # -- flying
-    # --------------------------------------------------------------------------------------------------
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         motion, ramp = self._motion, self._ramp

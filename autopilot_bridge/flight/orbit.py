@@ -45,8 +45,7 @@ class OrbitTask:
 
     Args:
         centre_ned_m: centre and height, (3,); NaN components: of the place where the task starts; None: one
-        radius
-            ahead, so that the circle starts here (ArduPilot CIRCLE).
+            radius ahead, so that the circle starts here (ArduPilot CIRCLE).
         radius_m: None: the parameter. Its sign is ignored.
         velocity_m_s: ground speed, positive clockwise seen from above; None: the parameter. Limited by the
             centripetal acceleration.

@@ -1,6 +1,4 @@
-"""Limits and habits of flight, in the meaning shared by PX4 (MPC_*, RTL_*, MIS_*) and ArduPilot (WPNAV_*,
-RTL_*).
-"""
+"""Limits and habits of flight, in the meaning PX4 (MPC_*, RTL_*) and ArduPilot (WPNAV_*, RTL_*) share."""
 
 import math
 from dataclasses import dataclass, fields
