@@ -73,7 +73,7 @@ class _Watch:
     def __init__(self, reading: Reading, stale_us: int) -> None:
         self._reading = reading
         self._stale_us = stale_us
-        self._last = reading.values.copy()
+        self._last = reading.values.tobytes()
         self._last_time_us = -1
         self._equal = 0
 
@@ -83,11 +83,9 @@ class _Watch:
             return False
         if reading.time_us != self._last_time_us:
             self._last_time_us = reading.time_us
-            if bool((reading.values == self._last).all()):
-                self._equal += 1
-            else:
-                self._equal = 0
-                self._last[:] = reading.values
+            newest = reading.values.tobytes()  # NaN fields compare equal as bytes
+            self._equal = self._equal + 1 if newest == self._last else 0
+            self._last = newest
         return self._equal < _FROZEN_SAMPLES
 
 

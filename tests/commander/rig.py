@@ -1,4 +1,4 @@
-"""A commander with everything around it, on a vehicle that follows its setpoints exactly: no filter, no physics."""
+"""A commander with everything around it, on a vehicle that follows its setpoints exactly."""
 
 import math
 from typing import Any
@@ -39,7 +39,9 @@ class FollowerLandDetector:
 
     def update(self, ctx: FlightContext, thrust: float) -> LandedState:
         height_m = -float(ctx.nav[nav.POS_NED_M][2])
-        resting = height_m <= 0.02 and not (ctx.armed and ctx.setpoint[sp.LEVEL] > sp.IDLE and ctx.setpoint[5] < 0.0)
+        resting = height_m <= 0.02 and not (
+            ctx.armed and ctx.setpoint[sp.LEVEL] > sp.IDLE and ctx.setpoint[5] < 0.0
+        )
         ctx.ground_contact = ctx.maybe_landed = resting
         if resting:
             ctx.landed_state = LandedState.ON_GROUND
@@ -123,7 +125,9 @@ class Rig:
         """Seconds until `condition()`; fails after the limit."""
         start_us = self.time_us
         while not condition():
-            assert self.time_us - start_us < limit_s * 1e6, f"not within {limit_s} s; mode {self.commander.mode}"
+            assert self.time_us - start_us < limit_s * 1e6, (
+                f"not within {limit_s} s; mode {self.commander.mode}"
+            )
             self.tick()
         return (self.time_us - start_us) * 1e-6
 
@@ -143,7 +147,9 @@ class Rig:
         self.tick()
         assert commander.airborne
 
-    def waypoint(self, north_m: float, east_m: float, height_m: float = 10.0, command: int = 16) -> MissionItem:
+    def waypoint(
+        self, north_m: float, east_m: float, height_m: float = 10.0, command: int = 16
+    ) -> MissionItem:
         assert self.context.frame is not None
         lat, lon, _ = self.context.frame.geodetic_from_ned(north_m, east_m, 0.0)
         return MissionItem(command=command, frame=6, x=lat, y=lon, z=height_m)
@@ -168,7 +174,13 @@ class Rig:
         if not np.isfinite(readings.battery.values).all():
             readings.battery.values[:] = (16.2, 1.0, 0.0, 1.0)
         readings.battery.values[interface.BATTERY_CURRENT_A] = 1.0 + jitter
-        for reading in (readings.imu, readings.barometer, readings.magnetometer, readings.gps, readings.battery):
+        for reading in (
+            readings.imu,
+            readings.barometer,
+            readings.magnetometer,
+            readings.gps,
+            readings.battery,
+        ):
             reading.time_us = self.time_us
         if self.spoil is not None:
             self.spoil()

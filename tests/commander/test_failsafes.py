@@ -304,7 +304,8 @@ def test_ardupilot_ekf_failsafe_lands_and_does_not_come_back() -> None:
 
 
 @pytest.mark.parametrize(
-    ("action", "mode"), [(1, FlightMode.HOLD), (2, FlightMode.HOLD), (3, FlightMode.RETURN), (5, FlightMode.LAND)]
+    ("action", "mode"),
+    [(1, FlightMode.HOLD), (2, FlightMode.HOLD), (3, FlightMode.RETURN), (5, FlightMode.LAND)],
 )
 @pytest.mark.parametrize("place", [(60.0, 0.0, -5.0), (0.0, 0.0, -25.0)])
 def test_px4_geofence(action: int, mode: FlightMode, place: tuple[float, float, float]) -> None:

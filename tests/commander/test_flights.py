@@ -131,7 +131,9 @@ def test_a_commanded_home_stays_when_arming() -> None:
     assert rig.commander.home.position.lat_deg == 47.4
 
 
-@pytest.mark.parametrize("place", [(95.0, 8.0, 0.0), (math.nan, 8.0, 0.0), (47.0, 8.0, math.inf), (47.0, 400.0, 0.0)])
+@pytest.mark.parametrize(
+    "place", [(95.0, 8.0, 0.0), (math.nan, 8.0, 0.0), (47.0, 8.0, math.inf), (47.0, 400.0, 0.0)]
+)
 def test_home_is_a_place_on_earth(place: tuple[float, float, float]) -> None:
     rig = Rig("px4")
     before = rig.commander.home.position

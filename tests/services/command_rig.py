@@ -1,0 +1,134 @@
+"""Services around a commander rig, on a channel that keeps what was sent."""
+
+from typing import Any
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.services.channel import Source
+from autopilot_bridge.services.command_common import CommandHooks
+from autopilot_bridge.services.commands import CommandService
+from autopilot_bridge.services.manual import ManualService
+from autopilot_bridge.services.setpoints import SetpointService
+from autopilot_bridge.services.status_text import StatusTextService
+from tests.commander.rig import Rig
+
+NAN = float("nan")
+
+
+class Channel:
+    """Keeps what is sent; every message must pack."""
+
+    def __init__(self, name: str = "test") -> None:
+        self.name = name
+        self.sent: list[Any] = []
+        self._packer = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+
+    def send(self, message: Any) -> None:
+        message.pack(self._packer)
+        self.sent.append(message)
+
+    def texts(self) -> list[str]:
+        return [
+            m.text if isinstance(m.text, str) else m.text.decode() for m in self.sent if m.get_msgId() == 253
+        ]
+
+
+class Intervals:
+    """Remembers what was asked."""
+
+    def __init__(self) -> None:
+        self.calls: list[tuple[Any, ...]] = []
+
+    def set_interval(self, source: Source, message_id: int, interval_us: float) -> Result:
+        self.calls.append(("set", message_id, interval_us))
+        return Result.ACCEPTED
+
+    def get_interval(self, source: Source, message_id: int) -> Result:
+        self.calls.append(("get", message_id))
+        return Result.ACCEPTED
+
+    def request(self, source: Source, message_id: int, parameter: float = 0.0) -> Result:
+        self.calls.append(("request", message_id, parameter))
+        return Result.ACCEPTED
+
+
+class ServiceRig(Rig):
+    """A commander with its command, setpoint, manual and text services."""
+
+    def __init__(self, flavour: str = "px4", **arguments: Any) -> None:
+        super().__init__(flavour, **arguments)
+        self.channel = Channel()
+        self.channels = [self.channel]
+        self.source = Source(self.channel, 255, 190)
+        self.intervals = Intervals()
+        self.failures: list[tuple[int, int, int]] = []
+        self.status = StatusTextService(self.flavour, self)
+        hooks = CommandHooks(
+            intervals=self.intervals,
+            parameters=self.store,
+            announce=self.status.announce,
+            set_current_item=self._set_current,
+            mission_item_count=lambda: len(self.missions.items),
+            inject_failure=self._inject,
+        )
+        self.commands = CommandService.for_flavour(
+            flavour, self.commander, hooks, self.flavour.command_address(1)
+        )
+        self.setpoints = SetpointService(flavour, self.commander)
+        self.manual = ManualService(self.commander, system_id=1)
+
+    def handle(self, message: Any) -> bool:
+        services = (self.setpoints, self.manual, self.commands, self.status)
+        return any(service.handle(message, self.source, self.time_us) for service in services)
+
+    def long(self, command: int, *parameters: float, system: int = 1, component: int = 1) -> list[int]:
+        """Results acknowledged for a COMMAND_LONG."""
+        values = [*parameters, *[0.0] * (7 - len(parameters))]
+        return self._acks(mavlink.MAVLink_command_long_message(system, component, command, 0, *values))
+
+    def int(
+        self,
+        command: int,
+        p1: float,
+        p2: float,
+        p3: float,
+        p4: float,
+        x: int,
+        y: int,
+        z: float,
+        *,
+        frame: int,
+    ) -> list[int]:
+        """Results acknowledged for a COMMAND_INT."""
+        return self._acks(
+            mavlink.MAVLink_command_int_message(1, 1, frame, command, 0, 0, p1, p2, p3, p4, x, y, z)
+        )
+
+    def set_mode(self, base_mode: int, custom_mode: int) -> list[int]:
+        return self._acks(mavlink.MAVLink_set_mode_message(1, base_mode, custom_mode))
+
+    def _acks(self, message: Any) -> list:
+        self.channel.sent.clear()
+        assert self.handle(message)
+        for event in self.commander.drain_events():
+            self.events.append(event)
+            self.status.tell(event)
+        return [sent.result for sent in self.channel.sent if sent.get_msgId() == 77]
+
+    def _set_current(self, item: int) -> bool:
+        self.missions.current = item
+        return True
+
+    def _inject(self, unit: int, kind: int, instance: int) -> Result:
+        self.failures.append((unit, kind, instance))
+        return Result.ACCEPTED
+
+    def fly(self) -> "ServiceRig":
+        """Airborne in the mode that goes to places."""
+        if self.flavour.name == "ardupilot":
+            from autopilot_bridge.commander.modes import FlightMode
+
+            self.commander.set_mode(FlightMode.GUIDED)
+        self.put_in_air()
+        return self

@@ -1,0 +1,426 @@
+"""COMMAND_LONG, COMMAND_INT and SET_MODE: the results of the reference tables, state by state."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.events import RebootRequested
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.mission_plan import MissionItem
+from tests.services.command_rig import NAN, ServiceRig
+
+ARM, MODE, TAKEOFF, LAND, RTL = 400, 176, 22, 21, 20
+HERE = (473977400, 85455900)
+
+
+def rig_of(flavour: str, state: str) -> ServiceRig:
+    """ready: on the ground, disarmed; booting; armed: on the ground; flying."""
+    rig = ServiceRig(flavour, start_s=0.5 if state == "booting" else 45.0)
+    if flavour == "ardupilot":
+        rig.commander.set_mode(FlightMode.GUIDED)
+    if state == "armed":
+        assert rig.commander.arm().accepted
+    elif state == "flying":
+        rig.put_in_air()
+    rig.commander.drain_events()
+    return rig
+
+
+PX4_TABLE = [
+    # command, parameters, state, acknowledgements
+    (31999, (), "ready", [3]),
+    (0, (), "ready", [3]),
+    (ARM, (1,), "booting", [1]),
+    (ARM, (1,), "ready", [0]),
+    (ARM, (0.5,), "ready", [0]),
+    (ARM, (1, NAN, NAN, NAN, NAN, NAN, NAN), "ready", [0]),
+    (ARM, (2,), "ready", []),
+    (ARM, (-1,), "ready", []),
+    (ARM, (NAN,), "ready", []),
+    (ARM, (1,), "armed", [0]),
+    (ARM, (0,), "ready", [0]),
+    (ARM, (0,), "armed", [0]),
+    (ARM, (0,), "flying", [1]),
+    (ARM, (0, 21196), "flying", [0]),
+    (ARM, (1, 21196), "booting", [1]),
+    (MODE, (129, 4, 3), "ready", [0, 0]),
+    (MODE, (1, 4, 4), "ready", [0, 0]),
+    (MODE, (1, 6), "ready", [0, 0]),
+    (MODE, (1, 8), "ready", [0, 0]),
+    (MODE, (1, 99), "ready", [0, 0]),
+    (MODE, (0, 4, 3), "ready", [0, 0]),
+    (MODE, (1, 4, 77), "ready", [0, 1]),
+    (MODE, (1, 4, 4), "flying", [0, 1]),
+    (MODE, (1, 6), "flying", [0, 1]),
+    (MODE, (1, 3), "flying", [0, 1]),
+    (MODE, (1, 4, 5), "flying", [0, 0]),
+    (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, NAN), "ready", [0]),
+    (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, NAN), "armed", [0]),
+    (LAND, (), "ready", [0]),
+    (LAND, (), "flying", [0]),
+    (RTL, (), "ready", [0]),
+    (RTL, (), "flying", [0]),
+    (192, (-1, 1, 0, NAN, NAN, NAN, NAN), "ready", [0]),
+    (192, (-1, 1, 0, NAN, NAN, NAN, NAN), "flying", [0]),
+    (192, (-1, 0, 0, NAN, NAN, NAN, NAN), "flying", [3]),
+    (34, (10, 2, 0, NAN, NAN, NAN, NAN), "ready", [0]),
+    (34, (10, 2, 0, NAN, NAN, NAN, NAN), "flying", [0]),
+    (178, (1, 3, -1), "ready", [0]),
+    (178, (1, 3, -1), "flying", [0]),
+    (179, (1,), "ready", [0]),
+    (179, (0, 0, 0, 0, 47.4, 8.5, 500), "ready", [0]),
+    (201, (), "ready", [0]),
+    (195, (), "ready", [0]),
+    (197, (), "ready", [0]),
+    (300, (0, 0), "ready", [2]),
+    (189, (), "ready", [6]),
+    (185, (1,), "flying", [2]),
+    (246, (1,), "ready", [2]),
+    (246, (0,), "ready", [0]),
+    (115, (90, 30, 0, 0), "flying", [3]),
+    (209, (1,), "ready", [3]),
+    (183, (9, 1500), "ready", [3]),
+    (181, (0, 1), "ready", [3]),
+    (207, (1,), "ready", [3]),
+    (208, (1,), "ready", [3]),
+    (193, (0,), "flying", [3]),
+    (2000, (), "ready", [3]),
+    (2500, (), "ready", [3]),
+    (16, (), "ready", [3]),
+    (17, (), "ready", [3]),
+    (224, (0,), "ready", [3]),
+    (203, (), "ready", []),
+    (1000, (), "ready", []),
+    (3000, (4,), "ready", []),
+    (530, (), "ready", []),
+    (245, (7,), "ready", []),
+    (420, (4, 1, 0), "ready", [0]),
+    (401, (), "ready", [0]),
+    (410, (), "ready", [0]),
+    (520, (1,), "ready", [0]),
+    (511, (30, 20000), "ready", [0]),
+    (510, (30,), "ready", [0]),
+    (512, (148,), "ready", [0]),
+    (511, (NAN, 20000), "ready", [2]),
+]
+
+ARDUPILOT_TABLE = [
+    (31999, (), "ready", [3]),
+    (65535, (), "ready", [3]),
+    (MODE, (1, 5), "ready", [0]),
+    (MODE, (1, 99), "ready", [4]),
+    (MODE, (1, 14), "ready", [4]),
+    (MODE, (0, 5), "ready", [2]),
+    (MODE, (NAN, 5), "ready", [2]),
+    (ARM, (1,), "ready", [0]),
+    (ARM, (1,), "booting", [4]),
+    (ARM, (1, 21196), "booting", [4]),
+    (ARM, (1,), "armed", [0]),
+    (ARM, (0,), "ready", [0]),
+    (ARM, (2,), "ready", [3]),
+    (ARM, (0.5,), "ready", [3]),
+    (ARM, (0,), "flying", [4]),
+    (ARM, (0, 21196), "flying", [0]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, 10), "ready", [4]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, 10), "armed", [0]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, 10), "flying", [4]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, 0), "armed", [4]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, -5), "armed", [4]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, NAN), "armed", [4]),
+    (LAND, (), "flying", [0]),
+    (RTL, (), "flying", [0]),
+    (17, (), "flying", [0]),
+    (16, (), "ready", [3]),
+    (177, (), "ready", [3]),
+    (34, (), "flying", [3]),
+    (200, (), "ready", [3]),
+    (611, (), "ready", [3]),
+    (519, (), "ready", [3]),
+    (192, (-1, 1, 0, 0, 47.4, 8.5, 10), "flying", [3]),
+    (178, (1, 5, -1), "flying", [0]),
+    (115, (90, 30, 1, 0), "flying", [0]),
+    (115, (500, 30, 1, 0), "flying", [4]),
+    (300, (0, 0), "ready", [0]),
+    (300, (1, 0), "ready", [2]),
+    (179, (1,), "ready", [0]),
+    (179, (0,), "ready", [0]),
+    (179, (0, 0, 0, 0, 95, 8.5, 10), "ready", [2]),
+    (43000, (), "ready", [3]),
+    (193, (0,), "flying", [0]),
+    (193, (7,), "flying", [2]),
+    (185, (0,), "ready", [4]),
+    (183, (9, 1500), "ready", [0]),
+    (183, (99, 1500), "ready", [4]),
+    (211, (), "ready", [4]),
+    (207, (1,), "ready", [0]),
+    (241, (), "ready", [3]),
+    (245, (99,), "ready", [2]),
+    (401, (), "ready", [0]),
+    (410, (), "ready", [0]),
+    (520, (1,), "ready", [0]),
+    (224, (77,), "ready", [2]),
+    (224, (-1,), "ready", [2]),
+    (224, (0,), "ready", [0]),
+    (246, (1,), "ready", [0]),
+    (246, (1,), "flying", [4]),
+]
+
+
+@pytest.mark.parametrize(("command", "parameters", "state", "acks"), PX4_TABLE)
+def test_px4_results(command: int, parameters: tuple[float, ...], state: str, acks: list[int]) -> None:
+    assert rig_of("px4", state).long(command, *parameters) == acks
+
+
+@pytest.mark.parametrize(("command", "parameters", "state", "acks"), ARDUPILOT_TABLE)
+def test_ardupilot_results(command: int, parameters: tuple[float, ...], state: str, acks: list[int]) -> None:
+    rig = rig_of("ardupilot", state)
+    rig.upload(rig.waypoint(5.0, 0.0))
+    assert rig.long(command, *parameters) == acks
+
+
+@pytest.mark.parametrize(
+    ("frame", "latitude", "flags", "state", "acks"),
+    [
+        (0, 473978000, 1, "ready", [0]),
+        (3, 473978000, 1, "flying", [0]),
+        (5, 473978000, 1, "flying", [0]),
+        (6, 473978000, 1, "flying", [0]),
+        (6, 473978000, 0, "flying", [0]),  # in GUIDED already
+        (6, 950000000, 1, "flying", [2]),
+        (1, 473978000, 1, "flying", [2]),
+    ],
+)
+def test_ardupilot_reposition(frame: int, latitude: int, flags: int, state: str, acks: list[int]) -> None:
+    rig = rig_of("ardupilot", state)
+    assert rig.int(192, -1, flags, 0, 0, latitude, HERE[1], 20.0, frame=frame) == acks
+    if frame == 1:
+        assert rig.channel.texts() == []  # nobody greeted this channel
+    rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+    rig.int(192, -1, 1, 0, 0, latitude, HERE[1], 20.0, frame=1)
+    assert rig.channel.texts() == ["Unknown mavlink coordinate frame 1"]
+
+
+def test_ardupilot_reposition_needs_the_flag_in_other_modes() -> None:
+    rig = rig_of("ardupilot", "flying")
+    rig.commander.set_mode(FlightMode.HOLD)
+    assert rig.int(192, -1, 0, 0, 0, *HERE, 20.0, frame=6) == [2]
+    assert rig.int(192, -1, 1, 0, 0, *HERE, 20.0, frame=6) == [0]
+    assert rig.commander.mode is FlightMode.GUIDED
+
+
+@pytest.mark.parametrize("frame", [0, 5, 6, 99])
+def test_px4_reposition_flies_there(frame: int) -> None:
+    rig = rig_of("px4", "flying")
+    lat, lon, _ = rig.context.frame.geodetic_from_ned(12.0, 7.0, 0.0)  # type: ignore[union-attr]
+    altitude_m = 15.0 if frame == 6 else 489.0 + 15.0
+    assert rig.int(192, -1, 1, 0, NAN, round(lat * 1e7), round(lon * 1e7), altitude_m, frame=frame) == [0]
+    rig.run(20.0)
+    assert rig.context.nav[10:13] == pytest.approx((12.0, 7.0, -15.0), abs=0.1)
+
+
+def test_px4_reposition_takes_off_when_armed_on_the_ground() -> None:
+    rig = rig_of("px4", "armed")
+    assert rig.int(192, -1, 1, 0, NAN, *HERE, 10.0, frame=6) == [0]
+    rig.run(20.0)
+    assert rig.height_m == pytest.approx(10.0, abs=0.2)
+
+
+def test_px4_takeoff_altitude_is_over_sea_level_and_may_be_commanded_first() -> None:
+    rig = rig_of("px4", "ready")
+    assert rig.long(TAKEOFF, 0, 0, 0, NAN, NAN, NAN, 489.0 + 12.0) == [0]
+    assert rig.long(ARM, 1) == [0]
+    rig.run(20.0)
+    assert rig.height_m == pytest.approx(12.0, abs=0.6)
+
+
+def test_px4_takeoff_without_altitude_uses_the_parameter() -> None:
+    rig = rig_of("px4", "ready")
+    rig.set_parameter("MIS_TAKEOFF_ALT", 4.0)
+    assert rig.long(MODE, 1, 4, 2) == [0, 0]
+    assert rig.long(ARM, 1) == [0]
+    rig.run(15.0)
+    assert rig.height_m == pytest.approx(4.0, abs=0.6)
+
+
+def test_px4_mission_start_changes_the_mode_and_arms() -> None:
+    rig = rig_of("px4", "ready")
+    assert rig.long(300, 0, 0) == [2]
+    assert "Mission start denied! No valid mission" in rig.channel.texts()
+    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0))
+    rig.tick()
+    assert rig.long(300, NAN) == [2]
+    assert rig.long(300, 7) == [2]
+    assert rig.long(300, 0) == [0]
+    assert rig.commander.armed
+    assert rig.commander.mode is FlightMode.MISSION
+
+
+@pytest.mark.parametrize(
+    ("flavour", "system", "component", "answered"),
+    [
+        ("px4", 1, 1, True),
+        ("px4", 1, 0, True),
+        ("px4", 1, 191, False),
+        ("px4", 0, 0, False),
+        ("px4", 2, 1, False),
+        ("ardupilot", 1, 1, True),
+        ("ardupilot", 0, 0, True),
+        ("ardupilot", 1, 191, True),
+        ("ardupilot", 2, 1, False),
+    ],
+)
+def test_targets(flavour: str, system: int, component: int, answered: bool) -> None:
+    rig = rig_of(flavour, "ready")
+    assert rig.long(31999, system=system, component=component) == ([3] if answered else [])
+
+
+def test_the_acknowledgement_names_its_receiver() -> None:
+    rig = rig_of("px4", "ready")
+    rig.long(401)
+    ack = next(message for message in rig.channel.sent if message.get_msgId() == 77)
+    assert (ack.command, ack.result, ack.target_system, ack.target_component) == (401, 0, 255, 190)
+
+
+@pytest.mark.parametrize(
+    ("base", "custom", "acks", "mode"),
+    [
+        (1, 0x05040000, [0], FlightMode.RETURN),
+        (0, 0x05040000, [0], FlightMode.HOLD),
+        (129, 0x00060000, [0], FlightMode.OFFBOARD),
+        (1, 0x4D040000, [1], FlightMode.HOLD),
+    ],
+)
+def test_px4_set_mode_message(base: int, custom: int, acks: list[int], mode: FlightMode) -> None:
+    rig = rig_of("px4", "ready")
+    assert rig.set_mode(base, custom) == acks
+    assert rig.commander.mode is mode
+
+
+def test_ardupilot_set_mode_message_is_not_acknowledged() -> None:
+    rig = rig_of("ardupilot", "ready")
+    rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+    assert rig.set_mode(1, 5) == []
+    assert rig.commander.mode is FlightMode.HOLD
+    assert rig.set_mode(1, 99) == []
+    assert "No such mode 99" in rig.channel.texts()
+
+
+def test_px4_texts_of_refused_commands() -> None:
+    rig = rig_of("px4", "flying")
+    rig.long(ARM, 0)
+    assert rig.channel.texts() == ["Disarming denied: not landed"]
+    rig.long(ARM, 2)
+    assert rig.channel.texts() == ["Unsupported ARM_DISARM param"]
+    rig.long(MODE, 1, 4, 77)
+    assert rig.channel.texts() == ["Unsupported auto mode"]
+    rig.long(MODE, 1, 4, 4)
+    assert rig.channel.texts() == ["Switching to Mission is currently not available"]
+
+
+def test_ardupilot_pause_outside_guided_and_auto() -> None:
+    rig = rig_of("ardupilot", "flying")
+    rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+    rig.commander.set_mode(FlightMode.HOLD)
+    assert rig.long(193, 0) == [4]
+    assert "Failed to pause" in rig.channel.texts()
+
+
+def test_ardupilot_yaw_turns_and_the_place_stays() -> None:
+    rig = rig_of("ardupilot", "flying")
+    rig.run(1.0)
+    assert rig.long(115, 90, 30, 1, 0) == [0]
+    rig.run(8.0)
+    assert rig.context.nav[27] == pytest.approx(math.pi / 2, abs=0.02)
+    assert rig.long(115, 45, 30, -1, 1) == [0]
+    rig.run(8.0)
+    assert rig.context.nav[27] == pytest.approx(math.pi / 4, abs=0.02)
+    assert rig.context.nav[10:12] == pytest.approx((0.0, 0.0), abs=0.1)
+
+
+def test_change_speed_lasts_until_the_next_mode() -> None:
+    rig = rig_of("px4", "flying")
+    rig.long(178, 1, 2.5, -1)
+    assert rig.context.parameters.cruise_speed_m_s == 2.5
+    rig.commander.set_mode(FlightMode.RETURN)
+    assert rig.context.parameters.cruise_speed_m_s == 5.0
+
+
+def test_fence_switch_sets_the_parameter() -> None:
+    rig = rig_of("ardupilot", "ready")
+    assert rig.long(207, 1) == [0]
+    assert rig.store.get("FENCE_ENABLE") == 1
+
+
+def test_reboot_is_asked_of_the_autopilot() -> None:
+    rig = rig_of("ardupilot", "ready")
+    rig.long(246, 1)
+    assert any(isinstance(event, RebootRequested) for event in rig.events)
+
+
+def test_failures_reach_the_hook() -> None:
+    rig = rig_of("px4", "ready")
+    rig.long(420, 4, 1, 0)
+    assert rig.failures == [(4, 1, 0)]
+
+
+def test_cancel_is_tolerated() -> None:
+    if not hasattr(mavlink, "MAVLink_command_cancel_message"):
+        pytest.skip("this release of the dialect has no COMMAND_CANCEL")
+    rig = rig_of("px4", "ready")
+    assert rig.handle(mavlink.MAVLink_command_cancel_message(1, 1, 22))
+
+
+COMMANDS = sorted(
+    {row[0] for row in PX4_TABLE + ARDUPILOT_TABLE} | {2510, 31010, 252, 186, 530, 43001, 84, 205}
+)
+ANYTHING = st.one_of(
+    st.floats(width=32, allow_nan=True, allow_infinity=True),
+    st.sampled_from([0.0, 1.0, -1.0, 2.0, 3.0, 6.0, 21196.0, 1e30, -1e30, NAN, math.inf, -math.inf]),
+)
+RIGS: dict[tuple[str, str], Callable[[], ServiceRig]] = {
+    (flavour, state): (lambda flavour=flavour, state=state: rig_of(flavour, state))
+    for flavour in ("px4", "ardupilot")
+    for state in ("ready", "flying")
+}
+
+
+def sane(rig: ServiceRig) -> None:
+    """Whatever was asked for, the control setpoint is usable and home is a place."""
+    setpoint = rig.context.setpoint
+    assert setpoint[sp.LEVEL] in (sp.OFF, sp.IDLE, sp.RATES, sp.ATTITUDE, sp.TRAJECTORY)
+    assert not any(math.isinf(value) for value in setpoint)
+    if setpoint[sp.LEVEL] in (sp.RATES,):
+        assert 0.0 <= setpoint[sp.THRUST] <= 1.0
+
+
+@pytest.mark.parametrize("place", list(RIGS))
+@settings(max_examples=60, deadline=None)
+@given(
+    calls=st.lists(
+        st.tuples(
+            st.one_of(st.sampled_from(COMMANDS), st.integers(0, 65535)),
+            st.lists(ANYTHING, min_size=4, max_size=4),
+            st.integers(-(2**31), 2**31 - 1),
+            st.integers(-(2**31), 2**31 - 1),
+            ANYTHING,
+            st.integers(0, 255),
+            st.booleans(),
+        ),
+        max_size=6,
+    )
+)
+def test_no_command_ever_raises(place: tuple[str, str], calls: list[tuple]) -> None:
+    rig = RIGS[place]()
+    for command, parameters, x, y, z, frame, as_int in calls:
+        if as_int:
+            acks = rig.int(command, *parameters, x, y, z, frame=frame)
+        else:
+            acks = rig.long(command, *parameters, float(x), float(y), z)
+        assert len(acks) <= 2
+        rig.run(0.1)
+        sane(rig)
