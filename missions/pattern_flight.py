@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -22,13 +23,15 @@ from missions.planning.trajectory import (
     plan_trajectory,
 )
 from missions.planning.waypoints import waypoints_along
+from missions.telemetry import Attitude
 from missions.vehicle.guided import GuidedSession
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.vehicle import Vehicle
 
-_SETTLE_S = 2.0
-_PATH_STEP_M = 0.25
-_TRANSIT_M_S = 5.0
+_SETTLE_S: Final = 1.5
+_SAME_PLACE_M: Final = 0.3
+_PATH_STEP_M: Final = 0.25
+_TRANSIT_M_S: Final = 5.0
 
 
 def plan(curve: Curve, options: FlightOptions, limits: VehicleLimits) -> Trajectory:
@@ -121,13 +124,8 @@ async def _fly_setpoints(
     assert first.position_ned_m is not None and last.position_ned_m is not None
     async with vehicle.guided(options.rate_hz) as guided:
         notes.begin("transit", clock.time_us)
-        await _fly_line(guided, above_home, first.position_ned_m, limits)
-        await guided.stay(
-            Setpoint(
-                position_ned_m=first.position_ned_m, velocity_ned_m_s=(0.0, 0.0, 0.0), yaw_rad=first.yaw_rad
-            ),
-            _SETTLE_S + math.pi / limits.yaw_rate_rad_s,
-        )
+        await _fly_line(vehicle, guided, above_home, first.position_ned_m, limits)
+        await _turn(vehicle, guided, first.position_ned_m, first.yaw_rad or 0.0, limits)
         notes.begin(PATTERN, clock.time_us)
         duration_s = trajectory.duration_s
 
@@ -137,16 +135,43 @@ async def _fly_setpoints(
 
         await guided.follow(source)
         notes.begin("return", clock.time_us)
-        await _fly_line(guided, last.position_ned_m, above_home, limits)
+        await _fly_line(vehicle, guided, last.position_ned_m, above_home, limits)
     await vehicle.land()
     notes.end(clock.time_us)
 
 
-async def _fly_line(guided: GuidedSession, start: Vector, stop: Vector, limits: VehicleLimits) -> None:
-    if math.dist(start, stop) < 0.3:
+async def _fly_line(
+    vehicle: Vehicle, guided: GuidedSession, start: Vector, stop: Vector, limits: VehicleLimits
+) -> None:
+    """Turn the nose along the way, and fly straight from rest to rest."""
+    if math.dist(start, stop) < _SAME_PLACE_M:
         return
     line = line_trajectory(start, stop, speed_m_s=_TRANSIT_M_S, limits=limits)
+    await _turn(vehicle, guided, start, line.at(0.0).yaw_rad, limits)
     await guided.follow(lambda t: setpoint_at(line.at(t), (0.0, 0.0, 0.0)) if t <= line.duration_s else None)
+
+
+async def _turn(
+    vehicle: Vehicle, guided: GuidedSession, position: Vector, yaw_rad: float, limits: VehicleLimits
+) -> None:
+    """Stay in a place, turn the nose at no more than the yaw rate, and settle for a moment."""
+    attitude = vehicle.latest(Attitude)
+    start_rad = yaw_rad if attitude is None else attitude.yaw_rad
+    turn_rad = math.remainder(yaw_rad - start_rad, math.tau)
+    turn_s = max(0.1, 1.5 * abs(turn_rad) / limits.yaw_rate_rad_s)
+
+    def source(t: float) -> Setpoint | None:
+        if t > turn_s + _SETTLE_S:
+            return None
+        f = min(1.0, t / turn_s)
+        return Setpoint(
+            position_ned_m=position,
+            velocity_ned_m_s=(0.0, 0.0, 0.0),
+            yaw_rad=math.remainder(start_rad + turn_rad * f * f * (3.0 - 2.0 * f), math.tau),
+            yaw_rate_rad_s=turn_rad * 6.0 * f * (1.0 - f) / turn_s,
+        )
+
+    await guided.follow(source)
 
 
 def waypoint_items(

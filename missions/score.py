@@ -137,22 +137,11 @@ def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
     """
     if len(path_ned_m) < 2 or not len(track_ned_m):
         return np.zeros(0)
-    legs = np.diff(path_ned_m, axis=0)
-    lengths = np.linalg.norm(legs, axis=1)
-    arc = np.concatenate(([0.0], np.cumsum(lengths)))
-    squared = np.maximum(lengths**2, 1e-12)
+    from missions.path_distance import follow_path
+
     errors = np.empty(len(track_ned_m))
-    at_m, last_error = 0.0, _AHEAD_M
-    for k, point in enumerate(track_ned_m):
-        low = max(0, int(np.searchsorted(arc, at_m - _BACK_M)) - 1)
-        high = int(np.searchsorted(arc, at_m + _AHEAD_M + last_error)) + 1
-        window = slice(low, min(high, len(legs)))
-        offset = point - path_ned_m[:-1][window]
-        along = np.clip(np.einsum("ij,ij->i", offset, legs[window]) / squared[window], 0.0, 1.0)
-        distance = np.linalg.norm(offset - along[:, None] * legs[window], axis=1)
-        best = int(distance.argmin())
-        errors[k] = last_error = float(distance[best])
-        at_m = float(arc[low + best] + along[best] * lengths[low + best])
+    path, track = np.ascontiguousarray(path_ned_m), np.ascontiguousarray(track_ned_m)
+    follow_path(path, track, _BACK_M, _AHEAD_M, errors)
     return errors
 
 

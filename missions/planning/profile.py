@@ -41,7 +41,9 @@ def speed_profile(arc_m: Array, curvature_per_m: Array, speed_m_s: float, limits
     """
     start, stop = float(arc_m[0]), float(arc_m[-1])
     count = max(16, int(np.ceil((stop - start) / _GRID_M)))
-    grid = np.linspace(start, stop, count + 1)
+    even = np.linspace(start, stop, count + 1)
+    grid = np.union1d(even, arc_m)  # knots are closer together in bends
+    grid = grid[np.concatenate(([True], np.diff(grid) > 1e-7))]
     bend = np.abs(np.interp(grid, arc_m, curvature_per_m))
     bend = np.maximum(bend, 1e-9)
     limit = np.minimum(
@@ -54,12 +56,12 @@ def speed_profile(arc_m: Array, curvature_per_m: Array, speed_m_s: float, limits
         ratio = profile.speed_m_s**2 / np.interp(profile.arc_m, grid, limit)
         if ratio.max() <= 1.001:
             return profile
-        excess = np.ones_like(grid)
+        excess = np.ones_like(even)
         nearest = np.clip(np.rint((profile.arc_m - start) / (stop - start) * count).astype(np.intp), 0, count)
         np.maximum.at(excess, nearest, ratio)
         # spread to neighbours within the window, since they carry the excess
         reach = max(1, int(0.5 * limits.smoothing_s * speed_m_s / _GRID_M))
-        excess = _running_max(excess, reach)
+        excess = np.interp(grid, even, _running_max(excess, reach))
         allowed = np.maximum(allowed / excess, _SLOWEST_M_S**2)
     stretch = float(np.sqrt(max(1.0, ratio.max())))
     return _stretched(profile, stretch)

@@ -59,7 +59,8 @@ def test_waypoint_misses_between_samples_and_in_order():
 def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=0.0, truth=True):
     """A flight 10 m up along a straight path.
 
-    It is off the commanded path by `offset_ned` while flying, and the autopilot's frame is off the true one by `gps_ned` all the time.
+    It is off the commanded path by `offset_ned` while flying, and the autopilot's frame is off the true one
+    by `gps_ned` all the time.
     """
     records = FlightRecords()
     autopilot, simulator = FrameEncoder(1, 1), FrameEncoder(1, 240)
