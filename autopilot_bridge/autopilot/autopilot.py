@@ -266,6 +266,7 @@ class Autopilot:
         context.hover_thrust = self.controller.hover_thrust
         self._view.vibration.update(self._readings.imu.values[IMU_ACCEL_FRD_M_S2], 1.0 / SLOW_RATE_HZ)
         self.commander.update(time_us)
+        self.controller.set_ground_contact(context.ground_contact)
         navigation.vehicle_at_rest = context.on_ground and not self.commander.tasks.lifting_off
         self._view.refresh(time_us)
         for service in self._services:

@@ -237,6 +237,10 @@ class MulticopterController:
             raise ValueError(f"battery scale {scale} is not in 0.5..2")
         self._state[c.BATTERY_SCALE] = scale
 
+    def set_ground_contact(self, contact: bool) -> None:
+        """Tell whether the ground may carry part of the weight; hover thrust is not learnt meanwhile."""
+        self._state[c.GROUND_CONTACT] = 1.0 if contact else 0.0
+
     def step(self) -> None:
         """Write `actuators` for this physics step from `nav` and `setpoint`."""
         _step(self._nav, self.setpoint, self._packed, self._state, self._scratch, self.actuators)

@@ -71,4 +71,5 @@ THRUST_LAGGED: Final = 48  # collective as the rotors should give it by now
 BATTERY_SCALE: Final = 49  # factor on thrust for a sagging battery
 MOTOR_THRUST: Final = 50  # 4 normalised motor thrusts
 THRUST_GIVEN: Final = 54  # mean of the motor thrusts after desaturation
-STATE_SIZE: Final = 55
+GROUND_CONTACT: Final = 55  # 1.0 while something else than the rotors may carry the vehicle
+STATE_SIZE: Final = 56

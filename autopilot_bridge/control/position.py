@@ -57,12 +57,16 @@ def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
     """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
+    Not so on the ground: the thrust that winds down after a touchdown would be taken for hover thrust, and the
+    landing would never be seen.
     """
     s[c.THRUST_LAGGED] += (s[c.THRUST_GIVEN] - s[c.THRUST_LAGGED]) * min(
         1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT])
     )
     measured = -nav[_NAV_FORCE + 2]
-    if p[c.USE_HOVER_ESTIMATE] == 0.0 or s[c.AIRBORNE] == 0.0 or not math.isfinite(measured):
+    if p[c.USE_HOVER_ESTIMATE] == 0.0 or s[c.AIRBORNE] == 0.0 or s[c.GROUND_CONTACT] != 0.0:
+        return
+    if not math.isfinite(measured):
         return
     variance = s[c.HOVER_VARIANCE] + _HOVER_PROCESS_STD_1_S * _HOVER_PROCESS_STD_1_S * dt
     hover = s[c.HOVER]
