@@ -1,6 +1,6 @@
 """Battery warning level: remaining charge or voltage against thresholds. It only rises while powered."""
 
-from autopilot_bridge.commander.events import BatteryLevel
+from autopilot_bridge.commander.events import BatteryLevel, BatteryWarning
 from autopilot_bridge.commander.health import VehicleHealth
 from autopilot_bridge.commander.parameters import CommanderParameters
 
@@ -15,15 +15,24 @@ class BatteryMonitor:
         self._low_since_us: int | None = None
         self._critical_since_us: int | None = None
 
-    def update(self, health: VehicleHealth, parameters: CommanderParameters, time_us: int) -> bool:
-        """Judge the newest battery reading; True when the level rose."""
+    def update(
+        self, health: VehicleHealth, parameters: CommanderParameters, time_us: int
+    ) -> BatteryWarning | None:
+        """Judge the newest battery reading; the warning when the level rose."""
         if not health.battery:
-            return False
+            return None
         before = self.level
         self.level = max(
             before, self._by_charge(health, parameters), self._by_voltage(health, parameters, time_us)
         )
-        return self.level > before
+        if self.level == before:
+            return None
+        return BatteryWarning(
+            time_us=time_us,
+            level=self.level,
+            voltage_v=health.battery_voltage_v,
+            used_ah=health.battery_used_ah,
+        )
 
     @staticmethod
     def _by_charge(health: VehicleHealth, parameters: CommanderParameters) -> BatteryLevel:

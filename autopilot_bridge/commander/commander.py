@@ -10,11 +10,11 @@ from typing import Final
 
 from autopilot_bridge.commander.arming import arming_reasons, shortfalls
 from autopilot_bridge.commander.battery import BatteryMonitor
+from autopilot_bridge.commander.disarming import AutoDisarm
 from autopilot_bridge.commander.events import (
     Armed,
     ArmingDenied,
     BatteryLevel,
-    BatteryWarning,
     Booted,
     Disarmed,
     DisarmingDenied,
@@ -22,23 +22,21 @@ from autopilot_bridge.commander.events import (
     Event,
     FailsafeAction,
     HomeSet,
-    LandingDetected,
     MissionFinished,
     MissionItemReached,
     ModeChanged,
     ModeDenied,
     NavigationReady,
     SystemStatus,
-    TakeoffDetected,
 )
-from autopilot_bridge.commander.failsafe import FailsafeMonitor
+from autopilot_bridge.commander.failsafe import FailsafeMonitor, failsafe_mode
 from autopilot_bridge.commander.geofence import Geofence
 from autopilot_bridge.commander.guidance import Guidance
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.home import Home
 from autopilot_bridge.commander.modes import LANDING_MODES, STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
-from autopilot_bridge.commander.pilot import THROTTLE_HIGH, PilotInput
+from autopilot_bridge.commander.pilot import THROTTLE_HIGH, PilotInput, stick_travel
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.setpoints import SetpointStream
 from autopilot_bridge.commander.situation import Situation
@@ -51,18 +49,6 @@ from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav
 
 _CHECK_EVERY: Final = 5  # arming checks run at 10 Hz while disarmed
-
-_ACTION_MODES: Final = {
-    FailsafeAction.POSITION: FlightMode.POSITION,
-    FailsafeAction.ALTITUDE: FlightMode.ALTITUDE,
-    FailsafeAction.STABILIZED: FlightMode.STABILIZED,
-    FailsafeAction.HOLD: FlightMode.HOLD,
-    FailsafeAction.BRAKE: FlightMode.BRAKE,
-    FailsafeAction.RETURN: FlightMode.RETURN,
-    FailsafeAction.LAND: FlightMode.LAND,
-    FailsafeAction.DESCEND: FlightMode.DESCEND,
-    FailsafeAction.TERMINATE: FlightMode.TERMINATION,
-}
 
 
 class Commander:
@@ -132,7 +118,6 @@ class Commander:
         self.guidance = Guidance(self)
         self.situation = Situation(health=health.health, mode=policy.boot_mode)
         self.arming_reasons: tuple[Reason, ...] = (Reason.BOOTING,)
-        self.preflight_since_us = 0
         self._health = health
         self._land_detector = land_detector
         self._thrust = thrust
@@ -142,8 +127,7 @@ class Commander:
         self._events: list[Event] = []
         self._ticks = 0
         self._booted = False
-        self._flew = False
-        self._landed_since_us = 0
+        self._disarming = AutoDisarm()
         self._last_prearm_report_us = 0
         self._sticks_at_command = flight.ManualInput()
 
@@ -246,9 +230,9 @@ class Commander:
                 self.emit(ArmingDenied(time_us=self.time_us, mode=self.commanded_mode, reasons=reasons))
             return Verdict(result=self.policy.arming_denied, reasons=reasons)
         self.armed = True
-        self.armed_time_us = self.preflight_since_us = self.time_us
+        self.armed_time_us = self.time_us
         self.context.armed = True
-        self._flew = False
+        self._disarming.begin(self.time_us)
         self.situation.sticks_at_arming = self.situation.sticks_age_s <= self.parameters.stick_timeout_s
         self._sticks_at_command = self.context.sticks
         if not self.home.commanded and self.home.set_here():
@@ -316,7 +300,9 @@ class Commander:
         self._refresh()
         self._follow_home()
         self._follow_landing()
-        self._follow_battery()
+        warning = self.battery.update(self.situation.health, self.parameters, time_us)
+        if warning is not None:
+            self.emit(warning)
         self._auto_disarm()
         if not self.armed and self._ticks % _CHECK_EVERY == 1:
             self._check_arming()
@@ -379,7 +365,7 @@ class Commander:
 
     def _command(self, mode: FlightMode) -> None:
         self.commanded_mode = self.situation.mode = mode
-        self.preflight_since_us = self.time_us
+        self._disarming.restart(self.time_us)
         self._sticks_at_command = self.context.sticks
         if mode in self.policy.kept_after_disarm:
             self._mode_after_disarm = mode
@@ -400,28 +386,10 @@ class Commander:
         elif action is FailsafeAction.DISARM or (not self.policy.recovers and self.context.on_ground):
             self._disarm(DisarmReason.FAILSAFE)
         else:
-            mode = self._failsafe_mode(action)
+            mode = failsafe_mode(action, self.situation, self.policy, sticks_valid=self.context.sticks.valid)
             if not self.policy.recovers:
                 self._command(mode)
             self._enter(mode)
-
-    def _failsafe_mode(self, action: FailsafeAction) -> FlightMode:
-        """The mode of an action, or the next safer one that can be flown now."""
-        situation = self.situation
-        mode = _ACTION_MODES[action]
-        if (
-            action is FailsafeAction.DESCEND
-            and self.commanded_mode in STICK_MODES
-            and self.context.sticks.valid
-        ):
-            return FlightMode.ALTITUDE  # the pilot lands it (PX4 COM_POSCTL_NAVL 0)
-        if mode is FlightMode.POSITION and not situation.position:
-            mode = FlightMode.ALTITUDE
-        if mode in STICK_MODES:
-            return mode
-        if mode is FlightMode.RETURN and not situation.home_set:
-            mode = FlightMode.LAND
-        return mode if situation.position else self.policy.fallback_land
 
     def _enter(self, mode: FlightMode) -> None:
         if mode is self.mode:
@@ -448,32 +416,21 @@ class Commander:
     def _auto_disarm(self) -> None:
         if not self.armed or not self.context.on_ground:
             return
-        parameters, policy = self.parameters, self.policy
-        if self.tasks.lifting_off:
-            self.preflight_since_us = self.time_us
-            return
-        landing = policy.disarm_landed_everywhere or self.mode in LANDING_MODES or self.tasks.ends_on_ground
-        if self._flew and landing:
-            delay_s, since_us, reason = parameters.disarm_landed_s, self._landed_since_us, DisarmReason.LANDED
-        else:
-            since_us = max(self.preflight_since_us, self._landed_since_us)
-            delay_s = parameters.disarm_preflight_s + policy.preflight_disarm_extra_s
-            reason = DisarmReason.LANDED if self._flew else DisarmReason.PREFLIGHT_TIMEOUT
-            if parameters.disarm_preflight_s <= 0.0:
-                return
-        if delay_s > 0.0 and self.time_us - since_us >= delay_s * 1e6:
+        reason = self._disarming.due(
+            self.time_us,
+            self.parameters,
+            self.policy,
+            lifting_off=self.tasks.lifting_off,
+            landing=self.mode in LANDING_MODES or self.tasks.ends_on_ground,
+        )
+        if reason is not None:
             self._disarm(reason)
 
     def _follow_home(self) -> None:
         self.home.follow_frame()
-        if self.armed or self.home.commanded or self.time_us < self.policy.home_s * 1e6:
-            return
-        if not self.situation.health.position:
-            return
-        known = self.home.position is not None
-        # until the position is taken as good, home follows it; the altitude still settles
-        settling = not self.situation.position and self._ticks % 50 == 0 and self.home.moved_m() > 0.1
-        if (not known or settling) and self.home.set_here():
+        situation = self.situation
+        waiting = self.armed or self.time_us < self.policy.home_s * 1e6 or not situation.health.position
+        if not waiting and self.home.settle(settled=situation.position, once_a_second=self._ticks % 50 == 0):
             self._tell_home()
 
     def _tell_home(self) -> None:
@@ -481,29 +438,10 @@ class Commander:
             self.emit(HomeSet(time_us=self.time_us, home=self.home.position))
 
     def _follow_landing(self) -> None:
-        on_ground = self.context.on_ground
-        if not self.armed:
-            return
-        if not on_ground and not self._flew:
-            self._flew = True
-            self.emit(TakeoffDetected(time_us=self.time_us))
-        elif not on_ground:
-            self._landed_since_us = -1
-        elif self._flew and self._landed_since_us < 0:
-            self._landed_since_us = self.time_us
-            self.emit(LandingDetected(time_us=self.time_us))
-
-    def _follow_battery(self) -> None:
-        health = self.situation.health
-        if self.battery.update(health, self.parameters, self.time_us):
-            self.emit(
-                BatteryWarning(
-                    time_us=self.time_us,
-                    level=self.battery.level,
-                    voltage_v=health.battery_voltage_v,
-                    used_ah=health.battery_used_ah,
-                )
-            )
+        if self.armed:
+            event = self._disarming.follow(self.time_us, on_ground=self.context.on_ground)
+            if event is not None:
+                self.emit(event)
 
     def _report_prearm(self) -> None:
         interval_us = self.policy.prearm_report_s * 1e6
@@ -522,15 +460,12 @@ class Commander:
 
     def _take_over_by_sticks(self) -> None:
         """PX4 COM_RC_OVERRIDE: moved sticks end automatic flight."""
-        parameters, sticks = self.parameters, self.context.sticks
-        if not self.airborne or not sticks.valid or self.mode in STICK_MODES:
-            return
+        parameters = self.parameters
         offboard = self.mode is FlightMode.OFFBOARD
-        if not (parameters.stick_override_offboard if offboard else parameters.stick_override):
+        allowed = parameters.stick_override_offboard if offboard else parameters.stick_override
+        if not allowed or not self.airborne or self.mode in STICK_MODES:
             return
-        before = self._sticks_at_command
-        travel = max(abs(sticks.roll - before.roll), abs(sticks.pitch - before.pitch))
-        if before.valid and travel > parameters.stick_override_threshold:
+        if stick_travel(self.context.sticks, self._sticks_at_command) > parameters.stick_override_threshold:
             self.set_mode(FlightMode.POSITION if self.situation.position else FlightMode.ALTITUDE)
 
     def _follow_task(self) -> None:

@@ -18,14 +18,28 @@ from autopilot_bridge.commander.events import (
     FailsafeCleared,
     FailsafeKind,
 )
-from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
+from autopilot_bridge.commander.modes import MODE_NEEDS, STICK_MODES, FlightMode, Need
 from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.situation import Situation
 
 _LINKS: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST})
 _LATCHING: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST, FailsafeKind.GEOFENCE})
 """Kinds whose RETURN stays although the condition clears (PX4's ClearCondition::OnModeChangeOrDisarm)."""
 _NOT_OVERRIDABLE: Final = frozenset({FailsafeKind.POSITION_LOST})
+
+
+_ACTION_MODES: Final = {
+    FailsafeAction.POSITION: FlightMode.POSITION,
+    FailsafeAction.ALTITUDE: FlightMode.ALTITUDE,
+    FailsafeAction.STABILIZED: FlightMode.STABILIZED,
+    FailsafeAction.HOLD: FlightMode.HOLD,
+    FailsafeAction.BRAKE: FlightMode.BRAKE,
+    FailsafeAction.RETURN: FlightMode.RETURN,
+    FailsafeAction.LAND: FlightMode.LAND,
+    FailsafeAction.DESCEND: FlightMode.DESCEND,
+    FailsafeAction.TERMINATE: FlightMode.TERMINATION,
+}
 
 
 @dataclass(slots=True)
@@ -165,3 +179,23 @@ class FailsafeMonitor:
         if situation.mode is FlightMode.OFFBOARD:
             return situation.setpoint_needs_position
         return Need.POSITION in MODE_NEEDS[situation.mode]
+
+
+def failsafe_mode(
+    action: FailsafeAction, situation: Situation, policy: CommanderPolicy, *, sticks_valid: bool
+) -> FlightMode:
+    """The mode of an action, or the next safer one that can be flown now.
+
+    Args:
+        sticks_valid: a pilot is there: in a stick mode they land it themselves (PX4 COM_POSCTL_NAVL 0).
+    """
+    if action is FailsafeAction.DESCEND and situation.mode in STICK_MODES and sticks_valid:
+        return FlightMode.ALTITUDE
+    mode = _ACTION_MODES[action]
+    if mode is FlightMode.POSITION and not situation.position:
+        mode = FlightMode.ALTITUDE
+    if mode in STICK_MODES:
+        return mode
+    if mode is FlightMode.RETURN and not situation.home_set:
+        mode = FlightMode.LAND
+    return mode if situation.position else policy.fallback_land

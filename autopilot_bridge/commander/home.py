@@ -1,10 +1,13 @@
 """Home: where the vehicle returns to, and the reference of relative altitudes."""
 
 import math
+from typing import Final
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import layout as nav
+
+_SETTLING_M: Final = 0.1
 
 
 class Home:
@@ -52,6 +55,19 @@ class Home:
         self.yaw_rad = yaw_rad
         self._mirror()
         return True
+
+    def settle(self, *, settled: bool, once_a_second: bool) -> bool:
+        """Before arming: home where the vehicle stands; True when it was set.
+
+        Args:
+            settled: the position is taken as good; until then home follows it, since the altitude still moves.
+            once_a_second: this is a moment to follow.
+        """
+        if self.commanded:
+            return False
+        if self.position is None:
+            return self.set_here()
+        return not settled and once_a_second and self.moved_m() > _SETTLING_M and self.set_here()
 
     def moved_m(self) -> float:
         """Distance of the vehicle from home, vertical distance included; infinite while unknown."""

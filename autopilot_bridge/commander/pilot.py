@@ -62,3 +62,10 @@ class PilotInput:
     def gcs_age_s(self, time_us: int) -> float:
         """Since a ground station was heard; infinite when none ever was."""
         return (time_us - self._gcs_time_us) * 1e-6 if self._gcs_time_us >= 0 else math.inf
+
+
+def stick_travel(now: ManualInput, before: ManualInput) -> float:
+    """How far the pilot moved roll or pitch, 0..2; 0 while there is nobody at the sticks."""
+    if not (now.valid and before.valid):
+        return 0.0
+    return max(abs(now.roll - before.roll), abs(now.pitch - before.pitch))

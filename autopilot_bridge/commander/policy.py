@@ -41,8 +41,8 @@ class CommanderPolicy:
             ones that land by themselves.
         prearm_report_s: interval at which failing arming checks are announced unasked; 0: never.
         arming_denied, mode_denied, disarm_in_air_denied: results of refused requests.
-        gcs_needed_to_arm: with a ground-station failsafe set, arming waits for a ground station (PX4); else only
-            one that was heard and lost is in the way.
+        gcs_needed_to_arm: with a ground-station failsafe set, arming waits for a ground station (PX4); else
+            only one that was heard and lost is in the way.
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
     """
 
