@@ -60,7 +60,7 @@ class Home:
         """Before arming: home where the vehicle stands; True when it was set.
 
         Args:
-            settled: the position is taken as good; until then home follows it, since the altitude still moves.
+            settled: the position is taken as good; until then home follows it: the altitude moves.
             once_a_second: this is a moment to follow.
         """
         if self.commanded:
