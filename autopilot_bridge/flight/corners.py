@@ -11,6 +11,7 @@ Point = tuple[float, float, float]
 
 _STRAIGHT_RAD: Final = 1e-3
 _REVERSAL_RAD: Final = math.radians(150.0)
+_ROUNDING: Final = 0.6  # of the acceptance radius may be used up by rounding a corner
 
 
 def turn_angle(before: Point, corner: Point, after: Point) -> float:
@@ -32,6 +33,17 @@ def corner_speed(angle_rad: float, tangent_m: float, acceleration_m_s2: float) -
     if angle_rad > _REVERSAL_RAD:
         return 0.0
     return math.sqrt(acceleration_m_s2 * tangent_m / math.tan(0.5 * angle_rad))
+
+
+def easing_speed(angle_rad: float, distance_m: float, jerk_m_s3: float) -> float:
+    """Speed at which a turn whose acceleration is built up and taken back within twice `distance_m` is a full one.
+
+    The lateral acceleration is a triangle of slope jerk over the time 2 distance / v, so the course changes by
+    jerk distance^2 / v^3.
+    """
+    if angle_rad < _STRAIGHT_RAD:
+        return math.inf
+    return (jerk_m_s3 * distance_m * distance_m / angle_rad) ** (1.0 / 3.0)
 
 
 def turn_in_distance(angle_rad: float, speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
@@ -62,7 +74,14 @@ def passing_speed(path: Sequence[Point], radii_m: Sequence[float], parameters: F
         reach = braking_speed(
             ahead, speed, parameters.acceleration_m_s2, parameters.jerk_m_s3, parameters.trajectory_p_1_s
         )
-        tangent = min(radii_m[i], 0.5 * ahead, 0.5 * behind if behind > 0.1 else math.inf)
+        half_leg = min(0.5 * ahead, 0.5 * behind if behind > 0.1 else math.inf)
+        tangent = min(radii_m[i], half_leg)
         angle = turn_angle(path[i - 1], path[i], path[i + 1])
-        speed = min(reach, corner_speed(angle, tangent, parameters.corner_acceleration_m_s2))
+        # a rounded corner stays this close to the waypoint when the turn is eased in from here
+        easing = min(half_leg, _ROUNDING * radii_m[i] / math.tan(0.25 * max(angle, _STRAIGHT_RAD)))
+        speed = min(
+            reach,
+            corner_speed(angle, tangent, parameters.corner_acceleration_m_s2),
+            easing_speed(angle, easing, parameters.jerk_m_s3),
+        )
     return speed
