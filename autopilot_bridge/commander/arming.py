@@ -23,6 +23,9 @@ _MANDATORY: Final = frozenset(
 )
 """What even a forced arming needs (ArduPilot; PX4 checks everything always)."""
 
+MODE_REASONS: Final = frozenset({Reason.MODE_NOT_ARMABLE, Reason.MISSION_MISSING, Reason.MISSION_INVALID})
+"""Reasons that lie in the chosen mode, not in the vehicle."""
+
 
 def shortfalls(mode: FlightMode, situation: Situation, parameters: CommanderParameters) -> tuple[Reason, ...]:
     """What a mode needs and does not have, in the order a pilot would mend it; empty when it can be flown."""

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 from typing import Final
 
-from autopilot_bridge.commander.arming import arming_reasons, shortfalls
+from autopilot_bridge.commander.arming import MODE_REASONS, arming_reasons, shortfalls
 from autopilot_bridge.commander.battery import BatteryMonitor
 from autopilot_bridge.commander.disarming import AutoDisarm
 from autopilot_bridge.commander.events import (
@@ -160,8 +160,11 @@ class Commander:
 
     @property
     def armable(self) -> bool:
-        """The arming checks pass in the commanded mode."""
-        return not self.arming_reasons
+        """The arming checks pass; where the flavour shows the mode's own obstacles only when somebody arms
+        (ArduPilot), without those."""
+        if self.policy.standby_when_armable:
+            return not self.arming_reasons
+        return MODE_REASONS.issuperset(self.arming_reasons)
 
     @property
     def failsafe_active(self) -> bool:
@@ -445,7 +448,7 @@ class Commander:
 
     def _report_prearm(self) -> None:
         interval_us = self.policy.prearm_report_s * 1e6
-        if interval_us <= 0.0 or not self._booted or not self.arming_reasons:
+        if interval_us <= 0.0 or not self._booted or self.armable:
             return
         if self.time_us - self._last_prearm_report_us >= interval_us:
             self._last_prearm_report_us = self.time_us

@@ -204,6 +204,15 @@ def test_every_mode_on_the_ground_and_in_flight(flavour: str) -> None:
             rig.run(0.5)
 
 
+def test_ardupilot_is_ready_in_a_mode_it_cannot_arm_in() -> None:
+    rig = Rig("ardupilot")
+    rig.commander.set_mode(FlightMode.RETURN)
+    rig.run(35.0)
+    assert rig.commander.armable
+    assert not rig.happened(ArmingDenied)
+    assert rig.commander.arm().reasons == (Reason.MODE_NOT_ARMABLE,)
+
+
 def test_a_mode_that_is_not_possible_says_why() -> None:
     rig = Rig("px4")
     rig.put_in_air()
