@@ -3,13 +3,15 @@
 import importlib.util
 import inspect
 import math
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Protocol
 
-from missions.errors import PlanError
+from autopilot_bridge.errors import BridgeError
+from missions.errors import MissionError, PlanError
 from missions.options import FlightOptions
 from missions.patterns import (
     Curve,
@@ -61,11 +63,11 @@ class PatternMission:
 
     def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
         """Plan for every vehicle of the team; the vehicle's own limits come into it when it is known."""
-        from missions.pattern_flight import plan
+        from missions.pattern_flight import plan_pattern
 
         for index in range(options.vehicles):
             own = replace(options, index=index)
-            plan(self.curve(own), own, limits)
+            plan_pattern(self.curve(own), own, limits)
 
     def curve(self, options: FlightOptions) -> Curve:
         """The pattern around its centre, as often as asked."""
@@ -191,6 +193,7 @@ class ScriptMission:
                 f"{path} has neither `async def fly(vehicle, options)` nor a class `Mission` with it; add one"
             )
         self._fly = fly
+        self._file = str(path)
         self._check = getattr(holder, "check", None)
 
     def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
@@ -198,7 +201,14 @@ class ScriptMission:
             self._check(options)
 
     async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
-        await self._fly(vehicle, options)
+        try:
+            await self._fly(vehicle, options)
+        except (MissionError, PlanError, BridgeError):
+            raise
+        except Exception as error:
+            frames = traceback.extract_tb(error.__traceback__)
+            line = next((f.lineno for f in reversed(frames) if f.filename == self._file), "?")
+            raise MissionError(f"{self._file}, line {line}: {type(error).__name__}: {error}") from error
 
 
 def _load(path: Path) -> Any:

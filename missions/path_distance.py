@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 def follow_path(path: Array, track: Array, back_m: float, ahead_m: float, errors: Array) -> None:
     """errors[k] = distance of track[k] from the path (m, 3), near the place found for track[k - 1].
 
-    Legs are looked at from `back_m` before that place to `ahead_m` and the last error behind it, along the path.
+    Legs are looked at from `back_m` before that place to `ahead_m` and the last error beyond it.
     """
     first = 0  # leg that holds the place found last
     along_m = 0.0  # of the place, from the leg's start

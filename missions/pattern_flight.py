@@ -1,7 +1,7 @@
 """Flying a pattern: as an uploaded waypoint mission, or by streamed setpoints."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from missions.errors import PlanError, VehicleTimeout
 from missions.notes import PATTERN, CommandedPath
 from missions.options import FlightOptions, Via
 from missions.patterns.curve import ArcLengthTable, Array, Curve
+from missions.patterns.polyline import Polyline
 from missions.planning.limits import VehicleLimits
 from missions.planning.natural import is_lissajous, natural_trajectory
 from missions.planning.trajectory import (
@@ -22,7 +23,7 @@ from missions.planning.trajectory import (
     line_trajectory,
     plan_trajectory,
 )
-from missions.planning.waypoints import waypoints_along
+from missions.planning.waypoints import leg_speeds, waypoints_along
 from missions.telemetry import Attitude
 from missions.vehicle.guided import GuidedSession
 from missions.vehicle.setpoint import Setpoint, Vector
@@ -32,9 +33,10 @@ _SETTLE_S: Final = 1.5
 _SAME_PLACE_M: Final = 0.3
 _PATH_STEP_M: Final = 0.25
 _TRANSIT_M_S: Final = 5.0
+_SPEED_STEP_M_S: Final = 0.5
 
 
-def plan(curve: Curve, options: FlightOptions, limits: VehicleLimits) -> Trajectory:
+def plan_pattern(curve: Curve, options: FlightOptions, limits: VehicleLimits) -> Trajectory:
     """The pattern in time, around its own centre.
 
     Raises:
@@ -76,7 +78,7 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
         MissionError: the flight went wrong.
     """
     limits = await vehicle.limits()
-    trajectory = plan(curve, options, limits)
+    trajectory = plan_pattern(curve, options, limits)
     centre = (0.0, 0.0, 0.0)
     if options.centre is not None:
         c = options.centre
@@ -85,7 +87,7 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
     if options.via is Via.SETPOINTS:
         await _fly_setpoints(vehicle, options, limits, trajectory, centre)
     else:
-        await _fly_waypoints(vehicle, options, curve, centre)
+        await _fly_waypoints(vehicle, options, curve, trajectory, centre)
 
 
 def setpoint_at(point: TrajectoryPoint, centre: Vector) -> Setpoint:
@@ -174,17 +176,33 @@ async def _turn(
     await guided.follow(source)
 
 
-def waypoint_items(
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WaypointPlan:
+    """A plan to upload, and where the pattern is in it.
+
+    Attributes:
+        items: the plan.
+        first, last: indices of the pattern's first and last waypoint.
+    """
+
+    items: list[MissionItem]
+    first: int
+    last: int
+
+
+def waypoint_plan(
     vehicle: Vehicle,
     points: list[tuple[float, float]],
+    speeds_m_s: list[float],
     options: FlightOptions,
     centre: Vector,
-) -> list[MissionItem]:
-    """The plan to upload: takeoff, speed, waypoints, and the way home."""
+) -> WaypointPlan:
+    """The plan to upload: takeoff, waypoints with their speeds, and the way home."""
     home = vehicle.home
     frame = LocalFrame(home)
     unset = vehicle.adapter.unset
     altitude_m = options.own_altitude_m
+    waypoint, land = dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_LAND
 
     def over(command: int, north_m: float, east_m: float, height_m: float) -> MissionItem:
         lat, lon, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
@@ -192,33 +210,49 @@ def waypoint_items(
             command=command, param2=options.acceptance_m, param4=unset, x=lat, y=lon, z=height_m
         )
 
-    waypoint, land = dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_LAND
-    items = [
-        vehicle.adapter.takeoff_item(home, altitude_m),
-        MissionItem(
-            command=dialect.MAV_CMD_DO_CHANGE_SPEED,
-            frame=dialect.MAV_FRAME_MISSION,
-            param1=1.0,
-            param2=options.speed_m_s,
-            param3=-1.0,
-        ),
-    ]
-    items += [over(waypoint, n + centre[0], e + centre[1], altitude_m) for n, e in points]
+    items = [vehicle.adapter.takeoff_item(home, altitude_m)]
+    current_m_s = 0.0
+    first = None
+    for (north_m, east_m), speed_m_s in zip(points, speeds_m_s, strict=True):
+        rounded = max(_SPEED_STEP_M_S, _SPEED_STEP_M_S * math.floor(speed_m_s / _SPEED_STEP_M_S + 1e-6))
+        if rounded != current_m_s:
+            items.append(_speed_item(rounded))
+            current_m_s = rounded
+        first = len(items) if first is None else first
+        items.append(over(waypoint, north_m + centre[0], east_m + centre[1], altitude_m))
+    last = len(items) - 1
     if options.vehicles > 1:  # home in its own layer: returns all climb to one altitude
+        items.append(_speed_item(options.speed_m_s))
         items += [over(waypoint, 0.0, 0.0, altitude_m), replace(over(land, 0.0, 0.0, 0.0), param2=0.0)]
     else:
         items.append(
             MissionItem(command=dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=dialect.MAV_FRAME_MISSION)
         )
-    return items
+    return WaypointPlan(items=items, first=first or 0, last=last)
 
 
-async def _fly_waypoints(vehicle: Vehicle, options: FlightOptions, curve: Curve, centre: Vector) -> None:
+def _speed_item(speed_m_s: float) -> MissionItem:
+    return MissionItem(
+        command=dialect.MAV_CMD_DO_CHANGE_SPEED,
+        frame=dialect.MAV_FRAME_MISSION,
+        param1=1.0,
+        param2=speed_m_s,
+        param3=-1.0,
+    )
+
+
+async def _fly_waypoints(
+    vehicle: Vehicle, options: FlightOptions, curve: Curve, trajectory: Trajectory, centre: Vector
+) -> None:
     notes, clock = vehicle.notes, vehicle.clock
     length_m = None if options.search_time_s is None else options.search_time_s * options.speed_m_s
     points = waypoints_along(curve, length_m=length_m)
     acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
-    items = waypoint_items(vehicle, points, options, centre)
+    # a polyline's corners are the vehicle's own business: its long legs are flown at full speed
+    speeds = [options.speed_m_s] * len(points)
+    if not isinstance(curve, Polyline):
+        speeds = leg_speeds(points, trajectory)
+    plan = waypoint_plan(vehicle, points, speeds, options, centre)
     down_m = -options.own_altitude_m
     offset = np.array(centre)
     notes.commanded = CommandedPath(
@@ -228,8 +262,8 @@ async def _fly_waypoints(vehicle: Vehicle, options: FlightOptions, curve: Curve,
         acceptance_m=acceptance_m,
     )
     notes.begin("upload", clock.time_us)
-    first = await vehicle.upload_mission(items) + 2
-    last = first + len(points) - 1
+    start = await vehicle.upload_mission(plan.items)
+    first, last = start + plan.first, start + plan.last
     notes.begin("takeoff", clock.time_us)
     await vehicle.start_mission()
     route_m = float(np.linalg.norm(np.diff(notes.commanded.points_ned_m, axis=0), axis=1).sum())

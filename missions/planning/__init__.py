@@ -3,12 +3,13 @@
 from missions.planning.limits import VehicleLimits
 from missions.planning.natural import natural_trajectory
 from missions.planning.trajectory import Trajectory, TrajectoryPoint, line_trajectory, plan_trajectory
-from missions.planning.waypoints import waypoints_along
+from missions.planning.waypoints import leg_speeds, waypoints_along
 
 __all__ = [
     "Trajectory",
     "TrajectoryPoint",
     "VehicleLimits",
+    "leg_speeds",
     "line_trajectory",
     "natural_trajectory",
     "plan_trajectory",

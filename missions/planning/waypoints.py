@@ -2,12 +2,16 @@
 
 import itertools
 import math
+from typing import Final
 
 import numpy as np
 
 from missions.errors import PlanError
 from missions.patterns.curve import ArcLengthTable, Curve
 from missions.patterns.polyline import Polyline
+from missions.planning.trajectory import Trajectory
+
+_LEG_SAMPLES: Final = 100_000
 
 
 def waypoints_along(
@@ -64,3 +68,37 @@ def _cut_polyline(curve: Polyline, length_m: float | None) -> list[tuple[float, 
         kept.append((n1, e1))
         left -= leg
     return kept
+
+
+def leg_speeds(points: list[tuple[float, float]], trajectory: Trajectory) -> list[float]:
+    """Speed (m/s) for the leg to each waypoint: the slowest the planned trajectory flies it.
+
+    Waypoint missions know no acceleration limits; with the speeds of the plan a vehicle takes bends as the
+    plan does. The smooth start and stop of the trajectory don't count. The first waypoint gets the speed of
+    the leg behind it.
+
+    Args:
+        points: waypoints (north, east) on the trajectory's path, in order.
+        trajectory: the plan.
+    """
+    position = trajectory.position_ned_m[:, :2]
+    speed = np.hypot(trajectory.velocity_ned_m_s[:, 0], trajectory.velocity_ned_m_s[:, 1])
+    where = [0]
+    for point in points[1:]:
+        start = where[-1]
+        leg_m = math.dist(point, position[start])
+        window = position[start : start + _LEG_SAMPLES]
+        flown = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(window, axis=0).T))))
+        near = flown <= 1.5 * leg_m + 2.0
+        distance = np.hypot(*(window[near] - point).T)
+        where.append(start + int(distance.argmin()))
+    speeds = []
+    last = len(where) - 1
+    for k in range(1, len(where)):
+        flown = speed[where[k - 1] : where[k] + 1]
+        if k == 1:
+            flown = flown[-1:]
+        elif k == last:
+            flown = flown[:1]
+        speeds.append(float(flown.min()) if len(flown) else float(speed.max()))
+    return [speeds[0], *speeds] if speeds else [float(speed.max())] * len(points)

@@ -21,6 +21,7 @@ from missions.patterns import (
 )
 from missions.planning import (
     VehicleLimits,
+    leg_speeds,
     line_trajectory,
     natural_trajectory,
     plan_trajectory,
@@ -223,3 +224,16 @@ def test_laps_are_one_continuous_flight():
     thrice = plan_trajectory(Lap(curve=CURVES["L1"], laps=3), altitude_m=10.0, speed_m_s=5.0, limits=LIMITS)
     round_s = ArcLengthTable.of(CURVES["L1"]).length_m / 5.0
     assert thrice.duration_s == pytest.approx(once.duration_s + 2 * round_s, abs=0.1)
+
+
+def test_leg_speeds_are_those_of_the_plan():
+    curve = CURVES["L4"]
+    trajectory = plan_trajectory(curve, altitude_m=10.0, speed_m_s=5.0, limits=LIMITS)
+    points = waypoints_along(curve)
+    speeds = leg_speeds(points, trajectory)
+    assert len(speeds) == len(points)
+    assert max(speeds) == pytest.approx(5.0)
+    assert speeds[0] == speeds[1]
+    assert min(speeds) > 1.0  # the smooth start and stop don't count
+    sharpest = np.abs(ArcLengthTable.of(curve).curvature_per_m).max()
+    assert min(speeds) <= math.sqrt(LIMITS.lateral_m_s2 / sharpest) * 1.1

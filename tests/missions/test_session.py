@@ -188,6 +188,16 @@ def test_users_own_mission(embedded, tmp_path):
     assert summary["distance_m"] > 25.0
 
 
+def test_a_mistake_in_a_users_mission_is_one_line_and_the_vehicle_returns(embedded, tmp_path, capsys):
+    script = tmp_path / "mine.py"
+    script.write_text("async def fly(vehicle, options):\n    await vehicle.takeoff(8.0)\n    1 / 0\n")
+    code, _out, err = command_line(capsys, "fly", str(script), "--out", str(tmp_path / "run"))
+    assert code == 1
+    assert len(err.splitlines()) == 1
+    assert "mine.py, line 3: ZeroDivisionError: division by zero" in err
+    assert embedded[0].autopilots[0].kind == "return"
+
+
 def test_run_folders_are_numbered_and_never_overwritten(tmp_path):
     assert create_run_folder(None, "x", tmp_path / "runs").name == "x-1"
     assert create_run_folder(None, "x", tmp_path / "runs").name == "x-2"
