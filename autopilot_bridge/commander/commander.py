@@ -44,7 +44,9 @@ from autopilot_bridge.commander.tasks import TaskRunner
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
 from autopilot_bridge.flight import context as flight
 from autopilot_bridge.flight.context import FlightContext, LandedState
+from autopilot_bridge.flight.hold import HoldTask
 from autopilot_bridge.flight.land_detector import LandDetector
+from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav
 
@@ -160,8 +162,7 @@ class Commander:
 
     @property
     def armable(self) -> bool:
-        """The arming checks pass; where the flavour shows the mode's own obstacles only when somebody arms
-        (ArduPilot), without those."""
+        """The arming checks pass; ArduPilot shows obstacles that lie in the mode only when somebody arms."""
         if self.policy.standby_when_armable:
             return not self.arming_reasons
         return MODE_REASONS.issuperset(self.arming_reasons)
@@ -344,7 +345,7 @@ class Commander:
         situation.mission_problem = self._mission_problem()
         situation.battery_level = self.battery.level
         roll, pitch, _ = context.nav[nav.EULER_RAD].tolist()
-        situation.tilt_rad = math.acos(max(-1.0, min(1.0, math.cos(roll) * math.cos(pitch))))
+        situation.tilt_rad = math.acos(math.cos(roll) * math.cos(pitch))
         situation.terminated = self.terminated
         home = tuple(context.home_ned_m.tolist()) if situation.home_set else None
         situation.outside_fence = situation.position and self._geofence.breached(
@@ -498,5 +499,9 @@ class Commander:
                 and self.mode is self.policy.takeoff_mode
                 and self.mode is self.commanded_mode
             ):
+                task = self.tasks.task
+                if isinstance(task, TakeoffTask):  # hold the height that was asked for, not the one reached
+                    place_ned_m = task.place_ned_m
+                    self.tasks.prepare(FlightMode.HOLD, lambda: HoldTask(place_ned_m))
                 self._command(FlightMode.HOLD)
                 self._enter(FlightMode.HOLD)
