@@ -1,0 +1,6 @@
+"""Settings of the whole suite: property tests draw the same examples on every run, so that no run is luckier than another."""
+
+from hypothesis import settings
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
