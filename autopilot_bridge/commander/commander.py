@@ -6,6 +6,7 @@ Requests answer with a `Verdict`; what happens is told in typed events, which fl
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from autopilot_bridge.commander.arming import MODE_REASONS, arming_reasons, shortfalls
@@ -231,7 +232,7 @@ class Commander:
             self.arming_reasons = reasons
             booting = Reason.BOOTING in reasons
             if not booting or self.policy.force_arm_skips_checks:
-                self.emit(ArmingDenied(time_us=self.time_us, mode=self.commanded_mode, reasons=reasons))
+                self._tell_reasons(reasons, check_only=False)
             return Verdict(result=self.policy.arming_denied, reasons=reasons)
         self.armed = True
         self.armed_time_us = self.time_us
@@ -316,6 +317,10 @@ class Commander:
         self._select()
         self.tasks.update()
         self._follow_task()
+
+    def _tell_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
+        mode = self.commanded_mode
+        self.emit(ArmingDenied(time_us=self.time_us, mode=mode, reasons=reasons, check_only=check_only))
 
     def _check_arming(self) -> tuple[Reason, ...]:
         self.arming_reasons = arming_reasons(
@@ -453,14 +458,7 @@ class Commander:
             return
         if self.time_us - self._last_prearm_report_us >= interval_us:
             self._last_prearm_report_us = self.time_us
-            self.emit(
-                ArmingDenied(
-                    time_us=self.time_us,
-                    mode=self.commanded_mode,
-                    reasons=self.arming_reasons,
-                    check_only=True,
-                )
-            )
+            self._tell_reasons(self.arming_reasons, check_only=True)
 
     def _take_over_by_sticks(self) -> None:
         """PX4 COM_RC_OVERRIDE: moved sticks end automatic flight."""
@@ -501,7 +499,6 @@ class Commander:
             ):
                 task = self.tasks.task
                 if isinstance(task, TakeoffTask):  # hold the height that was asked for, not the one reached
-                    place_ned_m = task.place_ned_m
-                    self.tasks.prepare(FlightMode.HOLD, lambda: HoldTask(place_ned_m))
+                    self.tasks.prepare(FlightMode.HOLD, partial(HoldTask, task.place_ned_m))
                 self._command(FlightMode.HOLD)
                 self._enter(FlightMode.HOLD)
