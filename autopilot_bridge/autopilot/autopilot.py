@@ -307,7 +307,7 @@ class Autopilot:
     def _on_parameter(self, name: str, value: float) -> None:
         flavour, store = self.flavour, self.parameters
         self.controller.set_parameters(flavour.controller_parameters(store))
-        self.context.parameters = flavour.flight_parameters(store)
+        self.commander.guidance.set_parameters(flavour.flight_parameters(store))
         self.commander.parameters = flavour.commander_parameters(store)
         if name.startswith("SR") and name[2:3].isdigit():
             self._apply_stream_rates(int(name[2]))

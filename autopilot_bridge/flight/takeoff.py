@@ -50,6 +50,11 @@ class TakeoffTask:
         """Local down coordinate of the height to reach; valid after `activate`."""
         return float(self._place[2])
 
+    @property
+    def place_ned_m(self) -> Array:
+        """Where the climb ends, (3,); a copy, valid after `activate`."""
+        return self._place.copy()
+
     def _set_height(self, ctx: FlightContext) -> None:
         altitude = ctx.parameters.takeoff_altitude_m if self._altitude_m is None else self._altitude_m
         down = float(ctx.nav[nav_layout.POS_NED_M][2])

@@ -27,7 +27,7 @@ from mavsdk.plugins.telemetry import Telemetry
 from tests.clients.sitl_process import free_port, running_sitl
 
 SPEEDUP = 5.0
-WALL_DEADLINE_S = 90.0
+WALL_DEADLINE_S = 25.0
 
 
 def mission_items(latitude_deg: float, longitude_deg: float) -> list[MissionItem]:

@@ -12,7 +12,8 @@ from tests.clients.sitl_process import free_port, running_sitl
 
 mavlink = mavutil.mavlink
 SPEEDUP = 10.0
-WALL_DEADLINE_S = 60.0
+WALL_DEADLINE_S = 30.0
+EKF_READY = 831  # attitude, velocity and position, as ArduPilot reports a filter that uses GPS
 MODES = {
     "px4": {"hold": "LOITER", "mission": "MISSION", "offboard": "OFFBOARD", "rtl": "RTL", "land": "LAND"},
     "ardupilot": {"hold": "LOITER", "mission": "AUTO", "offboard": "GUIDED", "rtl": "RTL", "land": "LAND"},
@@ -52,6 +53,12 @@ class Client:
                 return message
         raise AssertionError(f"{what} was not seen; texts: {self.texts}")
 
+    def stream_for(self, seconds: float, each: Callable[[], None]) -> None:
+        """Send `each` for so long, by the vehicle's own time."""
+        start = self.until("attitude", lambda m: m.get_type() == "ATTITUDE", each)
+        goal_ms = start.time_boot_ms + 1000.0 * seconds
+        self.until("time", lambda m: m.get_type() == "ATTITUDE" and m.time_boot_ms >= goal_ms, each)
+
     def command(self, command: int, *parameters: float) -> None:
         """COMMAND_LONG, and wait for an accepting acknowledgement."""
         values = (*parameters, *(0.0,) * (7 - len(parameters)))
@@ -84,6 +91,11 @@ class Client:
                 and bool(m.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
             ),
         )
+        if self.flavour == "ardupilot":  # its pre-arm check passes before there is a position to guide to
+            self.until(
+                "position estimate",
+                lambda m: m.get_type() == "EKF_STATUS_REPORT" and m.flags & EKF_READY == EKF_READY,
+            )
         self.until("global position", lambda m: m.get_type() == "GLOBAL_POSITION_INT")
 
     def at(
@@ -175,9 +187,10 @@ def take_off(client: Client, height_m: float) -> None:
 
 def test_offboard_positions_and_return(client: Client) -> None:
     take_off(client, 10.0)
-    client.send_position(0.0, 0.0, 12.0)
     if client.flavour == "px4":
-        client.set_mode("offboard", each=lambda: client.send_position(0.0, 0.0, 12.0))
+        hover = (0.0, 0.0, 12.0)
+        client.stream_for(0.5, lambda: client.send_position(*hover))  # OFFBOARD wants to see a stream first
+        client.set_mode("offboard", each=lambda: client.send_position(*hover))
     for goal in ((15.0, 0.0, 12.0), (15.0, 10.0, 12.0)):
         client.until(f"position {goal}", client.at(*goal), each=lambda goal=goal: client.send_position(*goal))
     client.set_mode("rtl")
