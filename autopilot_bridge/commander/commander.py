@@ -269,9 +269,7 @@ class Commander:
         self._refresh()
         reasons = self._check_arming()
         if reasons:
-            self.emit(
-                ArmingDenied(time_us=self.time_us, mode=self.commanded_mode, reasons=reasons, check_only=True)
-            )
+            self._tell_reasons(reasons, check_only=True)
         return reasons
 
     def set_home(self, lat_deg: float, lon_deg: float, alt_m: float) -> bool:
