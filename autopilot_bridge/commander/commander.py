@@ -134,8 +134,6 @@ class Commander:
         self._last_prearm_report_us = 0
         self._sticks_at_command = flight.ManualInput()
 
-    # what others read
-
     @property
     def time_us(self) -> int:
         """Vehicle time of the newest update."""
@@ -206,8 +204,6 @@ class Commander:
     def emit(self, event: Event) -> None:
         """Add an event of a service that acts for the commander (denied commands, reboot)."""
         self._events.append(event)
-
-    # requests
 
     def set_mode(self, mode: FlightMode) -> Verdict:
         """Command a mode. On the ground almost any is taken; in flight it must be possible now."""
@@ -287,8 +283,6 @@ class Commander:
         self.home.commanded = False
         self._tell_home()
         return True
-
-    # 50 Hz
 
     def update(self, time_us: int) -> None:
         """Advance everything by one 50 Hz period and write the control setpoint."""
