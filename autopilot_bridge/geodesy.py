@@ -44,6 +44,11 @@ class LocalFrame:
         self._m_per_deg_lat = math.radians(meridian_m + origin.alt_m)
         self._m_per_deg_lon = math.radians((normal_m + origin.alt_m) * cos_lat)
 
+    @property
+    def metres_per_degree(self) -> tuple[float, float]:
+        """Metres per degree of latitude and of longitude at the origin."""
+        return self._m_per_deg_lat, self._m_per_deg_lon
+
     def ned_from_geodetic(self, lat_deg: float, lon_deg: float, alt_m: float) -> tuple[float, float, float]:
         """(north, east, down) in metres of a geodetic point."""
         dlon = (lon_deg - self.origin.lon_deg + 180.0) % 360.0 - 180.0

@@ -55,6 +55,9 @@ class AutopilotChannel(Channel, Protocol):
     def send_payload(self, message_id: int, payload: bytes) -> None:
         """Frame the payload and send it."""
 
+    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Frame several payloads (message id, bytes) and send them together."""
+
 
 class _Progress:
     """The mission being flown, as the mission protocol sees it."""
@@ -215,7 +218,7 @@ class Autopilot:
         self.controller.step()
         for table in self._table_list:
             if table.next_due_us <= time_us:
-                self._view.refresh(time_us)
+                self._view.advance(time_us)
                 table.tick(time_us)
 
     # the link's side
@@ -268,7 +271,7 @@ class Autopilot:
         self.commander.update(time_us)
         self.controller.set_ground_contact(context.ground_contact)
         navigation.vehicle_at_rest = context.on_ground and not self.commander.tasks.lifting_off
-        self._view.refresh(time_us)
+        self._view.advance(time_us)
         for service in self._services:
             service.tick(time_us)
         for event in self.commander.drain_events():

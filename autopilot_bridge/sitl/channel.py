@@ -1,5 +1,6 @@
 """A link as an autopilot's MAVLink channel: a parser for each peer and its own sequence numbers."""
 
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Final
 
@@ -8,6 +9,7 @@ from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, ParserCou
 from autopilot_bridge.services.channel import MavlinkMessage
 
 _MAX_PARSERS: Final = 64
+_MAX_PACKET: Final = 1400  # bytes: one datagram that no network splits
 _MEMORY_PEER: Final[PeerId] = ("memory", 0)
 
 
@@ -54,6 +56,21 @@ class LinkChannel:
     def send_payload(self, message_id: int, payload: bytes) -> None:
         """Frame an already packed payload and send it."""
         self.link.send(self._encoder.encode_payload(message_id, payload))
+
+    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Frame several packed payloads and send them together, a packet of a network at most at a time."""
+        encode = self._encoder.encode_payload
+        if len(payloads) == 1:
+            self.link.send(encode(*payloads[0]))
+            return
+        packet = b""
+        for message_id, payload in payloads:
+            frame = encode(message_id, payload)
+            if len(packet) + len(frame) > _MAX_PACKET:
+                self.link.send(packet)
+                packet = b""
+            packet += frame
+        self.link.send(packet)
 
     def send_frame(self, raw: bytes) -> None:
         """Forward somebody else's frame as it is."""

@@ -117,7 +117,7 @@ class ArdupilotMessages(CommonMessages):
 
     def airspeed_m_s(self) -> float:
         """Without an airspeed sensor ArduCopter shows its ground speed."""
-        return self.view.ground_speed_m_s
+        return self.view.refreshed().ground_speed_m_s
 
     def raw_imu(self) -> Values | None:
         """RAW_IMU (27), scaled like SCALED_IMU."""
@@ -137,7 +137,7 @@ class ArdupilotMessages(CommonMessages):
         q_w, q_x, q_y, q_z = self.sources.controller.attitude_setpoint.tolist()
         roll = math.atan2(2.0 * (q_w * q_x + q_y * q_z), 1.0 - 2.0 * (q_x * q_x + q_y * q_y))
         pitch = math.asin(max(-1.0, min(1.0, 2.0 * (q_w * q_y - q_z * q_x))))
-        v = self.view
+        v = self.view.refreshed()
         bearing_deg, distance_m, alt_error_m = 0, 0.0, 0.0
         target = self.trajectory_setpoint()
         if target is not None and all(map(math.isfinite, target[:3])):
@@ -168,7 +168,7 @@ class ArdupilotMessages(CommonMessages):
 
     def ahrs2(self) -> Values | None:
         """AHRS2 (178)."""
-        v = self.view
+        v = self.view.refreshed()
         if not v.has_global:
             return None
         return (v.roll, v.pitch, v.yaw, v.alt_amsl_m, v.lat_e7, v.lon_e7)
@@ -206,7 +206,7 @@ class ArdupilotMessages(CommonMessages):
 
     def terrain_report(self) -> Values | None:
         """TERRAIN_REPORT (136): no terrain data is loaded."""
-        v = self.view
+        v = self.view.refreshed()
         if not v.has_global:
             return None
         return (v.lat_e7, v.lon_e7, 0, 0.0, 0.0, 0, 0)

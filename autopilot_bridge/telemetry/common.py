@@ -11,13 +11,13 @@ from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.streams import Builder, Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, TelemetryView, pressure_altitude_m
 from flightsim import interface
 from flightsim.interface import SensorReadings
 
 NAN: Final = math.nan
-HIGHRES_FIELDS_UPDATED: Final = 63
 
 
 @dataclass(slots=True, kw_only=True)
@@ -57,19 +57,17 @@ class CommonMessages:
     def __init__(self, sources: TelemetrySources) -> None:
         self.sources = sources
         self.view = sources.view
+        self._motion = MotionMessages(sources.view, sources.context, sources.navigation, sources.readings)
 
     def builders(self) -> Mapping[int, Builder]:
         """Message id -> builder of its field values."""
         return {
+            **self._motion.builders(),
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self.sources.heartbeat,
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,
             mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: self.gps_raw_int,
             mavlink.MAVLINK_MSG_ID_SCALED_PRESSURE: self.scaled_pressure,
-            mavlink.MAVLINK_MSG_ID_ATTITUDE: self.attitude,
-            mavlink.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: self.attitude_quaternion,
-            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self.local_position_ned,
-            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self.global_position_int,
             mavlink.MAVLINK_MSG_ID_SERVO_OUTPUT_RAW: self.servo_output_raw,
             mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self.sources.mission_current,
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self.gps_global_origin,
@@ -77,7 +75,6 @@ class CommonMessages:
             mavlink.MAVLINK_MSG_ID_ATTITUDE_TARGET: self.attitude_target,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_LOCAL_NED: self.position_target_local_ned,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: self.position_target_global_int,
-            mavlink.MAVLINK_MSG_ID_HIGHRES_IMU: self.highres_imu,
             mavlink.MAVLINK_MSG_ID_SCALED_IMU: self.scaled_imu,
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: self.battery_status,
             mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self.sources.autopilot_version,
@@ -142,43 +139,6 @@ class CommonMessages:
             return None
         return (self.view.time_ms, pressure_pa * 0.01, 0.0, round(temperature_c * 100.0), 0)
 
-    def attitude(self) -> Values | None:
-        """ATTITUDE (30)."""
-        v = self.view
-        if not self.sources.navigation.health.attitude:
-            return None
-        return (v.time_ms, v.roll, v.pitch, v.yaw, *v.rates)
-
-    def attitude_quaternion(self) -> Values | None:
-        """ATTITUDE_QUATERNION (31)."""
-        v = self.view
-        if not self.sources.navigation.health.attitude:
-            return None
-        return (v.time_ms, *v.q, *v.rates, (0.0, 0.0, 0.0, 0.0))
-
-    def local_position_ned(self) -> Values:
-        """LOCAL_POSITION_NED (32)."""
-        v = self.view
-        return (v.time_ms, *v.pos, *v.vel)
-
-    def global_position_int(self) -> Values | None:
-        """GLOBAL_POSITION_INT (33)."""
-        v = self.view
-        if not v.has_global:
-            return None
-        vn, ve, vd = v.vel
-        return (
-            v.time_ms,
-            v.lat_e7,
-            v.lon_e7,
-            round(v.alt_amsl_m * 1000.0),
-            round(v.alt_relative_m * 1000.0),
-            round(vn * 100.0),
-            round(ve * 100.0),
-            round(vd * 100.0),
-            v.heading_cdeg,
-        )
-
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): motor outputs 1000..2000 us."""
         motors = self.sources.controller.actuators.tolist()[:4]
@@ -203,7 +163,7 @@ class CommonMessages:
 
     def vfr_hud(self) -> Values:
         """VFR_HUD (74)."""
-        v = self.view
+        v = self.view.refreshed()
         return (
             self.airspeed_m_s(),
             v.ground_speed_m_s,
@@ -265,25 +225,6 @@ class CommonMessages:
             round(lon_deg * 1e7),
             alt_m,
             *target[3:],
-        )
-
-    def highres_imu(self) -> Values | None:
-        """HIGHRES_IMU (105): m/s^2, rad/s, gauss, hPa."""
-        imu = self.view.imu()
-        pressure_pa, _ = self.view.pressure()
-        if not math.isfinite(imu[0]) or not math.isfinite(pressure_pa):
-            return None
-        return (
-            self.view.time_us,
-            *imu[interface.IMU_ACCEL_FRD_M_S2],
-            *imu[interface.IMU_GYRO_FRD_RAD_S],
-            *self.view.magnetometer_gauss(),
-            pressure_pa * 0.01,
-            0.0,
-            pressure_altitude_m(pressure_pa),
-            imu[interface.IMU_TEMPERATURE_C],
-            HIGHRES_FIELDS_UPDATED,
-            0,
         )
 
     def raw_scaled_imu(self) -> tuple[int, ...] | None:

@@ -117,7 +117,6 @@ class Px4Messages(CommonMessages):
             _M.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
             _M.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
             _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
-            _M.MAVLINK_MSG_ID_ODOMETRY: self.odometry,
             _M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: self.orbit_execution_status,
             _M.MAVLINK_MSG_ID_CURRENT_MODE: self._current_mode,
             _M.MAVLINK_MSG_ID_OPEN_DRONE_ID_LOCATION: self.open_drone_id_location,
@@ -135,7 +134,7 @@ class Px4Messages(CommonMessages):
 
     def altitude(self) -> Values | None:
         """ALTITUDE (141)."""
-        v = self.view
+        v = self.view.refreshed()
         if not v.has_global:
             return None
         clearance_m = float(self.sources.navigation.state[nav.HEIGHT_ABOVE_GROUND_M])
@@ -166,35 +165,6 @@ class Px4Messages(CommonMessages):
             health.position_vertical_accuracy_m,
         )
 
-    def odometry(self) -> Values | None:
-        """ODOMETRY (331): pose in local NED, velocity in the local frame as PX4 sends it."""
-        v = self.view
-        navigation = self.sources.navigation
-        if not navigation.health.attitude:
-            return None
-        pose = [NAN] * 21
-        velocity = [NAN] * 21
-        variances = navigation.covariance.diagonal().tolist()
-        for index, diagonal in enumerate((0, 6, 11)):
-            pose[diagonal] = variances[6 + index]
-            velocity[diagonal] = variances[3 + index]
-        for index, diagonal in enumerate((15, 18, 20)):
-            pose[diagonal] = variances[index]
-        return (
-            v.time_us,
-            mavlink.MAV_FRAME_LOCAL_NED,
-            mavlink.MAV_FRAME_LOCAL_NED,
-            *v.pos,
-            v.q,
-            *v.vel,
-            *v.rates,
-            pose,
-            velocity,
-            0,
-            mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
-            0,
-        )
-
     def orbit_execution_status(self) -> Values | None:
         """ORBIT_EXECUTION_STATUS (360), while circling."""
         orbit = self._orbit()
@@ -214,7 +184,7 @@ class Px4Messages(CommonMessages):
 
     def open_drone_id_location(self) -> Values | None:
         """OPEN_DRONE_ID_LOCATION (12901), ASTM F3411."""
-        v = self.view
+        v = self.view.refreshed()
         if not v.has_global:
             return None
         airborne = int(self.sources.context.landed_state) != mavlink.MAV_LANDED_STATE_ON_GROUND

@@ -5,7 +5,7 @@ physics grid; the payload of a message that several channels send in the same st
 """
 
 import heapq
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Protocol
 
 from autopilot_bridge.mavlink.definitions import definition
@@ -21,8 +21,8 @@ MICROSECONDS: Final = 1_000_000
 class PayloadSink(Protocol):
     """Where a stream's packed payloads go: one MAVLink channel."""
 
-    def send_payload(self, message_id: int, payload: bytes) -> None:
-        """Frame the payload and send it."""
+    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Frame the payloads (message id, bytes) and send them."""
 
 
 class PayloadCache:
@@ -126,6 +126,7 @@ class StreamTable:
     def tick(self, time_us: int) -> None:
         """Send what is due."""
         heap = self._heap
+        due: list[tuple[int, bytes]] = []
         while heap and heap[0][0] <= time_us:
             due_us, message_id = heap[0]
             next_us = due_us + self._intervals_us[message_id]
@@ -134,7 +135,9 @@ class StreamTable:
             heapq.heapreplace(heap, (next_us, message_id))
             payload = self._cache.payload(message_id, time_us)
             if payload is not None:
-                self._sink.send_payload(message_id, payload)
+                due.append((message_id, payload))
+        if due:
+            self._sink.send_payloads(due)
         self.next_due_us = heap[0][0] if heap else self.NEVER
 
     def _start(self, message_id: int, interval_us: int, due_us: int) -> None:

@@ -17,14 +17,15 @@ GRAVITY_M_S2: Final = 9.80665
 
 
 class TelemetryView:
-    """Snapshot of one autopilot's state for the message builders; `refresh` costs one array-to-list conversion.
+    """Snapshot of one autopilot's state for the message builders, made once per step and only when asked for.
 
-    Attributes (after `refresh`): `time_us`, `time_ms`; attitude `q` (w, x, y, z), `rates` rad/s, `roll`, `pitch`, `yaw`
-    rad; `pos` and `vel` NED m, m/s; `acc` NED m/s^2; `heading_cdeg`; and, when the filter has an origin, `lat_e7`,
-    `lon_e7`, `alt_amsl_m`, `alt_relative_m` (to home).
+    Attributes (of `refreshed()`): attitude `q` (w, x, y, z), `rates` rad/s, `roll`, `pitch`, `yaw` rad; `pos` and `vel`
+    NED m, m/s; `acc` NED m/s^2; `heading_cdeg`; and, when the filter has an origin, `lat_e7`, `lon_e7`,
+    `alt_amsl_m`, `alt_relative_m` (to home). `time_us` and `time_ms` are always those of the step.
     """
 
     __slots__ = (
+        "_fresh_us",
         "_nav_state",
         "acc",
         "alt_amsl_m",
@@ -55,16 +56,23 @@ class TelemetryView:
         self.readings = readings
         self.vibration = VibrationMeter()
         self._nav_state = nav_state
-        self.time_us = -1
+        self._fresh_us = -1
         self.has_global = False
-        self.refresh(0)
+        self.advance(0)
 
-    def refresh(self, time_us: int) -> None:
-        """Bring the snapshot to this step; free when it is there already."""
-        if time_us == self.time_us:
-            return
+    def advance(self, time_us: int) -> None:
+        """The step is now `time_us`; everything else follows when somebody asks for it."""
         self.time_us = time_us
         self.time_ms = time_us // 1000
+
+    def refreshed(self) -> "TelemetryView":
+        """This view, with every attribute at the present step."""
+        if self._fresh_us != self.time_us:
+            self._fresh_us = self.time_us
+            self._refresh()
+        return self
+
+    def _refresh(self) -> None:
         state = self._nav_state.tolist()
         self.q = state[nav.Q_NED_FROM_FRD]
         self.rates = state[nav.RATES_FRD_RAD_S]

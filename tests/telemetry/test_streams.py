@@ -1,6 +1,7 @@
 """Streams keep their rates exactly, pack once per step and never burst."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
@@ -18,9 +19,10 @@ class Sink:
         self.times: dict[int, list[int]] = {}
         self.now_us = 0
 
-    def send_payload(self, message_id: int, payload: bytes) -> None:
-        self.sent[message_id] += 1
-        self.times.setdefault(message_id, []).append(self.now_us)
+    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
+        for message_id, _ in payloads:
+            self.sent[message_id] += 1
+            self.times.setdefault(message_id, []).append(self.now_us)
 
 
 class Source:
