@@ -51,7 +51,7 @@ from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav
 
-_CHECK_EVERY: Final = 5  # arming checks run at 10 Hz while disarmed
+_SUPERVISE_EVERY: Final = 5  # health, failsafes and arming checks at 10 Hz, as PX4's commander; flight tasks at 50 Hz
 
 
 class Commander:
@@ -207,6 +207,8 @@ class Commander:
 
     def set_mode(self, mode: FlightMode) -> Verdict:
         """Command a mode. On the ground almost any is taken; in flight it must be possible now."""
+        self._health.update(self.time_us)
+        self._refresh()
         reason = self._mode_obstacle(mode)
         if reason is not None:
             self.emit(ModeDenied(time_us=self.time_us, mode=mode, reason=reason))
@@ -289,26 +291,33 @@ class Commander:
         self.situation.time_us = time_us
         self.context.time_us = time_us
         self._ticks += 1
+        self.context.sticks = self.pilot.sticks(time_us, self.parameters.stick_timeout_s)
+        self._land_detector.update(self.context, self._thrust())
+        self.home.follow_frame()
+        self._follow_landing()
+        self._auto_disarm()
+        if self._ticks % _SUPERVISE_EVERY == 1:
+            self._supervise(time_us)
+        self._take_over_by_sticks()
+        self.tasks.update()
+        self._follow_task()
+
+    def _supervise(self, time_us: int) -> None:
+        """What needs no haste: sensors, arming checks, home, battery, failsafes and the mode they ask for."""
         if not self._booted and time_us >= self.policy.boot_s * 1e6:
             self._booted = True
             self.emit(Booted(time_us=time_us))
         self._health.update(time_us)
-        self._land_detector.update(self.context, self._thrust())
-        self._refresh()
-        self._follow_home()
-        self._follow_landing()
         warning = self.battery.update(self.situation.health, self.parameters, time_us)
         if warning is not None:
             self.emit(warning)
-        self._auto_disarm()
-        if not self.armed and self._ticks % _CHECK_EVERY == 1:
+        self._refresh()
+        self._follow_home()
+        if not self.armed:
             self._check_arming()
             self._report_prearm()
         self._events.extend(self.failsafes.update(self.situation, self.parameters))
-        self._take_over_by_sticks()
         self._select()
-        self.tasks.update()
-        self._follow_task()
 
     def _tell_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
         mode = self.commanded_mode
@@ -324,7 +333,6 @@ class Commander:
         """Bring the situation up to date."""
         situation, context, parameters = self.situation, self.context, self.parameters
         time_us = situation.time_us
-        context.sticks = self.pilot.sticks(time_us, parameters.stick_timeout_s)
         situation.mode = self.commanded_mode
         situation.armed = self.armed
         situation.airborne = self.airborne
@@ -339,7 +347,7 @@ class Commander:
         situation.sticks_age_s = self.pilot.sticks_age_s(time_us, parameters.stick_timeout_s)
         situation.throttle_high = context.sticks.valid and context.sticks.throttle > THROTTLE_HIGH
         situation.home_set = self.home.position is not None
-        situation.mission_problem = self._mission_problem()
+        situation.mission_problem = self.mission_problem
         situation.battery_level = self.battery.level
         roll, pitch, _ = context.nav[nav.EULER_RAD].tolist()
         situation.tilt_rad = math.acos(math.cos(roll) * math.cos(pitch))
@@ -349,7 +357,9 @@ class Commander:
             tuple(context.nav[nav.POS_NED_M].tolist()), home, context.frame, parameters
         )
 
-    def _mission_problem(self) -> Reason | None:
+    @property
+    def mission_problem(self) -> Reason | None:
+        """Why the stored mission can't be flown; None when it can."""
         if len(self.missions.items) <= self.policy.mission_first_item:
             return Reason.MISSION_MISSING
         return None if self._mission_valid() else Reason.MISSION_INVALID
@@ -428,10 +438,9 @@ class Commander:
             self._disarm(reason)
 
     def _follow_home(self) -> None:
-        self.home.follow_frame()
         situation = self.situation
         waiting = self.armed or self.time_us < self.policy.home_s * 1e6 or not situation.health.position
-        if not waiting and self.home.settle(settled=situation.position, once_a_second=self._ticks % 50 == 0):
+        if not waiting and self.home.settle(settled=situation.position, once_a_second=self._ticks % 50 == 1):
             self._tell_home()
 
     def _tell_home(self) -> None:

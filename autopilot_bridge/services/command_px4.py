@@ -136,7 +136,7 @@ class Px4Commands(CommandHandlers):
 
     def start_mission(self, command: Command, source: Source) -> Result:
         """MISSION_START: p1 first item. Changes the mode and arms."""
-        if self.commander.situation.mission_problem is not None:
+        if self.commander.mission_problem is not None:
             return self.deny(command, Reason.MISSION_MISSING, Result.DENIED)
         first = whole(command.p1)
         if first is None or not -1 <= first < self.hooks.mission_item_count():

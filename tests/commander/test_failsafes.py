@@ -328,7 +328,8 @@ def test_ardupilot_fence_from_the_plan() -> None:
     rig.fence.replace(tuple(items), 7)
     rig.run(0.2)
     assert rig.commander.mode is FlightMode.GUIDED
-    rig.context.nav[10] = 21.0
+    nav = rig.context.nav
+    rig.spoil = lambda: nav.__setitem__(10, 21.0)  # the rig's vehicle would be back before the next check
     rig.run(0.2)
     assert rig.commander.mode is FlightMode.RETURN
     assert "Fence Breached" in rig.texts()
