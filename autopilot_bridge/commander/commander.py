@@ -480,7 +480,8 @@ class Commander:
         events.clear()
         for event in told:
             if isinstance(event, flight.WaypointReached):
-                if event.navigation or self.policy.reports_do_items:
+                last = event.seq + 1 == len(self.missions.items)  # clients know by it that the mission is over
+                if event.navigation or last or self.policy.reports_do_items:
                     self.emit(MissionItemReached(time_us=self.time_us, index=event.seq))
             elif isinstance(event, flight.MissionFinished):
                 self.mission_complete = True

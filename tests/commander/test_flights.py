@@ -108,6 +108,17 @@ def test_the_end_of_a_mission_without_return_holds() -> None:
     assert rig.commander.airborne and rig.commander.mode is FlightMode.MISSION
 
 
+def test_px4_reports_the_last_item_reached_whatever_it_is() -> None:
+    """MAVSDK takes the mission for finished when the last item, often a change of speed, was reached."""
+    rig = Rig("px4")
+    speed = MissionItem(command=178, frame=2, param1=1.0, param2=4.0)
+    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 5.0), speed)
+    rig.commander.set_mode(FlightMode.MISSION)
+    rig.commander.arm()
+    rig.run_until(lambda: rig.commander.mission_complete, 60.0)
+    assert [event.index for event in rig.happened(MissionItemReached)] == [0, 1, 2]
+
+
 def test_home_is_set_when_the_position_is_good_and_again_at_arming() -> None:
     rig = Rig("px4", start_s=0.0)
     rig.run(2.0)
