@@ -40,7 +40,7 @@ from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.px4 import Px4Messages
 from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable, Values
 from autopilot_bridge.telemetry.view import TelemetryView
-from flightsim.interface import IMU_ACCEL_FRD_M_S2, SensorReadings
+from flightsim.interface import SensorReadings
 
 SLOW_RATE_HZ: Final = 50
 _COMPONENT: Final = 1
@@ -267,7 +267,7 @@ class Autopilot:
         context, navigation = self.context, self.navigation
         context.frame = navigation.frame
         context.hover_thrust = self.controller.hover_thrust
-        self._view.vibration.update(self._readings.imu.values[IMU_ACCEL_FRD_M_S2], 1.0 / SLOW_RATE_HZ)
+        self._view.vibration.update()
         self.commander.update(time_us)
         self.controller.set_ground_contact(context.ground_contact)
         navigation.vehicle_at_rest = context.on_ground and not self.commander.tasks.lifting_off

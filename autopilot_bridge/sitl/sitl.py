@@ -65,7 +65,7 @@ class SitlVehicle:
         )
         self.channels: list[LinkChannel] = []
         self._router: Router[LinkChannel] = Router()
-        self.truth_encoder = TruthEncoder(specification.system_id)
+        self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
 
     def _inject_failure(self, unit: int, failure: int, instance: int) -> Result:
         """MAV_CMD_INJECT_FAILURE on the vehicle's sensors."""
@@ -181,7 +181,7 @@ class Sitl:
         if time_us >= self._next_truth_us:
             self._next_truth_us = time_us + self._truth_interval_us
             for vehicle in self.vehicles:
-                frame = vehicle.truth_encoder.encode(time_us, vehicle.vehicle.truth)
+                frame = vehicle.truth_encoder.encode(time_us)
                 for listener in self._truth_listeners:
                     listener(time_us, frame)
 

@@ -8,49 +8,64 @@ import math
 from typing import Final
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
-from autopilot_bridge.telemetry.packing import values_packer
-from flightsim import truth as t
+from autopilot_bridge.telemetry.records import record_type
+from flightsim.truth import TRUTH_SIZE
 
 SIMULATOR_COMPONENT: Final = mavlink.MAV_COMP_ID_USER1
 TRUTH_RATE_HZ: Final = 50
-_MILLI_G: Final = 1000.0 / 9.80665
 _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 
 
+@njit(cache=True)
+def _whole(value: float, limit: float) -> int:
+    return int(math.floor(min(limit, max(-limit, value)) + 0.5))
+
+
+@njit(cache=True)
+def _fill(truth: NDArray[np.float64], time_us: int, out: NDArray[np.void]) -> None:
+    """Layout of `flightsim.truth` to the wire's units."""
+    r = out[0]
+    r.time_usec = time_us
+    for i in range(4):
+        r.attitude_quaternion[i] = truth[6 + i]
+    r.rollspeed, r.pitchspeed, r.yawspeed = truth[10], truth[11], truth[12]
+    r.lat = _whole(math.degrees(truth[0]) * 1e7, 1.8e9)
+    r.lon = _whole(math.degrees(truth[1]) * 1e7, 1.8e9)
+    r.alt = _whole(truth[2] * 1e3, 2e9)
+    r.vx = _whole(truth[3] * 100.0, 32767.0)
+    r.vy = _whole(truth[4] * 100.0, 32767.0)
+    r.vz = _whole(truth[5] * 100.0, 32767.0)
+    r.true_airspeed = _whole(truth[26] * 100.0, 32767.0)
+    r.ind_airspeed = _whole(truth[26] * 100.0 * math.sqrt(max(0.0, truth[18]) / 1.225), 32767.0)
+    r.xacc = _whole(truth[13] * (1000.0 / 9.80665), 32767.0)
+    r.yacc = _whole(truth[14] * (1000.0 / 9.80665), 32767.0)
+    r.zacc = _whole(truth[15] * (1000.0 / 9.80665), 32767.0)
+
+
 class TruthEncoder:
-    """Packs the truth vector of one vehicle."""
+    """Packs the truth vector of one vehicle.
 
-    __slots__ = ("_encoder", "_pack")
+    Args:
+        system_id: the vehicle's.
+        truth: layout of `flightsim.truth`, written in place by the vehicle.
+    """
 
-    def __init__(self, system_id: int) -> None:
+    __slots__ = ("_encoder", "_record", "_truth")
+
+    def __init__(self, system_id: int, truth: NDArray[np.float64]) -> None:
+        if truth.shape != (TRUTH_SIZE,):
+            raise ValueError(f"truth has shape {truth.shape}; accepted: ({TRUTH_SIZE},)")
         self._encoder = FrameEncoder(system_id, SIMULATOR_COMPONENT)
-        self._pack = values_packer(definition(_MESSAGE_ID))
+        self._truth = truth
+        self._record = np.zeros(1, record_type(definition(_MESSAGE_ID)))
 
-    def encode(self, time_us: int, truth: NDArray[np.float64]) -> bytes:
-        """One HIL_STATE_QUATERNION frame."""
-        values = truth.tolist()
-        north, east, down = values[t.VEL_NED_M_S]
-        airspeed_cm_s = round(values[t.AIRSPEED_TRUE_M_S] * 100.0)
-        indicated_cm_s = round(airspeed_cm_s * math.sqrt(max(0.0, values[t.DENSITY_KG_M3]) / 1.225))
-        payload = self._pack(
-            (
-                time_us,
-                values[t.Q_NED_FROM_FRD],
-                *values[t.RATES_FRD_RAD_S],
-                round(math.degrees(values[t.LAT_RAD]) * 1e7),
-                round(math.degrees(values[t.LON_RAD]) * 1e7),
-                round(values[t.ALT_M] * 1000.0),
-                round(north * 100.0),
-                round(east * 100.0),
-                round(down * 100.0),
-                indicated_cm_s,
-                airspeed_cm_s,
-                *(round(force * _MILLI_G) for force in values[t.SPECIFIC_FORCE_FRD_M_S2]),
-            )
-        )
-        return self._encoder.encode_payload(_MESSAGE_ID, payload)
+    def encode(self, time_us: int) -> bytes:
+        """One HIL_STATE_QUATERNION frame of the present truth."""
+        _fill(self._truth, time_us, self._record)
+        return self._encoder.encode_payload(_MESSAGE_ID, self._record.tobytes())

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.telemetry.records import record_type
 from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
@@ -30,30 +31,10 @@ MESSAGES: Final = (
     "HIGHRES_IMU",
     "ODOMETRY",
 )
-_NUMPY_CODES: Final = {
-    "f": "<f4",
-    "B": "u1",
-    "b": "i1",
-    "H": "<u2",
-    "h": "<i2",
-    "I": "<u4",
-    "i": "<i4",
-    "Q": "<u8",
-}
 _POSE_POSITION: Final = (0, 6, 11)  # diagonal of an upper-triangular 6x6 covariance, row by row
 _POSE_ATTITUDE: Final = (15, 18, 20)
 _HIGHRES_FIELDS_UPDATED: Final = 63  # accelerometer, gyro: what PX4's driver publishes together
 _PLACE_SIZE: Final = 6
-
-
-def _record_type() -> np.dtype[np.void]:
-    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
-    for name in MESSAGES:
-        for field in definition(name).wire_fields:
-            code = _NUMPY_CODES[field.code]
-            label = f"{name.lower()}__{field.name}"
-            fields.append((label, code, (field.length,)) if field.length else (label, code))
-    return np.dtype(fields)
 
 
 @njit(cache=True)
@@ -145,7 +126,7 @@ class MotionMessages:
         self._place[3:5] = 1.0
         self._frame: object = None
         self._time_us = -1
-        self._record = np.zeros(1, _record_type())
+        self._record = np.zeros(1, record_type(*map(definition, MESSAGES), prefixed=True))
         self._bytes = memoryview(self._record).cast("B")
         row = self._record[0]
         row["highres_imu__fields_updated"] = _HIGHRES_FIELDS_UPDATED

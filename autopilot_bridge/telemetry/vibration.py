@@ -1,5 +1,7 @@
 """Vibration metrics as VIBRATION reports them: the level of what the accelerometers feel faster than 5 Hz."""
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -10,26 +12,34 @@ Array = NDArray[np.float64]
 @njit(cache=True)
 def _update(accel_frd: Array, slow: Array, level: Array, blend_slow: float, blend_level: float) -> None:
     for i in range(3):
+        if not math.isfinite(accel_frd[i]):
+            continue
         slow[i] += blend_slow * (accel_frd[i] - slow[i])
         fast = accel_frd[i] - slow[i]
         level[i] += blend_level * (fast * fast - level[i])
 
 
 class VibrationMeter:
-    """High-passed accelerometer RMS per body axis (ArduPilot's definition: 5 Hz high pass, 2 Hz smoothing)."""
+    """High-passed accelerometer RMS per body axis (ArduPilot: 5 Hz high pass, 2 Hz smoothing).
 
-    __slots__ = ("_level", "_slow")
+    Args:
+        accel_frd_m_s2: newest accelerometer sample, shape (3,), written in place by the sensor; what is not a finite
+            number is passed over.
+        rate_hz: calls of `update` per second.
+    """
 
-    def __init__(self) -> None:
+    __slots__ = ("_accel", "_blend_level", "_blend_slow", "_level", "_slow")
+
+    def __init__(self, accel_frd_m_s2: Array, *, rate_hz: float) -> None:
+        self._accel = accel_frd_m_s2
         self._slow = np.array([0.0, 0.0, -9.80665])
         self._level = np.zeros(3)
+        self._blend_slow = min(1.0, 2.0 * math.pi * 5.0 / rate_hz)
+        self._blend_level = min(1.0, 2.0 * math.pi * 2.0 / rate_hz)
 
-    def update(self, accel_frd_m_s2: Array, dt_s: float) -> None:
-        """Take one accelerometer sample (shape (3,), m/s^2)."""
-        if np.isfinite(accel_frd_m_s2).all():
-            slow = min(1.0, dt_s * 2.0 * np.pi * 5.0)
-            level = min(1.0, dt_s * 2.0 * np.pi * 2.0)
-            _update(accel_frd_m_s2, self._slow, self._level, slow, level)
+    def update(self) -> None:
+        """Take the newest sample."""
+        _update(self._accel, self._slow, self._level, self._blend_slow, self._blend_level)
 
     @property
     def rms_m_s2(self) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from flightsim import interface
 from flightsim.interface import SensorReadings
 
 UINT16_UNKNOWN: Final = 65535
-GRAVITY_M_S2: Final = 9.80665
+VIBRATION_RATE_HZ: Final = 50.0  # of the slow loop
 
 
 class TelemetryView:
@@ -54,7 +54,9 @@ class TelemetryView:
     ) -> None:
         self.context = context
         self.readings = readings
-        self.vibration = VibrationMeter()
+        self.vibration = VibrationMeter(
+            readings.imu.values[interface.IMU_ACCEL_FRD_M_S2], rate_hz=VIBRATION_RATE_HZ
+        )
         self._nav_state = nav_state
         self._fresh_us = -1
         self.has_global = False

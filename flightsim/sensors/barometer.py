@@ -52,7 +52,7 @@ class BarometerParameters:
         self_heating_k, temperature_quantum_k: the sensor's own temperature reading.
     """
 
-    rate_hz: int = 50
+    rate_hz: int = 25
     latency_s: float = 0.0
     noise_pa: float = 1.2
     turn_on_bias_pa: float = 20.0

@@ -38,7 +38,7 @@ class MagnetometerParameters:
         range_gauss, quantum_gauss: 1600 uT and 0.3 uT per bit (datasheet).
     """
 
-    rate_hz: int = 50
+    rate_hz: int = 25
     latency_s: float = 0.0
     noise_gauss: float = 0.0028
     hard_iron_gauss: float = 0.002

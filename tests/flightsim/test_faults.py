@@ -12,6 +12,7 @@ from flightsim import truth as t
 from flightsim.interface import Reading
 from flightsim.random_streams import RandomStreams
 from flightsim.sensors import (
+    BarometerParameters,
     FaultType,
     SensorSuite,
     SensorSuiteParameters,
@@ -57,11 +58,11 @@ class Trace:
         return self.fresh & (steps >= BEGIN_STEP) & (steps < END_STEP)
 
 
-def make_suite() -> tuple[SensorSuite, Array]:
+def make_suite(parameters: SensorSuiteParameters | None = None) -> tuple[SensorSuite, Array]:
     truth = np.zeros(t.TRUTH_SIZE)
     streams = RandomStreams(5)
     suite = SensorSuite(
-        SensorSuiteParameters(),
+        parameters or SensorSuiteParameters(),
         physics_rate_hz=RATE_HZ,
         truth=truth,
         seeds=lambda name: streams.child("sensor", name),
@@ -314,7 +315,7 @@ def test_intermittent_comes_and_goes(unit: SensorUnit, healthy: dict[str, Trace]
 
 
 def test_intermittent_keeps_its_mean_times() -> None:
-    suite, truth = make_suite()
+    suite, truth = make_suite(SensorSuiteParameters(barometer=BarometerParameters(rate_hz=50)))
     write_truth(truth, 0)
     suite.faults.inject(SensorUnit.BARO, FaultType.INTERMITTENT, mean_up_s=0.6, mean_down_s=0.2)
     up = np.empty(50_000, dtype=bool)

@@ -87,11 +87,12 @@ def test_rates_are_exact(name: str) -> None:
 def test_latency_is_exact(latency_steps: int) -> None:
     """Shorter, equal to and longer than the sampling interval of five steps."""
     latency_s = latency_steps * STEP_US * 1e-6
-    late = SensorSuiteParameters(barometer=BarometerParameters(latency_s=latency_s))
+    late = SensorSuiteParameters(barometer=BarometerParameters(rate_hz=50, latency_s=latency_s))
     deliveries = fly(*make_suite(late), 100)["barometer"]
     assert {delivered - measured for delivered, measured, _ in deliveries} == {latency_steps * STEP_US}
     assert len(deliveries) == len(range(latency_steps, 100, 5))
-    prompt = fly(*make_suite(), 100)["barometer"]
+    at_once = SensorSuiteParameters(barometer=BarometerParameters(rate_hz=50))
+    prompt = fly(*make_suite(at_once), 100)["barometer"]
     assert [value for *_, value in deliveries] == [value for *_, value in prompt][: len(deliveries)]
 
 

@@ -1,0 +1,34 @@
+"""NumPy record types with exactly the layout of a message's payload on the wire, for kernels that fill payloads."""
+
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.mavlink.definitions import MessageDefinition
+
+_NUMPY_CODES: Final = {
+    "f": "<f4",
+    "B": "u1",
+    "b": "i1",
+    "H": "<u2",
+    "h": "<i2",
+    "I": "<u4",
+    "i": "<i4",
+    "Q": "<u8",
+}
+
+
+def record_type(*messages: MessageDefinition, prefixed: bool = False) -> np.dtype[np.void]:
+    """A packed record of one message, or of several one behind the other.
+
+    Args:
+        messages: whose fields, in the order of the wire; messages with strings are not meant.
+        prefixed: field names carry the message's name before them: `attitude__roll`.
+    """
+    fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+    for message in messages:
+        for field in message.wire_fields:
+            code = _NUMPY_CODES[field.code]
+            label = f"{message.name.lower()}__{field.name}" if prefixed else field.name
+            fields.append((label, code, (field.length,)) if field.length else (label, code))
+    return np.dtype(fields)
