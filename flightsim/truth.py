@@ -3,6 +3,9 @@
 One preallocated float64 array per vehicle, written in place by the vehicle model and read by the sensor
 kernels and the log. It never reaches an autopilot, a mission or an estimator.
 
+Motion (position, velocity, attitude, rates, specific force) is written every step; air, battery, rotors, airspeed,
+height above ground and ground contact every step or, in a `World`, at its slow rate.
+
 Frames: NED is the local geodetic frame at the vehicle; FRD is the body frame (x forward, y right, z down).
 """
 

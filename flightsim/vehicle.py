@@ -58,6 +58,7 @@ _STATE: Final = (
     "forces/fbz-gear-lbs",
 )
 _STATE_SIZE: Final = len(_STATE)
+_MOTION_SIZE: Final = _STATE.index("atmosphere/P-psf")  # read every step; the rest and the model's own may be slower
 
 
 class VehicleDivergedError(ArithmeticError):
@@ -78,7 +79,8 @@ class Vehicle:
 
     __slots__ = (
         "_fdm",
-        "_getters",
+        "_getters_motion",
+        "_getters_slow",
         "_gusts",
         "_initial",
         "_magnetic_steps",
@@ -89,6 +91,8 @@ class Vehicle:
         "_seed_sequence",
         "_set_actuators",
         "_set_gust",
+        "_slow_phase",
+        "_slow_steps",
         "_steps",
         "_truth_extra",
         "_turbulence",
@@ -108,6 +112,7 @@ class Vehicle:
         environment: Environment,
         seed_sequence: np.random.SeedSequence,
         physics_rate_hz: int = 250,
+        slow_rate_hz: int | None = None,
         initial: InitialState | None = None,
     ) -> None:
         """Load the model and start it.
@@ -118,6 +123,8 @@ class Vehicle:
             environment: the air.
             seed_sequence: the vehicle's own random stream (turbulence).
             physics_rate_hz: 100 to 2000.
+            slow_rate_hz: how often the part of `truth` that is not motion (air, power, ground contact) is read from
+                JSBSim, from the first step on; None: every step.
             initial: how it starts; by default standing at home.
 
         Raises:
@@ -139,6 +146,8 @@ class Vehicle:
         self._truth_extra = np.array([index for index, _ in self.airframe.truth], dtype=np.int64)
         self._raw = np.zeros(_STATE_SIZE + len(self.airframe.truth))
         self._raw_view = self._raw.data  # its elements are set faster than the array's
+        self._slow_steps = max(1, physics_rate_hz // (slow_rate_hz or physics_rate_hz))
+        self._slow_phase = 1 % self._slow_steps  # the first step, and then at the slow rate, as sensors measure
         self._magnetic_steps = _MAGNETIC_REFRESH_S * physics_rate_hz
         self._initial = initial or InitialState()
         self.reset(self._initial)
@@ -165,10 +174,11 @@ class Vehicle:
         self._run = fdm.run
         name = self.airframe.name
         properties = (*_STATE, *(prop for _, prop in self.airframe.truth))
-        self._getters = tuple(
+        getters = tuple(
             (i, find_property(fdm, prop, needed_by="the truth vector").get_double_value)
             for i, prop in enumerate(properties)
         )
+        self._getters_motion, self._getters_slow = getters[:_MOTION_SIZE], getters[_MOTION_SIZE:]
         self._set_actuators = tuple(
             find_property(fdm, prop, needed_by=f"vehicle '{name}'").set_double_value
             for prop in self.airframe.actuators
@@ -254,8 +264,11 @@ class Vehicle:
 
     def _observe(self) -> None:
         raw = self._raw_view
-        for i, get in self._getters:
+        for i, get in self._getters_motion:
             raw[i] = get()
+        if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
+            for i, get in self._getters_slow:
+                raw[i] = get()
         if not _write_truth(self._raw, self._truth_extra, self.truth):
             raise VehicleDivergedError(
                 f"vehicle '{self.airframe.name}' diverged at step {self._steps} "

@@ -2,12 +2,17 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Final
 
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.random_streams import RandomStreams
 from flightsim.vehicle import Vehicle
+
+
+SLOW_RATE_HZ: Final = 50
+"""Rate of the part of truth that is not motion: no sensor of it is faster."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +91,7 @@ class World:
             environment=self.parameters.environment,
             seed_sequence=self.streams.child("vehicle", len(self.vehicles), "turbulence"),
             physics_rate_hz=self.parameters.physics_rate_hz,
+            slow_rate_hz=SLOW_RATE_HZ,
             initial=initial or InitialState(offset_ne_m=offset_ne_m),
         )
         self.vehicles.append(vehicle)
