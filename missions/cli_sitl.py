@@ -23,6 +23,21 @@ def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...], count: int):  # t
     return [chosen]
 
 
+def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
+    """Parameters that give clients, who live in wall time, as long to answer as at speedup 1.
+
+    PX4's own SITL stretches these when it runs faster (reference page, section 2); ArduPilot's stretches none.
+    """
+    if autopilot != "px4" or speedup <= 1.0:
+        return {}
+    return {
+        "COM_DL_LOSS_T": min(round(10.0 * speedup), 300),
+        "COM_RC_LOSS_T": min(speedup, 35.0),
+        "COM_OF_LOSS_T": min(speedup, 60.0),
+        "COM_OBC_LOSS_T": min(5.0 * speedup, 60.0),
+    }
+
+
 @click.command()
 @click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
 @click.option("--model", default="iris", show_default=True, help="One of our models, or a path.")
@@ -89,7 +104,10 @@ def sitl(
                     count,
                     model=model,
                     flavour=autopilot,
-                    parameters={} if params is None else parameters_from_file(params),
+                    parameters={
+                        **_loss_times(autopilot, speedup),
+                        **({} if params is None else parameters_from_file(params)),
+                    },
                 ),
                 home=None if home is None else parse_home(home),
                 environment=Environment.from_wind(

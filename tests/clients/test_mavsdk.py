@@ -26,7 +26,7 @@ from mavsdk.plugins.telemetry import Telemetry
 
 from tests.clients.sitl_process import free_port, running_sitl
 
-SPEEDUP = 5.0
+SPEEDUP = 10.0
 WALL_DEADLINE_S = 25.0
 
 
