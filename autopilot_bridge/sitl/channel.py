@@ -10,6 +10,7 @@ from autopilot_bridge.services.channel import MavlinkMessage
 
 _MAX_PARSERS: Final = 64
 _MAX_PACKET: Final = 1400  # bytes: one datagram that no network splits
+_ALWAYS_FIT: Final = 5  # frames are 280 bytes at most
 _MEMORY_PEER: Final[PeerId] = ("memory", 0)
 
 
@@ -59,13 +60,12 @@ class LinkChannel:
 
     def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Frame several packed payloads and send them together, a packet of a network at most at a time."""
-        encode = self._encoder.encode_payload
-        if len(payloads) == 1:
-            self.link.send(encode(*payloads[0]))
+        frames = self._encoder.encode_payloads(payloads)
+        if len(payloads) <= _ALWAYS_FIT:
+            self.link.send(b"".join(frames))
             return
         packet = b""
-        for message_id, payload in payloads:
-            frame = encode(message_id, payload)
+        for frame in frames:
             if len(packet) + len(frame) > _MAX_PACKET:
                 self.link.send(packet)
                 packet = b""

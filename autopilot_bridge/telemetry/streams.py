@@ -4,8 +4,8 @@ A `StreamTable` belongs to one channel. Every stream keeps its own due time, so 
 physics grid; the payload of a message that several channels send in the same step is built once (`PayloadCache`).
 """
 
-import heapq
 from collections.abc import Callable, Mapping, Sequence
+from heapq import heapify, heappush, heapreplace
 from typing import Final, Protocol
 
 from autopilot_bridge.mavlink.definitions import definition
@@ -43,19 +43,24 @@ class PayloadCache:
         """Build anew even within this step: something has changed."""
         self._payloads.clear()
 
-    def payload(self, message_id: int, time_us: int) -> bytes | None:
-        """Packed payload of a message at this step, or None when there is nothing to say."""
+    def at(self, time_us: int) -> dict[int, bytes | None]:
+        """Payloads built so far at this step; the next step starts with none."""
         if time_us != self.time_us:
             self.time_us = time_us
             self._payloads.clear()
-        try:
-            return self._payloads[message_id]
-        except KeyError:
-            pass
+        return self._payloads
+
+    def build(self, message_id: int) -> bytes | None:
+        """Build and keep a payload of this step; None when there is nothing to say."""
         values = self._builders[message_id]()
         payload = values if values is None or isinstance(values, bytes) else self._packers[message_id](values)
         self._payloads[message_id] = payload
         return payload
+
+    def payload(self, message_id: int, time_us: int) -> bytes | None:
+        """Packed payload of a message at this step, or None when there is nothing to say."""
+        payloads = self.at(time_us)
+        return payloads[message_id] if message_id in payloads else self.build(message_id)
 
 
 class StreamTable:
@@ -101,7 +106,7 @@ class StreamTable:
     def set_interval(self, message_id: int, interval_us: int, time_us: int) -> None:
         """Run a stream at a new interval (microseconds), or stop it (-1). The next one is due after one interval."""
         self._heap = [entry for entry in self._heap if entry[1] != message_id]
-        heapq.heapify(self._heap)
+        heapify(self._heap)
         self._intervals_us.pop(message_id, None)
         if interval_us > 0:
             interval_us = max(interval_us, self._step_us)
@@ -112,7 +117,7 @@ class StreamTable:
         """Have the next message of a running stream sent at `due_us`."""
         if message_id in self._intervals_us:
             self._heap = [entry for entry in self._heap if entry[1] != message_id]
-            heapq.heapify(self._heap)
+            heapify(self._heap)
             self._start(message_id, self._intervals_us[message_id], due_us)
 
     def set_default(self, message_id: int, interval_us: int, time_us: int) -> None:
@@ -125,15 +130,18 @@ class StreamTable:
 
     def tick(self, time_us: int) -> None:
         """Send what is due."""
-        heap = self._heap
+        heap, intervals_us, cache = self._heap, self._intervals_us, self._cache
+        payloads = cache.at(time_us)
         due: list[tuple[int, bytes]] = []
-        while heap and heap[0][0] <= time_us:
+        while heap:
             due_us, message_id = heap[0]
-            next_us = due_us + self._intervals_us[message_id]
+            if due_us > time_us:
+                break
+            next_us = due_us + intervals_us[message_id]
             if next_us <= time_us:  # a stream never bursts to catch up
-                next_us = time_us + self._intervals_us[message_id]
-            heapq.heapreplace(heap, (next_us, message_id))
-            payload = self._cache.payload(message_id, time_us)
+                next_us = time_us + intervals_us[message_id]
+            heapreplace(heap, (next_us, message_id))
+            payload = payloads[message_id] if message_id in payloads else cache.build(message_id)
             if payload is not None:
                 due.append((message_id, payload))
         if due:
@@ -142,5 +150,5 @@ class StreamTable:
 
     def _start(self, message_id: int, interval_us: int, due_us: int) -> None:
         self._intervals_us[message_id] = interval_us
-        heapq.heappush(self._heap, (due_us, message_id))
+        heappush(self._heap, (due_us, message_id))
         self.next_due_us = self._heap[0][0]
