@@ -2,13 +2,13 @@
 
     python benchmarks/sitl_speed.py [--seconds 120]
 
-One process, warm (everything compiled and flown once before the clock starts). A quadrotor hovers and flies
-streamed setpoints at 250 Hz physics under the px4 flavour; its default onboard telemetry goes over a memory link and, with
-the truth, into a log, as `flightstack fly` does it. Then the same for 2, 4 and 8 vehicles in one world, and where the
-time of one vehicle goes.
+One process, warm (everything compiled and flown before the clock starts). A quadrotor orbits at 250 Hz physics under the
+px4 flavour; its default onboard telemetry goes over a memory link and, with the truth, into a log, as `flightstack fly`
+does it. Then the same for 2, 4 and 8 vehicles in one world, and where the time of one vehicle goes.
 """
 
 import argparse
+import math
 import tempfile
 import time
 from collections.abc import Callable
@@ -16,12 +16,12 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
 from autopilot_bridge.tlog import TlogWriter
 
 PHYSICS_RATE_HZ = 250
-SETPOINT_INTERVAL_US = 20_000
 
 
 class Flight:
@@ -36,44 +36,42 @@ class Flight:
         self.links = [self.sitl.connect(index) for index in range(vehicles)]
         self.encoder = FrameEncoder(255, 190)
         for link in self.links:
-            link.on_receive = self._record
+            link.on_receive = self._recorder(FrameParser())
         self.sitl.on_truth(lambda time_us, frame: self.log.write(time_us, frame))
-        self._next_setpoint_us = 0
 
-    def _record(self, frame: bytes) -> None:
-        self.frames += 1
-        self.log.write(self.sitl.time_us, frame)
+    def _recorder(self, parser: FrameParser) -> Callable[[bytes], None]:
+        def record(data: bytes) -> None:
+            for frame in parser.feed(data):
+                self.frames += 1
+                self.log.write(self.sitl.time_us, frame.raw)
+
+        return record
 
     def take_off(self) -> None:
-        """Arm, take off, enter OFFBOARD."""
+        """Arm, take off, orbit."""
         self.run(8.0)
-        for index, link in enumerate(self.links):
-            command = mavlink.MAVLink_command_long_message
-            link.send(self.encoder.encode(command(index + 1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)))
-        self.run(0.5, setpoints=True)
-        for index, link in enumerate(self.links):
-            link.send(self.encoder.encode(command(index + 1, 1, 176, 0, 1, 6, 0, 0, 0, 0, 0)))
-        self.run(12.0, setpoints=True)
+        self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+        self._command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, math.nan, math.nan, math.nan, math.nan)
+        self.run(10.0)
+        self._command(mavlink.MAV_CMD_DO_ORBIT, 15.0, 3.0, 0, math.nan, math.nan, math.nan, math.nan)
+        self.run(5.0)
         for vehicle in self.sitl.vehicles:
-            height_m = -float(vehicle.autopilot.navigation.state[12])
-            assert height_m > 8.0, f"vehicle {vehicle.specification.system_id} is at {height_m:.1f} m"
+            mode = vehicle.autopilot.commander.mode
+            assert mode is FlightMode.ORBIT, f"vehicle {vehicle.specification.system_id} is in {mode}"
 
-    def run(self, seconds: float, *, setpoints: bool = False) -> None:
+    def run(self, seconds: float) -> None:
         """Advance by vehicle seconds."""
         sitl = self.sitl
         end_us = sitl.time_us + round(seconds * 1e6)
         while sitl.time_us < end_us:
-            if setpoints and sitl.time_us >= self._next_setpoint_us:
-                self._next_setpoint_us = sitl.time_us + SETPOINT_INTERVAL_US
-                self._send_setpoints()
             sitl.advance()
 
-    def _send_setpoints(self) -> None:
+    def _command(self, command: int, *parameters: float) -> None:
+        values = (*parameters, *(0.0,) * (7 - len(parameters)))
         for index, link in enumerate(self.links):
-            message = mavlink.MAVLink_set_position_target_local_ned_message(
-                0, index + 1, 1, mavlink.MAV_FRAME_LOCAL_NED, 0xDF8, 0.0, 5.0 * index, -10.0, *(0.0,) * 8
-            )
+            message = mavlink.MAVLink_command_long_message(index + 1, 1, command, 0, *values)
             link.send(self.encoder.encode(message))
+        self.run(0.1)
 
     def close(self) -> None:
         """Close links and log."""
@@ -146,7 +144,7 @@ def main() -> None:
             flight = Flight(vehicles, Path(folder) / f"{vehicles}.tlog")
             flight.take_off()
             before = flight.frames
-            wall_s = timed(lambda flight=flight: flight.run(seconds, setpoints=True))
+            wall_s = timed(lambda flight=flight: flight.run(seconds))
             speed = seconds / wall_s
             rate = (flight.frames - before) / seconds / vehicles
             print(
