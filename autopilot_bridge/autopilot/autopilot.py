@@ -28,6 +28,7 @@ from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Channel, MavlinkMessage, Service, Source
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
+from autopilot_bridge.services.file_transfer import FileTransferService
 from autopilot_bridge.services.manual import ManualService
 from autopilot_bridge.services.message_interval import MessageIntervalService
 from autopilot_bridge.services.mission import MissionService, new_stores
@@ -195,6 +196,7 @@ class Autopilot:
             ),
             self.missions,
             TimeSyncService(self, answers_ping=firmware.answers_ping),
+            FileTransferService(),
             self.intervals,
             self._texts,
         )

@@ -42,7 +42,7 @@ class SitlProcess:
 def running_sitl(
     flavour: str, links: Sequence[str], *, speedup: float = 10.0, options: Sequence[str] = ()
 ) -> Iterator[SitlProcess]:
-    """Start a SITL on the given links, wait until it says that it is ready, stop it with Ctrl-C at the end."""
+    """Start a SITL on the given links, wait until it is ready, stop it with Ctrl-C at the end."""
     command = [sys.executable, "-m", "missions", "sitl", "--autopilot", flavour, "--speedup", str(speedup)]
     for link in links:
         command += ["--link", link]
