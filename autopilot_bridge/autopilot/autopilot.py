@@ -38,6 +38,7 @@ from autopilot_bridge.services.status_text import StatusTextService
 from autopilot_bridge.services.timesync import TimeSyncService
 from autopilot_bridge.telemetry.ardupilot import STREAM_GROUPS, STREAM_RATE_PARAMETERS, ArdupilotMessages
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
+from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.px4 import Px4Messages
 from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable, Values
 from autopilot_bridge.telemetry.view import TelemetryView
@@ -51,13 +52,19 @@ FailureHook = Callable[[int, int, int], Result]
 
 
 class AutopilotChannel(Channel, Protocol):
-    """A channel that takes packed payloads too."""
+    """A channel that takes packed payloads too.
+
+    Attributes:
+        motion: makes the frames of the fastest messages; set when the channel is added.
+    """
+
+    motion: MotionMessages | None
 
     def send_payload(self, message_id: int, payload: bytes) -> None:
         """Frame the payload and send it."""
 
-    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Frame several payloads (message id, bytes) and send them together."""
+    def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Send the due motion messages and frames of the payloads (message id, bytes) together."""
 
 
 class _Progress:
@@ -237,7 +244,14 @@ class Autopilot:
             raise ValueError(f"channel role {role!r} is unknown; accepted: {accepted}")
         if channel.name in self._tables:
             raise ValueError(f"a channel named {channel.name!r} is open already")
-        table = StreamTable(self._cache, channel, rates_hz, physics_step_us=self._step_us)
+        table = StreamTable(
+            self._cache,
+            channel,
+            rates_hz,
+            physics_step_us=self._step_us,
+            motion_bits=self._messages.motion.bits,
+        )
+        channel.motion = self._messages.motion
         first_us = max(self._time_us, round(self.flavour.policy.heartbeat_start_s * 1e6))
         table.delay(mavlink.MAVLINK_MSG_ID_HEARTBEAT, first_us)
         self.channels.append(channel)

@@ -7,10 +7,10 @@ from typing import Final
 from autopilot_bridge.links import Link, PeerId
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, ParserCounters
 from autopilot_bridge.services.channel import MavlinkMessage
+from autopilot_bridge.telemetry.motion import MotionMessages
 
 _MAX_PARSERS: Final = 64
 _MAX_PACKET: Final = 1400  # bytes: one datagram that no network splits
-_ALWAYS_FIT: Final = 5  # frames are 280 bytes at most
 _MEMORY_PEER: Final[PeerId] = ("memory", 0)
 
 
@@ -21,13 +21,17 @@ class LinkChannel:
         name: how the channel is called in tables and reports; unique per autopilot.
         link: where bytes go and come from.
         system_id, component_id: the autopilot's.
+
+    Attributes:
+        motion: set by the autopilot that the channel is added to.
     """
 
-    __slots__ = ("_encoder", "_parsers", "_retired", "link", "name")
+    __slots__ = ("_encoder", "_parsers", "_retired", "link", "motion", "name")
 
     def __init__(self, name: str, link: Link, *, system_id: int, component_id: int = 1) -> None:
         self.name = name
         self.link = link
+        self.motion: MotionMessages | None = None
         self._encoder = FrameEncoder(system_id, component_id)
         self._parsers: dict[PeerId, FrameParser] = {}
         self._retired = ParserCounters()
@@ -58,19 +62,16 @@ class LinkChannel:
         """Frame an already packed payload and send it."""
         self.link.send(self._encoder.encode_payload(message_id, payload))
 
-    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Frame several packed payloads and send them together, a packet of a network at most at a time."""
-        frames = self._encoder.encode_payloads(payloads)
-        if len(payloads) <= _ALWAYS_FIT:
-            self.link.send(b"".join(frames))
-            return
-        packet = b""
-        for frame in frames:
+    def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Send what is due together, a packet of a network at most at a time."""
+        packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
+        for frame in self._encoder.encode_payloads(payloads):
             if len(packet) + len(frame) > _MAX_PACKET:
                 self.link.send(packet)
                 packet = b""
             packet += frame
-        self.link.send(packet)
+        if packet:
+            self.link.send(packet)
 
     def send_frame(self, raw: bytes) -> None:
         """Forward somebody else's frame as it is."""

@@ -8,13 +8,13 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type
+from flightsim.kernels import kernel
 from flightsim.truth import TRUTH_SIZE
 
 SIMULATOR_COMPONENT: Final = mavlink.MAV_COMP_ID_USER1
@@ -22,12 +22,12 @@ TRUTH_RATE_HZ: Final = 50
 _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 
 
-@njit(cache=True)
+@kernel
 def _whole(value: float, limit: float) -> int:
     return int(math.floor(min(limit, max(-limit, value)) + 0.5))
 
 
-@njit(cache=True)
+@kernel
 def _fill(truth: NDArray[np.float64], time_us: int, out: NDArray[np.void]) -> None:
     """Layout of `flightsim.truth` to the wire's units."""
     r = out[0]

@@ -57,12 +57,12 @@ class CommonMessages:
     def __init__(self, sources: TelemetrySources) -> None:
         self.sources = sources
         self.view = sources.view
-        self._motion = MotionMessages(sources.view, sources.context, sources.navigation, sources.readings)
+        self.motion = MotionMessages(sources.view, sources.context, sources.navigation, sources.readings)
 
     def builders(self) -> Mapping[int, Builder]:
         """Message id -> builder of its field values."""
         return {
-            **self._motion.builders(),
+            **self.motion.builders(),
             mavlink.MAVLINK_MSG_ID_HEARTBEAT: self.sources.heartbeat,
             mavlink.MAVLINK_MSG_ID_SYS_STATUS: self.sys_status,
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self.system_time,

@@ -1,7 +1,7 @@
-"""The fastest messages, packed by one compiled kernel straight from the navigation state.
+"""The fastest messages, packed and framed by compiled kernels straight from the navigation state.
 
 Six messages make up three quarters of PX4's onboard traffic. Their payloads lie one behind the other in a record with
-exactly the layout of the wire; one call fills all of them, and whoever streams one takes its bytes.
+exactly the layout of the wire. One call fills all of them, another makes frames of those that are due on a channel.
 """
 
 import math
@@ -9,17 +9,18 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.records import record_type
 from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -35,9 +36,13 @@ _POSE_POSITION: Final = (0, 6, 11)  # diagonal of an upper-triangular 6x6 covari
 _POSE_ATTITUDE: Final = (15, 18, 20)
 _HIGHRES_FIELDS_UPDATED: Final = 63  # accelerometer, gyro: what PX4's driver publishes together
 _PLACE_SIZE: Final = 6
+_FRAME_OVERHEAD: Final = 12  # header and checksum
+_NEED_ATTITUDE: Final = 0b100011  # bits of MESSAGES
+_NEED_FRAME: Final = 0b001000
+_NEED_SENSORS: Final = 0b010000
 
 
-@njit(cache=True)
+@kernel
 def _whole(value: float, limit: float) -> float:
     """Nearest whole number within +-limit; 0 for not-a-number."""
     if value != value:
@@ -45,7 +50,7 @@ def _whole(value: float, limit: float) -> float:
     return math.floor(min(limit, max(-limit, value)) + 0.5)
 
 
-@njit(cache=True)
+@kernel
 def _fill(
     nav: Array, imu: Array, mag: Array, baro: Array, covariance: Array, place: Array, time_us: int, out: Array
 ) -> None:
@@ -100,8 +105,72 @@ def _fill(
         r.odometry__velocity_covariance[_POSE_POSITION[i]] = covariance[3 + i, 3 + i]
 
 
+def _crc_table() -> NDArray[np.uint16]:
+    """CRC-16/MCRF4XX by bytes (MAVLink guide, "Checksum": polynomial 0x1021, reflected)."""
+    table = np.zeros(256, np.uint16)
+    for byte in range(256):
+        crc = byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0x8408 if crc & 1 else 0)
+        table[byte] = crc
+    return table
+
+
+_CRC_TABLE: Final = _crc_table()
+
+
+@kernel
+def _frames(
+    record: NDArray[np.uint8],
+    parts: NDArray[np.int64],
+    crc_table: NDArray[np.uint16],
+    due: int,
+    sender: int,
+    sequence: int,
+    out: NDArray[np.uint8],
+) -> int:
+    """MAVLink 2 frames of the parts whose bit is set in `due`, one behind the other; returns their length.
+
+    Args:
+        parts: (n, 4): first byte in `record`, size, message id, CRC_EXTRA.
+        sender: system id x 256 + component id.
+    """
+    end = 0
+    for part in range(parts.shape[0]):
+        if not due >> part & 1:
+            continue
+        first, size, message_id = parts[part, 0], parts[part, 1], parts[part, 2]
+        while size > 1 and record[first + size - 1] == 0:
+            size -= 1
+        out[end] = 0xFD
+        out[end + 1] = size
+        out[end + 2] = 0
+        out[end + 3] = 0
+        out[end + 4] = sequence & 0xFF
+        out[end + 5] = sender >> 8
+        out[end + 6] = sender & 0xFF
+        out[end + 7] = message_id & 0xFF
+        out[end + 8] = message_id >> 8 & 0xFF
+        out[end + 9] = message_id >> 16 & 0xFF
+        for i in range(size):
+            out[end + 10 + i] = record[first + i]
+        crc = 0xFFFF
+        for i in range(end + 1, end + 10 + size):
+            crc = crc >> 8 ^ int(crc_table[(crc ^ out[i]) & 0xFF])
+        crc = crc >> 8 ^ int(crc_table[(crc ^ parts[part, 3]) & 0xFF])
+        end += 10 + size
+        out[end] = crc & 0xFF
+        out[end + 1] = crc >> 8
+        end += 2
+        sequence += 1
+    return end
+
+
 class MotionMessages:
     """Payloads of ATTITUDE, ATTITUDE_QUATERNION, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, HIGHRES_IMU and ODOMETRY.
+
+    Attributes:
+        bits: message id -> its bit in `frames`.
 
     Args:
         view: gives the time of the step.
@@ -134,10 +203,40 @@ class MotionMessages:
         row["odometry__estimator_type"] = mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT
         row["odometry__pose_covariance"] = row["odometry__velocity_covariance"] = math.nan
         self._slices: dict[str, slice] = {}
+        self._parts = np.zeros((len(MESSAGES), 4), np.int64)
         start = 0
-        for name in MESSAGES:
-            self._slices[name] = slice(start, start + definition(name).size)
-            start += definition(name).size
+        for index, found in enumerate(map(definition, MESSAGES)):
+            self._slices[found.name] = slice(start, start + found.size)
+            self._parts[index] = start, found.size, found.message_id, found.crc_extra
+            start += found.size
+        self._packet = np.zeros(start + len(MESSAGES) * _FRAME_OVERHEAD, np.uint8)
+        self._record_bytes = self._record.view(np.uint8)
+        self.bits: Mapping[int, int] = {
+            int(message_id): 1 << index for index, message_id in enumerate(self._parts[:, 2])
+        }
+
+    def frames(self, due: int, encoder: FrameEncoder) -> bytes:
+        """Frames of the messages whose `bits` are set, those that there is something to say for.
+
+        Args:
+            due: sum of `bits`.
+            encoder: the channel's; gives sender and sequence numbers.
+        """
+        if not self._navigation.health.attitude:
+            due &= ~_NEED_ATTITUDE
+        if self._context.frame is None:
+            due &= ~_NEED_FRAME
+        if self._readings.barometer.time_us < 0 or self._readings.imu.time_us < 0:
+            due &= ~_NEED_SENSORS
+        if not due:
+            return b""
+        self._fresh()
+        sequence = encoder.sequence
+        encoder.sequence = (sequence + due.bit_count()) & 0xFF
+        sender = encoder.system_id << 8 | encoder.component_id
+        packet = self._packet
+        end = _frames(self._record_bytes, self._parts, _CRC_TABLE, due, sender, sequence, packet)
+        return packet[:end].tobytes()
 
     def builders(self) -> Mapping[int, Builder]:
         """Message id -> builder of its payload."""

@@ -21,8 +21,8 @@ MICROSECONDS: Final = 1_000_000
 class PayloadSink(Protocol):
     """Where a stream's packed payloads go: one MAVLink channel."""
 
-    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Frame the payloads (message id, bytes) and send them."""
+    def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Send the due motion messages (bits of `motion_bits`) and frames of the payloads (message id, bytes)."""
 
 
 class PayloadCache:
@@ -71,16 +71,33 @@ class StreamTable:
         sink: the channel.
         rates_hz: message id -> rate of the streams that run from the start.
         physics_step_us: no stream runs faster than the physics.
+        motion_bits: messages that the sink frames by itself, and their bits.
     """
 
-    __slots__ = ("_cache", "_defaults_us", "_heap", "_intervals_us", "_sink", "_step_us", "next_due_us")
+    __slots__ = (
+        "_cache",
+        "_defaults_us",
+        "_heap",
+        "_intervals_us",
+        "_motion_bits",
+        "_sink",
+        "_step_us",
+        "next_due_us",
+    )
 
     NEVER: Final = 1 << 62
 
     def __init__(
-        self, cache: PayloadCache, sink: PayloadSink, rates_hz: Mapping[int, float], *, physics_step_us: int
+        self,
+        cache: PayloadCache,
+        sink: PayloadSink,
+        rates_hz: Mapping[int, float],
+        *,
+        physics_step_us: int,
+        motion_bits: Mapping[int, int] | None = None,
     ) -> None:
         self._cache = cache
+        self._motion_bits = motion_bits or {}
         self._sink = sink
         self._step_us = physics_step_us
         self._heap: list[tuple[int, int]] = []
@@ -131,7 +148,8 @@ class StreamTable:
     def tick(self, time_us: int) -> None:
         """Send what is due."""
         heap, intervals_us, cache = self._heap, self._intervals_us, self._cache
-        payloads = cache.at(time_us)
+        payloads, motion_bits = cache.at(time_us), self._motion_bits
+        motion = 0
         due: list[tuple[int, bytes]] = []
         while heap:
             due_us, message_id = heap[0]
@@ -141,11 +159,14 @@ class StreamTable:
             if next_us <= time_us:  # a stream never bursts to catch up
                 next_us = time_us + intervals_us[message_id]
             heapreplace(heap, (next_us, message_id))
+            if message_id in motion_bits:
+                motion |= motion_bits[message_id]
+                continue
             payload = payloads[message_id] if message_id in payloads else cache.build(message_id)
             if payload is not None:
                 due.append((message_id, payload))
-        if due:
-            self._sink.send_payloads(due)
+        if motion or due:
+            self._sink.send_streams(motion, due)
         self.next_due_us = heap[0][0] if heap else self.NEVER
 
     def _start(self, message_id: int, interval_us: int, due_us: int) -> None:

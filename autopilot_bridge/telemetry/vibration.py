@@ -3,13 +3,14 @@
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel
 def _update(accel_frd: Array, slow: Array, level: Array, blend_slow: float, blend_level: float) -> None:
     for i in range(3):
         if not math.isfinite(accel_frd[i]):

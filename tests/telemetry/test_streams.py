@@ -19,7 +19,7 @@ class Sink:
         self.times: dict[int, list[int]] = {}
         self.now_us = 0
 
-    def send_payloads(self, payloads: Sequence[tuple[int, bytes]]) -> None:
+    def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         for message_id, _ in payloads:
             self.sent[message_id] += 1
             self.times.setdefault(message_id, []).append(self.now_us)

@@ -1,0 +1,65 @@
+"""The compiled frames of the fastest messages are the encoder's own frames, byte for byte."""
+
+import pytest
+
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition
+from autopilot_bridge.sitl import Sitl, SitlConfiguration
+from autopilot_bridge.telemetry.motion import MESSAGES
+
+
+@pytest.fixture(scope="module")
+def flying() -> Sitl:
+    """A vehicle that has booted and knows where it is."""
+    sitl = Sitl(SitlConfiguration(seed=3))
+    while sitl.time_us < 8_000_000:
+        sitl.advance()
+    return sitl
+
+
+def test_frames_equal_the_encoders(flying: Sitl) -> None:
+    autopilot = flying.vehicles[0].autopilot
+    motion = autopilot._messages.motion
+    builders = motion.builders()
+    compiled, plain = FrameEncoder(7, 1), FrameEncoder(7, 1)
+    compiled.sequence = plain.sequence = 253  # wraps on the way
+    due = sum(motion.bits.values())
+    frames = motion.frames(due, compiled)
+    expected = [
+        plain.encode_payload(definition(name).message_id, builders[definition(name).message_id]())
+        for name in MESSAGES
+    ]
+    assert frames == b"".join(expected)
+    assert compiled.sequence == plain.sequence
+
+
+def test_contents_are_the_navigation_state(flying: Sitl) -> None:
+    autopilot = flying.vehicles[0].autopilot
+    motion = autopilot._messages.motion
+    autopilot._view.advance(flying.time_us)
+    parsed = FrameParser().feed(motion.frames(sum(motion.bits.values()), FrameEncoder(7, 1)))
+    messages = {message.get_type(): message for message in map(decode, parsed)}
+    state = autopilot.navigation.state
+    assert messages["ATTITUDE"].roll == pytest.approx(state[25], abs=1e-6)
+    assert messages["LOCAL_POSITION_NED"].z == pytest.approx(state[12], abs=1e-5)
+    assert messages["ODOMETRY"].q == pytest.approx(state[0:4].tolist(), abs=1e-6)
+    place = messages["GLOBAL_POSITION_INT"]
+    lat_deg, lon_deg, alt_m = autopilot.context.frame.geodetic_from_ned(*state[10:13].tolist())
+    assert (place.lat, place.lon) == (round(lat_deg * 1e7), round(lon_deg * 1e7))
+    assert place.alt == pytest.approx(alt_m * 1e3, abs=1.0)
+    assert messages["HIGHRES_IMU"].zacc == pytest.approx(-9.8, abs=0.3)
+
+
+def test_a_single_bit_makes_a_single_frame(flying: Sitl) -> None:
+    motion = flying.vehicles[0].autopilot._messages.motion
+    for message_id, bit in motion.bits.items():
+        (frame,) = FrameParser().feed(motion.frames(bit, FrameEncoder(1, 1)))
+        assert frame.message_id == message_id
+
+
+def test_nothing_is_said_before_there_is_an_attitude() -> None:
+    sitl = Sitl(SitlConfiguration())
+    motion = sitl.vehicles[0].autopilot._messages.motion
+    local = motion.bits[definition("LOCAL_POSITION_NED").message_id]
+    frames = FrameParser().feed(motion.frames(sum(motion.bits.values()), FrameEncoder(1, 1)))
+    assert [frame.message_id for frame in frames] == [definition("LOCAL_POSITION_NED").message_id]
+    assert local
