@@ -3,13 +3,14 @@
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel
 def rotate(q: Array, v: Array, out: Array) -> None:
     """out = R(q) v: with q_a_from_b and v in b, out is v in a. `out` may not alias `v`."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -21,7 +22,7 @@ def rotate(q: Array, v: Array, out: Array) -> None:
     out[2] = v[2] + w * tz + x * ty - y * tx
 
 
-@njit(cache=True)
+@kernel
 def rotate_inverse(q: Array, v: Array, out: Array) -> None:
     """out = R(q)^T v: with q_a_from_b and v in a, out is v in b. `out` may not alias `v`."""
     w, x, y, z = q[0], -q[1], -q[2], -q[3]
@@ -33,7 +34,7 @@ def rotate_inverse(q: Array, v: Array, out: Array) -> None:
     out[2] = v[2] + w * tz + x * ty - y * tx
 
 
-@njit(cache=True)
+@kernel
 def matrix_from_quaternion(q: Array, out: Array) -> None:
     """out (3, 3) = R(q)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -48,7 +49,7 @@ def matrix_from_quaternion(q: Array, out: Array) -> None:
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(cache=True)
+@kernel
 def multiply(a: Array, b: Array, out: Array) -> None:
     """out = a (x) b (Hamilton product). `out` may not alias `a` or `b`."""
     out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
@@ -57,7 +58,7 @@ def multiply(a: Array, b: Array, out: Array) -> None:
     out[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
 
 
-@njit(cache=True)
+@kernel
 def integrate(q: Array, dx: float, dy: float, dz: float) -> None:
     """q <- q (x) exp(d/2) in place, d the rotation vector in the body frame (rad); renormalises."""
     angle_sq = dx * dx + dy * dy + dz * dz
@@ -78,7 +79,7 @@ def integrate(q: Array, dx: float, dy: float, dz: float) -> None:
     q[0], q[1], q[2], q[3] = nw * n, nx * n, ny * n, nz * n
 
 
-@njit(cache=True)
+@kernel
 def euler_from_quaternion(q: Array, out: Array) -> None:
     """out = (roll, pitch, yaw) in rad, ZYX order, from q_ned_from_frd."""
     w, x, y, z = q[0], q[1], q[2], q[3]
@@ -88,7 +89,7 @@ def euler_from_quaternion(q: Array, out: Array) -> None:
     out[2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-@njit(cache=True)
+@kernel
 def quaternion_from_euler(roll: float, pitch: float, yaw: float, out: Array) -> None:
     """out = q_ned_from_frd from roll, pitch, yaw in rad (ZYX order)."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
@@ -100,7 +101,7 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float, out: Array) -> 
     out[3] = cr * cp * sy - sr * sp * cy
 
 
-@njit(cache=True)
+@kernel
 def wrap_pi(angle: float) -> float:
     """Angle in rad wrapped to [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

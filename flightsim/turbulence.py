@@ -13,8 +13,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ _LEAST_HEIGHT_FT: Final = 10.0
 _GREATEST_HEIGHT_FT: Final = 1000.0
 
 
-@njit(cache=True)
+@kernel
 def low_altitude_scales(height_m: float, wind_at_20_ft_m_s: float, out: Array) -> None:
     """out = (L_u m, L_w m, sigma_u m/s, sigma_w m/s); L_v = L_u and sigma_v = sigma_u.
 
@@ -42,7 +43,7 @@ def low_altitude_scales(height_m: float, wind_at_20_ft_m_s: float, out: Array) -
     out[2] = out[3] / base**0.4
 
 
-@njit(cache=True)
+@kernel
 def _second_order(x: Array, i: int, d: float, n1: float, n2: float) -> float:
     """Advance the filter (1 + sqrt(3) T s)/(1 + T s)^2 by d = dt/T; returns its unit-variance output.
 
@@ -66,7 +67,7 @@ def _second_order(x: Array, i: int, d: float, n1: float, n2: float) -> float:
     return _SQRT3 * x[i] + (1.0 - _SQRT3) * x[i + 1]
 
 
-@njit(cache=True)
+@kernel
 def _advance(
     x: Array,
     normals: Array,

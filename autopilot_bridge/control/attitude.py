@@ -8,10 +8,10 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from autopilot_bridge.control import layout as c
+from flightsim.kernels import kernel
 from flightsim.rotations import multiply
 
 Array = NDArray[np.float64]
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _INTEGRAL_FADE_RAD_S: Final = math.radians(400.0)  # the integrator rests during flips (PX4)
 
 
-@njit(cache=True)
+@kernel
 def body_z_of(q: Array) -> tuple[float, float, float]:
     """Third column of R(q): the body's down axis in NED."""
     return (
@@ -29,7 +29,7 @@ def body_z_of(q: Array) -> tuple[float, float, float]:
     )
 
 
-@njit(cache=True)
+@kernel
 def quaternion_from_thrust_axis(zx: float, zy: float, zz: float, yaw: float, q: Array) -> None:
     """q = attitude whose down axis is the unit vector z (NED) and whose nose points to `yaw`."""
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -61,7 +61,7 @@ def quaternion_from_thrust_axis(zx: float, zy: float, zz: float, yaw: float, q: 
         q[0], q[1], q[2] = 0.5 * (xy - yx) / s, 0.5 * (zx + xz) / s, 0.5 * (zy + yz) / s
 
 
-@njit(cache=True)
+@kernel
 def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_sp: Array, w: Array) -> None:
     """rate_sp (3,) FRD from the attitude error; `yaw_rate_ff` about NED down; `w` (8,) is scratch."""
     ex, ey, ez = body_z_of(q)
@@ -110,14 +110,14 @@ def attitude_control(q: Array, q_sp: Array, yaw_rate_ff: float, p: Array, rate_s
     rate_sp[2] += yaw_rate_ff * ez
 
 
-@njit(cache=True)
+@kernel
 def limit_rates(rate_sp: Array, p: Array) -> None:
     """Clip to the rate limits, in place."""
     for i in range(3):
         rate_sp[i] = min(p[c.RATE_MAX + i], max(-p[c.RATE_MAX + i], rate_sp[i]))
 
 
-@njit(cache=True)
+@kernel
 def rate_control(rates: Array, rate_sp: Array, p: Array, s: Array, dt: float, integrate: bool) -> None:
     """Torques of the rate PID, left in UNALLOCATED of the state `s` for the mixer."""
     alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))

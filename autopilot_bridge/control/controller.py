@@ -5,7 +5,6 @@ from dataclasses import astuple, replace
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from autopilot_bridge.control import layout as c
@@ -22,6 +21,7 @@ from autopilot_bridge.control.position import (
 )
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.interface import MAX_ACTUATORS
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ _LEVEL: Final = 19
 _MIN_COS_TILT: Final = 0.5  # collective isn't raised any more beyond 60 deg of tilt
 
 
-@njit(cache=True)
+@kernel
 def _finite4(v: Array, start: int) -> bool:
     return (
         math.isfinite(v[start])
@@ -47,7 +47,7 @@ def _finite4(v: Array, start: int) -> bool:
     )
 
 
-@njit(cache=True)
+@kernel
 def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
     """Motors at one command, every integrator and filter at its start."""
     for i in range(actuators.shape[0]):
@@ -64,7 +64,7 @@ def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
     s[c.THRUST_LAGGED] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
     """Thrust setpoint below level TRAJECTORY; NaN flies the vertical part of the trajectory fields."""
     if math.isfinite(sp[_THRUST]):
@@ -85,7 +85,7 @@ def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: 
     return min(p[c.THRUST_MAX], max(p[c.THRUST_MIN], up / max(_MIN_COS_TILT, cos_tilt)))
 
 
-@njit(cache=True)
+@kernel
 def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: Array) -> None:
     level = sp[_LEVEL]
     dt = s[c.DT]

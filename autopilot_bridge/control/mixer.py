@@ -10,8 +10,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -29,7 +30,7 @@ ALLOCATION: Final[Array] = np.array(
 _YAW_MARGIN: Final = 0.15  # of the range, kept for yaw when thrust is full (PX4 MINIMUM_YAW_MARGIN)
 
 
-@njit(cache=True)
+@kernel
 def _desaturation_gain(motor: Array, axis: int, upper: float) -> float:
     """Step along `axis` that brings the worst motors back into 0..upper (sum of both ends)."""
     gain_min = 0.0
@@ -45,7 +46,7 @@ def _desaturation_gain(motor: Array, axis: int, upper: float) -> float:
     return gain_min + gain_max
 
 
-@njit(cache=True)
+@kernel
 def _desaturate(motor: Array, axis: int, upper: float, only_reduce: bool) -> None:
     gain = _desaturation_gain(motor, axis, upper)
     if only_reduce and gain > 0.0:
@@ -58,7 +59,7 @@ def _desaturate(motor: Array, axis: int, upper: float, only_reduce: bool) -> Non
         motor[i] += gain * ALLOCATION[i, axis]
 
 
-@njit(cache=True)
+@kernel
 def allocate(roll: float, pitch: float, yaw: float, thrust: float, motor: Array, unallocated: Array) -> None:
     """motor (4,) = normalised motor thrusts 0..1; unallocated (3,) = torque asked for but not given."""
     for i in range(MOTORS):
@@ -83,7 +84,7 @@ def allocate(roll: float, pitch: float, yaw: float, thrust: float, motor: Array,
     unallocated[2] = yaw - given_yaw
 
 
-@njit(cache=True)
+@kernel
 def command_from_thrust(thrust: float, factor: float) -> float:
     """Motor command c with thrust = factor c^2 + (1 - factor) c (PX4 THR_MDL_FAC)."""
     thrust = min(1.0, max(0.0, thrust))

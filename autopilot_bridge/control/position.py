@@ -14,11 +14,11 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from autopilot_bridge.control import layout as c
 from autopilot_bridge.control.attitude import body_z_of, quaternion_from_thrust_axis
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -46,13 +46,13 @@ _AIRBORNE_CLIMB_M: Final = 0.2
 _AIRBORNE_SPEED_M_S: Final = 0.5
 
 
-@njit(cache=True)
+@kernel
 def lowpass_gain(dt: float, cutoff_hz: float) -> float:
     """Gain of a first-order low-pass step."""
     return dt / (dt + 1.0 / (2.0 * math.pi * cutoff_hz))
 
 
-@njit(cache=True)
+@kernel
 def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
     """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
@@ -88,7 +88,7 @@ def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
     s[c.HOVER_VARIANCE] = min(0.04, max(_HOVER_MIN_STD * _HOVER_MIN_STD, variance))
 
 
-@njit(cache=True)
+@kernel
 def update_airborne(nav: Array, s: Array) -> None:
     """Latch AIRBORNE once the vehicle has moved vertically under power; OFF and IDLE clear it."""
     if s[c.AIRBORNE] == 0.0 and (
@@ -98,7 +98,7 @@ def update_airborne(nav: Array, s: Array) -> None:
         s[c.AIRBORNE] = 1.0
 
 
-@njit(cache=True)
+@kernel
 def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
     """Low-passed acceleration (the velocity derivative) and measured drag."""
     alpha = lowpass_gain(dt, p[c.VEL_D_CUTOFF])
@@ -125,7 +125,7 @@ def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
     s[c.DRAG + 1] += beta * (east - s[c.DRAG + 1])
 
 
-@njit(cache=True)
+@kernel
 def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
     """VEL_SETPOINT from position P and feed-forward, limited; NaN where the velocity isn't controlled."""
     px, py = 0.0, 0.0  # share of the position loop, which keeps its right of way under the speed limit
@@ -171,12 +171,12 @@ def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
     s[c.VEL_SETPOINT + 2] = vz
 
 
-@njit(cache=True)
+@kernel
 def _finite_or_zero(value: float) -> float:
     return value if math.isfinite(value) else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _acceleration_axis(
     axis: int, nav: Array, sp: Array, kp: float, kd: float, s: Array
 ) -> tuple[float, float, bool]:
@@ -193,7 +193,7 @@ def _acceleration_axis(
     )
 
 
-@njit(cache=True)
+@kernel
 def vertical_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
     """Vertical thrust (positive up, normalised, before tilt) from the vertical part of the setpoint."""
     acc, error, controlled = _acceleration_axis(2, nav, sp, p[c.VEL_Z_P], p[c.VEL_Z_D], s)
@@ -218,7 +218,7 @@ def vertical_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enter
     return min(p[c.THRUST_MAX], max(0.0, up))
 
 
-@njit(cache=True)
+@kernel
 def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
     """One step of the position loop: writes Q_SETPOINT, THRUST_SETPOINT and YAW_RATE_FF."""
     _velocity_setpoint(nav, sp, p, s)

@@ -13,10 +13,10 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from autopilot_bridge.flight.parameters import FlightParameters
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _BRAKE_SHARE: Final = 0.8  # of the acceleration, used for the braking profile
 _VELOCITY_GAIN_1_S: Final = 7.0
 
 
-@njit(cache=True)
+@kernel
 def braking_speed(distance: float, end_speed: float, acc: float, jerk: float, gain: float) -> float:
     """Speed at `distance` before a point to be passed at `end_speed`.
 
@@ -54,7 +54,7 @@ def braking_speed(distance: float, end_speed: float, acc: float, jerk: float, ga
     return min(v, end_speed + gain * distance)
 
 
-@njit(cache=True)
+@kernel
 def _room(distance: float, speed: float, acc: float, jerk: float) -> float:
     """Distance left for braking once a present acceleration towards the point has been taken back."""
     if acc <= 0.0 or speed <= 0.0:
@@ -62,7 +62,7 @@ def _room(distance: float, speed: float, acc: float, jerk: float) -> float:
     return max(0.0, distance - (speed + acc * acc / (3.0 * jerk)) * acc / jerk)
 
 
-@njit(cache=True)
+@kernel
 def _approach2(s: Array, vx: float, vy: float, acc_max: float, jerk: float, dt: float) -> None:
     """Horizontal velocity of the state towards (vx, vy)."""
     dvx, dvy = vx - s[3], vy - s[4]
@@ -84,7 +84,7 @@ def _approach2(s: Array, vx: float, vy: float, acc_max: float, jerk: float, dt: 
         s[6 + i] = a1
 
 
-@njit(cache=True)
+@kernel
 def _approach1(s: Array, vz: float, up: float, down: float, jerk: float, dt: float) -> None:
     """Vertical velocity of the state towards vz (NED down)."""
     dv = vz - s[5]
@@ -98,13 +98,13 @@ def _approach1(s: Array, vz: float, up: float, down: float, jerk: float, dt: flo
     s[8] = a1
 
 
-@njit(cache=True)
+@kernel
 def _track_velocity(s: Array, vx: float, vy: float, vz: float, lim: Array, dt: float) -> None:
     _approach2(s, vx, vy, lim[ACC], lim[JERK], dt)
     _approach1(s, vz, lim[ACC_UP], lim[ACC_DOWN], lim[JERK], dt)
 
 
-@njit(cache=True)
+@kernel
 def _follow_leg(s: Array, start: Array, end: Array, end_speed: float, lim: Array, dt: float) -> None:
     """One tick along the straight leg start -> end, to be left at `end_speed` along the leg."""
     lx, ly, lz = end[0] - start[0], end[1] - start[1], end[2] - start[2]

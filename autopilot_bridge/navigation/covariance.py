@@ -19,7 +19,6 @@ multirotor's tilting undoes itself, so it counts with its usual amplitude of som
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.states import (
@@ -44,6 +43,7 @@ from autopilot_bridge.navigation.states import (
     X_VEL,
     Q,
 )
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ TURN_CROSS = 15  # about the horizontal axes: rad^2 per rad turned about the ver
 PROCESS_SIZE = 16
 
 
-@njit(cache=True)
+@kernel
 def carry(p: Array, core: Array, t: float, along_rows: bool) -> None:
     """p <- F p (along_rows False: every column) or p <- p F^T (every row), the first nine states only."""
     s = SUM_R
@@ -96,7 +96,7 @@ def carry(p: Array, core: Array, t: float, along_rows: bool) -> None:
         line[ATT + 2] = az - (s20 * gx + s21 * gy + s22 * gz)
 
 
-@njit(cache=True)
+@kernel
 def _decay(
     p: Array, core: Array, first: int, factor: float, var_0: float, var_1: float, var_2: float
 ) -> None:
@@ -112,7 +112,7 @@ def _decay(
     p[first + 2, first + 2] += q * var_2
 
 
-@njit(cache=True)
+@kernel
 def predict(p: Array, core: Array, process: Array) -> None:
     """Carry `p` (22, 22) over the time summed up in `core`, and clear the sums. Stays exactly symmetric."""
     t = core[SUM_TIME]
@@ -152,7 +152,7 @@ def predict(p: Array, core: Array, process: Array) -> None:
     core[SUM_TIME] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def apply_scalar(p: Array, work: Array, residual: float, variance: float) -> None:
     """One scalar update: `work[PH]` holds P H^T, `residual` the innovation left after the updates before.
 
@@ -168,7 +168,7 @@ def apply_scalar(p: Array, work: Array, residual: float, variance: float) -> Non
             p[j, i] = value
 
 
-@njit(cache=True)
+@kernel
 def inject(core: Array, work: Array) -> None:
     """Move the error estimate into the nominal state and clear it."""
     hx, hy, hz = 0.5 * work[DX], 0.5 * work[DX + 1], 0.5 * work[DX + 2]
@@ -188,7 +188,7 @@ def inject(core: Array, work: Array) -> None:
         work[DX + i] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def shift(core: Array, first: int, dx: float, dy: float, dz: float) -> None:
     """Move position (first = POS) or velocity (VEL) by a jump; the history moves along."""
     for i, d in enumerate((dx, dy, dz)):
@@ -199,7 +199,7 @@ def shift(core: Array, first: int, dx: float, dy: float, dz: float) -> None:
             core[CORRECTION_VEL + i] += d
 
 
-@njit(cache=True)
+@kernel
 def forget(p: Array, index: int, variance: float) -> None:
     """State `index` is unknown again: no correlations, the given variance."""
     for k in range(ERROR_SIZE):
@@ -208,7 +208,7 @@ def forget(p: Array, index: int, variance: float) -> None:
     p[index, index] = variance
 
 
-@njit(cache=True)
+@kernel
 def is_sound(p: Array, core: Array) -> bool:
     """No NaN, no negative variance, no absurd nominal state (|v| over 1 km/s, |p| over 1000 km)."""
     for i in range(ERROR_SIZE):

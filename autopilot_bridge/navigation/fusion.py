@@ -11,7 +11,6 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.covariance import apply_scalar, inject, is_sound, predict
@@ -44,6 +43,7 @@ from autopilot_bridge.navigation.states import (
     X_VEL,
     R,
 )
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -92,20 +92,20 @@ ACCEPTED_MAG: Final = 16
 UNSOUND: Final = 32
 
 
-@njit(cache=True)
+@kernel
 def single_ph(p: Array, work: Array, index: int) -> None:
     """PH of a measurement of state `index` itself."""
     for i in range(ERROR_SIZE):
         work[PH + i] = p[i, index]
 
 
-@njit(cache=True)
+@kernel
 def position_dot(work: Array, base: int, axis: int, delay: float) -> float:
     """H times the vector at `base` of `work`, for a GPS position axis."""
     return work[base + POS + axis] - delay * work[base + VEL + axis] + work[base + GPS_ERROR + axis]
 
 
-@njit(cache=True)
+@kernel
 def position_ph(p: Array, work: Array, axis: int, delay: float) -> float:
     """PH of a GPS position axis; returns H P H^T."""
     a, b, c = POS + axis, VEL + axis, GPS_ERROR + axis
@@ -114,7 +114,7 @@ def position_ph(p: Array, work: Array, axis: int, delay: float) -> float:
     return position_dot(work, PH, axis, delay)
 
 
-@njit(cache=True)
+@kernel
 def velocity_dot(
     work: Array, base: int, axis: int, u_next: float, u_last: float, b0: float, b1: float, b2: float
 ) -> float:
@@ -129,7 +129,7 @@ def velocity_dot(
     )
 
 
-@njit(cache=True)
+@kernel
 def velocity_ph(
     p: Array, work: Array, axis: int, u_next: float, u_last: float, b0: float, b1: float, b2: float
 ) -> float:
@@ -147,13 +147,13 @@ def velocity_ph(
     return velocity_dot(work, PH, axis, u_next, u_last, b0, b1, b2)
 
 
-@njit(cache=True)
+@kernel
 def baro_dot(work: Array, base: int, delay: float) -> float:
     """H times the vector at `base`, for the pressure altitude."""
     return -work[base + POS + 2] + delay * work[base + VEL + 2] + work[base + BARO_OFFSET]
 
 
-@njit(cache=True)
+@kernel
 def baro_ph(p: Array, work: Array, delay: float) -> float:
     """PH of the pressure altitude; returns H P H^T."""
     for i in range(ERROR_SIZE):
@@ -161,7 +161,7 @@ def baro_ph(p: Array, work: Array, delay: float) -> float:
     return baro_dot(work, PH, delay)
 
 
-@njit(cache=True)
+@kernel
 def mag_dot(work: Array, base: int, axis: int, h0: float, h1: float, h2: float) -> float:
     """H times the vector at `base`, for a magnetometer axis."""
     return (
@@ -172,7 +172,7 @@ def mag_dot(work: Array, base: int, axis: int, h0: float, h1: float, h2: float) 
     )
 
 
-@njit(cache=True)
+@kernel
 def mag_ph(p: Array, work: Array, axis: int, h0: float, h1: float, h2: float) -> float:
     """PH of a magnetometer axis; returns H P H^T."""
     for i in range(ERROR_SIZE):
@@ -180,7 +180,7 @@ def mag_ph(p: Array, work: Array, axis: int, h0: float, h1: float, h2: float) ->
     return mag_dot(work, PH, axis, h0, h1, h2)
 
 
-@njit(cache=True)
+@kernel
 def body_axis_in_ned(history: Array, row: int, axis: int) -> tuple[float, float, float]:
     """Column `axis` of r_ned_from_frd at a row of the history."""
     w, x, y, z = (
@@ -196,7 +196,7 @@ def body_axis_in_ned(history: Array, row: int, axis: int) -> tuple[float, float,
     return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(cache=True)
+@kernel
 def fuse_gps(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> int:
     """GPS velocity, horizontal position and height, each gated as a whole."""
     accepted = 0
@@ -246,7 +246,7 @@ def fuse_gps(p: Array, core: Array, history: Array, work: Array, obs: Array, row
     return accepted
 
 
-@njit(cache=True)
+@kernel
 def fuse_baro(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> int:
     """Pressure altitude."""
     s = baro_ph(p, work, obs[BARO_DELAY_S]) + obs[BARO_VAR]
@@ -259,7 +259,7 @@ def fuse_baro(p: Array, core: Array, history: Array, work: Array, obs: Array, ro
     return ACCEPTED_BARO
 
 
-@njit(cache=True)
+@kernel
 def fuse_mag(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> int:
     """The three magnetometer axes: z_i = r_i . m + bias_i, and r_i x m is the Jacobian to the attitude
     error."""
@@ -283,14 +283,14 @@ def fuse_mag(p: Array, core: Array, history: Array, work: Array, obs: Array, row
     return ACCEPTED_MAG
 
 
-@njit(cache=True)
+@kernel
 def fuse_direct(p: Array, work: Array, index: int, residual: float, variance: float) -> None:
     """A measurement of state `index` itself, not gated (position hold, standing still)."""
     single_ph(p, work, index)
     apply_scalar(p, work, residual - work[DX + index], work[PH + index] + variance)
 
 
-@njit(cache=True)
+@kernel
 def fuse_rest(p: Array, core: Array, work: Array, obs: Array) -> None:
     """Standing still: velocity zero, and the mean gyro reading is bias and Earth's rotation."""
     for a in range(3):
@@ -303,7 +303,7 @@ def fuse_rest(p: Array, core: Array, work: Array, obs: Array) -> None:
             fuse_direct(p, work, GYRO_BIAS + a, rate - core[X_GYRO_BIAS + a], obs[REST_RATE_VAR])
 
 
-@njit(cache=True)
+@kernel
 def restart_mean_rate(core: Array) -> None:
     """Begin a new average of the gyro for the next update at rest."""
     for a in range(3):
@@ -311,7 +311,7 @@ def restart_mean_rate(core: Array) -> None:
     core[SUM_GYRO_TIME] = 0.0
 
 
-@njit(cache=True)
+@kernel
 def update(
     p: Array,
     core: Array,

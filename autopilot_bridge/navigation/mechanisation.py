@@ -9,7 +9,6 @@ neglected: below 1e-6 rad/s here).
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.layout import (
@@ -51,6 +50,7 @@ from autopilot_bridge.navigation.states import (
     Q,
     R,
 )
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ _N_FORCE = SPECIFIC_FORCE_FRD_M_S2.start
 _N_EULER = EULER_RAD.start
 
 
-@njit(cache=True)
+@kernel
 def take_sample(core: Array, imu: Array, gyro_range: float, accel_range: float) -> None:
     """Take a fresh IMU sample into `core` if it is finite and within range; else count it and keep the last
     one."""
@@ -80,7 +80,7 @@ def take_sample(core: Array, imu: Array, gyro_range: float, accel_range: float) 
         core[INVALID_SAMPLES] += 1.0
 
 
-@njit(cache=True)
+@kernel
 def refresh_rotation(core: Array) -> None:
     """Rotation matrix in `core` from its quaternion."""
     w, x, y, z = core[Q], core[Q + 1], core[Q + 2], core[Q + 3]
@@ -95,7 +95,7 @@ def refresh_rotation(core: Array) -> None:
     core[R + 8] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(cache=True)
+@kernel
 def advance(core: Array, dt: float, sample_timeout_s: float) -> None:
     """Carry the nominal state over one step and add to the sums of the covariance prediction."""
     core[SAMPLE_AGE_S] += dt
@@ -163,7 +163,7 @@ def advance(core: Array, dt: float, sample_timeout_s: float) -> None:
     core[SUM_TIME] += dt
 
 
-@njit(cache=True)
+@kernel
 def write_navigation(core: Array, nav: Array) -> None:
     """The autopilot's navigation state (layout.py) from `core`."""
     nav[0], nav[1], nav[2], nav[3] = core[Q], core[Q + 1], core[Q + 2], core[Q + 3]
@@ -182,7 +182,7 @@ def write_navigation(core: Array, nav: Array) -> None:
     nav[HEIGHT_ABOVE_GROUND_M] = core[TERRAIN_DOWN] - core[X_POS + 2]
 
 
-@njit(cache=True)
+@kernel
 def step(
     core: Array,
     nav: Array,

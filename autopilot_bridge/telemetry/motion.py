@@ -52,7 +52,14 @@ def _whole(value: float, limit: float) -> float:
 
 @kernel
 def _fill(
-    nav: Array, imu: Array, mag: Array, baro: Array, covariance: Array, place: Array, time_us: int, out: Array
+    nav: Array,
+    imu: Array,
+    mag: Array,
+    baro: Array,
+    covariance: Array,
+    place: Array,
+    time_us: int,
+    out: NDArray[np.void],
 ) -> None:
     r = out[0]
     time_ms = time_us // 1000
@@ -196,7 +203,7 @@ class MotionMessages:
         self._frame: object = None
         self._time_us = -1
         self._record = np.zeros(1, record_type(*map(definition, MESSAGES), prefixed=True))
-        self._bytes = memoryview(self._record).cast("B")
+        self._bytes = self._record.view(np.uint8).data
         row = self._record[0]
         row["highres_imu__fields_updated"] = _HIGHRES_FIELDS_UPDATED
         row["odometry__frame_id"] = row["odometry__child_frame_id"] = mavlink.MAV_FRAME_LOCAL_NED

@@ -110,7 +110,7 @@ class TelemetryView:
 
     def imu(self) -> list[float]:
         """Newest gyro (rad/s), accelerometer (m/s^2), temperature (deg C)."""
-        return self.readings.imu.values.tolist()  # type: ignore[no-any-return]
+        return self.readings.imu.values.tolist()
 
     def magnetometer_gauss(self) -> list[float]:
         """Newest body field; zeros before the first reading."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
+from flightsim.kernels import kernel
 from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import gauss_markov, quantise
@@ -109,7 +109,7 @@ class BarometerParameters:
         )
 
 
-@njit(cache=True)
+@kernel
 def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
     pressure_pa = truth[t.PRESSURE_PA]
     if math.isnan(state[_LAGGED]):

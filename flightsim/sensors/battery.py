@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
+from flightsim.kernels import kernel
 from flightsim.sensors.checks import require_not_negative, require_rate
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import quantise
@@ -96,7 +96,7 @@ class BatteryMonitorParameters:
         )
 
 
-@njit(cache=True)
+@kernel
 def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
     voltage_v = (
         constants[_VOLTAGE_GAIN] * truth[t.BATTERY_VOLTAGE_V] + constants[_VOLTAGE_NOISE] * normals[row, 0]

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
+from flightsim.kernels import kernel
 from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import gauss_markov, quantise
@@ -211,7 +211,7 @@ def add_local_bias(values: Array, bias: Array) -> None:
     values[i.GPS_LON_DEG] += bias[1] / per_lon_deg - bias[1]
 
 
-@njit(cache=True)
+@kernel
 def _metres_per_degree(lat_deg: float, alt_m: float) -> tuple[float, float]:
     sin_lat = math.sin(math.radians(lat_deg))
     # At the poles a degree of longitude has no length; the floor keeps the division finite.
@@ -222,7 +222,7 @@ def _metres_per_degree(lat_deg: float, alt_m: float) -> tuple[float, float]:
     return math.radians(meridian_m + alt_m), math.radians((normal_m + alt_m) * cos_lat)
 
 
-@njit(cache=True)
+@kernel
 def _write_no_fix(fix_type: float, satellites: float, out: Array) -> None:
     out[:] = 0.0
     out[i.GPS_EPH_M] = NO_FIX_ACCURACY_M
@@ -238,7 +238,7 @@ _VEL: Final = t.VEL_NED_M_S.start
 _OUT_VEL: Final = i.GPS_VEL_NED_M_S.start
 
 
-@njit(cache=True)
+@kernel
 def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
     elapsed_s = state[_SAMPLES] * constants[_INTERVAL_S]
     state[_SAMPLES] += 1.0

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
+from flightsim.kernels import kernel
 from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import gauss_markov, quantise, saturate
@@ -189,7 +189,7 @@ _GYRO: Final = IMU_GYRO_FRD_RAD_S.start
 _ACCEL: Final = IMU_ACCEL_FRD_M_S2.start
 
 
-@njit(cache=True)
+@kernel
 def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
     for triad in range(2):
         c = triad * _TRIAD

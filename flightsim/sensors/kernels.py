@@ -2,10 +2,10 @@
 
 import math
 
-from numba import njit
+from flightsim.kernels import kernel
 
 
-@njit(cache=True)
+@kernel
 def quantise(value: float, quantum: float) -> float:
     """`value` rounded to the nearest multiple of `quantum`; a quantum of zero leaves it alone."""
     if quantum <= 0.0:
@@ -13,7 +13,7 @@ def quantise(value: float, quantum: float) -> float:
     return math.floor(value / quantum + 0.5) * quantum
 
 
-@njit(cache=True)
+@kernel
 def saturate(value: float, limit: float) -> float:
     """`value` limited to -limit..limit."""
     return min(limit, max(-limit, value))

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.interface import MAG_SIZE
+from flightsim.kernels import kernel
 from flightsim.rotations import rotate_inverse
 from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
@@ -84,7 +84,7 @@ class MagnetometerParameters:
         )
 
 
-@njit(cache=True)
+@kernel
 def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
     rotate_inverse(truth[t.Q_NED_FROM_FRD], truth[t.MAG_NED_GAUSS], out)
     for axis in range(3):

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.interface import RANGE_DISTANCE_M, RANGE_MAX_M, RANGE_MIN_M, RANGE_SIZE
+from flightsim.kernels import kernel
 from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import quantise
@@ -101,7 +101,7 @@ class RangefinderParameters:
         )
 
 
-@njit(cache=True)
+@kernel
 def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
     out[RANGE_MIN_M] = constants[_MIN]
     out[RANGE_MAX_M] = constants[_MAX]

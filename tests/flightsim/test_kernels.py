@@ -1,0 +1,160 @@
+"""The compile cache of kernels: code made from other sources is never used, and nothing is compiled twice."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from flightsim.kernels import source_stamp
+
+ROOT = Path(__file__).parents[2]
+
+SOURCES = {
+    "layout": "FACTOR = 2.0\nPLACE = slice(1, 3)\nTABLE = (1, (2.0, 'a'))\n",
+    "inner": """
+from flightsim.kernels import kernel
+
+@kernel
+def offset(x):
+    return x + 1.0
+""",
+    "outer": """
+from flightsim.kernels import kernel
+from {package} import layout
+from {package}.inner import offset
+from {package}.layout import FACTOR, TABLE
+
+@kernel
+def outer(values):
+    return FACTOR * offset(values[layout.PLACE].sum()) + below(0.0) * TABLE[0]
+
+@kernel
+def below(x):
+    return offset(x)
+""",
+}
+PROGRAM = """
+import numpy as np
+from tiny.outer import outer
+print(outer(np.array([1.0, 2.0, 3.0])), sum(outer.stats.cache_hits.values()))
+"""
+
+
+def stamp(sources: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> str:
+    """Stamp of `outer` in a package that exists in memory only."""
+    package = ModuleType("in_memory")
+    monkeypatch.setitem(sys.modules, "in_memory", package)
+    for name, text in sources.items():
+        module = ModuleType(f"in_memory.{name}")
+        monkeypatch.setitem(sys.modules, module.__name__, module)
+        setattr(package, name, module)
+        exec(text.format(package="in_memory"), vars(module))
+    return source_stamp(package.outer.outer.py_func)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("layout", "FACTOR = 2.0", "FACTOR = 3.0"),
+        ("layout", "slice(1, 3)", "slice(0, 2)"),
+        ("layout", "'a'", "'b'"),
+        ("inner", "x + 1.0", "x + 2.0"),
+        ("inner", "x + 1.0", "x - 1.0"),
+        ("outer", "+ below(0.0)", "- below(0.0)"),
+    ],
+)
+def test_an_edit_anywhere_below_changes_the_stamp(
+    monkeypatch: pytest.MonkeyPatch, name: str, old: str, new: str
+) -> None:
+    edited = {**SOURCES, name: SOURCES[name].replace(old, new)}
+    assert edited != SOURCES
+    assert stamp(edited, monkeypatch) != stamp(SOURCES, monkeypatch)
+
+
+def test_an_edit_elsewhere_does_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    edited = {**SOURCES, "layout": "# a remark\nOTHER = 1\n" + SOURCES["layout"]}
+    assert stamp(edited, monkeypatch) == stamp(SOURCES, monkeypatch)
+
+
+def test_a_global_without_a_value_of_its_own_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    edited = {**SOURCES, "layout": SOURCES["layout"].replace("2.0\n", "object()\n")}
+    with pytest.raises(TypeError, match=r"outer names FACTOR, a object; accepted: numbers"):
+        stamp(edited, monkeypatch)
+
+
+class Package:
+    """The same package as files, run in processes of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.parts = folder / "tiny"
+        self.parts.mkdir()
+        (self.parts / "__init__.py").touch()
+        for name, text in SOURCES.items():
+            self.write(name, text)
+
+    def write(self, name: str, text: str) -> None:
+        path = self.parts / f"{name}.py"
+        # The interpreter tells versions of a source by whole seconds and size: each edit is a second later.
+        later_ns = path.stat().st_mtime_ns + 10**9 if path.exists() else time.time_ns()
+        path.write_text(text.format(package="tiny"), encoding="utf-8")
+        os.utime(path, ns=(later_ns, later_ns))
+
+    def start(self, **environment: str) -> "subprocess.Popen[str]":
+        return subprocess.Popen(
+            [sys.executable, "-c", PROGRAM],
+            cwd=self.folder,
+            env={**os.environ, "PYTHONPATH": f"{self.folder}{os.pathsep}{ROOT}", **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def run(self, **environment: str) -> tuple[float, int]:
+        """Result, and how much of it came out of the cache."""
+        return finished(self.start(**environment))
+
+    def cached(self) -> list[Path]:
+        return list((self.parts / "__pycache__").glob("outer.outer-*.nbc"))
+
+
+def finished(process: "subprocess.Popen[str]") -> tuple[float, int]:
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    value, hits = out.split()
+    return float(value), int(hits)
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Package:
+    return Package(tmp_path)
+
+
+def test_code_is_kept_until_a_constant_of_another_module_changes(package: Package) -> None:
+    both = [package.start(), package.start()]  # processes may compile at the same time
+    assert [finished(process)[0] for process in both] == [13.0, 13.0]
+    (old,) = package.cached()
+    assert package.run() == (13.0, 1)
+    package.write("layout", SOURCES["layout"].replace("FACTOR = 2.0", "FACTOR = 3.0"))
+    assert package.run() == (19.0, 0)
+    (new,) = package.cached()  # the old code is gone
+    assert new != old
+    new.write_bytes(new.read_bytes()[:100])  # a damaged file is compiled anew
+    assert package.run() == (19.0, 0)
+    assert package.run() == (19.0, 1)
+
+
+def test_without_a_writable_package_folder_the_users_cache_serves(package: Package, tmp_path: Path) -> None:
+    (package.parts / "__pycache__").write_text("in the way", encoding="utf-8")
+    home = tmp_path / "home"
+    home.mkdir()
+    places = {"HOME": str(home), "XDG_CACHE_HOME": str(home), "LOCALAPPDATA": str(home)}
+    assert package.run(**places) == (13.0, 0)
+    assert package.run(**places) == (13.0, 1)
+    home.rename(tmp_path / "away")
+    home.write_text("in the way", encoding="utf-8")  # no folder at all: the kernel still runs
+    assert package.run(**places) == (13.0, 0)
