@@ -4,14 +4,13 @@ This is the shell around the missions: it opens things, starts the event loop, a
 """
 
 import asyncio
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AsyncExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock, run
+from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.tlog import TlogWriter
@@ -136,7 +135,7 @@ def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | N
     flight = Flight()
     outcome, reason = COMPLETED, ""
     with TlogWriter(folder / LOG_NAME) as log:
-        recorder = FlightRecorder(log, epoch_us=session.epoch_us, unix_time_us=_unix_time_us)
+        recorder = FlightRecorder(log, epoch_us=session.epoch_us, unix_time_us=unix_time_us)
         session.on_truth(recorder.record_truth)
         try:
             run(_fly(mission, request, session, recorder, flight, on_progress), session.loop)
@@ -177,10 +176,6 @@ def limits_before_flight(request: RunRequest) -> VehicleLimits:
         speed_m_s=0.01 * given.get("WPNAV_SPEED", 100.0 * known.speed_m_s),
         acceleration_m_s2=0.01 * given.get("WPNAV_ACCEL", 100.0 * known.acceleration_m_s2),
     )
-
-
-def _unix_time_us() -> int:
-    return time.time_ns() // 1000
 
 
 @dataclass(slots=True, kw_only=True)
