@@ -86,7 +86,15 @@ def sitl(
     """
     click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.clock.pacing import wall_time_s
-    from autopilot_bridge.sitl import PaceReport, Sitl, SitlConfiguration, SitlServer, parse_home, team
+    from autopilot_bridge.sitl import (
+        PaceReport,
+        Sitl,
+        SitlConfiguration,
+        SitlServer,
+        compile_flight_code,
+        parse_home,
+        team,
+    )
     from flightsim.environment import Environment
     from missions.options import parameters_from_file, parse_wind
 
@@ -116,6 +124,7 @@ def sitl(
                 seed=seed,
             )
         )
+        compile_flight_code()
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
         opened = server.open(ports)
     except (ValueError, OSError, BridgeError) as error:

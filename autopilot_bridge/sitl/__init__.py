@@ -10,6 +10,7 @@ from autopilot_bridge.sitl.configuration import (
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
+from autopilot_bridge.sitl.warm_up import compile_flight_code
 
 __all__ = [
     "HOMES",
@@ -20,6 +21,7 @@ __all__ = [
     "SitlServer",
     "SitlVehicle",
     "VehicleSpecification",
+    "compile_flight_code",
     "default_ports",
     "parse_home",
     "team",

@@ -21,8 +21,8 @@ class Port:
 def default_ports(flavour: str, index: int) -> tuple[Port, ...]:
     """The links of vehicle `index` (0, 1, ...).
 
-    PX4 sends to UDP 14540 + index (at most 14549) for onboard computers and to 14550 for the ground station, from
-    14580 + index and 18570 + index. ArduPilot listens on TCP 5760, 5762 and 5763, each + 10 index.
+    PX4 sends to UDP 14540 + index (at most 14549) for onboard computers and to 14550 for the ground station,
+    from 14580 + index and 18570 + index. ArduPilot listens on TCP 5760, 5762 and 5763, each + 10 index.
     """
     if flavour == "ardupilot":
         return tuple(Port(TcpServer(LOOPBACK, port + 10 * index), "gcs") for port in _ARDUPILOT_SERIAL_PORTS)

@@ -76,7 +76,7 @@ class SitlServer:
         return opened
 
     def wait_for_client(self, stopped: Callable[[], bool]) -> bool:
-        """Wait until somebody has connected to the first link (ArduPilot's `tcp:0:wait`); False when stopped."""
+        """Wait for somebody on the first link (ArduPilot's `tcp:0:wait`); False when stopped."""
         link = self.sitl.vehicles[0].channels[0].link
         while not link.peers:
             if stopped():
