@@ -1,7 +1,8 @@
 """Local NED frames on the WGS84 ellipsoid.
 
-`LocalFrame` linearises around its origin with the local radii of curvature (NGA.STND.0036, section 4), as autopilots
-do: against the true tangent plane (`pymap3d`) it is off by 1 mm at 100 m, 0.1 m at 1 km, 10 m at 10 km.
+`LocalFrame` linearises around its origin with the local radii of curvature (NGA.STND.0036, section 4), as
+autopilots do: against the true tangent plane (`pymap3d`) it is off by 1 mm at 100 m, 0.1 m at 1 km, 10 m at
+10 km.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""A mission as data: what is uploaded, stored, flown and written to files. Knows no protocol and no vehicle."""
+"""A mission as data: uploaded, stored, flown and written to files. Knows no protocol and no vehicle."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -17,11 +17,12 @@ class MissionType(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionItem:
-    """One item of a plan, as MISSION_ITEM_INT carries it (MAVLink mission protocol), with x and y in natural units.
+    """One item of a plan: MISSION_ITEM_INT of the MAVLink mission protocol, with x and y in natural units.
 
     Attributes:
         command: MAV_CMD.
-        frame: MAV_FRAME (global frames: x latitude deg, y longitude deg, z altitude m; local: metres; MAV_FRAME_MISSION (2): plain numbers).
+        frame: MAV_FRAME (global frames: x latitude deg, y longitude deg, z altitude m; local: metres;
+            MAV_FRAME_MISSION (2): plain numbers).
         param1..param4: as the command defines; NaN means "not set".
         x, y, z: as the frame defines.
         autocontinue: go on to the next item when this one is done.

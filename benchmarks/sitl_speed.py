@@ -2,13 +2,15 @@
 
     python benchmarks/sitl_speed.py [--seconds 120]
 
-One process, warm (everything compiled and flown before the clock starts). A quadrotor orbits at 250 Hz physics under the
-px4 flavour; its default onboard telemetry goes over a memory link and, with the truth, into a log, as `flightstack fly`
-does it. Then the same for 2, 4 and 8 vehicles in one world, and where the time of one vehicle goes.
+One process, warm (everything compiled and flown before the clock starts). A quadrotor orbits at 250 Hz
+physics under the px4 flavour; its default onboard telemetry goes over a memory link and, with the truth, into
+a log, as `flightstack fly` does it. Then the same for 2, 4 and 8 vehicles in one world, and where the time of
+one vehicle goes.
 """
 
 import argparse
 import math
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -134,12 +136,11 @@ def main() -> None:
     )
     parser.add_argument("--seconds", type=float, default=120.0, help="vehicle seconds per measurement")
     seconds = parser.parse_args().seconds
+    out = sys.stdout.write
     with tempfile.TemporaryDirectory() as folder:
         base = jsbsim_alone(seconds)
-        print(f"JSBSim alone, one quadrotor, {PHYSICS_RATE_HZ} Hz: {base:6.0f} simulated s per wall s")
-        print(
-            f"{'vehicles':>8} {'sim s / wall s':>15} {'vehicle s / wall s':>19} {'of JSBSim alone':>16} {'messages/s':>11}"
-        )
+        out(f"JSBSim alone, one quadrotor, {PHYSICS_RATE_HZ} Hz: {base:6.0f} simulated s per wall s\n")
+        out("vehicles  sim s / wall s  vehicle s / wall s  of JSBSim alone  messages/s\n")
         for vehicles in (1, 2, 4, 8):
             flight = Flight(vehicles, Path(folder) / f"{vehicles}.tlog")
             flight.take_off()
@@ -147,20 +148,19 @@ def main() -> None:
             wall_s = timed(lambda flight=flight: flight.run(seconds))
             speed = seconds / wall_s
             rate = (flight.frames - before) / seconds / vehicles
-            print(
-                f"{vehicles:>8} {speed:>15.0f} {speed * vehicles:>19.0f} {speed * vehicles / base:>15.0%} {rate:>11.0f}"
-            )
+            share = speed * vehicles / base
+            out(f"{vehicles:>8} {speed:>15.0f} {speed * vehicles:>19.0f} {share:>16.0%} {rate:>11.0f}\n")
             if vehicles == 1:
                 one = flight
                 step_us = wall_s / seconds / PHYSICS_RATE_HZ * 1e6
             else:
                 flight.close()
         parts = where_time_goes(one, seconds)
-        print(f"\none vehicle: {step_us:.1f} us per physics step, of which")
+        out(f"\none vehicle: {step_us:.1f} us per physics step, of which\n")
         for name, cost_us in parts.items():
-            print(f"  {name:<28} {cost_us:5.1f} us")
+            out(f"  {name:<28} {cost_us:5.1f} us\n")
         measured = sum(cost for name, cost in parts.items() if name != "JSBSim")
-        print(f"  {'slow loop, MAVLink, log':<28} {step_us - measured:5.1f} us (the rest)")
+        out(f"  {'slow loop, MAVLink, log':<28} {step_us - measured:5.1f} us (the rest)\n")
         one.close()
 
 

@@ -1,7 +1,8 @@
 """The narrow interface where simulator and autopilot meet: sensor readings in, actuator commands out.
 
 A `Reading` is the newest *delivered* sample of one sensor. The sensor suite writes it in place; the autopilot
-only reads it. Any real firmware (PX4's HIL_* lockstep, ArduPilot's JSON interface) can stand on the same line.
+only reads it. Any real firmware (PX4's HIL_* lockstep, ArduPilot's JSON interface) can stand on the same
+line.
 """
 
 from typing import Final

@@ -3,8 +3,8 @@
 One preallocated float64 array per vehicle, written in place by the vehicle model and read by the sensor
 kernels and the log. It never reaches an autopilot, a mission or an estimator.
 
-Motion (position, velocity, attitude, rates, specific force) is written every step; air, battery, rotors, airspeed,
-height above ground and ground contact every step or, in a `World`, at its slow rate.
+Motion (position, velocity, attitude, rates, specific force) is written every step; air, battery, rotors,
+airspeed, height above ground and ground contact every step or, in a `World`, at its slow rate.
 
 Frames: NED is the local geodetic frame at the vehicle; FRD is the body frame (x forward, y right, z down).
 """
@@ -17,7 +17,7 @@ ALT_M: Final = 2  # height above mean sea level (JSBSim's geodetic altitude), m
 VEL_NED_M_S: Final = slice(3, 6)  # velocity over ground
 Q_NED_FROM_FRD: Final = slice(6, 10)  # Hamilton, w x y z
 RATES_FRD_RAD_S: Final = slice(10, 13)  # body rates against inertial space, what a perfect gyro reads
-SPECIFIC_FORCE_FRD_M_S2: Final = slice(13, 16)  # what a perfect accelerometer at the CG reads; (0, 0, -g) at rest
+SPECIFIC_FORCE_FRD_M_S2: Final = slice(13, 16)  # what a perfect accelerometer at the CG reads; -g down at rest
 PRESSURE_PA: Final = 16  # static pressure at the vehicle
 TEMPERATURE_K: Final = 17  # air temperature at the vehicle
 DENSITY_KG_M3: Final = 18

@@ -10,7 +10,6 @@ from flightsim.initial_state import InitialState
 from flightsim.random_streams import RandomStreams
 from flightsim.vehicle import Vehicle
 
-
 SLOW_RATE_HZ: Final = 50
 """Rate of the part of truth that is not motion: no sensor of it is faster."""
 

@@ -1,4 +1,4 @@
-"""Settings of the whole suite: property tests draw the same examples on every run, so that no run is luckier than another."""
+"""Settings of the whole suite: property tests draw the same examples on every run."""
 
 from hypothesis import settings
 

@@ -1,4 +1,4 @@
-"""The emulated autopilot: sensor readings and MAVLink frames in, motor commands and MAVLink messages out. Sans-IO."""
+"""The emulated autopilot: sensor readings and MAVLink frames in, motor commands and messages out. Sans-IO."""
 
 from autopilot_bridge.autopilot.autopilot import Autopilot, AutopilotChannel
 

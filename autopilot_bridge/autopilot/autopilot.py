@@ -1,7 +1,8 @@
-"""The emulated autopilot, composed: navigation, control, commander and MAVLink services around sensor readings.
+"""The emulated autopilot: navigation, control, commander and MAVLink services around sensor readings.
 
-Execution order of a physics step: navigation filter; every fifth step (50 Hz) the slow loop (commander with its flight
-task, services, events); control laws; streams that are due. Nothing here sleeps, opens or reads a clock.
+Execution order of a physics step: navigation filter; every fifth step (50 Hz) the slow loop (commander with
+its flight task, services, events); control laws; streams that are due. Nothing here sleeps, opens or reads a
+clock.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -25,7 +26,7 @@ from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Service, Source
+from autopilot_bridge.services.channel import Channel, Service, Source
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
 from autopilot_bridge.services.file_transfer import FileTransferService
@@ -40,7 +41,7 @@ from autopilot_bridge.telemetry.ardupilot import STREAM_GROUPS, STREAM_RATE_PARA
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.px4 import Px4Messages
-from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable, Values
+from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
 

@@ -1,4 +1,4 @@
-"""What the autopilot says of its own state: HEARTBEAT, SYS_STATUS, AUTOPILOT_VERSION, as each flavour fills them."""
+"""The autopilot's own state as each flavour tells it: HEARTBEAT, SYS_STATUS, AUTOPILOT_VERSION."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -17,7 +17,7 @@ PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorBits:
-    """SYS_STATUS bits of a healthy vehicle, from the reference pages; broken sensors are taken out of `health`."""
+    """SYS_STATUS bits of a healthy vehicle; broken sensors are taken out of `health`."""
 
     present: int
     enabled: int

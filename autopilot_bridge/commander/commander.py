@@ -51,7 +51,8 @@ from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav
 
-_SUPERVISE_EVERY: Final = 5  # health, failsafes and arming checks at 10 Hz, as PX4's commander; flight tasks at 50 Hz
+# Health, failsafes and arming checks run at 10 Hz, as in PX4's commander; flight tasks at 50 Hz.
+_SUPERVISE_EVERY: Final = 5
 
 
 class Commander:
@@ -480,7 +481,7 @@ class Commander:
         events.clear()
         for event in told:
             if isinstance(event, flight.WaypointReached):
-                last = event.seq + 1 == len(self.missions.items)  # clients know by it that the mission is over
+                last = event.seq + 1 == len(self.missions.items)  # tells clients that the mission is over
                 if event.navigation or last or self.policy.reports_do_items:
                     self.emit(MissionItemReached(time_us=self.time_us, index=event.seq))
             elif isinstance(event, flight.MissionFinished):

@@ -22,7 +22,7 @@ _STALE_US: Final = {
     "gps": 1_000_000,
     "battery": 3_000_000,
 }
-_FROZEN_SAMPLES: Final = 20  # judged at 10 Hz: a sensor that says the same for 2 s is frozen (PX4's DataValidator)
+_FROZEN_SAMPLES: Final = 20  # judged at 10 Hz: the same for 2 s is frozen (PX4's DataValidator)
 _MAX_RATE_RAD_S: Final = 40.0
 _MAX_ACCEL_M_S2: Final = 250.0
 _PRESSURE_PA: Final = (10_000.0, 120_000.0)

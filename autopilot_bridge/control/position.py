@@ -57,8 +57,8 @@ def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
     """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
-    Not so on the ground: the thrust that winds down after a touchdown would be taken for hover thrust, and the
-    landing would never be seen.
+    Not so on the ground: the thrust that winds down after a touchdown would be taken for hover thrust, and
+    the landing would never be seen.
     """
     s[c.THRUST_LAGGED] += (s[c.THRUST_GIVEN] - s[c.THRUST_LAGGED]) * min(
         1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT])

@@ -36,10 +36,10 @@ def corner_speed(angle_rad: float, tangent_m: float, acceleration_m_s2: float) -
 
 
 def easing_speed(angle_rad: float, distance_m: float, jerk_m_s3: float) -> float:
-    """Speed at which a turn whose acceleration is built up and taken back within twice `distance_m` is a full one.
+    """Speed at which a turn built up and taken back within twice `distance_m` is a full one.
 
-    The lateral acceleration is a triangle of slope jerk over the time 2 distance / v, so the course changes by
-    jerk distance^2 / v^3.
+    The lateral acceleration is a triangle of slope jerk over the time 2 distance / v, so the course changes
+    by jerk distance^2 / v^3.
     """
     if angle_rad < _STRAIGHT_RAD:
         return math.inf

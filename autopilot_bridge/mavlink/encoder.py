@@ -70,7 +70,8 @@ class FrameEncoder:
     def encode_payloads(self, payloads: Iterable[tuple[int, bytes]]) -> list[bytes]:
         """The frames of several packed payloads (message id, bytes of at most 255), in order.
 
-        As `encode_payload` for each, without its check of the length: for streams, where the calls would cost more.
+        As `encode_payload` for each, without its check of the length: for streams, where the calls would cost
+        more.
         """
         messages, sequence, frames = self._messages, self.sequence, []
         for message_id, payload in payloads:

@@ -1,7 +1,8 @@
 """The one visible wiring: world, sensors, autopilots and links, stepped together.
 
-Execution order of a step, for each vehicle in turn: vehicle dynamics, sensors, autopilot (navigation, slow loop,
-control, streams). Then the world's clock moves on and what links have brought is handed to the autopilots.
+Execution order of a step, for each vehicle in turn: vehicle dynamics, sensors, autopilot (navigation, slow
+loop, control, streams). Then the world's clock moves on and what links have brought is handed to the
+autopilots.
 """
 
 from collections.abc import Callable, Sequence

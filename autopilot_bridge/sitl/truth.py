@@ -1,7 +1,7 @@
-"""Truth as MAVLink frames, for the log and the score only: HIL_STATE_QUATERNION, as PX4 sends its ground truth.
+"""Truth as MAVLink frames, for log and score only: HIL_STATE_QUATERNION, as PX4 sends its ground truth.
 
-The frames carry the vehicle's system id and the component id of the simulator (`SIMULATOR_COMPONENT`), so that no
-reader takes them for the autopilot's word.
+The frames carry the vehicle's system id and the component id of the simulator (`SIMULATOR_COMPONENT`), so
+that no reader takes them for the autopilot's word.
 """
 
 import math
@@ -13,18 +13,13 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
-from autopilot_bridge.telemetry.records import record_type
+from autopilot_bridge.telemetry.records import record_type, whole
 from flightsim.kernels import kernel
 from flightsim.truth import TRUTH_SIZE
 
 SIMULATOR_COMPONENT: Final = mavlink.MAV_COMP_ID_USER1
 TRUTH_RATE_HZ: Final = 50
 _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
-
-
-@kernel
-def _whole(value: float, limit: float) -> int:
-    return int(math.floor(min(limit, max(-limit, value)) + 0.5))
 
 
 @kernel
@@ -35,17 +30,17 @@ def _fill(truth: NDArray[np.float64], time_us: int, out: NDArray[np.void]) -> No
     for i in range(4):
         r.attitude_quaternion[i] = truth[6 + i]
     r.rollspeed, r.pitchspeed, r.yawspeed = truth[10], truth[11], truth[12]
-    r.lat = _whole(math.degrees(truth[0]) * 1e7, 1.8e9)
-    r.lon = _whole(math.degrees(truth[1]) * 1e7, 1.8e9)
-    r.alt = _whole(truth[2] * 1e3, 2e9)
-    r.vx = _whole(truth[3] * 100.0, 32767.0)
-    r.vy = _whole(truth[4] * 100.0, 32767.0)
-    r.vz = _whole(truth[5] * 100.0, 32767.0)
-    r.true_airspeed = _whole(truth[26] * 100.0, 32767.0)
-    r.ind_airspeed = _whole(truth[26] * 100.0 * math.sqrt(max(0.0, truth[18]) / 1.225), 32767.0)
-    r.xacc = _whole(truth[13] * (1000.0 / 9.80665), 32767.0)
-    r.yacc = _whole(truth[14] * (1000.0 / 9.80665), 32767.0)
-    r.zacc = _whole(truth[15] * (1000.0 / 9.80665), 32767.0)
+    r.lat = whole(math.degrees(truth[0]) * 1e7, 1.8e9)
+    r.lon = whole(math.degrees(truth[1]) * 1e7, 1.8e9)
+    r.alt = whole(truth[2] * 1e3, 2e9)
+    r.vx = whole(truth[3] * 100.0, 32767.0)
+    r.vy = whole(truth[4] * 100.0, 32767.0)
+    r.vz = whole(truth[5] * 100.0, 32767.0)
+    r.true_airspeed = whole(truth[26] * 100.0, 32767.0)
+    r.ind_airspeed = whole(truth[26] * 100.0 * math.sqrt(max(0.0, truth[18]) / 1.225), 32767.0)
+    r.xacc = whole(truth[13] * (1000.0 / 9.80665), 32767.0)
+    r.yacc = whole(truth[14] * (1000.0 / 9.80665), 32767.0)
+    r.zacc = whole(truth[15] * (1000.0 / 9.80665), 32767.0)
 
 
 class TruthEncoder:

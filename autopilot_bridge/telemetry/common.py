@@ -7,13 +7,13 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.control import MulticopterController
+from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.streams import Builder, Values
-from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, TelemetryView, pressure_altitude_m
+from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, TelemetryView
 from flightsim import interface
 from flightsim.interface import SensorReadings
 
@@ -197,7 +197,7 @@ class CommonMessages:
         )
 
     def trajectory_setpoint(self) -> list[float] | None:
-        """Position 3, velocity 3, acceleration 3, yaw, yaw rate asked of the control laws; None when not flying so."""
+        """Position 3, velocity 3, acceleration 3, yaw, yaw rate asked for; None when not flying so."""
         context = self.sources.context
         if not context.armed or context.setpoint[sp.LEVEL] != sp.TRAJECTORY:
             return None

@@ -1,7 +1,8 @@
 """The fastest messages, packed and framed by compiled kernels straight from the navigation state.
 
-Six messages make up three quarters of PX4's onboard traffic. Their payloads lie one behind the other in a record with
-exactly the layout of the wire. One call fills all of them, another makes frames of those that are due on a channel.
+Six messages make up three quarters of PX4's onboard traffic. Their payloads lie one behind the other in a
+record with exactly the layout of the wire. One call fills all of them, another makes frames of those that are
+due on a channel.
 """
 
 import math
@@ -16,7 +17,7 @@ from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.navigation import NavigationFilter
-from autopilot_bridge.telemetry.records import record_type
+from autopilot_bridge.telemetry.records import record_type, whole
 from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
@@ -40,14 +41,6 @@ _FRAME_OVERHEAD: Final = 12  # header and checksum
 _NEED_ATTITUDE: Final = 0b100011  # bits of MESSAGES
 _NEED_FRAME: Final = 0b001000
 _NEED_SENSORS: Final = 0b010000
-
-
-@kernel
-def _whole(value: float, limit: float) -> float:
-    """Nearest whole number within +-limit; 0 for not-a-number."""
-    if value != value:
-        return 0.0
-    return math.floor(min(limit, max(-limit, value)) + 0.5)
 
 
 @kernel
@@ -80,14 +73,14 @@ def _fill(
 
     r.global_position_int__time_boot_ms = time_ms
     longitude = (place[1] + nav[11] / place[4] + 180.0) % 360.0 - 180.0
-    r.global_position_int__lat = int(_whole((place[0] + nav[10] / place[3]) * 1e7, 1.8e9))
-    r.global_position_int__lon = int(_whole(longitude * 1e7, 1.8e9))
-    r.global_position_int__alt = int(_whole((place[2] - nav[12]) * 1e3, 2e9))
-    r.global_position_int__relative_alt = int(_whole((place[5] - nav[12]) * 1e3, 2e9))
-    r.global_position_int__vx = int(_whole(nav[7] * 100.0, 32767.0))
-    r.global_position_int__vy = int(_whole(nav[8] * 100.0, 32767.0))
-    r.global_position_int__vz = int(_whole(nav[9] * 100.0, 32767.0))
-    r.global_position_int__hdg = int(_whole(math.degrees(nav[27]) % 360.0 * 100.0, 36000.0)) % 36000
+    r.global_position_int__lat = whole((place[0] + nav[10] / place[3]) * 1e7, 1.8e9)
+    r.global_position_int__lon = whole(longitude * 1e7, 1.8e9)
+    r.global_position_int__alt = whole((place[2] - nav[12]) * 1e3, 2e9)
+    r.global_position_int__relative_alt = whole((place[5] - nav[12]) * 1e3, 2e9)
+    r.global_position_int__vx = whole(nav[7] * 100.0, 32767.0)
+    r.global_position_int__vy = whole(nav[8] * 100.0, 32767.0)
+    r.global_position_int__vz = whole(nav[9] * 100.0, 32767.0)
+    r.global_position_int__hdg = whole(math.degrees(nav[27]) % 360.0 * 100.0, 36000.0) % 36000
 
     r.highres_imu__time_usec = time_us
     r.highres_imu__xacc, r.highres_imu__yacc, r.highres_imu__zacc = imu[3], imu[4], imu[5]
@@ -174,7 +167,7 @@ def _frames(
 
 
 class MotionMessages:
-    """Payloads of ATTITUDE, ATTITUDE_QUATERNION, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, HIGHRES_IMU and ODOMETRY.
+    """Payloads of the messages in `MESSAGES`.
 
     Attributes:
         bits: message id -> its bit in `frames`.

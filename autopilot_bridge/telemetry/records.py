@@ -1,10 +1,12 @@
-"""NumPy record types with exactly the layout of a message's payload on the wire, for kernels that fill payloads."""
+"""NumPy record types with the wire layout of a message's payload, for kernels that fill payloads."""
 
+import math
 from typing import Final
 
 import numpy as np
 
 from autopilot_bridge.mavlink.definitions import MessageDefinition
+from flightsim.kernels import kernel
 
 _NUMPY_CODES: Final = {
     "f": "<f4",
@@ -32,3 +34,11 @@ def record_type(*messages: MessageDefinition, prefixed: bool = False) -> np.dtyp
             label = f"{message.name.lower()}__{field.name}" if prefixed else field.name
             fields.append((label, code, (field.length,)) if field.length else (label, code))
     return np.dtype(fields)
+
+
+@kernel
+def whole(value: float, limit: float) -> int:
+    """Nearest whole number within +-limit; 0 for not-a-number."""
+    if math.isnan(value):
+        return 0
+    return math.floor(min(limit, max(-limit, value)) + 0.5)

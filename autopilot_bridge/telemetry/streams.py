@@ -1,7 +1,8 @@
 """Which messages go out on a channel, and when.
 
-A `StreamTable` belongs to one channel. Every stream keeps its own due time, so any rate is exact on average on the
-physics grid; the payload of a message that several channels send in the same step is built once (`PayloadCache`).
+A `StreamTable` belongs to one channel. Every stream keeps its own due time, so any rate is exact on average
+on the physics grid; the payload of a message that several channels send in the same step is built once
+(`PayloadCache`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -13,7 +14,7 @@ from autopilot_bridge.telemetry.packing import values_packer
 
 Values = tuple[object, ...]
 Builder = Callable[[], Values | bytes | None]
-"""Field values of one message in the order of its definition, or its packed payload; None: nothing to say now."""
+"""Field values of a message in the order of its definition, or its packed payload; None: nothing to say."""
 
 MICROSECONDS: Final = 1_000_000
 
@@ -22,7 +23,7 @@ class PayloadSink(Protocol):
     """Where a stream's packed payloads go: one MAVLink channel."""
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Send the due motion messages (bits of `motion_bits`) and frames of the payloads (message id, bytes)."""
+        """Send the due motion messages (bits of `motion_bits`) and frames of payloads (message id, bytes)."""
 
 
 class PayloadCache:
@@ -121,7 +122,7 @@ class StreamTable:
         return self._defaults_us.get(message_id, -1)
 
     def set_interval(self, message_id: int, interval_us: int, time_us: int) -> None:
-        """Run a stream at a new interval (microseconds), or stop it (-1). The next one is due after one interval."""
+        """Run a stream at a new interval (us) or stop it (-1). The next one is due after one interval."""
         self._heap = [entry for entry in self._heap if entry[1] != message_id]
         heapify(self._heap)
         self._intervals_us.pop(message_id, None)

@@ -24,8 +24,8 @@ class VibrationMeter:
     """High-passed accelerometer RMS per body axis (ArduPilot: 5 Hz high pass, 2 Hz smoothing).
 
     Args:
-        accel_frd_m_s2: newest accelerometer sample, shape (3,), written in place by the sensor; what is not a finite
-            number is passed over.
+        accel_frd_m_s2: newest accelerometer sample, shape (3,), written in place by the sensor; what is not a
+            finite number is passed over.
         rate_hz: calls of `update` per second.
     """
 

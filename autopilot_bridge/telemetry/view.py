@@ -1,4 +1,4 @@
-"""What the telemetry messages are made of, converted once per physics step to plain numbers in the wire's units."""
+"""What telemetry is made of, converted once per physics step to plain numbers in the wire's units."""
 
 import math
 from typing import Final
@@ -19,9 +19,9 @@ VIBRATION_RATE_HZ: Final = 50.0  # of the slow loop
 class TelemetryView:
     """Snapshot of one autopilot's state for the message builders, made once per step and only when asked for.
 
-    Attributes (of `refreshed()`): attitude `q` (w, x, y, z), `rates` rad/s, `roll`, `pitch`, `yaw` rad; `pos` and `vel`
-    NED m, m/s; `acc` NED m/s^2; `heading_cdeg`; and, when the filter has an origin, `lat_e7`, `lon_e7`,
-    `alt_amsl_m`, `alt_relative_m` (to home). `time_us` and `time_ms` are always those of the step.
+    Attributes (of `refreshed()`): attitude `q` (w, x, y, z), `rates` rad/s, `roll`, `pitch`, `yaw` rad; `pos`
+    and `vel` NED m, m/s; `acc` NED m/s^2; `heading_cdeg`; and, when the filter has an origin, `lat_e7`,
+    `lon_e7`, `alt_amsl_m`, `alt_relative_m` (to home). `time_us` and `time_ms` are always those of the step.
     """
 
     __slots__ = (

@@ -247,7 +247,12 @@ def test_barometer_drifts_slowly() -> None:
 
 def test_barometer_noise_and_drift_are_independent() -> None:
     parameters = BarometerParameters(
-        rate_hz=50, noise_pa=3.0, quantum_pa=0.0, turn_on_bias_pa=0.0, drift_pa=3.0, drift_time_constant_s=0.02
+        rate_hz=50,
+        noise_pa=3.0,
+        quantum_pa=0.0,
+        turn_on_bias_pa=0.0,
+        drift_pa=3.0,
+        drift_time_constant_s=0.02,
     )
     steps_pa = np.diff(record(parameters, still_truth(), 40_000)[:, i.BARO_PRESSURE_PA])
     assert np.var(steps_pa) == pytest.approx(18.0 + 18.0 * (1.0 - math.exp(-1.0)), rel=0.05)
