@@ -1,6 +1,7 @@
 """SET_MESSAGE_INTERVAL, GET_MESSAGE_INTERVAL, REQUEST_MESSAGE and ArduPilot's REQUEST_DATA_STREAM.
 
-The results are those of reference sections 6 and 7 (PX4) and 2 (ArduPilot); `IntervalPolicy` holds the differences.
+The results are those of reference sections 6 and 7 (PX4) and 2 (ArduPilot); `IntervalPolicy` holds the
+differences.
 """
 
 import math
@@ -26,7 +27,8 @@ class IntervalPolicy:
     Attributes:
         unknown_set, unknown_get, unknown_request: results for a message the firmware does not send.
         fixed: messages whose interval can't be set (PX4: HEARTBEAT).
-        not_requestable: messages that exist but are refused on request.
+        not_requestable: messages that are sent, if at all, by the firmware's own choice: a client can neither
+            request them nor set their interval.
         refuse_running: a message that a fast stream is sending anyway is refused on request (PX4).
         max_rate_hz: fastest stream that is accepted; faster ones are denied with a text.
         groups: REQUEST_DATA_STREAM group -> message ids; empty: the message is ignored.
@@ -101,11 +103,11 @@ class MessageIntervalService:
                 channel.send_payload(message_id, payload)  # type: ignore[attr-defined]
 
     def set_interval(self, source: Source, message_id: int, interval_us: float) -> Result:
-        """MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 the channel's default, else the interval in microseconds."""
+        """MAV_CMD_SET_MESSAGE_INTERVAL: -1 off, 0 the channel's default, else an interval (us)."""
         table = self._tables.get(source.channel.name)
         if table is None or not math.isfinite(interval_us):
             return Result.DENIED
-        if message_id not in self._cache:
+        if not self._known(message_id):
             if self._policy.unknown_text:
                 self._announce(mavlink.MAV_SEVERITY_WARNING, self._policy.unknown_text.format(message_id))
             return self._policy.unknown_set
@@ -127,7 +129,7 @@ class MessageIntervalService:
     def get_interval(self, source: Source, message_id: int) -> Result:
         """MAV_CMD_GET_MESSAGE_INTERVAL: answers MESSAGE_INTERVAL, 0 when the message is not known."""
         table = self._tables.get(source.channel.name)
-        interval_us, known = 0, message_id in self._cache
+        interval_us, known = 0, self._known(message_id)
         if table is not None and known:
             interval_us = table.intervals_us.get(message_id, -1)
         if 0 <= message_id <= 0xFFFF:
@@ -142,11 +144,7 @@ class MessageIntervalService:
             self._pending.append((source.channel, message_id, parameter))
             return Result.ACCEPTED
         policy = self._policy
-        if (
-            message_id not in DEFINITIONS
-            or message_id not in self._cache
-            or message_id in policy.not_requestable
-        ):
+        if message_id not in DEFINITIONS or not self._known(message_id):
             return policy.unknown_request
         table = self._tables.get(source.channel.name)
         if policy.refuse_running and table is not None:
@@ -155,3 +153,7 @@ class MessageIntervalService:
                 return Result.DENIED
         self._pending.append((source.channel, message_id, parameter))
         return Result.ACCEPTED
+
+    def _known(self, message_id: int) -> bool:
+        """A client may ask for the message."""
+        return message_id in self._cache and message_id not in self._policy.not_requestable
