@@ -66,6 +66,9 @@ def run_command_line(arguments: list[str] | None = None) -> int:
     except click.Abort:
         click.echo("interrupted", err=True)
         return INTERRUPTED
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message(), err=True)
+        return USAGE
     except click.ClickException as error:
         message = " ".join(error.format_message().split())
         click.echo(f"flightstack: {message}", err=True)

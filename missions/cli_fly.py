@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from missions.cli_types import SPEEDUP
+
 if TYPE_CHECKING:
     from missions.session import Flight, RunResult
 
@@ -129,9 +131,7 @@ def _options(given: dict[str, Any]) -> Any:
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
 @click.option("--wind", default="0", metavar="SPEED[@FROM]", help="m/s, and degrees it comes from.")
 @click.option("--turbulence", type=click.Choice(["none", "light", "moderate", "severe"]), default="none")
-@click.option(
-    "--speedup", type=click.FloatRange(min=0.0, min_open=True), help="At most this fast. [default: no limit]"
-)
+@click.option("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
 @click.option(
     "--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params)."
 )

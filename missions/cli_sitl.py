@@ -7,6 +7,7 @@ from types import FrameType
 import click
 
 from autopilot_bridge.errors import BridgeError
+from missions.cli_types import SLOWEST, FiniteRange
 
 
 def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...], count: int):  # type: ignore[no-untyped-def]
@@ -44,7 +45,7 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
 @click.option("--count", type=click.IntRange(1, 250), default=1, show_default=True, help="Vehicles.")
 @click.option(
     "--speedup",
-    type=click.FloatRange(min=0.0),
+    type=FiniteRange(min=0.0, max=1e6),
     default=1.0,
     show_default=True,
     help="Simulated seconds per wall second; 0: as fast as possible.",
@@ -63,7 +64,7 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
 @click.option(
-    "--duration", type=click.FloatRange(min=0.0), help="Stop after so many seconds of vehicle time."
+    "--duration", type=FiniteRange(min=0.0, max=1e9), help="Stop after so many seconds of vehicle time."
 )
 def sitl(
     autopilot: str,
@@ -84,6 +85,8 @@ def sitl(
 
     Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
     """
+    if 0.0 < speedup < SLOWEST:
+        raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.clock.pacing import wall_time_s
     from autopilot_bridge.sitl import (
@@ -128,7 +131,7 @@ def sitl(
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
         opened = server.open(ports)
     except (ValueError, OSError, BridgeError) as error:
-        raise click.ClickException(str(error)) from error
+        raise click.UsageError(str(error)) from error
     signal.signal(signal.SIGINT, on_signal)
     signal.signal(signal.SIGTERM, on_signal)
     for vehicle, port, address in opened:

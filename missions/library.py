@@ -65,6 +65,8 @@ class PatternMission:
         """Plan for every vehicle of the team; the vehicle's own limits come into it when it is known."""
         from missions.pattern_flight import plan_pattern
 
+        for name in options.arguments:
+            raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
         for index in range(options.vehicles):
             own = replace(options, index=index)
             plan_pattern(self.curve(own), own, limits)
@@ -79,6 +81,25 @@ class PatternMission:
         await fly_pattern(vehicle, options, self.curve(options))
 
 
+MAX_LENGTH_M: Final = 100_000.0
+"""Longest pattern that is planned: some hours of flight, and what a planner holds in memory with ease."""
+
+
+def _check_length(length_m: float) -> None:
+    """Refuse a pattern by its rough length, before it is built point by point."""
+    if length_m > MAX_LENGTH_M:
+        raise PlanError(
+            f"the pattern is about {1e-3 * length_m:.4g} km long, more than {1e-3 * MAX_LENGTH_M:g} km; "
+            "ask for less --periods or --search-time, a smaller --size, a wider --spacing, a simpler --ratio"
+        )
+
+
+def _lissajous_length_m(shape: Lissajous, laps: float) -> float:
+    """Rough length: the root mean square of the speed in the parameter, times its range."""
+    speed = math.hypot(shape.amplitude_x_m * shape.ratio_x, shape.amplitude_y_m * shape.ratio_y)
+    return math.sqrt(0.5) * speed * shape.end * laps
+
+
 def _passes(options: FlightOptions, one_pass_m: float) -> int:
     """Whole passes for `--periods`, or enough of them for the search time."""
     if options.search_time_s is not None:
@@ -86,6 +107,15 @@ def _passes(options: FlightOptions, one_pass_m: float) -> int:
     if not float(options.periods).is_integer():
         raise PlanError(f"--periods {options.periods:g}: this pattern is flown in whole passes")
     return int(options.periods)
+
+
+def _in_passes(make: Callable[[int], Polyline], options: FlightOptions, rough_length_m: float) -> Polyline:
+    """As many passes as asked for of a pattern whose single pass has about a length."""
+    _check_length(rough_length_m)
+    one_pass_m = make(1).length_m
+    passes = _passes(options, one_pass_m)
+    _check_length(one_pass_m * passes)
+    return make(passes)
 
 
 def lissajous_curve(options: FlightOptions) -> Curve:
@@ -111,9 +141,10 @@ def lissajous_curve(options: FlightOptions) -> Curve:
             slowest_turn_m = 2.0 * min(options.width_m, options.height_m)
             slower_turns = max(1.0, options.search_time_s * options.speed_m_s / slowest_turn_m)
         spread = math.tau * options.index / options.vehicles
+        shape = replace(shape, open_turns=slower_turns)
+        _check_length(_lissajous_length_m(shape, 1.0))
         return replace(
             shape,
-            open_turns=slower_turns,
             phase_x_rad=shape.phase_x_rad + spread * shape.ratio_x,
             phase_y_rad=shape.phase_y_rad + spread * shape.ratio_y,
         )
@@ -124,13 +155,16 @@ def lissajous_curve(options: FlightOptions) -> Curve:
         else:
             once_m = 2.0 * math.hypot(options.width_m, options.height_m)
             laps = max(1, math.ceil(options.search_time_s * options.speed_m_s / once_m))
+    _check_length(_lissajous_length_m(shape, laps))
     return Lap(curve=shape, laps=laps, start=options.index / options.vehicles)
 
 
 def _sector(options: FlightOptions) -> Curve:
     radius_m = 0.5 * min(options.width_m, options.height_m)
+    passes = _passes(options, 9.0 * max(radius_m, 1e-3))
+    _check_length(9.0 * radius_m * passes)
     heading = options.heading_rad + math.radians(30.0) * options.index / options.vehicles
-    return sector(radius_m=radius_m, heading_rad=heading, passes=_passes(options, 9.0 * max(radius_m, 1e-3)))
+    return sector(radius_m=radius_m, heading_rad=heading, passes=passes)
 
 
 def _parallel_sweep(options: FlightOptions) -> Curve:
@@ -143,7 +177,7 @@ def _parallel_sweep(options: FlightOptions) -> Curve:
             passes=passes,
         )
 
-    whole = make(_passes(options, make(1).length_m))
+    whole = _in_passes(make, options, options.width_m * options.height_m / options.spacing_m)
     return whole.reversed() if options.index % 2 else whole
 
 
@@ -156,7 +190,7 @@ def _expanding_square(options: FlightOptions) -> Curve:
             passes=passes,
         )
 
-    return make(_passes(options, make(1).length_m))
+    return _in_passes(make, options, min(options.width_m, options.height_m) ** 2 / options.spacing_m)
 
 
 MISSIONS: Final[Mapping[str, Mission]] = MappingProxyType(

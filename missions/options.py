@@ -6,9 +6,19 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
+from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from missions.errors import PlanError
+
+MAX_PERIODS: Final = 1000.0
+MAX_SEARCH_TIME_S: Final = 24 * 3600.0
+MIN_SPEED_M_S: Final = 0.1
+MAX_SPEED_M_S: Final = 100.0
+MIN_ACCEPTANCE_M: Final = 0.1
+MAX_ACCEPTANCE_M: Final = 1000.0
+MIN_SIDE_M: Final = 1.0
+MAX_PHASE_RAD: Final = math.radians(3600.0) + 1e-9
 
 
 class Via(StrEnum):
@@ -67,6 +77,7 @@ class FlightOptions:
 
     def __post_init__(self) -> None:
         positive = {
+            "--speed": self.speed_m_s,
             "--periods": self.periods,
             "--acceptance": self.acceptance_m,
             "--spacing": self.spacing_m,
@@ -77,6 +88,26 @@ class FlightOptions:
         for name, value in positive.items():
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise PlanError(f"{name} {value:g} is not possible; ask for more than 0")
+        for name, bounded, lowest, highest, unit in (
+            ("--periods", self.periods, 0.0, MAX_PERIODS, ""),
+            ("--search-time", self.search_time_s, 0.0, MAX_SEARCH_TIME_S, " s"),
+            ("--speed", self.speed_m_s, MIN_SPEED_M_S, MAX_SPEED_M_S, " m/s"),
+            ("--acceptance", self.acceptance_m, MIN_ACCEPTANCE_M, MAX_ACCEPTANCE_M, " m"),
+        ):
+            if bounded is not None and not lowest <= bounded <= highest:
+                raise PlanError(f"{name} {bounded:g}{unit} is not in {lowest:g}..{highest:g}{unit}")
+        for side_m in (self.width_m, self.height_m):
+            if 0.0 < side_m < MIN_SIDE_M:
+                raise PlanError(
+                    f"--size {side_m:g} m is too small to be flown; ask for {MIN_SIDE_M:g} m or more"
+                )
+        for phase_rad in (self.phase_x_rad, self.phase_y_rad):
+            if phase_rad is not None and not abs(phase_rad) <= MAX_PHASE_RAD:
+                raise PlanError(f"--phase {math.degrees(phase_rad):g} is not in -3600..3600 degrees")
+        if not math.isfinite(self.heading_rad):
+            raise PlanError(
+                f"--heading {math.degrees(self.heading_rad):g} is not a direction; give degrees, such as 90"
+            )
         if not 2.5 <= self.rate_hz <= 100.0:
             raise PlanError(f"--rate {self.rate_hz:g} Hz is not in 2.5..100 Hz, what keeps a vehicle guided")
         if not 1 <= self.vehicles <= 250:

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from autopilot_bridge.links import Link
     from missions.score import FlightScore
 
+_LIMITING_PARAMETERS: Final = ("MPC_XY_VEL_MAX", "MPC_ACC_HOR", "WPNAV_SPEED", "WPNAV_ACCEL")
+
 COMPLETED: Final = "completed"
 FAILED: Final = "failed"
 INTERRUPTED: Final = "interrupted"
@@ -165,6 +167,9 @@ def limits_before_flight(request: RunRequest) -> VehicleLimits:
     if request.connect or known is None:
         return WIDEST_LIMITS
     given = request.parameters
+    for name in _LIMITING_PARAMETERS:
+        if not given.get(name, 1.0) > 0.0:
+            raise PlanError(f"parameter {name} = {given[name]:g} is not possible; it must be more than 0")
     if request.autopilot == "px4":
         return replace(
             known,

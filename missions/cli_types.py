@@ -1,0 +1,22 @@
+"""Kinds of numbers that the command line takes."""
+
+import math
+from typing import Any, Final
+
+import click
+
+
+class FiniteRange(click.FloatRange):
+    """A range of numbers without NaN, which compares as if it were in every range, and without infinity."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number, or a usage error that names it."""
+        number: float = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
+SLOWEST: Final = 0.001
+SPEEDUP: Final = FiniteRange(min=SLOWEST, max=1e6)
+"""Simulated seconds per wall second."""
