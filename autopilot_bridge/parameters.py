@@ -189,10 +189,6 @@ class ParameterStore:
         """
         return self._values[self.index_of(name)]
 
-    def get_int(self, name: str) -> int:
-        """Value of an integer parameter (a float one is truncated)."""
-        return int(self.get(name))
-
     def set(self, name: str, value: float, *, check_range: bool = True) -> bool:
         """Change a parameter and tell the subscribers; True when the value is new.
 

@@ -203,7 +203,7 @@ class Autopilot:
                 on_list=lambda channel: self._texts.banner(channel),
             ),
             self.missions,
-            TimeSyncService(self, answers_ping=firmware.answers_ping),
+            TimeSyncService(answers_ping=firmware.answers_ping),
             FileTransferService(),
             self.intervals,
             self._texts,

@@ -73,7 +73,7 @@ class Commander:
     Attributes:
         mode: the mode being flown, shown in HEARTBEAT.
         commanded_mode: the mode last asked for; differs from `mode` during a failsafe that keeps it (PX4).
-        armed, armed_time_us: motors may turn, and since when.
+        armed: motors may turn.
         pilot: sticks and ground-station heartbeats come in here.
         setpoints: streamed setpoints come in here.
         home: where to return to.
@@ -81,7 +81,6 @@ class Commander:
         failsafes: conditions that are up.
         tasks: the flight task being flown.
         guidance: requests that send the vehicle somewhere.
-        mission_complete: the last item was done, and the mission mode was not left since.
     """
 
     def __init__(
@@ -104,9 +103,7 @@ class Commander:
         self.mode = policy.boot_mode
         self.commanded_mode = policy.boot_mode
         self.armed = False
-        self.armed_time_us = -1
         self.terminated = False
-        self.mission_complete = False
         self.pilot = PilotInput(built_in_radio=policy.manual_control_always)
         self.setpoints = SetpointStream()
         self.home = Home(context)
@@ -175,11 +172,6 @@ class Commander:
         return self.failsafes.action(self.time_us, self.parameters) > FailsafeAction.WARN
 
     @property
-    def mission_active(self) -> bool:
-        """The mission mode is being flown, armed or not."""
-        return self.mode is FlightMode.MISSION
-
-    @property
     def battery_level(self) -> BatteryLevel:
         """Battery warning level."""
         return self.battery.level
@@ -234,7 +226,6 @@ class Commander:
                 self._tell_reasons(reasons, check_only=False)
             return Verdict(result=self.policy.arming_denied, reasons=reasons)
         self.armed = True
-        self.armed_time_us = self.time_us
         self.context.armed = True
         self._disarming.begin(self.time_us)
         self.situation.sticks_at_arming = self.situation.sticks_age_s <= self.parameters.stick_timeout_s
@@ -407,7 +398,6 @@ class Commander:
         if mode is self.mode:
             return
         previous, self.mode = self.mode, mode
-        self.mission_complete = False
         self.guidance.forget_speed()
         self.emit(ModeChanged(time_us=self.time_us, mode=mode, previous=previous))
         self.tasks.enter(mode)
@@ -485,7 +475,6 @@ class Commander:
                 if event.navigation or last or self.policy.reports_do_items:
                     self.emit(MissionItemReached(time_us=self.time_us, index=event.seq))
             elif isinstance(event, flight.MissionFinished):
-                self.mission_complete = True
                 self.emit(MissionFinished(time_us=self.time_us))
             elif isinstance(event, flight.MissionModeRequested):
                 if self.policy.mission_return_is_mode and self.mode is self.commanded_mode:

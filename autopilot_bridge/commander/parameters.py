@@ -23,7 +23,6 @@ class CommanderParameters:
         fence_radius_m, fence_height_max_m: cylinder around home; 0 switches that wall off.
         fence_polygons: the uploaded fence counts too.
         disarm_preflight_s, disarm_landed_s: automatic disarming; 0 or less switches it off.
-        takeoff_height_m: height over home of a takeoff that names none.
         stick_override: moved sticks take over from automatic flight (PX4 COM_RC_OVERRIDE, bit 0).
         stick_override_offboard: and from OFFBOARD (bit 1).
         stick_override_threshold: stick travel, 0..1, that counts as moved.
@@ -57,7 +56,6 @@ class CommanderParameters:
     fence_action: FailsafeAction
     disarm_preflight_s: float
     disarm_landed_s: float
-    takeoff_height_m: float
     stick_override: bool
     stick_override_offboard: bool
     stick_override_threshold: float

@@ -48,7 +48,6 @@ class Reason(Enum):
     NOT_ARMED = auto()
     ALREADY_FLYING = auto()
     BAD_ALTITUDE = auto()
-    BAD_POSITION = auto()
     BAD_PARAMETER = auto()
     WRONG_MODE = auto()
 
@@ -69,21 +68,6 @@ class Verdict:
 ACCEPTED: Final = Verdict(result=Result.ACCEPTED)
 
 
-def rejected(*reasons: Reason) -> Verdict:
-    """MAV_RESULT_TEMPORARILY_REJECTED: valid, but not now."""
-    return Verdict(result=Result.TEMPORARILY_REJECTED, reasons=reasons)
-
-
-def denied(*reasons: Reason) -> Verdict:
-    """MAV_RESULT_DENIED: the request itself is not acceptable."""
-    return Verdict(result=Result.DENIED, reasons=reasons)
-
-
 def failed(*reasons: Reason) -> Verdict:
     """MAV_RESULT_FAILED: valid, tried, and not done."""
     return Verdict(result=Result.FAILED, reasons=reasons)
-
-
-def unsupported() -> Verdict:
-    """MAV_RESULT_UNSUPPORTED."""
-    return Verdict(result=Result.UNSUPPORTED)

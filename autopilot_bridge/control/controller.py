@@ -160,7 +160,7 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
     )
     s[c.THRUST_GIVEN] = 0.25 * (motor[0] + motor[1] + motor[2] + motor[3])
     for i in range(MOTORS):
-        command = command_from_thrust(motor[i] * s[c.BATTERY_SCALE], p[c.THRUST_MODEL])
+        command = command_from_thrust(motor[i], p[c.THRUST_MODEL])
         command = max(p[c.MOTOR_IDLE], command)
         actuators[i] = command if math.isfinite(command) else p[c.MOTOR_IDLE]
     for i in range(MOTORS, actuators.shape[0]):
@@ -210,7 +210,6 @@ class MulticopterController:
         state[c.DIVISOR] = max(1.0, math.floor(physics_rate_hz / POSITION_RATE_HZ))
         state[c.COUNTER] = state[c.DIVISOR]
         state[c.Q_SETPOINT] = 1.0
-        state[c.BATTERY_SCALE] = 1.0
         state[c.HOVER_VARIANCE] = 0.01
         self.set_parameters(MulticopterParameters() if parameters is None else parameters)
         state[c.HOVER] = self._parameters.hover_thrust
@@ -230,12 +229,6 @@ class MulticopterController:
     def change(self, **values: float | bool) -> None:
         """Replace single parameters by their field names."""
         self.set_parameters(replace(self._parameters, **values))  # type: ignore[arg-type]
-
-    def set_battery_scale(self, scale: float) -> None:
-        """Factor on thrust that makes up for a sagging battery: (nominal voltage / present voltage)^2."""
-        if not 0.5 <= scale <= 2.0:
-            raise ValueError(f"battery scale {scale} is not in 0.5..2")
-        self._state[c.BATTERY_SCALE] = scale
 
     def set_ground_contact(self, contact: bool) -> None:
         """Tell whether the ground may carry part of the weight; hover thrust is not learnt meanwhile."""
@@ -269,13 +262,3 @@ class MulticopterController:
     def velocity_setpoint_ned_m_s(self) -> Array:
         """Velocity wanted by the velocity loop, a view (3,); NaN where it isn't controlled."""
         return self._state[c.VEL_SETPOINT : c.VEL_SETPOINT + 3]
-
-    @property
-    def acceleration_setpoint_ned_m_s2(self) -> Array:
-        """Acceleration wanted of the thrust vector, a view (3,)."""
-        return self._state[c.ACC_SETPOINT : c.ACC_SETPOINT + 3]
-
-    @property
-    def thrust_setpoint(self) -> float:
-        """Collective asked of the mixer, 0..1."""
-        return float(self._state[c.THRUST_SETPOINT])

@@ -96,7 +96,6 @@ IDENTITY: Final = Identity(
     uid=0,
     flight_custom_version=b"3fc7011a",
     uid2=b"flightstack-sitl".ljust(18, b"\0"),
-    answers_protocol_version=False,
 )
 
 

@@ -199,7 +199,6 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         fence_action=_FENCE.get(integer(store, "FENCE_ACTION", 1), FailsafeAction.WARN),
         disarm_preflight_s=clamp(number(store, "DISARM_DELAY", 10.0), 0.0, 127.0),
         disarm_landed_s=1.0,
-        takeoff_height_m=10.0,
         stick_override=False,
         stick_override_offboard=False,
         stick_override_threshold=1.0,

@@ -47,7 +47,6 @@ class Identity:
         middleware_sw_version, os_sw_version, board_version, vendor_id, product_id, uid: as AUTOPILOT_VERSION.
         flight_custom_version: 8 bytes of the source revision.
         uid2: 18 bytes of hardware identity.
-        answers_protocol_version: PROTOCOL_VERSION can be requested.
     """
 
     product: str
@@ -61,7 +60,6 @@ class Identity:
     uid: int
     flight_custom_version: bytes
     uid2: bytes
-    answers_protocol_version: bool
 
     def __post_init__(self) -> None:
         if len(self.flight_custom_version) != 8:
@@ -116,7 +114,3 @@ class Flavour:
     text_needs_heartbeat: bool
     heartbeat_on_mode_change: bool
     bytewise_parameters: bool
-
-    def mode_of(self, custom_mode: int) -> FlightMode | None:
-        """The mode of a custom_mode number, or None when this firmware has no such number."""
-        return next((mode for mode, number in self.custom_modes.items() if number == custom_mode), None)

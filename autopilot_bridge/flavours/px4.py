@@ -85,7 +85,6 @@ IDENTITY: Final = Identity(
     uid=5283920058631409231,
     flight_custom_version=(bytes.fromhex("94cb2012") + bytes(4))[::-1],
     uid2=bytes(18),
-    answers_protocol_version=True,
 )
 
 

@@ -181,7 +181,6 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         fence_action=fence_action,
         disarm_preflight_s=clamp(number(store, "COM_DISARM_PRFLT", 10.0), -1.0, 1e6),
         disarm_landed_s=clamp(number(store, "COM_DISARM_LAND", 2.0), -1.0, 1e6),
-        takeoff_height_m=clamp(number(store, "MIS_TAKEOFF_ALT", 2.5), 0.5, 500.0),
         stick_override=bool(override & 1),
         stick_override_offboard=bool(override & 2),
         stick_override_threshold=clamp(number(store, "COM_RC_STICK_OV", 30.0) / 100.0, 0.05, 0.8),

@@ -46,11 +46,6 @@ class TakeoffTask:
         self._arrived = False
 
     @property
-    def target_down_m(self) -> float:
-        """Local down coordinate of the height to reach; valid after `activate`."""
-        return float(self._place[2])
-
-    @property
     def place_ned_m(self) -> Array:
         """Where the climb ends, (3,); a copy, valid after `activate`."""
         return self._place.copy()

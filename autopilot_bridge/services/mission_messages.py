@@ -9,7 +9,6 @@ no part in CRC_EXTRA, so every MAVLink 2 receiver understands both.
 import math
 import struct
 import zlib
-from dataclasses import replace
 from typing import Any, ClassVar, Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -231,8 +230,3 @@ class _Nowhere:
 
 
 _NOWHERE: Final = _Nowhere()
-
-
-def with_frame(item: MissionItem, frame: int) -> MissionItem:
-    """The item in another frame of the same kind of coordinates."""
-    return item if item.frame == frame else replace(item, frame=frame)

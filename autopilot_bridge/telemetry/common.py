@@ -275,25 +275,27 @@ class CommonMessages:
 
     def home_position(self) -> Values | None:
         """HOME_POSITION (242)."""
-        context = self.sources.context
-        frame = context.frame
-        north, east, down = context.home_ned_m.tolist()
-        if frame is None or not math.isfinite(north):
+        place = self.home_place()
+        if place is None:
             return None
-        lat_deg, lon_deg, alt_m = frame.geodetic_from_ned(north, east, down)
         return (
-            round(lat_deg * 1e7),
-            round(lon_deg * 1e7),
-            round(alt_m * 1000.0),
-            north,
-            east,
-            down,
+            *place,
+            *self.sources.context.home_ned_m.tolist(),
             self.home_quaternion(),
             0.0,
             0.0,
             0.0,
             self.view.time_us,
         )
+
+    def home_place(self) -> tuple[int, int, int] | None:
+        """Latitude and longitude (degE7) and altitude (mm) of home; None before there is one."""
+        context = self.sources.context
+        north, east, down = context.home_ned_m.tolist()
+        if context.frame is None or not math.isfinite(north):
+            return None
+        lat_deg, lon_deg, alt_m = context.frame.geodetic_from_ned(north, east, down)
+        return round(lat_deg * 1e7), round(lon_deg * 1e7), round(alt_m * 1000.0)
 
     def home_quaternion(self) -> tuple[float, float, float, float]:
         """Heading at home as HOME_POSITION carries it."""

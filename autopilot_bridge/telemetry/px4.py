@@ -214,7 +214,7 @@ class Px4Messages(CommonMessages):
 
     def open_drone_id_system(self) -> Values | None:
         """OPEN_DRONE_ID_SYSTEM (12904): the operator is taken to stand at home."""
-        home = self.home_position()
+        home = self.home_place()
         if home is None:
             return None
         unix_s = (self.sources.unix_epoch_us + self.view.time_us) // 1_000_000
@@ -232,7 +232,7 @@ class Px4Messages(CommonMessages):
             -1000.0,
             mavlink.MAV_ODID_CATEGORY_EU_UNDECLARED,
             mavlink.MAV_ODID_CLASS_EU_UNDECLARED,
-            float(home[2]) * 1e-3,
+            home[2] * 1e-3,
             max(0, unix_s - ODID_EPOCH_UNIX_S),
         )
 

@@ -57,10 +57,6 @@ class GuidedSession:
         assert self._task is not None
         await self._until_done(self._task)
 
-    async def stay(self, setpoint: Setpoint, seconds: float) -> None:
-        """Keep one setpoint for some vehicle seconds."""
-        await self.follow(lambda t: setpoint if t < seconds else None)
-
     async def finish(self) -> None:
         """Leave the guided mode for hold while setpoints still go out, so that no failsafe sees a gap."""
         if self._entered:

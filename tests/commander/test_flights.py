@@ -103,8 +103,7 @@ def test_the_end_of_a_mission_without_return_holds() -> None:
     rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 5.0))
     rig.commander.set_mode(FlightMode.MISSION)
     rig.commander.arm()
-    rig.run_until(lambda: rig.commander.mission_complete, 60.0)
-    assert rig.happened(MissionFinished)
+    rig.run_until(lambda: rig.happened(MissionFinished), 60.0)
     assert rig.commander.airborne and rig.commander.mode is FlightMode.MISSION
 
 
@@ -115,7 +114,7 @@ def test_px4_reports_the_last_item_reached_whatever_it_is() -> None:
     rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 5.0), speed)
     rig.commander.set_mode(FlightMode.MISSION)
     rig.commander.arm()
-    rig.run_until(lambda: rig.commander.mission_complete, 60.0)
+    rig.run_until(lambda: rig.happened(MissionFinished), 60.0)
     assert [event.index for event in rig.happened(MissionItemReached)] == [0, 1, 2]
 
 
