@@ -6,7 +6,7 @@ import numpy as np
 
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
-from autopilot_bridge.flight.ground import TakeoffRamp
+from autopilot_bridge.flight.cruise import CruiseTask
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 
@@ -22,7 +22,7 @@ class IdleTask:
         return TaskStatus.RUNNING
 
 
-class HoldTask:
+class HoldTask(CruiseTask):
     """Brake within the limits, then hold the place; or fly to a given place and hold that.
 
     On the ground it rests with motors at idle. Without a position it stops by velocity, without that it
@@ -33,28 +33,17 @@ class HoldTask:
         yaw_rad: heading to hold; None: the present one.
     """
 
-    __slots__ = ("_motion", "_ramp", "_target", "_yaw_rad")
+    __slots__ = ("_target", "_yaw_rad")
 
     def __init__(self, position_ned_m: Array | None = None, yaw_rad: float | None = None) -> None:
+        super().__init__()
         self._target = None if position_ned_m is None else np.array(position_ned_m, dtype=np.float64)
         self._yaw_rad = math.nan if yaw_rad is None else yaw_rad
-        self._motion: SmoothMotion | None = None
-        self._ramp: TakeoffRamp | None = None
 
-    def activate(self, ctx: FlightContext) -> None:
-        ctx.phase = FlightPhase.CRUISE
-        self._motion = SmoothMotion(ctx)
-        self._ramp = TakeoffRamp(ctx)
+    def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
+        """Nothing to set: the present state is where it starts."""
 
-    def update(self, ctx: FlightContext) -> TaskStatus:
-        motion, ramp = self._motion, self._ramp
-        if motion is None or ramp is None:
-            self.activate(ctx)
-            return self.update(ctx)
-        if not ramp.update(ctx, False, 0.0):
-            motion.restart(ctx)
-            return TaskStatus.RUNNING
-        motion.synchronise(ctx)
+    def _fly(self, ctx: FlightContext, motion: SmoothMotion) -> TaskStatus:
         if self._target is None:
             motion.brake(ctx)
         else:
@@ -64,31 +53,19 @@ class HoldTask:
         return TaskStatus.RUNNING
 
 
-class BrakeTask:
+class BrakeTask(CruiseTask):
     """Stop as hard as the limits allow and hold (ArduPilot BRAKE); DONE when stopped."""
 
-    __slots__ = ("_done", "_motion", "_ramp")
+    __slots__ = ("_done",)
 
     def __init__(self) -> None:
-        self._motion: SmoothMotion | None = None
-        self._ramp: TakeoffRamp | None = None
+        super().__init__()
         self._done = False
 
-    def activate(self, ctx: FlightContext) -> None:
-        ctx.phase = FlightPhase.CRUISE
+    def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
         self._done = False
-        self._motion = SmoothMotion(ctx)
-        self._ramp = TakeoffRamp(ctx)
 
-    def update(self, ctx: FlightContext) -> TaskStatus:
-        motion, ramp = self._motion, self._ramp
-        if motion is None or ramp is None:
-            self.activate(ctx)
-            return self.update(ctx)
-        if not ramp.update(ctx, False, 0.0):
-            motion.restart(ctx)
-            return TaskStatus.RUNNING
-        motion.synchronise(ctx)
+    def _fly(self, ctx: FlightContext, motion: SmoothMotion) -> TaskStatus:
         motion.brake(ctx)
         motion.steer(ctx, motion.heading.yaw_rad)
         motion.write(ctx)

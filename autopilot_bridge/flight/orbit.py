@@ -6,8 +6,8 @@ from enum import IntEnum
 import numpy as np
 
 from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
-from autopilot_bridge.flight.ground import TakeoffRamp
+from autopilot_bridge.flight.context import Array, FlightContext, TaskFinished
+from autopilot_bridge.flight.cruise import CruiseTask
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
@@ -40,7 +40,7 @@ def circle_ahead(ctx: FlightContext, radius_m: float) -> Array:
     )
 
 
-class OrbitTask:
+class OrbitTask(CruiseTask):
     """Fly to the nearest point of a circle, then around it at constant speed; DONE after `turns`, if given.
 
     Args:
@@ -61,9 +61,7 @@ class OrbitTask:
         "_ahead",
         "_finished",
         "_initial_yaw",
-        "_motion",
         "_phase_rad",
-        "_ramp",
         "_speed_m_s",
         "_turns",
         "_yaw_behaviour",
@@ -83,6 +81,7 @@ class OrbitTask:
         yaw_behaviour: OrbitYaw = OrbitYaw.FRONT_TO_CENTRE,
         turns: float | None = None,
     ) -> None:
+        super().__init__()
         self._ahead = centre_ned_m is None
         self.centre_ned_m: Array = np.full(3, np.nan)
         if centre_ned_m is not None:
@@ -91,8 +90,6 @@ class OrbitTask:
         self.velocity_m_s = math.nan if velocity_m_s is None else velocity_m_s
         self._yaw_behaviour = yaw_behaviour
         self._turns = turns
-        self._motion: SmoothMotion | None = None
-        self._ramp: TakeoffRamp | None = None
         self.circling = False
         self.turns_done = 0.0
         self._phase_rad = 0.0
@@ -100,12 +97,9 @@ class OrbitTask:
         self._initial_yaw = 0.0
         self._finished = False
 
-    def activate(self, ctx: FlightContext) -> None:
-        ctx.phase = FlightPhase.CRUISE
+    def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
         p = ctx.parameters
-        self._motion = SmoothMotion(ctx)
-        self._ramp = TakeoffRamp(ctx)
-        position = self._motion.trajectory.position_ned_m
+        position = motion.trajectory.position_ned_m
         if not (math.isfinite(self.radius_m) and self.radius_m > 0.0):
             self.radius_m = p.orbit_radius_m
         self.radius_m = max(1.0, self.radius_m)
@@ -121,7 +115,7 @@ class OrbitTask:
         self.turns_done = 0.0
         self._speed_m_s = 0.0
         self._finished = False
-        self._initial_yaw = self._motion.heading.yaw_rad
+        self._initial_yaw = motion.heading.yaw_rad
         north = float(position[0] - self.centre_ned_m[0])
         east = float(position[1] - self.centre_ned_m[1])
         self._phase_rad = (
@@ -133,15 +127,7 @@ class OrbitTask:
             [math.cos(self._phase_rad), math.sin(self._phase_rad), 0.0]
         )
 
-    def update(self, ctx: FlightContext) -> TaskStatus:
-        motion, ramp = self._motion, self._ramp
-        if motion is None or ramp is None:
-            self.activate(ctx)
-            return self.update(ctx)
-        if not ramp.update(ctx, False, 0.0):
-            motion.restart(ctx)
-            return TaskStatus.RUNNING
-        motion.synchronise(ctx)
+    def _fly(self, ctx: FlightContext, motion: SmoothMotion) -> TaskStatus:
         trajectory = motion.trajectory
         if not ctx.position_valid:
             self.circling = False
