@@ -87,6 +87,9 @@ NOT_REQUESTABLE: Final = frozenset(
 
 _RC_NEUTRAL_US: Final = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
 _POSITION_ONLY_MASK: Final = 0xFDF8
+_FORCE_AND_FRAME_BITS: Final = 0xF200
+_VELOCITY_MASK: Final = 0xC07
+_SECONDS_PER_HOUR: Final = 3600.0
 
 
 class ArdupilotMessages(CommonMessages):
@@ -143,7 +146,7 @@ class ArdupilotMessages(CommonMessages):
         if target is not None and all(map(math.isfinite, target[:3])):
             north, east, down = (goal - here for goal, here in zip(target[:3], v.pos, strict=True))
             distance_m = math.hypot(north, east)
-            bearing_deg = round(math.degrees(math.atan2(east, north)))
+            bearing_deg = round(math.degrees(math.atan2(east, north))) % 360
             alt_error_m = -down
         heading_deg = round(math.degrees(v.yaw))
         return (
@@ -222,6 +225,33 @@ class ArdupilotMessages(CommonMessages):
     def extended_sys_state(self) -> Values:
         """EXTENDED_SYS_STATE (245): a copter calls itself VTOL in multicopter state."""
         return (mavlink.MAV_VTOL_STATE_MC, int(self.sources.context.landed_state))
+
+    def battery_status(self) -> Values | None:
+        """BATTERY_STATUS (147): kind of battery unknown, energy in hectojoules from charge and voltage."""
+        values = super().battery_status()
+        battery = self.view.battery
+        if values is None or battery is None:
+            return None
+        energy_hj = round(battery[0] * battery[2] * _SECONDS_PER_HOUR / 100.0)
+        return (
+            values[0],
+            mavlink.MAV_BATTERY_FUNCTION_UNKNOWN,
+            mavlink.MAV_BATTERY_TYPE_UNKNOWN,
+            *values[3:7],
+            energy_hj,
+            *values[8:],
+        )
+
+    def position_target_local_ned(self) -> Values | None:
+        """POSITION_TARGET_LOCAL_NED (85): a position alone, or velocity and acceleration."""
+        target = self.trajectory_setpoint()
+        if target is None:
+            return None
+        if all(map(math.isfinite, target[:3])):
+            mask, target = _POSITION_ONLY_MASK & ~_FORCE_AND_FRAME_BITS, [*target[:3], *(0.0,) * 8]
+        else:
+            mask, target = _VELOCITY_MASK, [0.0, 0.0, 0.0, *map(finite, target[3:9]), 0.0, 0.0]
+        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
 
     def position_target_global_int(self) -> Values | None:
         """POSITION_TARGET_GLOBAL_INT (87): frame 0, altitude above mean sea level."""

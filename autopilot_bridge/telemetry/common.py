@@ -313,11 +313,12 @@ class CommonMessages:
             return None
         distance_m, min_m, max_m = reading.values.tolist()
         in_range = math.isfinite(distance_m)
+        beyond_cm = 0 if self.sources.context.on_ground else round(max_m * 100.0) + 1  # too near, or too far
         return (
             reading.time_us // 1000,
             round(min_m * 100.0),
             round(max_m * 100.0),
-            round(distance_m * 100.0) if in_range else round(max_m * 100.0) + 1,
+            round(distance_m * 100.0) if in_range else beyond_cm,
             mavlink.MAV_DISTANCE_SENSOR_LASER,
             0,
             mavlink.MAV_SENSOR_ROTATION_PITCH_270,

@@ -81,6 +81,12 @@ GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
 )
 """PX4's NORMAL mode with raised rates (UDP 14550), reference section 6."""
 
+_TARGET_BITS: Final = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)
+"""POSITION_TARGET_TYPEMASK of position, velocity, acceleration (north, east, down), yaw and yaw rate."""
+
+_FREE_FALL_M_S2: Final = 100.0
+"""Downward acceleration that PX4 asks for while the motors are off."""
+
 ODID_EPOCH_UNIX_S: Final = 1546300800
 """2019-01-01, the epoch of Open Drone ID's system time stamp."""
 
@@ -133,21 +139,47 @@ class Px4Messages(CommonMessages):
         return (0, self.view.time_us * 1000, 0, 0)
 
     def altitude(self) -> Values | None:
-        """ALTITUDE (141)."""
+        """ALTITUDE (141): monotonic is the barometer's, terrain counts from the local origin."""
         v = self.view.refreshed()
         if not v.has_global:
             return None
         clearance_m = float(self.sources.navigation.state[nav.HEIGHT_ABOVE_GROUND_M])
-        terrain_m = v.alt_amsl_m - clearance_m if math.isfinite(clearance_m) else NAN
+        local_m = -v.pos[2]
+        pressure_pa, _ = v.pressure()
         return (
             v.time_us,
+            pressure_altitude_m(pressure_pa) if math.isfinite(pressure_pa) else NAN,
             v.alt_amsl_m,
-            v.alt_amsl_m,
-            -v.pos[2],
+            local_m,
             v.alt_relative_m,
-            terrain_m,
+            local_m - clearance_m if math.isfinite(clearance_m) else NAN,
             clearance_m,
         )
+
+    def attitude_target(self) -> Values | None:
+        """ATTITUDE_TARGET (83), at rest too: level, as it stands, motors off."""
+        target = super().attitude_target()
+        if target is not None or not self.sources.navigation.health.attitude:
+            return target
+        half_yaw = 0.5 * self.view.refreshed().yaw
+        level = (math.cos(half_yaw), 0.0, 0.0, math.sin(half_yaw))
+        return (self.view.time_ms, 0, level, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0))
+
+    def position_target_local_ned(self) -> Values | None:
+        """POSITION_TARGET_LOCAL_NED (85), at rest too; what nobody asks for is NaN, and masked."""
+        target = self.trajectory_setpoint()
+        if target is None:
+            if self.sources.context.armed or not self.sources.navigation.health.attitude:
+                return None
+            target = [NAN] * 6 + [0.0, 0.0, _FREE_FALL_M_S2, self.view.refreshed().yaw, 0.0]
+        else:  # PX4 shows what its position controller makes of a position
+            computed = self.sources.controller.velocity_setpoint_ned_m_s.tolist()
+            target[3:6] = [
+                made if math.isnan(asked) else asked
+                for asked, made in zip(target[3:6], computed, strict=True)
+            ]
+        mask = sum(bit for bit, value in zip(_TARGET_BITS, target, strict=True) if math.isnan(value))
+        return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
 
     def estimator_status(self) -> Values:
         """ESTIMATOR_STATUS (230)."""

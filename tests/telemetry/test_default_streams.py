@@ -20,6 +20,7 @@ PX4_ONBOARD_HZ = {
     **dict.fromkeys(("ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT", "HIGHRES_IMU"), 50),
     **dict.fromkeys(("LOCAL_POSITION_NED", "ODOMETRY"), 30),
     **dict.fromkeys(("ALTITUDE", "DISTANCE_SENSOR", "SERVO_OUTPUT_RAW", "TIMESYNC", "VFR_HUD"), 10),
+    **dict.fromkeys(("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"), 10),
     "GPS_RAW_INT": 8,
     **dict.fromkeys(("EXTENDED_SYS_STATE", "SYS_STATUS"), 5),
     **dict.fromkeys(("HEARTBEAT", "SYSTEM_TIME", "PING", "ESTIMATOR_STATUS", "SCALED_PRESSURE"), 1),
@@ -31,6 +32,7 @@ PX4_ONBOARD_HZ = {
 PX4_GCS_HZ = {
     **dict.fromkeys(("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT"), 50),
     **dict.fromkeys(("LOCAL_POSITION_NED", "SERVO_OUTPUT_RAW"), 50),
+    **dict.fromkeys(("ATTITUDE_TARGET", "POSITION_TARGET_LOCAL_NED"), 50),
     "GPS_RAW_INT": 5,
     "VFR_HUD": 4,
     **dict.fromkeys(("ALTITUDE", "EXTENDED_SYS_STATE", "HEARTBEAT", "MISSION_CURRENT"), 1),
