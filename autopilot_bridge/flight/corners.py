@@ -11,47 +11,78 @@ Point = tuple[float, float, float]
 
 _STRAIGHT_RAD: Final = 1e-3
 _REVERSAL_RAD: Final = math.radians(150.0)
-_ROUNDING: Final = 0.6  # of the acceptance radius may be used up by rounding a corner
+_TURN_SHARE: Final = 0.85  # of the acceptance radius: a turn begins inside it
+_SWING_OUT: Final = 0.2  # of the acceptance radius
+_SAME_PLACE_M: Final = 0.1
 
 
 def turn_angle(before: Point, corner: Point, after: Point) -> float:
     """Horizontal change of course at a corner, 0 (straight on) to pi; 0 beside a vertical leg."""
     n1, e1 = corner[0] - before[0], corner[1] - before[1]
     n2, e2 = after[0] - corner[0], after[1] - corner[1]
-    if math.hypot(n1, e1) < 0.1 or math.hypot(n2, e2) < 0.1:
+    if math.hypot(n1, e1) < _SAME_PLACE_M or math.hypot(n2, e2) < _SAME_PLACE_M:
         return 0.0
     return abs(math.atan2(n1 * e2 - e1 * n2, n1 * n2 + e1 * e2))
 
 
-def corner_speed(angle_rad: float, tangent_m: float, acceleration_m_s2: float) -> float:
-    """Speed on the arc that touches both legs `tangent_m` before and after the corner.
+def turn_distance(angle_rad: float, speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
+    """Distance before a corner at which a turn begins that ends on the leg behind it.
 
-    The arc's radius is tangent / tan(angle / 2), its centripetal acceleration the given one.
+    The velocity goes straight from one leg's to the other's, its change 2 v sin(angle / 2) built up and taken
+    back at limited jerk within a time T; that is symmetric about the corner and begins v T / 2 before it.
+    """
+    change = 2.0 * speed_m_s * math.sin(0.5 * angle_rad)
+    build_up = acceleration_m_s2 / jerk_m_s3
+    if change > acceleration_m_s2 * build_up:
+        time_s = change / acceleration_m_s2 + build_up
+    else:  # the full acceleration is not needed
+        time_s = 2.0 * math.sqrt(change / jerk_m_s3)
+    return 0.5 * speed_m_s * time_s
+
+
+def turn_speed(angle_rad: float, distance_m: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
+    """Speed of the turn that begins `distance_m` before a corner: the inverse of `turn_distance`.
+
+    Hardly any turn is flown at any speed, a reversal at none.
     """
     if angle_rad < _STRAIGHT_RAD:
         return math.inf
     if angle_rad > _REVERSAL_RAD:
         return 0.0
-    return math.sqrt(acceleration_m_s2 * tangent_m / math.tan(0.5 * angle_rad))
+    share = 2.0 * math.sin(0.5 * angle_rad)
+    build_up = acceleration_m_s2 / jerk_m_s3
+    speed = (jerk_m_s3 * distance_m * distance_m / share) ** (1.0 / 3.0)
+    if share * speed <= acceleration_m_s2 * build_up:
+        return speed
+    half = 0.5 * build_up
+    return (
+        acceleration_m_s2
+        / share
+        * (math.sqrt(half * half + 2.0 * share * distance_m / acceleration_m_s2) - half)
+    )
 
 
-def easing_speed(angle_rad: float, distance_m: float, jerk_m_s3: float) -> float:
-    """Speed at which a turn built up and taken back within twice `distance_m` is a full one.
-
-    The lateral acceleration is a triangle of slope jerk over the time 2 distance / v, so the course changes
-    by jerk distance^2 / v^3.
+def turn_room(path: Sequence[Point], radii_m: Sequence[float], index: int) -> float:
+    """How far before corner `index` of a path its turn may begin: inside the acceptance radius, and no more
+    than half of either leg.
     """
-    if angle_rad < _STRAIGHT_RAD:
-        return math.inf
-    return (jerk_m_s3 * distance_m * distance_m / angle_rad) ** (1.0 / 3.0)
+    behind, ahead = (
+        math.dist(path[index - 1][0:2], path[index][0:2]),
+        math.dist(path[index][0:2], path[index + 1][0:2]),
+    )
+    half_leg = 0.5 * min(ahead, behind if behind > _SAME_PLACE_M else math.inf)
+    return min(_TURN_SHARE * radii_m[index], half_leg)
 
 
-def turn_in_distance(angle_rad: float, speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
-    """Distance before the corner at which a turn at `speed_m_s` begins, its build-up included."""
-    if angle_rad < _STRAIGHT_RAD:
-        return 0.0
-    arc = speed_m_s * speed_m_s / acceleration_m_s2 * math.tan(0.5 * min(angle_rad, _REVERSAL_RAD))
-    return arc + 0.5 * speed_m_s * min(1.0, acceleration_m_s2 / jerk_m_s3)
+def turn_in_distance(
+    path: Sequence[Point], radii_m: Sequence[float], speed_m_s: float, parameters: FlightParameters
+) -> float:
+    """Distance before the first corner of a path at which its turn begins, passed at `speed_m_s`."""
+    p = parameters
+    wanted = turn_distance(
+        turn_angle(path[0], path[1], path[2]), speed_m_s, p.corner_acceleration_m_s2, p.jerk_m_s3
+    )
+    return min(wanted, turn_room(path, radii_m, 1))
 
 
 def passing_speed(path: Sequence[Point], radii_m: Sequence[float], parameters: FlightParameters) -> float:
@@ -64,24 +95,21 @@ def passing_speed(path: Sequence[Point], radii_m: Sequence[float], parameters: F
     """
     if len(path) < 3:
         return 0.0
-    speed = 0.0
+    p = parameters
+    speed = turn_in = 0.0
     for i in range(len(path) - 2, 0, -1):
         ahead = math.dist(path[i][0:2], path[i + 1][0:2])
-        behind = math.dist(path[i - 1][0:2], path[i][0:2])
-        if ahead < 0.1:
-            speed = 0.0  # a climb on the spot
+        if ahead < _SAME_PLACE_M:
+            speed = turn_in = 0.0  # a climb on the spot
             continue
         reach = braking_speed(
-            ahead, speed, parameters.acceleration_m_s2, parameters.jerk_m_s3, parameters.trajectory_p_1_s
+            max(0.0, ahead - turn_in), speed, p.acceleration_m_s2, p.jerk_m_s3, p.trajectory_p_1_s
         )
-        half_leg = min(0.5 * ahead, 0.5 * behind if behind > 0.1 else math.inf)
-        tangent = min(radii_m[i], half_leg)
         angle = turn_angle(path[i - 1], path[i], path[i + 1])
-        # a rounded corner stays this close to the waypoint when the turn is eased in from here
-        easing = min(half_leg, _ROUNDING * radii_m[i] / math.tan(0.25 * max(angle, _STRAIGHT_RAD)))
-        speed = min(
-            reach,
-            corner_speed(angle, tangent, parameters.corner_acceleration_m_s2),
-            easing_speed(angle, easing, parameters.jerk_m_s3),
-        )
+        room = turn_room(path, radii_m, i)
+        # a slight turn may begin late: it swings out by no more than a share of the radius
+        late = _SWING_OUT * radii_m[i] * max(0.0, math.cos(angle)) / math.sin(max(angle, _STRAIGHT_RAD))
+        turn = turn_speed(angle, min(room + late, 0.5 * ahead), p.corner_acceleration_m_s2, p.jerk_m_s3)
+        speed = min(reach, turn)
+        turn_in = min(room, turn_distance(angle, speed, p.corner_acceleration_m_s2, p.jerk_m_s3))
     return speed

@@ -14,7 +14,7 @@ from autopilot_bridge.flight.context import (
     WaypointReached,
     WaypointStarted,
 )
-from autopilot_bridge.flight.corners import Point, passing_speed, turn_angle, turn_in_distance
+from autopilot_bridge.flight.corners import Point, passing_speed, turn_in_distance
 from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.hold import HoldTask
 from autopilot_bridge.flight.land import LandTask
@@ -253,7 +253,7 @@ class MissionTask:
         if came_from is None:
             motion.begin_leg()
         else:
-            motion.set_leg_start(came_from)
+            motion.turn_into_leg(came_from)
         start = motion.trajectory.position_ned_m if came_from is None else came_from
         speed, turn_in = self._corner(ctx, item, start, target, radius)
         self._leg = _Leg(target, radius, self._yaw_rad if yaw is None else yaw, speed, turn_in, hold_s)
@@ -286,10 +286,7 @@ class MissionTask:
         if speed <= 0.0:
             return 0.0, 0.0
         speed = min(speed, self._speed_m_s or ctx.parameters.cruise_speed_m_s)
-        angle = turn_angle(path[0], path[1], path[2])
-        p = ctx.parameters
-        turn_in = turn_in_distance(angle, speed, p.corner_acceleration_m_s2, p.jerk_m_s3)
-        return speed, min(turn_in, 0.75 * radius, 0.5 * math.dist(path[1], path[2]))
+        return speed, turn_in_distance(path, radii, speed, ctx.parameters)
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         motion, ramp = self._motion, self._ramp
@@ -338,7 +335,7 @@ class MissionTask:
             motion.restart(ctx)
             return
         motion.synchronise(ctx)
-        motion.fly_to(ctx, leg.target, 0.0 if leg.arrived else leg.passing_m_s)
+        motion.fly_to(ctx, leg.target, 0.0 if leg.arrived else leg.passing_m_s, leg.turn_in_m)
         motion.steer(ctx, leg.yaw_rad, leg.target)
         motion.write(ctx)
         item = self._store.items[self._seq]
@@ -348,7 +345,7 @@ class MissionTask:
         level = abs(float(vehicle[2] - leg.target[2])) < ctx.parameters.acceptance_altitude_m
         inside = ctx.position_valid and away <= leg.radius_m and level
         if leg.passing_m_s > 0.0 and not leg.arrived:
-            ahead = self._ahead(motion, leg)
+            ahead = motion.ahead_m(leg.target)
             if inside and ahead <= leg.turn_in_m + float(motion.trajectory.limits[SPEED]) * ctx.dt_s:
                 self._complete(ctx, item, leg.target)
             elif ahead < -leg.radius_m:
@@ -361,15 +358,6 @@ class MissionTask:
             leg.waited_s += ctx.dt_s
             if leg.waited_s >= leg.hold_s:
                 self._complete(ctx, item, leg.target)
-
-    def _ahead(self, motion: SmoothMotion, leg: _Leg) -> float:
-        """Distance of the waypoint ahead of the moving point, along its course; negative when passed."""
-        point, velocity = motion.trajectory.position_ned_m, motion.trajectory.velocity_ned_m_s
-        north, east = float(leg.target[0] - point[0]), float(leg.target[1] - point[1])
-        speed = math.hypot(float(velocity[0]), float(velocity[1]))
-        if speed < 0.1:
-            return math.hypot(north, east)
-        return (north * float(velocity[0]) + east * float(velocity[1])) / speed
 
 
 def _flat_distance(a: Array, b: Array) -> float:

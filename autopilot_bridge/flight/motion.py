@@ -9,7 +9,7 @@ from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.parameters import YawBehaviour
 from autopilot_bridge.flight.task import clear_setpoint
-from autopilot_bridge.flight.trajectory import TrajectoryGenerator
+from autopilot_bridge.flight.trajectory import SPEED_TURN, TrajectoryGenerator
 from autopilot_bridge.flight.yaw import YawSteering
 from autopilot_bridge.navigation import layout as nav_layout
 
@@ -17,6 +17,8 @@ _CONTINUE_WITHIN_M: Final = 2.0  # a running trajectory this close to the vehicl
 _CONTINUE_WITHIN_M_S: Final = 2.0
 _TURN_DISTANCE_M: Final = 2.0  # the nose turns only to targets farther than this
 _MIN_COURSE_SPEED_M_S: Final = 0.7
+_SLOWEST_TURN_M_S: Final = 0.5
+_SHORTEST_LEG_M: Final = 0.1
 _NAV_YAW: Final = 27
 
 
@@ -67,7 +69,7 @@ class SmoothMotion:
             self.heading.reset(float(setpoint[sp.YAW_RAD]), rate if math.isfinite(rate) else 0.0)
         else:
             self.heading.reset(float(nav[_NAV_YAW]), float(nav[nav_layout.RATES_FRD_RAD_S][2]))
-        self._leg_start[:] = self.trajectory.position_ned_m
+        self.begin_leg()
         self._synchronised = ctx.position_valid
         if ctx.health is not None:
             self._position_resets = ctx.health.position_resets
@@ -99,15 +101,30 @@ class SmoothMotion:
     def begin_leg(self) -> None:
         """The next leg starts where the moving point is."""
         self._leg_start[:] = self.trajectory.position_ned_m
+        self.trajectory.limits[SPEED_TURN] = math.inf
 
-    def fly_to(self, ctx: FlightContext, end_ned_m: Array, end_speed_m_s: float = 0.0) -> None:
-        """One tick along the leg to `end_ned_m`."""
+    def fly_to(
+        self, ctx: FlightContext, end_ned_m: Array, end_speed_m_s: float = 0.0, turn_in_m: float = 0.0
+    ) -> None:
+        """One tick along the leg to `end_ned_m`, slowed down to the end speed `turn_in_m` before it."""
         self.trajectory.wait_for(ctx.nav[nav_layout.POS_NED_M], ctx.parameters.trajectory_error_max_m)
-        self.trajectory.follow_leg(self._leg_start, end_ned_m, end_speed_m_s, ctx.dt_s)
+        self.trajectory.follow_leg(self._leg_start, end_ned_m, end_speed_m_s, ctx.dt_s, turn_in_m=turn_in_m)
 
-    def set_leg_start(self, start_ned_m: Array) -> None:
-        """The leg to be flown starts at a given point (the waypoint before)."""
+    def turn_into_leg(self, start_ned_m: Array) -> None:
+        """The leg starts at a corner (the waypoint before), which is rounded at the present speed."""
         self._leg_start[:] = start_ned_m
+        north, east = (float(v) for v in self.trajectory.velocity_ned_m_s[0:2])
+        self.trajectory.limits[SPEED_TURN] = max(_SLOWEST_TURN_M_S, math.hypot(north, east))
+
+    def ahead_m(self, end_ned_m: Array) -> float:
+        """Distance still to go along the leg; negative beyond its end."""
+        point, start = self.trajectory.position_ned_m, self._leg_start
+        leg_n, leg_e = float(end_ned_m[0] - start[0]), float(end_ned_m[1] - start[1])
+        north, east = float(end_ned_m[0] - point[0]), float(end_ned_m[1] - point[1])
+        length = math.hypot(leg_n, leg_e)
+        if length < _SHORTEST_LEG_M:
+            return math.hypot(north, east)
+        return (north * leg_n + east * leg_e) / length
 
     def brake(self, ctx: FlightContext) -> None:
         """One tick towards standing still."""

@@ -31,11 +31,14 @@ ACC_UP: Final = 4
 ACC_DOWN: Final = 5
 JERK: Final = 6
 GAIN: Final = 7
-LIMITS_SIZE: Final = 8
+SPEED_TURN: Final = 8  # in the corner before the leg; infinite when it is behind
+LIMITS_SIZE: Final = 9
 
 _SURFACE_SHARE: Final = 0.8  # of the jerk, used by the switching surface; the rest absorbs the 50 Hz grid
 _BRAKE_SHARE: Final = 0.8  # of the acceleration, used for the braking profile
 _VELOCITY_GAIN_1_S: Final = 7.0
+_CROSS_ACC_SHARE: Final = 0.7  # of the acceleration, used by the profile with which a leg is joined
+_TURNED_M_S: Final = 0.3  # this close to the velocity behind a corner the turn is over
 
 
 @kernel
@@ -85,6 +88,40 @@ def _approach2(s: Array, vx: float, vy: float, acc_max: float, jerk: float, dt: 
 
 
 @kernel
+def _approach_leg(
+    s: Array, ux: float, uy: float, v_along: float, v_left: float, acc_max: float, jerk: float, dt: float
+) -> None:
+    """Horizontal velocity of the state towards a velocity along and to the left of a leg's direction.
+
+    The way across comes first and what is left of the acceleration goes along: a vehicle that leaves a
+    corner at once for full speed would have nothing left to turn with, and overshoot.
+    """
+    dv_along = v_along - (s[3] * ux + s[4] * uy)
+    dv_left = v_left - (s[3] * uy - s[4] * ux)
+    want = min(
+        acc_max, math.sqrt(2.0 * _SURFACE_SHARE * jerk * abs(dv_left)), _VELOCITY_GAIN_1_S * abs(dv_left)
+    )
+    left = want if dv_left > 0.0 else -want
+    rest = math.sqrt(acc_max * acc_max - left * left)
+    want = min(
+        rest, math.sqrt(2.0 * _SURFACE_SHARE * jerk * abs(dv_along)), _VELOCITY_GAIN_1_S * abs(dv_along)
+    )
+    along = want if dv_along > 0.0 else -want
+    j_left = left - (s[6] * uy - s[7] * ux)
+    j_along = along - (s[6] * ux + s[7] * uy)
+    change = math.sqrt(j_left * j_left + j_along * j_along)
+    if change > jerk * dt:
+        j_left *= jerk * dt / change
+        j_along *= jerk * dt / change
+    for i, j in ((0, j_along * ux + j_left * uy), (1, j_along * uy - j_left * ux)):
+        a0 = s[6 + i]
+        a1 = a0 + j
+        s[i] += s[3 + i] * dt + (2.0 * a0 + a1) * dt * dt / 6.0
+        s[3 + i] += 0.5 * (a0 + a1) * dt
+        s[6 + i] = a1
+
+
+@kernel
 def _approach1(s: Array, vz: float, up: float, down: float, jerk: float, dt: float) -> None:
     """Vertical velocity of the state towards vz (NED down)."""
     dv = vz - s[5]
@@ -105,8 +142,27 @@ def _track_velocity(s: Array, vx: float, vy: float, vz: float, lim: Array, dt: f
 
 
 @kernel
-def _follow_leg(s: Array, start: Array, end: Array, end_speed: float, lim: Array, dt: float) -> None:
-    """One tick along the straight leg start -> end, to be left at `end_speed` along the leg."""
+def _join_leg(
+    s: Array, rx: float, ry: float, ux: float, uy: float, speed: float, lim: Array, dt: float
+) -> None:
+    """One tick towards and along the line in direction u through the point at r from the state."""
+    cross = rx * uy - ry * ux  # distance to the leg, positive where it is on the left
+    off = abs(cross)
+    side = 1.0 if cross > 0.0 else -1.0
+    closing = side * (s[3] * uy - s[4] * ux)
+    pull = side * (s[6] * uy - s[7] * ux)
+    back = _room(off, closing, pull, lim[JERK])
+    profile = braking_speed(back, 0.0, _CROSS_ACC_SHARE * lim[ACC], lim[JERK], lim[GAIN])
+    v_cross = min(0.7 * max(speed, 1.0), profile)
+    v_along = math.sqrt(max(0.0, speed * speed - v_cross * v_cross))
+    _approach_leg(s, ux, uy, v_along, side * v_cross, lim[ACC], lim[JERK], dt)
+
+
+@kernel
+def _follow_leg(
+    s: Array, start: Array, end: Array, end_speed: float, turn_in: float, lim: Array, dt: float
+) -> None:
+    """One tick along the straight leg start -> end, to be left at `end_speed`, `turn_in` before its end."""
     lx, ly, lz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     flat = math.sqrt(lx * lx + ly * ly)
     rx, ry = end[0] - s[0], end[1] - s[1]
@@ -115,15 +171,16 @@ def _follow_leg(s: Array, start: Array, end: Array, end_speed: float, lim: Array
     # vertical speed that matches the leg's slope limits the horizontal speed too
     speed = lim[SPEED]
     v_limit_z = lim[SPEED_UP] if end[2] < s[2] else lim[SPEED_DOWN]
-    vx, vy = 0.0, 0.0
     z_target, slope_rate = end[2], 0.0
     if flat < 0.5 or remaining < 1e-6:
         # a vertical leg, or a short one: straight to its end
+        vx, vy = 0.0, 0.0
         if remaining > 1e-6:
             rate, pull = (s[3] * rx + s[4] * ry) / remaining, (s[6] * rx + s[7] * ry) / remaining
             room = _room(remaining, rate, pull, lim[JERK])
             v = min(speed, braking_speed(room, 0.0, lim[ACC], lim[JERK], gain))
             vx, vy = v * rx / remaining, v * ry / remaining
+        _approach2(s, vx, vy, lim[ACC], lim[JERK], dt)
     else:
         ux, uy = lx / flat, ly / flat
         slope = lz / flat
@@ -131,26 +188,21 @@ def _follow_leg(s: Array, start: Array, end: Array, end_speed: float, lim: Array
             leg_limit_z = lim[SPEED_UP] if lz < 0.0 else lim[SPEED_DOWN]
             speed = min(speed, leg_limit_z / abs(slope))
         along = rx * ux + ry * uy
-        cross = rx * uy - ry * ux  # distance to the leg, positive to its left
-        px, py = cross * uy, -cross * ux  # vector from the state to the leg
         if along <= 0.0 and end_speed <= 0.0:
             v = min(speed, braking_speed(remaining, 0.0, lim[ACC], lim[JERK], gain))
-            vx, vy = v * rx / remaining, v * ry / remaining
+            _approach2(s, v * rx / remaining, v * ry / remaining, lim[ACC], lim[JERK], dt)
         else:
-            room = _room(along, s[3] * ux + s[4] * uy, s[6] * ux + s[7] * uy, lim[JERK])
+            room = _room(max(0.0, along - turn_in), s[3] * ux + s[4] * uy, s[6] * ux + s[7] * uy, lim[JERK])
             v = min(speed, braking_speed(room, end_speed, lim[ACC], lim[JERK], gain))
-            off = abs(cross)
-            closing, pull = 0.0, 0.0
-            if off > 1e-6:
-                closing = (s[3] * px + s[4] * py) / off
-                pull = (s[6] * px + s[7] * py) / off
-            back = _room(off, closing, pull, lim[JERK])
-            v_cross = min(0.7 * max(v, 1.0), braking_speed(back, 0.0, 0.7 * lim[ACC], lim[JERK], gain))
-            v_along = math.sqrt(max(0.0, v * v - v_cross * v_cross))
-            vx, vy = v_along * ux, v_along * uy
-            if off > 1e-6:
-                vx += v_cross * px / off
-                vy += v_cross * py / off
+            turn = min(v, lim[SPEED_TURN])
+            tx, ty = turn * ux, turn * uy
+            if math.isfinite(lim[SPEED_TURN]) and math.hypot(tx - s[3], ty - s[4]) < _TURNED_M_S:
+                lim[SPEED_TURN] = math.inf
+            if math.isfinite(lim[SPEED_TURN]):
+                # in a corner: from one leg's velocity to the other's; where it ends was planned
+                _approach2(s, tx, ty, lim[ACC], lim[JERK], dt)
+            else:
+                _join_leg(s, rx, ry, ux, uy, v, lim, dt)
         part = min(1.0, max(0.0, 1.0 - along / flat))
         z_target = start[2] + part * lz
         if 0.0 < part < 1.0:
@@ -162,7 +214,7 @@ def _follow_leg(s: Array, start: Array, end: Array, end_speed: float, lim: Array
     v_z = min(v_limit_z, braking_speed(room, 0.0, acc_z, lim[JERK], gain))
     vz = slope_rate + sign * v_z
     vz = min(lim[SPEED_DOWN], max(-lim[SPEED_UP], vz))
-    _track_velocity(s, vx, vy, vz, lim, dt)
+    _approach1(s, vz, lim[ACC_UP], lim[ACC_DOWN], lim[JERK], dt)
 
 
 class TrajectoryGenerator:
@@ -170,7 +222,7 @@ class TrajectoryGenerator:
 
     Attributes:
         position_ned_m, velocity_ned_m_s, acceleration_ned_m_s2: views of the state, (3,) each.
-        limits: float64 (8,), see the indices of this module; writable.
+        limits: float64 (9,), see the indices of this module; writable.
     """
 
     __slots__ = (
@@ -203,6 +255,7 @@ class TrajectoryGenerator:
             parameters.acceleration_down_m_s2,
             parameters.jerk_m_s3,
             parameters.trajectory_p_1_s,
+            math.inf,
         )
 
     def reset(
@@ -231,9 +284,26 @@ class TrajectoryGenerator:
         free = 0.4 * error_max_m
         self.stretch = min(1.0, max(0.0, (error_max_m - error) / (error_max_m - free)))
 
-    def follow_leg(self, start_ned_m: Array, end_ned_m: Array, end_speed_m_s: float, dt_s: float) -> None:
-        """One tick along a straight leg, passing its end at `end_speed_m_s` (0: stop there)."""
-        _follow_leg(self._state, start_ned_m, end_ned_m, end_speed_m_s, self.limits, dt_s * self.stretch)
+    def follow_leg(
+        self,
+        start_ned_m: Array,
+        end_ned_m: Array,
+        end_speed_m_s: float,
+        dt_s: float,
+        *,
+        turn_in_m: float = 0.0,
+    ) -> None:
+        """One tick along a straight leg.
+
+        Args:
+            start_ned_m, end_ned_m: the leg, (3,).
+            end_speed_m_s: speed at which its end is passed; 0: stop there.
+            dt_s: length of the tick.
+            turn_in_m: distance before the end at which that speed is reached, for the turn to begin.
+        """
+        _follow_leg(
+            self._state, start_ned_m, end_ned_m, end_speed_m_s, turn_in_m, self.limits, dt_s * self.stretch
+        )
 
     def track_velocity(self, north_m_s: float, east_m_s: float, down_m_s: float, dt_s: float) -> None:
         """One tick towards a velocity."""

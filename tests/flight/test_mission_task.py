@@ -7,7 +7,7 @@ import pytest
 
 from autopilot_bridge.flight import MissionTask, TaskStatus
 from autopilot_bridge.flight.context import MissionFinished, MissionModeRequested, WaypointReached
-from autopilot_bridge.flight.corners import corner_speed, passing_speed, turn_angle
+from autopilot_bridge.flight.corners import passing_speed, turn_angle, turn_distance, turn_speed
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from tests.flight.rig import Rig, positions, velocities
@@ -85,8 +85,7 @@ def test_set_current_and_a_new_plan_take_effect_in_flight() -> None:
     rig.run(3.0)
     assert store.current == 0
     store.current = 1
-    rig.run(1.0)
-    rig.run(10.0)
+    rig.run(11.5)
     assert np.linalg.norm(rig.nav[10:12] - [0.0, 20.0]) < 2.0
     store.replace((waypoint(rig, -10.0, 20.0),), 2)
     rig.run(8.0)
@@ -134,9 +133,39 @@ def test_items_without_a_place_are_skipped(item: MissionItem) -> None:
 
 def test_corner_geometry() -> None:
     assert turn_angle((0, 0, 0), (1, 0, 0), (1, 1, 0)) == pytest.approx(math.pi / 2)
-    assert corner_speed(math.pi / 2, 2.0, 2.5) == pytest.approx(math.sqrt(5.0))
-    assert corner_speed(0.0, 2.0, 2.5) == math.inf
-    assert corner_speed(math.pi, 2.0, 2.5) == 0.0
+    assert turn_speed(0.0, 2.0, 2.5, 4.0) == math.inf
+    assert turn_speed(math.pi, 2.0, 2.5, 4.0) == 0.0
+
+
+@pytest.mark.parametrize("angle_deg", [5.0, 20.0, 60.0, 90.0, 120.0])
+@pytest.mark.parametrize("distance_m", [0.3, 1.7, 8.0])
+def test_turn_speed_is_the_inverse_of_the_turn_distance(angle_deg: float, distance_m: float) -> None:
+    angle = math.radians(angle_deg)
+    assert turn_distance(angle, turn_speed(angle, distance_m, 2.5, 4.0), 2.5, 4.0) == pytest.approx(
+        distance_m
+    )
+
+
+@pytest.mark.parametrize("turn_deg", [45.0, 90.0, -90.0, 120.0])
+def test_corners_are_rounded_inside_without_swinging_out(turn_deg: float) -> None:
+    rig = Rig(height_m=HEIGHT_M)
+    turn = math.radians(turn_deg)
+    corner = np.array([40.0, 0.0])
+    end = corner + 40.0 * np.array([math.cos(turn), math.sin(turn)])
+    rig.fly(MissionTask(store_of(*(waypoint(rig, n, e, param2=2.0) for n, e in (corner, end)))))
+    track = positions(rig.run(24.0))[:, 0:2]
+    assert reached(rig) == [0, 1]
+    assert np.linalg.norm(track - corner, axis=1).min() < 0.6
+    inside = np.array([-math.sin(turn / 2), math.cos(turn / 2)]) * math.copysign(1.0, turn)
+    swing_out = -((track - corner) @ inside)  # negative on the side to which the course turns
+    passed = int(np.linalg.norm(track - corner, axis=1).argmin())
+    assert np.abs(track[:passed][track[:passed, 0] < 36.0, 1]).max() < 0.1  # the leg before
+    along = np.array([math.cos(turn), math.sin(turn)])
+    across = np.array([-along[1], along[0]])
+    after = track[passed:] - corner
+    assert np.abs(after[after @ along > 6.0] @ across).max() < 0.2  # the leg behind it, without overshoot
+    near = np.linalg.norm(track - corner, axis=1) < 2.0
+    assert swing_out[near].max() < 2.0 * math.cos(turn / 2)
 
 
 def test_look_ahead_brakes_for_a_corner_two_legs_away() -> None:
