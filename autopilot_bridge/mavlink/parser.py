@@ -41,6 +41,16 @@ class SourceCounters:
     late: int = 0
     last_sequence: int = -1
 
+    def take(self, sequence: int) -> None:
+        """Count a good frame with this sequence number."""
+        self.frames += 1
+        missed = (sequence - self.last_sequence - 1) & 0xFF
+        if missed < 256 - _MAX_LATE:
+            self.lost += missed
+            self.last_sequence = sequence
+        else:
+            self.late += 1
+
 
 @dataclass(slots=True)
 class ParserCounters:
@@ -110,23 +120,36 @@ class FrameParser:
     def feed(self, data: bytes) -> list[Frame]:
         """All frames completed by `data`, in order."""
         size = len(data)
-        self.counters.bytes_in += size
-        if not self._pending:
-            # What most links deliver: exactly one unsigned MAVLink 2 frame.
-            if (
-                size >= _OVERHEAD_V2
-                and data[0] == MAGIC_V2
-                and data[2] == 0
-                and data[1] + _OVERHEAD_V2 == size
-            ):
-                message_id = data[7] | data[8] << 8 | data[9] << 16
-                extra = _CRC_EXTRA.get(message_id)
-                if extra is not None and mcrf4xx(data[1:-2] + extra) == data[-2] | data[-1] << 8:
-                    frame = Frame(bytes(data), message_id, data[5], data[6], data[4])
-                    self._count(frame)
-                    return [frame]
-            return self._search(bytes(data))
-        return self._search(self._pending + data)
+        counters = self.counters
+        counters.bytes_in += size
+        if self._pending:
+            return self._search(self._pending + data)
+        # What most links deliver: whole unsigned MAVLink 2 frames, and nothing else.
+        frames: list[Frame] = []
+        start = 0
+        source: SourceCounters | None = None
+        sender = -1, -1
+        while size - start >= _OVERHEAD_V2 and data[start] == MAGIC_V2 and data[start + 2] == 0:
+            end = start + _OVERHEAD_V2 + data[start + 1]
+            if end > size:
+                break
+            raw = bytes(data[start:end])
+            message_id = raw[7] | raw[8] << 8 | raw[9] << 16
+            extra = _CRC_EXTRA.get(message_id)
+            if extra is None or mcrf4xx(raw[1:-2] + extra) != raw[-2] | raw[-1] << 8:
+                break
+            sequence = raw[4]
+            if source is None or sender != (raw[5], raw[6]):
+                sender = raw[5], raw[6]
+                source = self._source(sender, sequence)
+            source.take(sequence)
+            frames.append(Frame(raw, message_id, raw[5], raw[6], sequence))
+            start = end
+        counters.frames += len(frames)
+        counters.bytes_framed += start
+        if start < size:
+            frames += self._search(bytes(data[start:]))
+        return frames
 
     def flush(self) -> None:
         """The stream has ended or was interrupted: what is pending will not be completed and is counted
@@ -214,15 +237,12 @@ class FrameParser:
             counters.frames_v1 += 1
         elif frame.signed:
             counters.frames_signed += 1
-        key = (frame.system_id, frame.component_id)
-        source = counters.sources.get(key)
+        sender = frame.system_id, frame.component_id
+        self._source(sender, frame.sequence).take(frame.sequence)
+
+    def _source(self, sender: tuple[int, int], sequence: int) -> SourceCounters:
+        """Counters of a component; a new one begins with the sequence number it is first heard with."""
+        source = self.counters.sources.get(sender)
         if source is None:
-            source = counters.sources[key] = SourceCounters()
-            source.last_sequence = (frame.sequence - 1) & 0xFF
-        source.frames += 1
-        missed = (frame.sequence - source.last_sequence - 1) & 0xFF
-        if missed < 256 - _MAX_LATE:
-            source.lost += missed
-            source.last_sequence = frame.sequence
-        else:
-            source.late += 1
+            source = self.counters.sources[sender] = SourceCounters(last_sequence=(sequence - 1) & 0xFF)
+        return source
