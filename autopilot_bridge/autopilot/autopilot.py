@@ -26,7 +26,7 @@ from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Channel, Service, Source
+from autopilot_bridge.services.channel import Channel, Service, Source, TimedService
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
 from autopilot_bridge.services.file_transfer import FileTransferService
@@ -186,6 +186,13 @@ class Autopilot:
             mission_item_count=lambda: len(stores[MissionType.MISSION].items),
             inject_failure=inject_failure,
         )
+        parameter_service = ParameterService(
+            self.parameters,
+            firmware.parameters,
+            self,
+            on_list=lambda channel: self._texts.banner(channel),
+        )
+        self._timed: tuple[TimedService, ...] = (parameter_service, self.missions, self.intervals)
         self._services: tuple[Service, ...] = (
             SetpointService(flavour.name, self.commander),
             ManualService(
@@ -196,12 +203,7 @@ class Autopilot:
             CommandService.for_flavour(
                 flavour.name, self.commander, hooks, flavour.command_address(system_id)
             ),
-            ParameterService(
-                self.parameters,
-                firmware.parameters,
-                self,
-                on_list=lambda channel: self._texts.banner(channel),
-            ),
+            parameter_service,
             self.missions,
             TimeSyncService(answers_ping=firmware.answers_ping),
             FileTransferService(),
@@ -289,7 +291,7 @@ class Autopilot:
         self.controller.set_ground_contact(context.ground_contact)
         navigation.vehicle_at_rest = context.on_ground and not self.commander.tasks.lifting_off
         self._view.advance(time_us)
-        for service in self._services:
+        for service in self._timed:
             service.tick(time_us)
         for event in self.commander.drain_events():
             self._follow(event)

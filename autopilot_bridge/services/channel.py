@@ -50,6 +50,10 @@ class Service(Protocol):
         """Take one message; True when it belonged to this service. Never raises on message contents."""
         ...
 
+
+class TimedService(Service, Protocol):
+    """A microservice with time-outs or queues of its own."""
+
     def tick(self, time_us: int) -> None:
         """Advance timers and queues; called at 50 Hz of vehicle time."""
         ...

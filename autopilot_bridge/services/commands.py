@@ -51,9 +51,6 @@ class CommandService:
             return True
         return bool(message_id == _CANCEL)  # nothing here takes long enough to be cancelled
 
-    def tick(self, time_us: int) -> None:
-        """Nothing is pending between messages."""
-
     def _execute(self, message: MavlinkMessage, source: Source) -> None:
         command = command_from_message(message)
         if command.id in self._handlers.double_ack:

@@ -93,9 +93,6 @@ class FileTransferService:
         )
         return True
 
-    def tick(self, time_us: int) -> None:
-        """Nothing waits here."""
-
 
 def refusal(opcode: int, data: bytes) -> FtpError | None:
     """Why a request is refused; None when it is not."""

@@ -51,9 +51,6 @@ class ManualService:
             return True
         return False
 
-    def tick(self, time_us: int) -> None:
-        """Nothing is pending: old sticks are forgotten by the commander."""
-
     def _is_gcs(self, message: MavlinkMessage, source: Source) -> bool:
         if self._gcs_system_id is not None:
             return source.system_id == self._gcs_system_id

@@ -81,9 +81,6 @@ class SetpointService:
             return False
         return True
 
-    def tick(self, time_us: int) -> None:
-        """Nothing is pending: time-outs belong to the commander and to the guided task."""
-
 
 class Px4Setpoints:
     """PX4: components are ignored one by one; a setpoint that controls nothing does not count."""

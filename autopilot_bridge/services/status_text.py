@@ -33,9 +33,6 @@ class StatusTextService:
             self._greeted.add(source.channel.name)
         return False
 
-    def tick(self, time_us: int) -> None:
-        """Texts go out at once."""
-
     def forget(self, channel: Channel) -> None:
         """A channel was closed."""
         self._greeted.discard(channel.name)
