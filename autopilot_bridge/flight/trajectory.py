@@ -153,8 +153,9 @@ def _join_leg(
     pull = side * (s[6] * uy - s[7] * ux)
     back = _room(off, closing, pull, lim[JERK])
     profile = braking_speed(back, 0.0, _CROSS_ACC_SHARE * lim[ACC], lim[JERK], lim[GAIN])
-    v_cross = min(0.7 * max(speed, 1.0), profile)
-    v_along = math.sqrt(max(0.0, speed * speed - v_cross * v_cross))
+    v_cross = min(0.6 * max(speed, 1.0), profile)
+    sideways = max(v_cross, abs(closing))  # what isn't taken back yet counts too
+    v_along = math.sqrt(max(0.0, speed * speed - sideways * sideways))
     _approach_leg(s, ux, uy, v_along, side * v_cross, lim[ACC], lim[JERK], dt)
 
 
