@@ -1,0 +1,65 @@
+"""What the README shows works as it stands: its commands parse, its mission flies, its files are there."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from missions.cli import command_line
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+COMMANDS = re.findall(r"^    (flightstack .*?)(?:  +#.*)?$", README, re.MULTILINE)
+MISSION = re.search(r"```python\n(.*?)```", README, re.DOTALL)
+
+
+def parse(line: str) -> None:
+    """Parse a command line with the program's own parser, without running it."""
+    words = shlex.split(line)[1:]
+    with click.Context(command_line, info_name="flightstack") as parent:
+        command = command_line.get_command(parent, words[0])
+        assert command is not None, f"no command {words[0]}"
+        command.make_context(words[0], words[1:], parent=parent)
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_commands_parse(line: str) -> None:
+    parse(line)
+
+
+def test_there_are_commands() -> None:
+    assert len(COMMANDS) > 8
+    with pytest.raises(click.UsageError):
+        parse("flightstack fly lissajous --no-such-option")
+
+
+def test_the_two_lines_set_up_what_they_use() -> None:
+    flight, tests = re.findall(r"^python3\.11 -m venv .*$", README, re.MULTILINE)
+    assert flight.endswith("flightstack fly lissajous")
+    assert "-e '.[test]'" in tests
+    assert tests.endswith("-m pytest")
+
+
+def test_the_mission_flies(tmp_path: Path) -> None:
+    assert MISSION is not None
+    (tmp_path / "square.py").write_text(MISSION[1], encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "missions", "fly", str(tmp_path / "square.py"), "--altitude", "15"]
+        + ["--out", str(tmp_path / "run")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("battery") == 4
+    assert (tmp_path / "run" / "track.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("link", re.findall(r"\]\(([^)h][^)]*)\)", README))
+def test_linked_files_exist(link: str) -> None:
+    assert (ROOT / link).exists(), link
