@@ -13,6 +13,7 @@ _WINDOW_S: Final = 4.0  # wall seconds over which the rate is measured
 _MIN_WINDOW_S: Final = 0.25  # a shorter base says nothing about the rate
 _MIN_SPACING_S: Final = 0.02  # observations kept for the rate are no closer than this
 _MAX_STEP_BACK_US: Final = 1_000_000  # messages overtake each other by less; more is a new time base
+_BACKLOG_S: Final = 0.25  # wall seconds in which messages that waited for us are read
 _RATE_LIMITS: Final = (0.01, 1000.0)
 _MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are looked at again: rates change
 
@@ -21,7 +22,8 @@ class TelemetryClock:
     """Vehicle time, carried on between messages at the rate (speed factor) seen lately.
 
     `time_us` follows the vehicle's own time since boot. It never runs backwards: when the vehicle reboots,
-    or comes back from a pause during which deadlines went on, time continues from where it was. When nothing
+    or comes back from a pause during which deadlines went on, time continues from where it was. Messages that
+    waited while this process was busy are no pause: time stands until they have been read. When nothing
     is heard, time goes on at the last rate, so that deadlines expire on a dead link too. The first
     observation sets the time; waits begun before keep what they had left.
 
@@ -39,6 +41,7 @@ class TelemetryClock:
         self._offset_us = 0.0  # clock time minus vehicle time
         self._vehicle_us: int | None = None
         self._rate = 1.0
+        self._behind: tuple[float, float] | None = None  # wall s and offset when the vehicle fell behind
         self._history: deque[tuple[float, int]] = deque()
         self._reported_us = 0
         self._deadlines: list[_Deadline] = []
@@ -81,9 +84,16 @@ class TelemetryClock:
             self._history.clear()
             self._offset_us = now_us - vehicle_time_us
         elif now_us - (vehicle_time_us + self._offset_us) > _MAX_STEP_BACK_US:
-            # The vehicle stood still (paused simulator, suspended machine) while deadlines went on.
-            self._history.clear()
-            self._offset_us = now_us - vehicle_time_us
+            if self._behind is None:
+                self._behind = (wall_s, now_us - vehicle_time_us)
+            if wall_s - self._behind[0] >= _BACKLOG_S:
+                # The vehicle stood still (paused simulator, suspended machine) while deadlines went on.
+                self._history.clear()
+                self._offset_us = self._behind[1]
+                self._behind = None
+            # Otherwise it may be us who were busy, and these are the messages that waited meanwhile.
+        else:
+            self._behind = None
         self._vehicle_us = vehicle_time_us
         self._wall_s = wall_s
         self._base_us = vehicle_time_us + self._offset_us

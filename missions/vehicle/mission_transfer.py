@@ -99,6 +99,8 @@ async def upload(vehicle: "Vehicle", items: Sequence[MissionItem]) -> None:
                     if asked + 1 >= len(items):
                         return
                     continue  # of an earlier transfer
+                if reply.type == dialect.MAV_MISSION_INVALID_SEQUENCE:
+                    continue  # to an item that was sent twice: the transfer stays open (ArduPilot)
                 where = f" at item {asked} (command {items[asked].command})" if asked >= 0 else ""
                 raise CommandRejected(
                     f"the vehicle refused the mission{where}: {_result_name(reply.type)}; {vehicle.heard()}",

@@ -531,3 +531,23 @@ def test_a_vehicle_that_stood_still_goes_on_with_the_clock():
         telling.cancel()
 
     telemetry_run(main)
+
+
+def test_messages_that_waited_for_a_busy_process_are_no_pause():
+    """A computation of a second blocks us; then all messages of that time come at once."""
+
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=10_000_000, rate=20.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        await asyncio.sleep(1.0)
+        before_us = clock.time_us
+        assert before_us == pytest.approx(10_000_000 + 20 * 6_000_000, abs=1_000_000)
+        for late_us in range(111_000_000, 130_000_001, 100_000):
+            clock.observe(late_us)
+            assert clock.time_us < before_us + 1_000_000
+        telling = asyncio.create_task(stream(clock, world, start_us=130_000_000, rate=20.0))
+        await asyncio.sleep(1.0)
+        assert clock.time_us == pytest.approx(150_000_000, abs=1_000_000)
+
+    telemetry_run(main)

@@ -65,12 +65,16 @@ class Flying:
         north, east, down = self.autopilot.navigation.state[nav.POS_NED_M]
         return float(north), float(east), float(down)
 
-    def mission(self, script: Callable[[Vehicle], Coroutine[Any, Any, T]]) -> T:
-        """Run a script on the vehicle; afterwards the vehicle has no mission and is stepped by hand."""
+    def mission(self, script: Callable[[Vehicle], Coroutine[Any, Any, T]], *, sendings: int = 1) -> T:
+        """Run a script on the vehicle; afterwards the vehicle has no mission and is stepped by hand.
+
+        Args:
+            sendings: how often each frame of the mission arrives, as on a link that repeats.
+        """
         sitl = self.sitl
 
         async def main() -> T:
-            connection = Connection(_Borrowed(self.link), LoopClock())
+            connection = Connection(_Borrowed(self.link, sendings), LoopClock())
             async with connection:
                 vehicle = Vehicle(connection)
                 await vehicle.wait_heartbeat()
@@ -101,14 +105,19 @@ class Flying:
 class _Borrowed:
     """A link that a connection may use but not close."""
 
-    def __init__(self, link: Any) -> None:
+    def __init__(self, link: Any, sendings: int) -> None:
         object.__setattr__(self, "_link", link)
+        object.__setattr__(self, "_sendings", sendings)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._link, name)
 
     def __setattr__(self, name: str, value: object) -> None:
         setattr(self._link, name, value)
+
+    def send(self, data: bytes) -> None:
+        for _ in range(self._sendings):
+            self._link.send(data)
 
     def close(self) -> None:
         self._link.on_receive = None
