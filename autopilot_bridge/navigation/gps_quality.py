@@ -1,7 +1,9 @@
 """Is the receiver's fix good enough to use? PX4's EKF2_REQ_* checks, with a time they must hold.
 
-One check more: over two seconds the position must move about as the velocity says, or a receiver that
-talks nonsense in good form would be believed once the filter has nothing else left.
+Two checks more. Over two seconds the position must move about as the velocity says, or a receiver that talks
+nonsense in good form would be believed once the filter has nothing else left. And a receiver that repeats
+itself to the last digit doesn't measure any more: believed, its constant velocity would have the vehicle
+chase it faster and faster, unseen.
 """
 
 import math
@@ -29,6 +31,8 @@ _M_PER_DEG: Final = 111_200.0
 _WINDOW_US: Final = 2_000_000
 _ALLOWED_M: Final = 1.5
 _ALLOWED_SIGMAS: Final = 4.0
+_FROZEN_SAMPLES: Final = 5  # equal ones in a row: a second of a usual receiver
+_MEASURED: Final = slice(GPS_LAT_DEG, GPS_VEL_NED_M_S.stop)
 
 
 class GpsQuality:
@@ -43,10 +47,12 @@ class GpsQuality:
         "_anchor",
         "_anchor_us",
         "_distrusted",
+        "_equal",
         "_last",
         "_last_us",
         "_newest_us",
         "_parameters",
+        "_said",
         "_travelled",
         "good",
         "good_since_us",
@@ -57,6 +63,7 @@ class GpsQuality:
         self._last: NDArray[np.float64] = np.zeros(GPS_SIZE)
         self._anchor: NDArray[np.float64] = np.zeros(GPS_SIZE)
         self._travelled: NDArray[np.float64] = np.zeros(3)
+        self._said: NDArray[np.float64] = np.zeros(GPS_SIZE)
         self.restart()
 
     def restart(self) -> None:
@@ -67,6 +74,7 @@ class GpsQuality:
         self._last_us = -1
         self._anchor_us = -1
         self._distrusted = False
+        self._equal = 0
 
     def judge(self, values: NDArray[np.float64], measured_us: int, time_us: int) -> bool:
         """Take a sample received at `time_us`; True when it is good and the checks have held long enough."""
@@ -87,6 +95,8 @@ class GpsQuality:
             and abs(values[GPS_ALT_M]) <= 1.0e5
             and math.hypot(north, east, down) <= 1.0e3
         )
+        if self._repeats_itself(values):
+            self.good = False
         if self.good and not self._moves_as_it_says(values, measured_us):
             self.good = False
             self._distrusted = True
@@ -100,6 +110,15 @@ class GpsQuality:
         if self._distrusted:
             self._distrusted = proven_us < _WINDOW_US
         return not self._distrusted and proven_us >= round(p.gps_check_time_s * 1e6)
+
+    def _repeats_itself(self, values: NDArray[np.float64]) -> bool:
+        """Position and velocity have been the same, digit by digit, for too long."""
+        if np.array_equal(values[_MEASURED], self._said[_MEASURED]):
+            self._equal += 1
+        else:
+            self._equal = 0
+            self._said[:] = values
+        return self._equal >= _FROZEN_SAMPLES
 
     def _moves_as_it_says(self, values: NDArray[np.float64], measured_us: int) -> bool:
         """Compare position with the velocity's integral since an anchor up to two seconds ago."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters
 from autopilot_bridge.navigation.gps_quality import GpsQuality
@@ -227,3 +228,22 @@ def test_terrain_follows_a_step() -> None:
     assert not terrain.in_use
     terrain.predict(10_000_000, 0.0)
     assert not terrain.valid(10_000_000) and math.isnan(terrain.down_m)
+
+
+def test_a_receiver_that_repeats_itself_is_not_believed() -> None:
+    """Frozen position and velocity would have the vehicle run away from its own estimate."""
+    quality = GpsQuality(PARAMETERS)
+    sample = np.array([47.0, 8.0, 500.0, 0.03, -0.02, 0.01, 0.3, 0.6, 0.1, 3.0, 10.0, 0.7, 1.1])
+    generator = np.random.default_rng(1)
+
+    def judge(k: int, values: NDArray[np.float64]) -> bool:
+        return quality.judge(values, 200_000 * k, 200_000 * k + 100_000)
+
+    for k in range(1, 20):
+        sample[3] = 0.05 * generator.standard_normal()
+        judge(k, sample.copy())
+    assert quality.good
+    assert [judge(k, sample.copy()) for k in range(20, 30)] == [True] * 4 + [False] * 6
+    sample[3] += 0.001
+    judge(30, sample.copy())
+    assert quality.good
