@@ -1,17 +1,23 @@
 """Parameter files: QGroundControl's `.params` and the `.parm` of MAVProxy, ArduPilot and Mission Planner.
 
 `.params`: vehicle id, component id, name, value, MAV_PARAM_TYPE, separated by tabs. `.parm` (also `.param`):
-name and value, separated by spaces or a comma. In both, `#` starts a comment. The form of a line tells which
-of the two it is.
+name and value, separated by spaces, a comma or `=`. In both, `#` starts a comment. The form of a line tells
+which of the two it is.
 """
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.parameters import ParameterDefinition, ParameterError, ParameterStore
+from autopilot_bridge.parameters import (
+    MAX_NAME_LENGTH,
+    ParameterDefinition,
+    ParameterError,
+    ParameterStore,
+)
 
 QGC_SUFFIX: Final = ".params"
 MAVPROXY_SUFFIXES: Final = (".parm", ".param")
@@ -40,25 +46,38 @@ def parse_parameters(
     """
     store = ParameterStore(definitions)
     values: dict[str, float] = {}
-    lines: dict[str, int] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        where = f"{source}, line {number}"
-        found = _split(line, where)
-        if found is None:
-            continue
-        name, value_text = found
+    for where, name, value_text in _entries(text, source):
         if skip_unknown and name not in store:
             continue
-        if name in lines:
-            raise ParameterError(f"{where}: {name} was set in line {lines[name]} already")
         try:
             definition = store.by_index(store.index_of(name))
             value = definition.convert(_number(value_text, definition))
             definition.check_range(value)
         except ParameterError as error:
             raise ParameterError(f"{where}: {error}") from None
-        lines[name] = number
         values[name] = value
+    return values
+
+
+def parse_untyped_parameters(text: str, *, source: str = "parameters") -> dict[str, float]:
+    """The values in a parameter file for a vehicle whose table is not known; the vehicle checks them itself.
+
+    Raises:
+        ParameterError: a line is not understood, a name is too long or given twice, a value is not a finite
+            number.
+    """
+    values: dict[str, float] = {}
+    for where, name, value_text in _entries(text, source):
+        if len(name) > MAX_NAME_LENGTH or not name.isascii():
+            raise ParameterError(
+                f"{where}: name {name!r}; accepted: up to {MAX_NAME_LENGTH} ASCII characters"
+            )
+        try:
+            values[name] = float(value_text)
+        except ValueError:
+            values[name] = math.nan
+        if not math.isfinite(values[name]):
+            raise ParameterError(f"{where}: '{name} {value_text}': accepted is a finite number")
     return values
 
 
@@ -70,15 +89,16 @@ def read_parameter_file(
     Raises:
         ParameterError: the file can't be read, or what it says is not acceptable.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ParameterError(f"can't read parameter file {path}: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise ParameterError(
-            f"can't read parameter file {path}: byte {error.start} is not UTF-8 text; accepted: {_FORMS}"
-        ) from error
-    return parse_parameters(text, definitions, source=str(path), skip_unknown=skip_unknown)
+    return parse_parameters(_read(path), definitions, source=str(path), skip_unknown=skip_unknown)
+
+
+def read_untyped_parameter_file(path: Path) -> dict[str, float]:
+    """The values in a parameter file; see `parse_untyped_parameters`.
+
+    Raises:
+        ParameterError: the file can't be read, or what it says is not acceptable.
+    """
+    return parse_untyped_parameters(_read(path), source=f"parameter file {path}")
 
 
 def format_mavproxy(values: Mapping[str, float]) -> str:
@@ -128,9 +148,35 @@ def write_parameter_file(path: Path, store: ParameterStore, *, changed_only: boo
         raise ParameterError(f"can't write parameter file {path}: {error.strerror}") from error
 
 
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ParameterError(f"parameter file {path} can't be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ParameterError(
+            f"parameter file {path} can't be read: it is not text (byte {error.start} is not UTF-8)"
+        ) from error
+
+
+def _entries(text: str, source: str) -> Iterator[tuple[str, str, str]]:
+    """Where it stands, name and value of each line that has one."""
+    lines: dict[str, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        where = f"{source}, line {number}"
+        found = _split(line, where)
+        if found is None:
+            continue
+        name, value = found
+        if name in lines:
+            raise ParameterError(f"{where}: {name} was set in line {lines[name]} already")
+        lines[name] = number
+        yield where, name, value
+
+
 def _split(line: str, where: str) -> tuple[str, str] | None:
     """Name and value in a line; None for an empty one."""
-    words = line.partition("#")[0].replace(",", " ").split()
+    words = line.partition("#")[0].replace(",", " ").replace("=", " ").split()
     if words and words[-1] == "@READONLY":  # a mark of MAVProxy
         words.pop()
     if not words:

@@ -9,6 +9,8 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.parameter_files import read_untyped_parameter_file
+from autopilot_bridge.parameters import ParameterError
 from missions.errors import PlanError
 
 MAX_PERIODS: Final = 1000.0
@@ -162,29 +164,12 @@ def parse_pair(text: str, name: str, separators: str) -> tuple[float, float]:
 
 
 def parameters_from_file(path: str | Path) -> dict[str, float]:
-    """Parameters from a file: `NAME VALUE` or `NAME,VALUE` lines (MAVProxy, ArduPilot), or QGroundControl's
-    tab-separated vehicle, component, name, value, type. `#` begins a comment.
+    """Parameters from a file (`autopilot_bridge.parameter_files`); the vehicle checks names and ranges.
 
     Raises:
-        PlanError: the file can't be read, or a line is neither; names the line.
+        PlanError: the file can't be read or understood; names the line.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "it is not text"
-        raise PlanError(f"parameter file {path} can't be read: {reason}") from error
-    values: dict[str, float] = {}
-    for number, line in enumerate(text.splitlines(), start=1):
-        words = line.split("#", 1)[0].replace(",", " ").replace("=", " ").split()
-        if not words:
-            continue
-        if len(words) >= 4 and words[0].isdigit() and words[1].isdigit():
-            words = words[2:4]
-        try:
-            name, value = words[0], float(words[1])
-        except (IndexError, ValueError):
-            name, value = "", math.nan
-        if not (0 < len(name) <= 16 and name.isascii() and math.isfinite(value)) or len(words) > 3:
-            raise PlanError(f"parameter file {path}, line {number}: {line.strip()!r} is not NAME VALUE")
-        values[name] = value
-    return values
+        return read_untyped_parameter_file(Path(path))
+    except ParameterError as error:
+        raise PlanError(str(error)) from error

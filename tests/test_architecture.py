@@ -9,7 +9,10 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("flightsim", "autopilot_bridge", "estimators", "missions")
 GROUND_FLOOR = tuple(
     f"autopilot_bridge.{name}"
-    for name in ("mavlink", "links", "routing", "clock", "tlog", "errors", "geodesy", "mission_plan")
+    for name in (
+        *("mavlink", "links", "routing", "clock", "tlog", "errors"),
+        *("geodesy", "mission_plan", "parameters", "parameter_files"),
+    )
 )
 # Where the wall clock, sockets and files may be met.
 CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")

@@ -18,6 +18,7 @@ QGC = """# Onboard parameters for Vehicle 1
 PARM = """# a comment
 WPNAV_SPEED      800.000000
 FENCE_ENABLE,1   # Mission Planner writes commas
+RTL_ALT=2000
 STAT_RUNTIME 12 @READONLY
 
 """
@@ -28,6 +29,7 @@ def test_reads_both_formats() -> None:
     assert parse_parameters(PARM, ARDUPILOT_PARAMETERS) == {
         "WPNAV_SPEED": 800.0,
         "FENCE_ENABLE": 1,
+        "RTL_ALT": 2000,
         "STAT_RUNTIME": 12,
     }
 
@@ -75,7 +77,7 @@ def test_changed_values_only(tmp_path: Path) -> None:
 
 
 def test_unreadable_files(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"can't read parameter file .*missing\.parm: No such file"):
+    with pytest.raises(ParameterError, match=r"parameter file .*missing\.parm can't be read: No such file"):
         read_parameter_file(tmp_path / "missing.parm", PX4_PARAMETERS)
     (tmp_path / "binary.parm").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ParameterError, match="not UTF-8"):
