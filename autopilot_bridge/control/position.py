@@ -114,6 +114,9 @@ def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
     fx, fy = nav[_NAV_FORCE], nav[_NAV_FORCE + 1]
     north = (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy
     east = 2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy
+    if s[c.GROUND_CONTACT] != 0.0:
+        # what the ground pushes sideways is no drag: leaning against it would tip the vehicle over
+        north, east = 0.0, 0.0
     size = math.sqrt(north * north + east * east)
     if not math.isfinite(size):
         return

@@ -187,7 +187,10 @@ def test_gps_quality_wants_a_series() -> None:
     quality = GpsQuality(replace(PARAMETERS, gps_check_time_s=1.0))
     sample = GPS_SAMPLE.copy()
     sample[3:6] = 0.0
-    results = [quality.judge(sample, k * 200_000, k * 200_000 + 110_000) for k in range(8)]
+    results = []
+    for k in range(8):
+        sample[3] = 0.001 * k  # a receiver never says twice the same
+        results.append(quality.judge(sample, k * 200_000, k * 200_000 + 110_000))
     assert results == [False] * 5 + [True] * 3
     poor = sample.copy()
     poor[9] = 2.0
