@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
 from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 
 if TYPE_CHECKING:
@@ -93,3 +94,16 @@ class Adapter(Protocol):
     def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
         """The mission item that begins a mission on the ground."""
         ...
+
+
+def missing_basics(vehicle: "Vehicle") -> list[str]:
+    """What every firmware must have said before the vehicle can be armed, and has not."""
+    missing = []
+    status = vehicle.message("SYS_STATUS")
+    if status is None or not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK:
+        missing.append("pre-arm checks")
+    if vehicle.message("HOME_POSITION") is None:
+        missing.append("home position")
+    if vehicle.message("GLOBAL_POSITION_INT") is None:
+        missing.append("position estimate")
+    return missing

@@ -8,7 +8,7 @@ from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions.planning.limits import DEFAULT_LIMITS, VehicleLimits
-from missions.vehicle.adapter import Mode, ModeCommand
+from missions.vehicle.adapter import Mode, ModeCommand, missing_basics
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
@@ -43,7 +43,6 @@ _NAMES: Final[Mapping[int, str]] = MappingProxyType(
         28: "Turtle",
     }
 )
-_PREARM_CHECK: Final = 0x10000000
 _EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions
 _EKF_CONST_POS: Final = 0x80
 
@@ -87,14 +86,7 @@ class ArduCopter:
         return ModeCommand(main=self.modes[mode])
 
     def readiness(self, vehicle: "Vehicle") -> list[str]:
-        missing = []
-        status = vehicle.message("SYS_STATUS")
-        if status is None or not status.onboard_control_sensors_health & _PREARM_CHECK:
-            missing.append("pre-arm checks")
-        if vehicle.message("HOME_POSITION") is None:
-            missing.append("home position")
-        if vehicle.message("GLOBAL_POSITION_INT") is None:
-            missing.append("position estimate")
+        missing = missing_basics(vehicle)
         ekf = vehicle.message("EKF_STATUS_REPORT")
         if ekf is None or ekf.flags & _EKF_NEEDED != _EKF_NEEDED or ekf.flags & _EKF_CONST_POS:
             missing.append("navigation filter on GPS")

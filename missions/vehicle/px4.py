@@ -9,7 +9,7 @@ from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions.planning.limits import DEFAULT_LIMITS, VehicleLimits
-from missions.vehicle.adapter import Mode, ModeCommand
+from missions.vehicle.adapter import Mode, ModeCommand, missing_basics
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
@@ -34,7 +34,6 @@ _NAMES: Final = {
     (7, 0): "Stabilized",
     (10, 0): "Termination",
 }
-_PREARM_CHECK: Final = 0x10000000  # MAV_SYS_STATUS_PREARM_CHECK
 
 
 def _custom_mode(mode: Mode) -> int:
@@ -79,15 +78,7 @@ class Px4:
         return ModeCommand(main=_AUTO, sub=_SUB_MODES[mode])
 
     def readiness(self, vehicle: "Vehicle") -> list[str]:
-        missing = []
-        status = vehicle.message("SYS_STATUS")
-        if status is None or not status.onboard_control_sensors_health & _PREARM_CHECK:
-            missing.append("pre-arm checks")
-        if vehicle.message("HOME_POSITION") is None:
-            missing.append("home position")
-        if vehicle.message("GLOBAL_POSITION_INT") is None:
-            missing.append("position estimate")
-        return missing
+        return missing_basics(vehicle)
 
     async def prepare_arming(self, vehicle: "Vehicle") -> None:
         if vehicle.custom_mode not in (self.modes[Mode.HOLD], self.modes[Mode.MISSION]):
