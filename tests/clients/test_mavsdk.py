@@ -21,6 +21,8 @@ from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.action import Action, ActionError
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
+from mavsdk.plugins.mission_raw import MissionItem as RawItem
+from mavsdk.plugins.mission_raw import MissionRaw
 from mavsdk.plugins.offboard import Offboard, PositionNedYaw
 from mavsdk.plugins.telemetry import Telemetry
 
@@ -42,6 +44,29 @@ def mission_items(latitude_deg: float, longitude_deg: float) -> list[MissionItem
             is_fly_through=True,
         )
         for north, east in corners
+    ]
+
+
+def raw_items(latitude_deg: float, longitude_deg: float) -> list[RawItem]:
+    """Home, a take-off and two waypoints, as they go over the wire."""
+    corners = ((0, 16, 0.0, 0.0), (6, 22, 0.0, 0.0), (6, 16, 2e-4, 0.0), (6, 16, 2e-4, 2e-4))
+    return [
+        RawItem(
+            seq=seq,
+            frame=frame,
+            command=command,
+            current=int(seq == 0),
+            autocontinue=1,
+            param1=0.0,
+            param2=0.0,
+            param3=0.0,
+            param4=0.0,
+            x=round((latitude_deg + north) * 1e7),
+            y=round((longitude_deg + east) * 1e7),
+            z=10.0,
+            mission_type=0,
+        )
+        for seq, (frame, command, north, east) in enumerate(corners)
     ]
 
 
@@ -172,6 +197,12 @@ def test_synchronous_interface_flies(flavour: str) -> None:
                 mission.upload_mission(MissionPlan(mission_items(here.latitude_deg, here.longitude_deg)))
                 mission.start_mission()
                 until("mission end", mission.is_mission_finished)
+            else:
+                raw = MissionRaw(system)  # the plain mission interface can't read ArduPilot's home item back
+                raw.upload_mission(raw_items(here.latitude_deg, here.longitude_deg))
+                assert len(raw.download_mission()) == 4
+                raw.start_mission()
+                until("mission end", lambda: raw.mission_progress().current == 3)
             action.return_to_launch()
             until("descent", lambda: telemetry.position().relative_altitude_m < 2.0)
             action.land()

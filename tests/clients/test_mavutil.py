@@ -11,7 +11,7 @@ from pymavlink import mavutil
 from tests.clients.sitl_process import free_port, running_sitl
 
 mavlink = mavutil.mavlink
-SPEEDUP = 10.0
+SPEEDUP = 16.0
 WALL_DEADLINE_S = 30.0
 EKF_READY = 831  # attitude, velocity and position, as ArduPilot reports a filter that uses GPS
 MODES = {
