@@ -1,0 +1,186 @@
+"""Vehicle time from telemetry: wall time is the virtual time of the test's loop."""
+
+import asyncio
+import random
+
+import pytest
+
+from autopilot_bridge.clock import (
+    TelemetryClock,
+    run,
+)
+from tests.bridge.clock_world import World
+
+
+def telemetry_run(main):
+    """Run `main(clock, wall)` with a telemetry clock on a wall clock that the loop simulates."""
+    world = World()
+
+    async def body():
+        return await main(TelemetryClock(lambda: world.now_us * 1e-6), world)
+
+    return run(body(), world.loop(max_time_us=10_000_000_000))
+
+
+async def stream(clock, world, *, start_us, rate, period_s=0.1, latency=None):
+    """Timestamps as a vehicle at `rate` sends them."""
+    wall_us = world.now_us
+    while True:
+        clock.observe(round(start_us + (world.now_us - wall_us) * rate))
+        await asyncio.sleep(period_s + (latency() if latency else 0.0))
+
+
+@pytest.mark.parametrize("rate", [0.25, 1.0, 20.0])
+def test_telemetry_clock_follows_and_interpolates(rate):
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=300_000_000, rate=rate))
+        await asyncio.sleep(5.0)
+        assert clock.rate == pytest.approx(rate, rel=1e-3)
+        for _ in range(200):
+            await asyncio.sleep(0.017)
+            expected_us = 300_000_000 + world.now_us * rate
+            assert clock.time_us == pytest.approx(expected_us, abs=20_000 * rate)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_telemetry_clock_never_runs_backwards():
+    chance = random.Random(6)
+
+    async def main(clock, world):
+        latency = lambda: chance.random() * 0.05  # noqa: E731
+        telling = [
+            asyncio.create_task(stream(clock, world, start_us=1_000_000, rate=5.0, latency=latency))
+            for _ in range(3)
+        ]
+        last_us = clock.time_us
+        for _ in range(2000):
+            await asyncio.sleep(0.004)
+            assert clock.time_us >= last_us
+            last_us = clock.time_us
+        for task in telling:
+            task.cancel()
+
+    telemetry_run(main)
+
+
+def test_waiting_on_a_fast_vehicle():
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=0, rate=10.0))
+        await asyncio.sleep(1.0)
+        started_us = world.now_us
+        await clock.sleep(50.0)
+        assert world.now_us - started_us == pytest.approx(5_000_000, abs=50_000)
+        with pytest.raises(TimeoutError):
+            async with clock.timeout(20.0):
+                await asyncio.Event().wait()
+        assert world.now_us - started_us == pytest.approx(7_000_000, abs=60_000)
+        await clock.sleep_until(clock.time_us - 5)
+        async with clock.timeout(20.0):
+            await clock.sleep(1.0)
+        await clock.sleep(30.0)  # the timeout that was left does not strike later
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_a_change_of_speed_is_noticed_while_waiting():
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=0, rate=1.0))
+        await asyncio.sleep(2.0)
+        waiting = asyncio.create_task(clock.sleep_until(100_000_000))
+        await asyncio.sleep(1.0)
+        telling.cancel()
+        telling = asyncio.create_task(stream(clock, world, start_us=clock.time_us, rate=20.0))
+        await waiting
+        assert world.now_us * 1e-6 == pytest.approx(3.0 + 97.0 / 20.0, abs=0.1)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_deadlines_expire_on_a_dead_link():
+    async def main(clock, world):
+        with pytest.raises(TimeoutError):
+            async with clock.timeout(5.0):  # nothing was ever heard
+                await asyncio.Event().wait()
+        assert world.now_us == pytest.approx(5_000_000, abs=10_000)
+        telling = asyncio.create_task(stream(clock, world, start_us=60_000_000, rate=4.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        silent_since_us = world.now_us
+        with pytest.raises(TimeoutError):
+            async with clock.timeout(40.0):
+                await asyncio.Event().wait()
+        assert world.now_us - silent_since_us == pytest.approx(10_000_000, abs=200_000)
+        assert clock.silence_s == pytest.approx(10.0, abs=0.3)
+
+    telemetry_run(main)
+
+
+def test_the_first_message_sets_the_time_and_leaves_waits_what_they_had():
+    async def main(clock, world):
+        waiting = asyncio.create_task(clock.sleep(10.0))
+        await asyncio.sleep(4.0)
+        telling = asyncio.create_task(stream(clock, world, start_us=500_000_000, rate=1.0))
+        await asyncio.sleep(0.1)
+        assert clock.time_us == pytest.approx(500_100_000, abs=10_000)
+        await waiting
+        assert world.now_us == pytest.approx(10_000_000, abs=20_000)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_a_reboot_does_not_stop_the_clock():
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=900_000_000, rate=1.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        await asyncio.sleep(2.0)
+        before_us = clock.time_us
+        telling = asyncio.create_task(stream(clock, world, start_us=100_000, rate=1.0))
+        await clock.sleep(3.0)
+        assert clock.reboots == 1
+        assert clock.time_us == pytest.approx(before_us + 3_000_000, abs=20_000)
+        assert clock.vehicle_time_us == pytest.approx(3_100_000, abs=110_000)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_a_vehicle_that_stood_still_goes_on_with_the_clock():
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=10_000_000, rate=1.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        await asyncio.sleep(60.0)  # paused; our deadlines went on
+        before_us = clock.time_us
+        telling = asyncio.create_task(stream(clock, world, start_us=15_000_000, rate=1.0))
+        await asyncio.sleep(1.0)
+        assert clock.time_us == pytest.approx(before_us + 1_000_000, abs=20_000)
+        assert clock.reboots == 0
+        telling.cancel()
+
+    telemetry_run(main)
+
+
+def test_messages_that_waited_for_a_busy_process_are_no_pause():
+    """A computation of a second blocks us; then all messages of that time come at once."""
+
+    async def main(clock, world):
+        telling = asyncio.create_task(stream(clock, world, start_us=10_000_000, rate=20.0))
+        await asyncio.sleep(5.0)
+        telling.cancel()
+        await asyncio.sleep(1.0)
+        before_us = clock.time_us
+        assert before_us == pytest.approx(10_000_000 + 20 * 6_000_000, abs=1_000_000)
+        for late_us in range(111_000_000, 130_000_001, 100_000):
+            clock.observe(late_us)
+            assert clock.time_us < before_us + 1_000_000
+        telling = asyncio.create_task(stream(clock, world, start_us=130_000_000, rate=20.0))
+        await asyncio.sleep(1.0)
+        assert clock.time_us == pytest.approx(150_000_000, abs=1_000_000)
+
+    telemetry_run(main)
