@@ -48,8 +48,17 @@ def test_the_mission_flies(tmp_path: Path) -> None:
     assert MISSION is not None
     (tmp_path / "square.py").write_text(MISSION[1], encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-m", "missions", "fly", str(tmp_path / "square.py"), "--altitude", "15"]
-        + ["--out", str(tmp_path / "run")],
+        [
+            sys.executable,
+            "-m",
+            "missions",
+            "fly",
+            str(tmp_path / "square.py"),
+            "--altitude",
+            "15",
+            "--out",
+            str(tmp_path / "run"),
+        ],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -1,4 +1,4 @@
-"""Fences, downloads and progress of the mission protocol (references: PX4 section 10, ArduPilot section 5)."""
+"""Fences, downloads and progress of the mission protocol (reference: PX4 section 10, ArduPilot section 5)."""
 
 import math
 from typing import Any
