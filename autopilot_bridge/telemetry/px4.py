@@ -182,16 +182,16 @@ class Px4Messages(CommonMessages):
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
 
     def estimator_status(self) -> Values:
-        """ESTIMATOR_STATUS (230)."""
+        """ESTIMATOR_STATUS (230). PX4's ratios are squares: of the innovation over that of its gate."""
         health = self.sources.navigation.health
         return (
             self.view.time_us,
             estimator_flags(health),
-            health.velocity_test_ratio,
-            health.position_horizontal_test_ratio,
-            health.position_vertical_test_ratio,
-            health.magnetometer_test_ratio,
-            health.height_above_ground_test_ratio,
+            health.velocity_test_ratio**2,
+            health.position_horizontal_test_ratio**2,
+            health.position_vertical_test_ratio**2,
+            health.magnetometer_test_ratio**2,
+            health.height_above_ground_test_ratio**2,
             NAN,
             health.position_horizontal_accuracy_m,
             health.position_vertical_accuracy_m,
