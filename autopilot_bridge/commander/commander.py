@@ -115,6 +115,7 @@ class Commander:
             self.setpoints,
             mission_waits=policy.mission_waits_for_start,
             first_item=policy.mission_first_item,
+            hold_by_sticks=policy.manual_control_always,
         )
         self.guidance = Guidance(self)
         self.situation = Situation(health=health.health, mode=policy.boot_mode)

@@ -6,7 +6,7 @@ from typing import Final
 from autopilot_bridge.flight.context import ManualInput
 
 _NO_INPUT: Final = ManualInput()
-_RADIO_AT_REST: Final = ManualInput(throttle=-1.0, valid=True)
+_RADIO_AT_REST: Final = ManualInput(throttle=-1.0, valid=True, simulated=True)
 THROTTLE_HIGH: Final = -0.8  # above this the throttle stick is not down
 
 

@@ -12,6 +12,7 @@ from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.hold import BrakeTask, HoldTask, IdleTask
 from autopilot_bridge.flight.land import LandTask
+from autopilot_bridge.flight.loiter import LoiterTask
 from autopilot_bridge.flight.manual import ManualMode, ManualTask
 from autopilot_bridge.flight.mission import MissionTask
 from autopilot_bridge.flight.orbit import OrbitTask, circle_ahead
@@ -42,6 +43,7 @@ class TaskRunner:
         setpoints: the stream that offboard and guided flying follow.
         mission_waits: on the ground a mission is held until `mission_started` is set.
         first_item: the first item to fly.
+        hold_by_sticks: a pilot's sticks move the vehicle in HOLD (ArduPilot's LOITER).
 
     Attributes:
         task: the active task; None while disarmed.
@@ -57,12 +59,14 @@ class TaskRunner:
         *,
         mission_waits: bool,
         first_item: int,
+        hold_by_sticks: bool,
     ) -> None:
         self._context = context
         self._missions = missions
         self._setpoints = setpoints
         self._mission_waits = mission_waits
         self._first_item = first_item
+        self._hold_by_sticks = hold_by_sticks
         self._prepared: tuple[FlightMode, TaskSource] | None = None
         self.task: FlightTask | None = None
         self.mission_started = False
@@ -153,4 +157,6 @@ class TaskRunner:
                 return BrakeTask()
             case FlightMode.TERMINATION:
                 return IdleTask()
+            case FlightMode.HOLD if self._hold_by_sticks:
+                return LoiterTask()
         return HoldTask()

@@ -44,13 +44,14 @@ class FlightPhase(IntEnum):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ManualInput:
     """Sticks as MANUAL_CONTROL means them, -1..1: positive is right, stick forward,
-    up, clockwise. `valid` is False while no pilot is heard."""
+    up, clockwise. `valid` is False while no pilot is heard, `simulated` where nobody moves them."""
 
     roll: float = 0.0
     pitch: float = 0.0  # positive: stick forward, fly forward
     throttle: float = 0.0
     yaw: float = 0.0
     valid: bool = False
+    simulated: bool = False
 
     def __post_init__(self) -> None:
         for name in ("roll", "pitch", "throttle", "yaw"):

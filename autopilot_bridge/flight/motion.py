@@ -139,8 +139,17 @@ class SmoothMotion:
             and np.abs(self.trajectory.acceleration_ned_m_s2).max() < 0.1
         )
 
-    def steer(self, ctx: FlightContext, yaw_rad: float, target_ned_m: Array | None = None) -> None:
-        """One tick of the heading: to `yaw_rad`, or by the vehicle's yaw behaviour where that is NaN."""
+    def steer(
+        self,
+        ctx: FlightContext,
+        yaw_rad: float,
+        target_ned_m: Array | None = None,
+        yaw_rate_rad_s: float = 0.0,
+    ) -> None:
+        """One tick of the heading: to `yaw_rad`, or by the vehicle's yaw behaviour where that is NaN.
+
+        `yaw_rate_rad_s` is the rate at which the wanted heading turns itself.
+        """
         wanted = yaw_rad
         if math.isnan(wanted):
             wanted = self.heading.yaw_rad
@@ -154,7 +163,7 @@ class SmoothMotion:
                 north, east = (float(v) for v in self.trajectory.velocity_ned_m_s[0:2])
                 if math.hypot(north, east) > _MIN_COURSE_SPEED_M_S:
                     wanted = math.atan2(east, north)
-        self.heading.turn_to(wanted, ctx.parameters, ctx.dt_s)
+        self.heading.turn_to(wanted, ctx.parameters, ctx.dt_s, target_rate_rad_s=yaw_rate_rad_s)
 
     def write(self, ctx: FlightContext) -> None:
         """Write the control setpoint, leaving out what the filter doesn't know."""

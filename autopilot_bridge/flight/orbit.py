@@ -139,7 +139,9 @@ class OrbitTask(CruiseTask):
             self.circling = away < _ON_CIRCLE_M and motion.stopped
         else:
             self._circle(ctx, motion)
-        motion.steer(ctx, self._yaw(ctx, motion))
+        turns = self.circling and self._yaw_behaviour in (OrbitYaw.FRONT_TO_CENTRE, OrbitYaw.FRONT_TANGENT)
+        rate = self._speed_m_s / self.radius_m if turns else 0.0
+        motion.steer(ctx, self._yaw(ctx, motion), yaw_rate_rad_s=rate)
         motion.write(ctx)
         if self._yaw_behaviour is OrbitYaw.UNCONTROLLED:
             ctx.setpoint[sp.YAW_RAD] = math.nan

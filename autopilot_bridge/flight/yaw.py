@@ -37,15 +37,17 @@ class YawSteering:
         parameters: FlightParameters,
         dt_s: float,
         rate_max_rad_s: float | None = None,
+        target_rate_rad_s: float = 0.0,
     ) -> None:
-        """One tick of the shorter way to `target_rad`; NaN stops the turn."""
+        """One tick of the shorter way to `target_rad`, which turns at a rate itself; NaN stops the turn."""
         rate_max = parameters.yaw_rate_max_rad_s if rate_max_rad_s is None else rate_max_rad_s
         acc = parameters.yaw_acceleration_rad_s2
         wanted = 0.0
         if math.isfinite(target_rad):
             error = wrap_pi(target_rad - self.yaw_rad)
             size = min(rate_max, _GAIN_1_S * abs(error), math.sqrt(1.6 * acc * abs(error)))
-            wanted = math.copysign(size, error)
+            wanted = target_rate_rad_s + math.copysign(size, error)
+            wanted = min(rate_max, max(-rate_max, wanted))
         self.turn(wanted, parameters, dt_s)
 
     def turn(self, rate_rad_s: float, parameters: FlightParameters, dt_s: float) -> None:
