@@ -169,14 +169,14 @@ def test_unknown_command_and_none(capsys: pytest.CaptureFixture[str]) -> None:
 
 PARAMETER_FILES = {
     b"MPC_XY_VEL_MAX\n": ("line 1", "NAME VALUE"),
-    b"# comment\nMPC_XY_VEL_MAX fast\n": ("line 2", "'MPC_XY_VEL_MAX fast'"),
+    b"# comment\nMPC_XY_VEL_MAX fast\n": ("line 2", "MPC_XY_VEL_MAX", "fast"),
     b"MPC_XY_VEL_MAX nan\n": ("line 1",),
     b"MPC_XY_VEL_MAX inf\n": ("line 1",),
     b"NO_SUCH_PARAM 1\n": ("NO_SUCH_PARAM",),
     b"MPC_XY_VEL_MAX -1\n": ("MPC_XY_VEL_MAX", "-1"),
     b"MPC_XY_VEL_MAX 1e30\n": ("MPC_XY_VEL_MAX", "1e+30"),
     b"A_NAME_OF_SEVENTEEN 1\n": ("line 1",),
-    b"\xff\xfe\x00\x01": ("it is not text",),
+    b"\xff\xfe\x00\x01": ("can't be read", "text"),
 }
 
 

@@ -74,7 +74,7 @@ def network(kind: str) -> Iterator[Ends]:
     }[kind]
 
 
-LINKS = {
+OPENERS = {
     "udpin": lambda: network("udpin"),
     "udpout": lambda: network("udpout"),
     "tcp": lambda: network("tcp"),
@@ -84,20 +84,22 @@ LINKS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("link", "px4_via", "ardupilot_via"),
+    ("px4", "ardupilot"),
     [
-        ("udpin", "waypoints", "setpoints"),
-        ("udpout", "setpoints", "waypoints"),
-        ("tcp", "waypoints", "setpoints"),
-        ("serial", "setpoints", "waypoints"),
+        (("udpin", "setpoints"), ("udpout", "waypoints")),
+        (("tcp", "waypoints"), ("tcp", "setpoints")),
+        (("serial", "setpoints"), ("serial", "waypoints")),
     ],
+    ids=["udp", "tcp", "serial"],
 )
-def test_flies_a_sitl_in_another_process(link: str, px4_via: str, ardupilot_via: str, tmp_path: Path) -> None:
+def test_flies_a_sitl_in_another_process(
+    px4: tuple[str, str], ardupilot: tuple[str, str], tmp_path: Path
+) -> None:
     """One flight of each firmware at the same time, each in its own two processes."""
     with ExitStack() as stack:
         flights = []
-        for flavour, via in (("px4", px4_via), ("ardupilot", ardupilot_via)):
-            ends = stack.enter_context(LINKS[link]())
+        for flavour, (link, via) in (("px4", px4), ("ardupilot", ardupilot)):
+            ends = stack.enter_context(OPENERS[link]())
             stack.enter_context(running_sitl(flavour, [ends.sitl], speedup=SPEEDUP))
             run = started(tmp_path / flavour, *SHORT, "--via", via, "--connect", ends.mission)
             flights.append((flavour, via, stack.enter_context(run)))
