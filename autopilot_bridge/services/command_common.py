@@ -5,6 +5,7 @@ for the COMMAND_ACK, or None where the firmware stays silent.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, NamedTuple, Protocol
@@ -140,7 +141,7 @@ class CommandHooks:
 Handler = Callable[[Command, Source], Result | None]
 
 
-class CommandHandlers:
+class CommandHandlers(ABC):
     """Handlers that both flavours share; a flavour adds its own in `table`.
 
     Args:
@@ -177,9 +178,9 @@ class CommandHandlers:
         handler = self.table.get(command.id)
         return Result.UNSUPPORTED if handler is None else handler(command, source)
 
+    @abstractmethod
     def set_mode_message(self, base_mode: int, custom_mode: int) -> Result | None:
         """The SET_MODE message."""
-        raise NotImplementedError
 
     def deny(self, command: Command, reason: Reason, result: Result) -> Result:
         """Refuse with a text, where the flavour has one."""
