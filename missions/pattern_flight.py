@@ -120,6 +120,7 @@ async def _fly_setpoints(
     )
     notes.begin("takeoff", clock.time_us)
     await vehicle.takeoff(altitude_m)
+    notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
     above_home = (0.0, 0.0, -altitude_m)
     first = setpoint_at(trajectory.at(0.0), centre)
     last = setpoint_at(trajectory.at(trajectory.duration_s), centre)
