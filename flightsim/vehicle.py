@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from flightsim import truth as t
@@ -14,6 +13,7 @@ from flightsim.environment import CosineGust, Environment, Turbulence
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.jsbsim_model import find_property, load_fdm
+from flightsim.kernels import kernel
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.rotations import quaternion_from_euler
 from flightsim.turbulence import DrydenTurbulence
@@ -58,7 +58,8 @@ _STATE: Final = (
     "forces/fbz-gear-lbs",
 )
 _STATE_SIZE: Final = len(_STATE)
-_MOTION_SIZE: Final = _STATE.index("atmosphere/P-psf")  # read every step; the rest and the model's own may be slower
+# Motion is read every step; the rest and the model's own properties may be slower.
+_MOTION_SIZE: Final = _STATE.index("atmosphere/P-psf")
 
 
 class VehicleDivergedError(ArithmeticError):
@@ -123,8 +124,8 @@ class Vehicle:
             environment: the air.
             seed_sequence: the vehicle's own random stream (turbulence).
             physics_rate_hz: 100 to 2000.
-            slow_rate_hz: how often the part of `truth` that is not motion (air, power, ground contact) is read from
-                JSBSim, from the first step on; None: every step.
+            slow_rate_hz: how often the part of `truth` that is not motion (air, power, ground contact) is
+                read from JSBSim, from the first step on; None: every step.
             initial: how it starts; by default standing at home.
 
         Raises:
@@ -147,7 +148,7 @@ class Vehicle:
         self._raw = np.zeros(_STATE_SIZE + len(self.airframe.truth))
         self._raw_view = self._raw.data  # its elements are set faster than the array's
         self._slow_steps = max(1, physics_rate_hz // (slow_rate_hz or physics_rate_hz))
-        self._slow_phase = 1 % self._slow_steps  # the first step, and then at the slow rate, as sensors measure
+        self._slow_phase = 1 % self._slow_steps  # the first step, then at the slow rate, as sensors measure
         self._magnetic_steps = _MAGNETIC_REFRESH_S * physics_rate_hz
         self._initial = initial or InitialState()
         self.reset(self._initial)
@@ -307,7 +308,7 @@ class Vehicle:
         )
 
 
-@njit(cache=True)
+@kernel
 def _write_truth(raw: Array, extra: NDArray[np.int64], truth: Array) -> bool:
     """Convert JSBSim's values (order of `_STATE`, then the model's own) to truth; False if not finite."""
     truth[0] = raw[0]

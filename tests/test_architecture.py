@@ -114,6 +114,12 @@ def test_only_clock_and_shells_know_the_wall_clock():
     assert users == []
 
 
+def test_kernels_have_the_cache_that_notices_other_modules():
+    """`missions` can't import it; its kernels name nothing outside their own file."""
+    users = [name for name, imports in MODULES.items() if "numba" in imports]
+    assert users == ["flightsim.kernels", "missions.path_distance"]
+
+
 @pytest.mark.parametrize(
     ("name", "source", "wrong"),
     [

@@ -203,7 +203,10 @@ def _follow_leg(
                 # in a corner: from one leg's velocity to the other's; where it ends was planned
                 _approach2(s, tx, ty, lim[ACC], lim[JERK], dt)
             else:
-                _join_leg(s, rx, ry, ux, uy, v, lim, dt)
+                # what speed there is across the leg is missing along it
+                across = s[4] * ux - s[3] * uy
+                along_limit = math.sqrt(max(0.04 * speed * speed, speed * speed - across * across))
+                _join_leg(s, rx, ry, ux, uy, min(v, along_limit), lim, dt)
         part = min(1.0, max(0.0, 1.0 - along / flat))
         z_target = start[2] + part * lz
         if 0.0 < part < 1.0:

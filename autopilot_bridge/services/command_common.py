@@ -195,6 +195,7 @@ class CommandHandlers(ABC):
 
     def silence(self, command: Command, source: Source) -> None:
         """No acknowledgement at all, as the firmware was seen to do."""
+        return None
 
     def return_to_launch(self, command: Command, source: Source) -> Result:
         """NAV_RETURN_TO_LAUNCH."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from autopilot_bridge.flight.parameters import FlightParameters
@@ -14,6 +14,7 @@ from autopilot_bridge.flight.yaw import YawSteering, wrap_pi
 DT_S = 0.02
 
 
+@example(target=(2.0, 0.0, 0.0), velocity=(0.0, 1.0, 0.0), cruise=1.0, acc=2.0, jerk=2.0)
 @settings(max_examples=60, deadline=None)
 @given(
     target=st.tuples(*[st.floats(-60.0, 60.0)] * 2, st.floats(-30.0, 30.0)),
@@ -39,8 +40,9 @@ def test_limits_hold_and_the_target_is_reached(
     for _ in range(int(120.0 / DT_S)):
         generator.follow_leg(start, end, 0.0, DT_S)
         v, a = generator.velocity_ned_m_s, generator.acceleration_ned_m_s2
-        # along and across the leg are shaped apart, so a turn may exceed the speed a little
-        assert math.hypot(v[0], v[1]) <= max(cruise, start_speed) * 1.05 + 0.15
+        # an acceleration that is there can be taken back at the jerk limit only: a turn may exceed the speed so long
+        overshoot = min(0.25, acc * acc / (2.0 * jerk))
+        assert math.hypot(v[0], v[1]) <= max(cruise, start_speed) * 1.05 + overshoot
         assert -p.climb_speed_m_s * 1.05 <= v[2] <= p.descend_speed_m_s * 1.05
         assert math.hypot(a[0], a[1]) <= acc + 1e-9
         assert -p.acceleration_up_m_s2 - 1e-9 <= a[2] <= p.acceleration_down_m_s2 + 1e-9
