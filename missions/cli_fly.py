@@ -3,7 +3,7 @@
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -98,6 +98,9 @@ def _options(given: dict[str, Any]) -> Any:
     )
 
 
+_EMBEDDED_ONLY: Final = ("autopilot", "model", "home", "seed", "wind", "turbulence", "speedup")
+
+
 @click.command(context_settings={"show_default": True})
 @click.argument("mission")
 @click.option("--pattern", default="L3", help="Lissajous pattern: L1 (circle), L2, L3, L4.")
@@ -152,10 +155,25 @@ def fly(**given: Any) -> int:
     """
     from missions.errors import PlanError
 
+    if given["connect"]:
+        _refuse_embedded_options(click.get_current_context())
     try:
         return _fly(given)
     except PlanError as error:
         raise click.UsageError(str(error)) from error
+
+
+def _refuse_embedded_options(context: click.Context) -> None:
+    """A vehicle elsewhere has its own wind: an option that would do nothing is not passed over in silence."""
+    given = [
+        f"--{name}"
+        for name in _EMBEDDED_ONLY
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+    ]
+    if given:
+        raise click.UsageError(
+            f"{', '.join(given)}: of the embedded SITL only, has no effect with --connect; leave it out"
+        )
 
 
 def _fly(given: dict[str, Any]) -> int:
