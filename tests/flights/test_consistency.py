@@ -20,7 +20,7 @@ PARTS = {"attitude": slice(0, 3), "velocity": slice(3, 6), "position": slice(6, 
 
 
 def errors_in_flight(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """NEES (n, 3) and errors (n, 9), once a second from takeoff on: climbs, turns, half of the seeds in wind."""
+    """NEES (n, 3) and errors (n, 9), once a second from takeoff on; every other seed in wind."""
     air = Environment()
     if seed % 2:
         air = Environment.from_wind(speed_m_s=5.0, from_deg=37.0 * seed % 360.0, turbulence="moderate")

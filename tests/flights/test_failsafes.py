@@ -1,4 +1,4 @@
-"""Failsafes of the whole stack, commanded and observed over MAVLink alone, as the reference pages time them."""
+"""Failsafes of the whole stack, commanded and observed over MAVLink alone, timed as the references say."""
 
 import math
 
