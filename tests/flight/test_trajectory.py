@@ -40,7 +40,7 @@ def test_limits_hold_and_the_target_is_reached(
     for _ in range(int(120.0 / DT_S)):
         generator.follow_leg(start, end, 0.0, DT_S)
         v, a = generator.velocity_ned_m_s, generator.acceleration_ned_m_s2
-        # an acceleration that is there can be taken back at the jerk limit only: a turn may exceed the speed so long
+        # acceleration is taken back at the jerk limit: until then a turn may exceed the speed
         overshoot = min(0.25, acc * acc / (2.0 * jerk))
         assert math.hypot(v[0], v[1]) <= max(cruise, start_speed) * 1.05 + overshoot
         assert -p.climb_speed_m_s * 1.05 <= v[2] <= p.descend_speed_m_s * 1.05
