@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from flightsim import truth as t
+from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
-from flightsim.initial_state import InitialState
+from flightsim.initial_state import InitialState, initialise
 from flightsim.interface import MAX_ACTUATORS
+from flightsim.jsbsim_model import load_fdm
 from flightsim.vehicle import Vehicle
 
 OFF = np.zeros(MAX_ACTUATORS)
@@ -134,3 +136,31 @@ def test_takes_off_and_lands_on_ground_flag() -> None:
         vehicle.step(full)
     assert vehicle.truth[t.ON_GROUND] == 0.0
     assert vehicle.truth[t.HEIGHT_ABOVE_GROUND_M] > 0.5
+
+
+def test_the_ground_is_felt_again_after_flight() -> None:
+    """The model works out ground reactions below 1 m only; a fall from above it must end on the feet."""
+    vehicle = make(InitialState(height_m=3.0))
+    touched_m = math.nan
+    for _ in range(1000):
+        vehicle.step(OFF)
+        if math.isnan(touched_m) and vehicle.truth[t.ON_GROUND] == 1.0:
+            touched_m = float(vehicle.truth[t.HEIGHT_ABOVE_GROUND_M])
+    assert 0.06 < touched_m <= 0.1  # at 7.4 m/s a step is 0.03 m
+    assert vehicle.truth[t.HEIGHT_ABOVE_GROUND_M] == pytest.approx(0.0985, abs=3e-4)
+
+
+def test_no_ground_reaction_outlives_a_new_start() -> None:
+    """One JSBSim instance, standing and flying in turn: the ground pushes only when there is contact."""
+    airframe = load_airframe("iris")
+    fdm, _ = load_fdm(airframe, 250)
+    weight_lbs = 1.5 * 9.807 * 0.2248089431
+    for height_m in (None, 50.0, None, 1.5):
+        initialise(fdm, airframe, HOME, Environment(), InitialState(height_m=height_m))
+        for _ in range(100 if height_m is None else 5):
+            fdm.run()
+        if height_m is None:
+            assert fdm.get_property_value("forces/fbz-gear-lbs") == pytest.approx(-weight_lbs, rel=1e-2)
+        else:
+            assert fdm.get_property_value("forces/fbz-gear-lbs") == 0.0
+            assert fdm.get_property_value("accelerations/a-pilot-z-ft_sec2") == pytest.approx(0.0, abs=0.02)
