@@ -89,7 +89,7 @@ class NavigationParameters:
     accel_bias_m_s2: float = 0.025
     accel_bias_tau_s: float = 40000.0
     gps_position_noise_m: tuple[float, float] = (0.2, 0.5)
-    gps_position_walk_m: tuple[float, float] = (0.12, 0.25)
+    gps_position_walk_m: tuple[float, float] = (0.06, 0.12)
     gps_position_tau_s: float = 100.0
     gps_velocity_noise_m_s: tuple[float, float, float] = (0.06, 0.077, 0.158)
     gps_nominal_speed_accuracy_m_s: float = 0.11
@@ -107,7 +107,7 @@ class NavigationParameters:
     barometer_gate: float = 5.0
     barometer_noise_m: float = 0.11
     barometer_lag_s: float = 0.02
-    barometer_offset_walk_m_per_sqrt_s: float = 0.02
+    barometer_offset_walk_m_per_sqrt_s: float = 0.01
     magnetometer_gate: float = 3.0
     magnetometer_noise_gauss: float = 0.003
     magnetometer_bias_gauss: float = 0.0032

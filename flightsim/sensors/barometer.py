@@ -46,7 +46,7 @@ class BarometerParameters:
         turn_on_bias_pa: one sigma of an offset that shifts all heights of a flight alike; the datasheet's
             accuracy of 1.5 mbar is the outer limit.
         drift_pa, drift_time_constant_s: slow Gauss-Markov wandering (temperature, weather, air in the case);
-            3 Pa is 0.25 m at sea level.
+            1.5 Pa is 0.13 m at sea level, what a shielded sensor wanders in the minutes of a flight.
         lag_s: first-order lag: foam and case volume, and 9 ms of conversion.
         quantum_pa: 0.01 mbar, the datasheet's integer output.
         self_heating_k, temperature_quantum_k: the sensor's own temperature reading.
@@ -56,7 +56,7 @@ class BarometerParameters:
     latency_s: float = 0.0
     noise_pa: float = 1.2
     turn_on_bias_pa: float = 20.0
-    drift_pa: float = 3.0
+    drift_pa: float = 1.5
     drift_time_constant_s: float = 300.0
     lag_s: float = 0.03
     quantum_pa: float = 1.0

@@ -90,7 +90,8 @@ class GpsParameters:
     """A receiver with differential corrections; `GpsParameters.standalone()` is one without.
 
     The white part is PX4's SIH receiver (0.2 m horizontal, 0.5 m vertical; velocity 0.06, 0.077, 0.158 m/s).
-    The correlated part is what corrections leave of the atmosphere and of multipath.
+    The correlated part is what corrections leave of the atmosphere and of multipath; the firmwares' own
+    simulators have none (PX4's SIH) or centimetres (ArduPilot's RTK fix).
 
     Attributes:
         rate_hz: samples per second.
@@ -106,8 +107,8 @@ class GpsParameters:
     latency_s: float = 0.11
     horizontal_noise_m: float = 0.2
     vertical_noise_m: float = 0.5
-    horizontal_wander_m: float = 0.12
-    vertical_wander_m: float = 0.25
+    horizontal_wander_m: float = 0.06
+    vertical_wander_m: float = 0.12
     wander_time_constant_s: float = 100.0
     velocity_noise_north_m_s: float = 0.06
     velocity_noise_east_m_s: float = 0.077

@@ -317,7 +317,7 @@ def test_gps_error_is_white_plus_correlated() -> None:
     """Autocovariance: white variance at lag zero only, the rest decays with the time constant."""
     parameters = GpsParameters(wander_time_constant_s=10.0)
     errors_m = gps_errors_m(record(parameters, still_truth(), 100_000))
-    for axis, wander_m, noise_m in ((0, 0.12, 0.2), (1, 0.12, 0.2), (2, 0.25, 0.5)):
+    for axis, wander_m, noise_m in ((0, 0.06, 0.2), (1, 0.06, 0.2), (2, 0.12, 0.5)):
         error = errors_m[:, axis]
         assert np.mean(error**2) == pytest.approx(wander_m**2 + noise_m**2, rel=0.05)
         for lag_s in (1.0, 5.0, 10.0):
@@ -356,7 +356,7 @@ def test_gps_stage_scales_errors_and_accuracy() -> None:
     poor = GpsParameters(fix_timeline=(GpsFixStage(**stage, error_scale=3.0),))
     good_m, bad_m = (gps_errors_m(record(p, still_truth(), 20)) for p in (plain, poor))
     np.testing.assert_allclose(bad_m, 3.0 * good_m, atol=0.05)
-    assert record(poor, still_truth(), 1)[0, i.GPS_EPH_M] == pytest.approx(3.0 * math.hypot(0.2, 0.12))
+    assert record(poor, still_truth(), 1)[0, i.GPS_EPH_M] == pytest.approx(3.0 * math.hypot(0.2, 0.06))
 
 
 # --- battery ---

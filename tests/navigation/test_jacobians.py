@@ -100,8 +100,9 @@ def test_prediction_is_the_transition_and_the_noise() -> None:
     np.testing.assert_allclose(off_diagonal, 0.0, atol=1e-11)
     assert noise[s.VEL, s.VEL] == pytest.approx(parameters.accel_noise_m_s2_sqrt_hz**2 * t, rel=1e-6)
     walk = 1.0 - np.exp(-2.0 * t / parameters.gps_position_tau_s)
-    assert noise[s.GPS_ERROR, s.GPS_ERROR] == pytest.approx(0.12**2 * walk, rel=1e-6)
-    assert noise[s.BARO_OFFSET, s.BARO_OFFSET] == pytest.approx(0.02**2 * t, rel=1e-6)
+    wander_m, offset_walk = parameters.gps_position_walk_m[0], parameters.barometer_offset_walk_m_per_sqrt_s
+    assert noise[s.GPS_ERROR, s.GPS_ERROR] == pytest.approx(wander_m**2 * walk, rel=1e-6)
+    assert noise[s.BARO_OFFSET, s.BARO_OFFSET] == pytest.approx(offset_walk**2 * t, rel=1e-6)
     assert (np.diag(noise)[: s.POS] > 0.0).all()
     assert not nominal[s.SUM_TIME : s.SUM_GYRO].any()
 
