@@ -1,6 +1,6 @@
 """One checked MAVLink frame, as it was on the wire."""
 
-from typing import Final
+from typing import Final, NamedTuple
 
 from autopilot_bridge.mavlink.definitions import DEFINITIONS, MessageDefinition
 
@@ -14,7 +14,7 @@ INCOMPAT_SIGNED: Final = 0x01
 MAX_FRAME_SIZE: Final = HEADER_SIZE_V2 + 255 + CHECKSUM_SIZE + SIGNATURE_SIZE
 
 
-class Frame:
+class Frame(NamedTuple):
     """A frame whose checksum is right and whose message the dialect knows (MAVLink guide, "Serialization").
 
     Attributes:
@@ -26,37 +26,19 @@ class Frame:
         signed: the frame carries a signature (which the parser does not verify).
     """
 
-    __slots__ = ("component_id", "message_id", "raw", "sequence", "signed", "system_id", "version")
-
-    def __init__(
-        self,
-        raw: bytes,
-        message_id: int,
-        system_id: int,
-        component_id: int,
-        sequence: int,
-        version: int = 2,
-        signed: bool = False,
-    ) -> None:
-        self.raw = raw
-        self.message_id = message_id
-        self.system_id = system_id
-        self.component_id = component_id
-        self.sequence = sequence
-        self.version = version
-        self.signed = signed
+    raw: bytes
+    message_id: int
+    system_id: int
+    component_id: int
+    sequence: int
+    version: int = 2
+    signed: bool = False
 
     def __repr__(self) -> str:
         return (
             f"Frame({self.definition.name}, from {self.system_id}/{self.component_id}, "
             f"sequence {self.sequence}, {len(self.raw)} bytes)"
         )
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Frame) and self.raw == other.raw
-
-    def __hash__(self) -> int:
-        return hash(self.raw)
 
     @property
     def definition(self) -> MessageDefinition:
