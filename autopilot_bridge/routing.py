@@ -66,3 +66,30 @@ def _leads_to(heard: set[tuple[int, int]], system: int, component: int) -> bool:
     if component == 0:
         return any(heard_system == system for heard_system, _ in heard)
     return (system, component) in heard
+
+
+class LoopGuard:
+    """Finds frames that come round: the same bytes heard lately on another channel.
+
+    Two links joined by somebody's bridge would otherwise pass a frame around for ever. Sequence numbers and
+    time stamps make equal bytes from one sender rare; on the same channel they are a repetition, not a loop.
+
+    Args:
+        memory: how many frames are remembered.
+    """
+
+    __slots__ = ("_heard", "_memory")
+
+    def __init__(self, memory: int = 512) -> None:
+        self._heard: dict[bytes, object] = {}
+        self._memory = memory
+
+    def comes_round(self, raw: bytes, channel: object) -> bool:
+        """True when these bytes were heard first on another channel; remembers them otherwise."""
+        first = self._heard.get(raw)
+        if first is None:
+            if len(self._heard) >= self._memory:
+                del self._heard[next(iter(self._heard))]
+            self._heard[raw] = channel
+            return False
+        return first is not channel

@@ -13,7 +13,7 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flavours import get_flavour
 from autopilot_bridge.links import Link, MemoryLink, memory_pair
 from autopilot_bridge.mavlink import Frame
-from autopilot_bridge.routing import Router
+from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TruthEncoder
@@ -30,6 +30,7 @@ TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a frame of truth."""
 
 _NEVER_US: Final = 1 << 62
+AUTOPILOT_COMPONENT: Final = 1
 
 
 class SitlVehicle:
@@ -40,6 +41,7 @@ class SitlVehicle:
         sensors: its sensor suite; `sensors.faults` switches failures.
         autopilot: the emulated autopilot.
         channels: its open links.
+        echoes: frames of its own that came back on a link; they are dropped.
     """
 
     def __init__(
@@ -65,7 +67,9 @@ class SitlVehicle:
             inject_failure=self._inject_failure,
         )
         self.channels: list[LinkChannel] = []
+        self.echoes = 0
         self._router: Router[LinkChannel] = Router()
+        self._loops = LoopGuard()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
 
     def _inject_failure(self, unit: int, failure: int, instance: int) -> Result:
@@ -114,11 +118,21 @@ class SitlVehicle:
     def take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
         """Hand frames that came in on a channel to the autopilot and to the channels they are meant for."""
         own = self.specification.system_id
+        several = len(self.channels) > 1
         for frame in frames:
+            if frame.system_id == own and frame.component_id == AUTOPILOT_COMPONENT:
+                self.echoes += 1  # its own words, brought back by somebody's bridge
+                continue
             self.autopilot.receive(frame, channel)
-            if len(self.channels) > 1 and (frame.target_system != own or frame.target_component > 1):
-                for other in self._router.route(frame, channel):
-                    other.send_frame(frame.raw)
+            if not several:
+                continue
+            others = self._router.route(frame, channel)
+            if (frame.target_system, frame.target_component) == (own, AUTOPILOT_COMPONENT):
+                continue
+            if self._loops.comes_round(frame.raw, channel):
+                continue
+            for other in others:
+                other.send_frame(frame.raw)
 
 
 def _gps(flavour: str) -> GpsParameters:
