@@ -1,5 +1,6 @@
 """Bytes in, frames out: finds MAVLink 1 and 2 frames in anything, never raises, accounts for every byte."""
 
+import struct
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -22,6 +23,7 @@ _MAGIC_V1_BYTE: Final = bytes([MAGIC_V1])
 _MAGIC_V2_BYTE: Final = bytes([MAGIC_V2])
 _OVERHEAD_V1: Final = HEADER_SIZE_V1 + CHECKSUM_SIZE
 _OVERHEAD_V2: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
+_unpack_head: Final = struct.Struct("<BBBBBBBHB").unpack_from
 _MAX_LATE: Final = 16  # frames; a larger step back is a sender that started anew
 
 
@@ -129,21 +131,21 @@ class FrameParser:
         start = 0
         source: SourceCounters | None = None
         sender = -1, -1
-        while size - start >= _OVERHEAD_V2 and data[start] == MAGIC_V2 and data[start + 2] == 0:
-            end = start + _OVERHEAD_V2 + data[start + 1]
-            if end > size:
+        while size - start >= _OVERHEAD_V2:
+            magic, length, flags, _, sequence, system_id, component_id, low, high = _unpack_head(data, start)
+            end = start + _OVERHEAD_V2 + length
+            if magic != MAGIC_V2 or flags or end > size:
                 break
-            raw = bytes(data[start:end])
-            message_id = raw[7] | raw[8] << 8 | raw[9] << 16
+            message_id = low | high << 16
             extra = _CRC_EXTRA.get(message_id)
+            raw = bytes(data[start:end])
             if extra is None or mcrf4xx(raw[1:-2] + extra) != raw[-2] | raw[-1] << 8:
                 break
-            sequence = raw[4]
-            if source is None or sender != (raw[5], raw[6]):
-                sender = raw[5], raw[6]
+            if source is None or sender != (system_id, component_id):
+                sender = system_id, component_id
                 source = self._source(sender, sequence)
             source.take(sequence)
-            frames.append(Frame(raw, message_id, raw[5], raw[6], sequence))
+            frames.append(Frame(raw, message_id, system_id, component_id, sequence))
             start = end
         counters.frames += len(frames)
         counters.bytes_framed += start

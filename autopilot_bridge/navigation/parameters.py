@@ -78,7 +78,7 @@ class NavigationParameters:
         history_s: how far back measurements can be delayed.
     """
 
-    covariance_rate_hz: int = 50
+    covariance_rate_hz: int = 25
     gyro_noise_rad_s_sqrt_hz: float = 2.5e-4
     gyro_bias_rad_s: float = 1.1e-3
     gyro_bias_tau_s: float = 16000.0

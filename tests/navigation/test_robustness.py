@@ -143,7 +143,7 @@ def test_covariance_is_read_only() -> None:
 
 
 def test_rates_must_fit() -> None:
-    with pytest.raises(ValueError, match="covariance_rate_hz 50 is not accepted"):
+    with pytest.raises(ValueError, match="covariance_rate_hz 25 is not accepted"):
         NavigationFilter(NavigationParameters(), readings=SensorReadings(), physics_rate_hz=240)
     with pytest.raises(ValueError, match="whole microseconds"):
         NavigationFilter(
