@@ -17,6 +17,8 @@ Builder = Callable[[], Values | bytes | None]
 """Field values of a message in the order of its definition, or its packed payload; None: nothing to say."""
 
 MICROSECONDS: Final = 1_000_000
+GRID_US: Final = 10_000
+"""Streams of 50 Hz and slower are sent on this grid of vehicle time; their rate stays exact on average."""
 
 
 class PayloadSink(Protocol):
@@ -78,6 +80,7 @@ class StreamTable:
     __slots__ = (
         "_cache",
         "_defaults_us",
+        "_due_times_us",
         "_heap",
         "_intervals_us",
         "_motion_bits",
@@ -103,6 +106,7 @@ class StreamTable:
         self._step_us = physics_step_us
         self._heap: list[tuple[int, int]] = []
         self._intervals_us: dict[int, int] = {}
+        self._due_times_us: dict[int, int] = {}
         self._defaults_us = {
             message_id: max(physics_step_us, round(MICROSECONDS / rate_hz))
             for message_id, rate_hz in rates_hz.items()
@@ -149,17 +153,19 @@ class StreamTable:
     def tick(self, time_us: int) -> None:
         """Send what is due."""
         heap, intervals_us, cache = self._heap, self._intervals_us, self._cache
-        payloads, motion_bits = cache.at(time_us), self._motion_bits
+        payloads, motion_bits, due_times_us = cache.at(time_us), self._motion_bits, self._due_times_us
         motion = 0
         due: list[tuple[int, bytes]] = []
         while heap:
-            due_us, message_id = heap[0]
-            if due_us > time_us:
+            wake_us, message_id = heap[0]
+            if wake_us > time_us:
                 break
-            next_us = due_us + intervals_us[message_id]
+            interval_us = intervals_us[message_id]
+            next_us = due_times_us[message_id] + interval_us
             if next_us <= time_us:  # a stream never bursts to catch up
-                next_us = time_us + intervals_us[message_id]
-            heapreplace(heap, (next_us, message_id))
+                next_us = time_us + interval_us
+            due_times_us[message_id] = next_us
+            heapreplace(heap, (_wake_us(next_us, interval_us), message_id))
             if message_id in motion_bits:
                 motion |= motion_bits[message_id]
                 continue
@@ -172,5 +178,11 @@ class StreamTable:
 
     def _start(self, message_id: int, interval_us: int, due_us: int) -> None:
         self._intervals_us[message_id] = interval_us
-        heappush(self._heap, (due_us, message_id))
+        self._due_times_us[message_id] = due_us
+        heappush(self._heap, (_wake_us(due_us, interval_us), message_id))
         self.next_due_us = self._heap[0][0]
+
+
+def _wake_us(due_us: int, interval_us: int) -> int:
+    """When a stream that is due is sent: the slower ones wait for the grid, to share a packet with others."""
+    return due_us if interval_us < 2 * GRID_US else -(-due_us // GRID_US) * GRID_US
