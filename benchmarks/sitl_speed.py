@@ -19,11 +19,31 @@ from pathlib import Path
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
+from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, team
 from autopilot_bridge.tlog import TlogWriter
 
 PHYSICS_RATE_HZ = 250
+
+
+def round_trip(vehicle: SitlVehicle) -> tuple[MissionItem, ...]:
+    """Takeoff, and a square of 60 m flown again and again."""
+    home = vehicle.autopilot.commander.home.position
+    assert home is not None
+    frame = LocalFrame(home)
+    corners = ((0.0, 0.0), (60.0, 0.0), (60.0, 60.0), (0.0, 60.0))
+    places = [frame.geodetic_from_ned(north_m, east_m, 0.0) for north_m, east_m in corners]
+    waypoints = [
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0, param4=math.nan)
+        for lat, lon, _ in places
+    ]
+    takeoff = MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, x=places[0][0], y=places[0][1], z=10.0)
+    again = MissionItem(
+        command=mavlink.MAV_CMD_DO_JUMP, frame=mavlink.MAV_FRAME_MISSION, param1=1.0, param2=1000.0
+    )
+    return (takeoff, *waypoints, again)
 
 
 class Flight:
@@ -50,16 +70,18 @@ class Flight:
         return record
 
     def take_off(self) -> None:
-        """Arm, take off, orbit."""
+        """Store a mission that goes round and round, arm, take off."""
         self.run(8.0)
+        for vehicle in self.sitl.vehicles:
+            vehicle.autopilot.commander.missions.replace(round_trip(vehicle), plan_id=1)
+        self._command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 4.0, 4.0)
         self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-        self._command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, math.nan, math.nan, math.nan, math.nan)
-        self.run(10.0)
-        self._command(mavlink.MAV_CMD_DO_ORBIT, 15.0, 3.0, 0, math.nan, math.nan, math.nan, math.nan)
-        self.run(5.0)
+        self.run(20.0)
         for vehicle in self.sitl.vehicles:
             mode = vehicle.autopilot.commander.mode
-            assert mode is FlightMode.ORBIT, f"vehicle {vehicle.specification.system_id} is in {mode}"
+            assert mode is FlightMode.MISSION and vehicle.autopilot.commander.airborne, (
+                f"vehicle {vehicle.specification.system_id} is in {mode}"
+            )
 
     def run(self, seconds: float) -> None:
         """Advance by vehicle seconds."""
