@@ -383,6 +383,9 @@ class Commander:
         else:
             action = max((action for _, action in self.failsafes.started), default=FailsafeAction.NONE)
             self.failsafes.started.clear()
+            if action > FailsafeAction.WARN:
+                # what is up already and left to nobody goes before a weaker newcomer
+                action = max(action, self.failsafes.action(self.time_us, self.parameters))
         if not self.armed or action <= FailsafeAction.WARN:
             self._enter(self.commanded_mode)
         elif action is FailsafeAction.TERMINATE:

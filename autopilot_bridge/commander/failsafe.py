@@ -89,6 +89,7 @@ class FailsafeMonitor:
                 events.append(FailsafeActivated(time_us=time_us, kind=kind, action=action))
             elif active is not None and present:
                 active.present = True
+                active.action = action  # its parameter may have been changed meanwhile
             elif active is not None:
                 if active.present:
                     events.append(FailsafeCleared(time_us=time_us, kind=kind))

@@ -6,8 +6,8 @@ vector under tilt and thrust limits with the vertical first, and the integrator 
 given (tracking anti-windup).
 
 Added to it: drag, which the accelerometer measures directly across the
-thrust axis, is fed forward below a cut-off (Kai, Allibert, Hua, Hamel, "Nonlinear feedback control of
-quadrotors exploiting first-order drag effects", 2017).
+thrust axis, is fed forward below a cut-off on axes whose velocity is controlled (Kai, Allibert, Hua, Hamel,
+"Nonlinear feedback control of quadrotors exploiting first-order drag effects", 2017).
 """
 
 import math
@@ -234,6 +234,14 @@ def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, ent
         pull = GRAVITY_M_S2 * s[c.THRUST_GIVEN] / hover
         s[c.BUMP] = -zx * pull + s[c.DRAG] - ax
         s[c.BUMP + 1] = -zy * pull + s[c.DRAG + 1] - ay
+    # drag is fought only for a wanted velocity: without one it is what brings the vehicle to rest in the air
+    drag_x, drag_y = s[c.DRAG], s[c.DRAG + 1]
+    if not control_x:
+        drag_x = 0.0
+        s[c.BUMP] = 0.0
+    if not control_y:
+        drag_y = 0.0
+        s[c.BUMP + 1] = 0.0
     up = vertical_control(nav, sp, p, s, dt, entering)
     ax += s[c.BUMP]
     ay += s[c.BUMP + 1]
@@ -244,7 +252,7 @@ def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, ent
     s[c.ACC_SETPOINT + 1] = ay
 
     # horizontal thrust for the wanted acceleration against the measured drag, in units of hover thrust / g
-    wanted_x, wanted_y = ax - s[c.DRAG], ay - s[c.DRAG + 1]
+    wanted_x, wanted_y = ax - drag_x, ay - drag_y
     tx, ty = hover * wanted_x / GRAVITY_M_S2, hover * wanted_y / GRAVITY_M_S2
     wanted = math.sqrt(tx * tx + ty * ty)
     # vertical first, but keep a margin for staying on the path when climbing at full thrust

@@ -12,6 +12,8 @@ from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
 _OVER_PLACE_M = 1.0  # a given place must be this close before the descent starts
+_THRUST_GONE_M_S2 = 20.0  # downwards, more than gravity: thrust to its minimum
+_RELIEF_M_S3 = 4.0  # how fast thrust is taken away on ground contact
 _NAV_HEIGHT = nav_layout.HEIGHT_ABOVE_GROUND_M
 
 
@@ -30,15 +32,15 @@ class LandTask:
     """Land here, or at a given place. DONE on the ground, with motors at idle and a `TouchedDown` event.
 
     The place is held by position, or by velocity when there is no position, or the vehicle sinks level when
-    there is neither. Ground contact levels the vehicle, and thrust is taken away before the landing is
-    believed.
+    there is neither. Ground contact levels the vehicle and takes thrust away little by little, until the
+    landing is believed; from then on the motors idle, whatever the land detector thinks later.
 
     Args:
         position_ned_m: place to land at, (3,) (down is ignored); None: where the vehicle comes to rest.
         yaw_rad: heading; None: the present one.
     """
 
-    __slots__ = ("_down", "_landed", "_motion", "_target", "_yaw_rad")
+    __slots__ = ("_contact_s", "_down", "_landed", "_motion", "_target", "_yaw_rad")
 
     def __init__(self, position_ned_m: Array | None = None, yaw_rad: float | None = None) -> None:
         self._target = None if position_ned_m is None else np.array(position_ned_m, dtype=np.float64)
@@ -46,12 +48,14 @@ class LandTask:
         self._motion: SmoothMotion | None = None
         self._down = self._target is None
         self._landed = False
+        self._contact_s = 0.0
 
     def activate(self, ctx: FlightContext) -> None:
         ctx.phase = FlightPhase.LANDING
         self._motion = SmoothMotion(ctx)
         self._down = self._target is None
         self._landed = False
+        self._contact_s = 0.0
         if self._target is not None:
             self._target[2] = self._motion.trajectory.position_ned_m[2]
 
@@ -60,7 +64,7 @@ class LandTask:
         if motion is None:
             self.activate(ctx)
             return self.update(ctx)
-        if not ctx.armed or ctx.on_ground:
+        if not ctx.armed or ctx.on_ground or self._landed:
             clear_setpoint(ctx.setpoint, sp.IDLE if ctx.armed else sp.OFF)
             if not self._landed:
                 self._landed = True
@@ -86,13 +90,15 @@ class LandTask:
         if self._down:
             ctx.setpoint[2] = math.nan  # by speed alone: the height of the ground isn't known
             ctx.setpoint[8] = 0.0
+            self._contact_s = self._contact_s + ctx.dt_s if ctx.ground_contact else 0.0
             if ctx.ground_contact:
                 ctx.setpoint[0:2] = math.nan
                 ctx.setpoint[3:5] = math.nan
                 ctx.setpoint[6:8] = 0.0
+                ctx.setpoint[8] = min(_THRUST_GONE_M_S2, _RELIEF_M_S3 * self._contact_s)
             if ctx.maybe_landed:
                 ctx.setpoint[5] = math.nan
-                ctx.setpoint[8] = 20.0  # more than gravity: thrust to its minimum
+                ctx.setpoint[8] = _THRUST_GONE_M_S2
         return TaskStatus.RUNNING
 
     def _sink(self, ctx: FlightContext, motion: SmoothMotion, speed_m_s: float) -> None:

@@ -390,6 +390,8 @@ class Aiding:
                 has |= f.HAS_REST
             else:
                 f.restart_mean_rate(solution.core)
+                if self._held:
+                    self._forget_velocity()
         self._rested = self.at_rest
         lost = clocks.horizontal_aid_us < 0 or time_us - clocks.horizontal_aid_us > p.no_aid_timeout_s * 1e6
         if lost and not self._held:
@@ -413,6 +415,11 @@ class Aiding:
         solution, core = self._solution, self._solution.core
         solution.obs[f.HOLD : f.HOLD + 2] = core[X_POS : X_POS + 2]
         self._held = True
+        self._forget_velocity()
+
+    def _forget_velocity(self) -> None:
+        """About zero is the best guess of a horizontal velocity that nothing has measured lately."""
+        solution, core = self._solution, self._solution.core
         if self._clocks.horizontal_aid_us >= 0:
             north, east = float(core[X_VEL]), float(core[X_VEL + 1])
             solution.change_velocity(-north, -east, sigma_m_s=_HELD_VELOCITY_M_S)

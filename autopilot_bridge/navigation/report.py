@@ -7,10 +7,11 @@ from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
-from autopilot_bridge.navigation.states import ATT, POS, SAMPLE_AGE_S, VEL
+from autopilot_bridge.navigation.states import ATT, POS, SAMPLE_AGE_S, VEL, X_VEL
 
 _IN_USE_US: Final = 1_000_000
 _MAX_TILT_SIGMA_RAD: Final = math.radians(10.0)
+_STILL_M_S: Final = 0.5
 _REFUSED_US: Final = 1_000_000  # both height sensors refused for this long: the accelerometer is suspected
 
 
@@ -78,7 +79,10 @@ def report(
     health.constant_position = held
     health.position_horizontal_relative = aided and bool(imu_alive)
     health.position_horizontal_absolute = health.position_horizontal_relative
-    health.velocity_horizontal = health.position_horizontal_relative or (held and at_rest)
+    # at rest the velocity is good as soon as the zero-velocity updates have brought it there
+    speed = math.hypot(solution.core[X_VEL], solution.core[X_VEL + 1])
+    still = at_rest and max(speed, health.velocity_accuracy_m_s) < _STILL_M_S
+    health.velocity_horizontal = bool(health.position_horizontal_relative or (held and still))
     health.position_vertical_absolute = height and bool(imu_alive)
     health.velocity_vertical = health.position_vertical_absolute
     ready = health.gps_quality and health.yaw_aligned

@@ -262,6 +262,47 @@ def test_ardupilot_battery_needs_its_timer() -> None:
     assert any(text.startswith("Battery 1 is low 10.20V used") for text in rig.texts())
 
 
+def test_a_weaker_failsafe_does_not_end_an_ardupilot_landing() -> None:
+    rig = guided(BATT_FS_LOW_ACT=1, FS_GCS_ENABLE=1)
+    heartbeats(rig, 1.0)
+    rig.context.nav[12] = -60.0
+    battery(rig, voltage_v=10.2)
+    for _ in range(11):
+        heartbeats(rig, 1.0)
+    assert rig.commander.mode is FlightMode.LAND
+    rig.run(6.0)
+    assert activated(rig, FailsafeKind.GCS_LOST)
+    assert rig.commander.mode is FlightMode.LAND
+
+
+def test_a_landing_left_to_the_pilot_does_not_hold_up_the_next_ardupilot_failsafe() -> None:
+    rig = guided(BATT_FS_LOW_ACT=1, FS_GCS_ENABLE=1)
+    rig.context.nav[12] = -60.0
+    battery(rig, voltage_v=10.2)
+    for _ in range(11):
+        heartbeats(rig, 1.0)
+    assert rig.commander.mode is FlightMode.LAND
+    assert rig.commander.set_mode(FlightMode.GUIDED).accepted
+    heartbeats(rig, 1.0)
+    assert rig.commander.mode is FlightMode.GUIDED
+    rig.run(6.0)
+    assert rig.commander.mode is FlightMode.RETURN
+
+
+def test_a_changed_action_counts_for_a_failsafe_that_is_up() -> None:
+    rig = Rig("px4", COM_LOW_BAT_ACT=0)
+    rig.put_in_air(30.0)
+    battery(rig, remaining=0.06)
+    rig.run(0.2)
+    assert rig.commander.mode is FlightMode.HOLD
+    rig.set_parameter("COM_LOW_BAT_ACT", 2)
+    rig.run(0.2)
+    assert rig.commander.mode is FlightMode.LAND
+    rig.set_parameter("COM_LOW_BAT_ACT", 0)
+    rig.run(0.2)
+    assert rig.commander.mode is FlightMode.HOLD
+
+
 def test_px4_without_position_descends_and_goes_back_when_it_returns() -> None:
     rig = Rig("px4")
     rig.put_in_air()

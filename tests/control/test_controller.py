@@ -159,6 +159,18 @@ def test_drag_compensation_halves_the_error_in_a_gale() -> None:
     assert error(0.8) < 0.6 * error(0.0)
 
 
+def test_without_a_wanted_velocity_drag_is_left_to_stop_the_vehicle() -> None:
+    rig, task = hovering()
+    task.set_trajectory(velocity_ned_m_s=(8.0, 0.0, 0.0), yaw_rad=0.0)
+    rig.run(6.0)
+    task.set_trajectory(
+        velocity_ned_m_s=(math.nan, math.nan, 0.0), acceleration_ned_m_s2=(0.0, 0.0, math.nan), yaw_rad=0.0
+    )
+    log = rig.run(12.0)
+    assert math.degrees(tilts(log)[100:].max()) < 1.5
+    assert np.hypot(*velocities(log)[-1, :2]) < 2.0
+
+
 def test_hover_thrust_is_learnt_from_a_wrong_start() -> None:
     for start in (0.25, 0.7):
         rig, _ = hovering(control=replace(MulticopterParameters(), hover_thrust=start))

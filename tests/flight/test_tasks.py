@@ -131,6 +131,34 @@ def test_land_without_a_position_descends_level(velocity_known: bool) -> None:
     assert np.degrees(tilts(log).max()) < 5.0
 
 
+def test_a_landing_is_kept_whatever_the_land_detector_thinks_later() -> None:
+    rig = flying(LandTask(), height_m=2.0)
+    rig.run(10.0)
+    assert rig.ctx.on_ground and rig.task is not None
+    for state in (LandedState.LANDING, LandedState.IN_AIR):
+        rig.ctx.landed_state = state
+        assert rig.task.update(rig.ctx) is TaskStatus.DONE
+        assert rig.controller.setpoint[sp.LEVEL] == sp.IDLE
+    assert rig.ctx.events.count(TouchedDown()) == 1
+
+
+def test_ground_contact_takes_the_thrust_away() -> None:
+    rig = flying(LandTask(), height_m=2.0)
+    rig.run(0.5)
+    assert rig.task is not None
+    assert rig.controller.setpoint[8] == 0.0
+    rig.ctx.ground_contact = True
+    downwards = []
+    for _ in range(150):
+        rig.task.update(rig.ctx)
+        downwards.append(float(rig.controller.setpoint[8]))
+    assert np.all(np.diff(downwards) > 0.0) and max(np.diff(downwards)) < 0.1
+    assert downwards[-1] > 9.81  # more than gravity: nothing is left
+    rig.ctx.ground_contact = False
+    rig.task.update(rig.ctx)
+    assert rig.controller.setpoint[8] == 0.0
+
+
 def test_goto_settles_within_nine_seconds() -> None:
     rig = flying(GotoTask(np.array([15.0, 0.0, -10.0])))
     log = rig.run(9.0)

@@ -178,6 +178,23 @@ def test_without_gps_the_vehicle_lands(flavour: str, failure: int) -> None:
     assert flight.actuators_finite
 
 
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_without_gps_at_cruise_the_vehicle_sinks_level_and_disarms(flavour: str) -> None:
+    flight = hovering(flavour, height_m=20.0)
+    guided_north(flight, 8.0)
+    flight.fly(6.0)
+    assert flight.speed_m_s > 7.0
+    flight.inject(GPS, OFF)
+    flight.fly_until(lambda: flight.mode == "land", 12.0, "landing")
+    flight.fly(2.0)
+    assert flight.tilt_deg < 2.0
+    flight.fly_until(lambda: flight.height_m < 1.0, 50.0, "the ground")
+    assert flight.tilt_deg < 2.0
+    assert flight.speed_m_s < 1.2
+    flight.wait_disarmed(12.0)
+    assert flight.tilt_deg < 3.0 and flight.speed_m_s < 0.05
+
+
 def test_gps_recovered_px4_goes_back_to_what_it_did_ardupilot_does_not() -> None:
     for flavour, then in (("px4", "hold"), ("ardupilot", "land")):
         flight = hovering(flavour, height_m=25.0)

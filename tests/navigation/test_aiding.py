@@ -268,6 +268,26 @@ def test_gps_loss_and_return(flight: Array) -> None:
     assert math.hypot(*health.position_reset_ne_m) > 5.0
 
 
+def test_velocity_of_a_landing_without_position_is_claimed_only_when_it_is_zero(rest: Array) -> None:
+    bench = Bench(rest).run(10.0)
+    nav, health = bench.filter, bench.filter.health
+    bench.suite.faults.inject(SensorUnit.GPS, FaultType.OFF)
+    bench.run(20.0)
+    assert health.constant_position and not health.velocity_horizontal
+    nav._solution.change_velocity(5.0, -3.0, sigma_m_s=0.1)  # five wrong metres per second, believed
+    nav.vehicle_at_rest = True
+    claimed: list[float] = []
+
+    def look() -> None:
+        if health.velocity_horizontal:
+            claimed.append(math.hypot(*nav.state[layout.VEL_NED_M_S][:2]))
+
+    bench.run(25.0, each=look)
+    assert claimed and max(claimed) < 1.0
+    assert len(claimed) > 3.0 * bench.rate_hz
+    assert claimed[-1] < 0.1
+
+
 def test_attitude_stays_good_indoors(hover: Array) -> None:
     bench = Bench(hover, sensors=SensorSuiteParameters(gps=None)).run(59.0)
     health = bench.filter.health
