@@ -331,6 +331,7 @@ class Autopilot:
         self.controller.set_parameters(flavour.controller_parameters(store))
         self.commander.guidance.set_parameters(flavour.flight_parameters(store))
         self.commander.parameters = flavour.commander_parameters(store)
+        self.navigation.set_parameters(flavour.navigation_parameters(store))
         if name.startswith("SR") and name[2:3].isdigit():
             self._apply_stream_rates(int(name[2]))
 

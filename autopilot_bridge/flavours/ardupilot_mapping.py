@@ -8,7 +8,7 @@ from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
-from autopilot_bridge.flavours.mapping import FieldMap, build, clamp, integer, number
+from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
@@ -141,7 +141,28 @@ NAVIGATION: Final = (
     FieldMap("gps_velocity_gate", "EK3_VEL_I_GATE", 0.01, low=1.0, high=10.0),
     FieldMap("barometer_gate", "EK3_HGT_I_GATE", 0.01, low=1.0, high=10.0),
     FieldMap("magnetometer_gate", "EK3_MAG_I_GATE", 0.01, low=1.0, high=10.0),
+    FieldMap("no_aid_noise_m", "EK3_NOAID_M_NSE", low=0.5, high=50.0),
 )
+
+NAVIGATION_NOISE: Final = (
+    NoiseMap(("gps_position_noise_m", "gps_position_walk_m"), "EK3_POSNE_M_NSE"),
+    NoiseMap(("gps_velocity_noise_m_s",), "EK3_VELNE_M_NSE", (0, 1)),
+    NoiseMap(("gps_velocity_noise_m_s",), "EK3_VELD_M_NSE", (2,)),
+    NoiseMap(("barometer_noise_m",), "EK3_ALT_M_NSE"),
+    NoiseMap(("magnetometer_noise_gauss",), "EK3_MAG_M_NSE"),
+    NoiseMap(("accel_noise_m_s2_sqrt_hz",), "EK3_ACC_P_NSE"),
+    NoiseMap(("gyro_noise_rad_s_sqrt_hz",), "EK3_GYRO_P_NSE"),
+    NoiseMap(
+        (
+            "gps_required_eph_m",
+            "gps_required_epv_m",
+            "gps_required_speed_accuracy_m_s",
+            "gps_required_hdop",
+        ),
+        "EK3_CHECK_SCALE",
+    ),
+)
+_SOURCE_GPS: Final = 3  # of EK3_SRC1_POSXY
 
 
 def commander_parameters(store: ParameterStore) -> CommanderParameters:
@@ -246,8 +267,19 @@ def controller_parameters(store: ParameterStore) -> MulticopterParameters:
 
 
 def navigation_parameters(store: ParameterStore) -> NavigationParameters:
-    """EK3_*."""
-    return build(NavigationParameters, store, NAVIGATION)
+    """EK3_*: gates as they are; noise and EK3_CHECK_SCALE relative to ArduPilot's defaults.
+
+    The noise of `NavigationParameters` is tuned to this vehicle's sensors and ArduPilot's defaults are not,
+    so a parameter at its default gives the tuned value and twice the parameter twice the noise. GPS is fused
+    as a whole, when EK3_SRC1_POSXY names it.
+    """
+    return build(
+        NavigationParameters,
+        store,
+        NAVIGATION,
+        use_gps=integer(store, "EK3_SRC1_POSXY", _SOURCE_GPS) == _SOURCE_GPS,
+        **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
+    )
 
 
 def _exempt(options: int, table: Mapping[int, tuple[FlightMode, ...]]) -> frozenset[FlightMode]:

@@ -2,11 +2,14 @@
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 
 T = TypeVar("T")
+
+_LEAST_RATIO: Final = 0.05  # a filter that believes its sensors to the millimetre diverges
+_GREATEST_RATIO: Final = 100.0
 
 
 class FieldMap(NamedTuple):
@@ -24,6 +27,45 @@ class FieldMap(NamedTuple):
     factor: float = 1.0
     low: float = 1e-3
     high: float = 1e4
+
+
+class NoiseMap(NamedTuple):
+    """Fields that hold noise as it is tuned here, and the firmware parameter that scales them.
+
+    The firmwares' defaults fit other sensors and another filter than ours, so that their figures mean nothing
+    to it. What a user does with them is taken relative to the default: left alone they give the tuned value,
+    doubled twice that.
+
+    Attributes:
+        fields: names in the parameter class; of numbers, or tuples of numbers.
+        name: the firmware's name.
+        components: of a tuple, the ones to scale; None: all.
+    """
+
+    fields: tuple[str, ...]
+    name: str
+    components: tuple[int, ...] | None = None
+
+
+def scaled_values(tuned: object, store: ParameterStore, table: Iterable[NoiseMap]) -> dict[str, Any]:
+    """Fields of `tuned` scaled by what the parameters of the store are of their firmware's defaults."""
+    values: dict[str, Any] = {}
+    for entry in table:
+        definition = store.find(entry.name)
+        if definition is None:
+            continue
+        default = definition.convert(definition.default)  # single precision, as the value is
+        ratio = clamp(store.get(entry.name) / default, _LEAST_RATIO, _GREATEST_RATIO)
+        if ratio == 1.0:
+            continue
+        for field in entry.fields:
+            old = values.get(field, getattr(tuned, field))
+            if isinstance(old, tuple):
+                scaled = range(len(old)) if entry.components is None else entry.components
+                values[field] = tuple(v * ratio if i in scaled else v for i, v in enumerate(old))
+            else:
+                values[field] = old * ratio
+    return values
 
 
 def field_values(store: ParameterStore, table: Iterable[FieldMap]) -> dict[str, float]:

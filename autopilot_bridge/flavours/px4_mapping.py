@@ -7,7 +7,7 @@ from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
-from autopilot_bridge.flavours.mapping import FieldMap, build, clamp, integer, number
+from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
@@ -144,7 +144,20 @@ NAVIGATION: Final = (
     FieldMap("gps_velocity_gate", "EKF2_GPS_V_GATE", low=1.0, high=20.0),
     FieldMap("barometer_gate", "EKF2_BARO_GATE", low=1.0, high=20.0),
     FieldMap("magnetometer_gate", "EKF2_MAG_GATE", low=1.0, high=20.0),
+    FieldMap("gps_required_hdop", "EKF2_REQ_PDOP", low=1.5, high=5.0),
+    FieldMap("no_aid_noise_m", "EKF2_NOAID_NOISE", low=0.5, high=50.0),
 )
+
+NAVIGATION_NOISE: Final = (
+    NoiseMap(("gps_position_noise_m", "gps_position_walk_m"), "EKF2_GPS_P_NOISE"),
+    NoiseMap(("gps_velocity_noise_m_s",), "EKF2_GPS_V_NOISE"),
+    NoiseMap(("barometer_noise_m",), "EKF2_BARO_NOISE"),
+    NoiseMap(("magnetometer_noise_gauss",), "EKF2_MAG_NOISE"),
+    NoiseMap(("accel_noise_m_s2_sqrt_hz",), "EKF2_ACC_NOISE"),
+    NoiseMap(("gyro_noise_rad_s_sqrt_hz",), "EKF2_GYR_NOISE"),
+    NoiseMap(("gps_check_time_s",), "EKF2_REQ_GPS_H"),
+)
+_GPS_POSITION_OR_VELOCITY: Final = 1 | 4  # of EKF2_GPS_CTRL
 
 
 def commander_parameters(store: ParameterStore) -> CommanderParameters:
@@ -215,9 +228,21 @@ def controller_parameters(store: ParameterStore) -> MulticopterParameters:
 
 
 def navigation_parameters(store: ParameterStore) -> NavigationParameters:
-    """EKF2_*."""
+    """EKF2_*: gates, checks and time-outs as they are; noise and EKF2_REQ_GPS_H relative to PX4's defaults.
+
+    The noise of `NavigationParameters` is tuned to this vehicle's sensors and PX4's defaults are not, so a
+    parameter at its default gives the tuned value and twice the parameter twice the noise. GPS is fused as
+    a whole: with neither position nor velocity in EKF2_GPS_CTRL not at all.
+    """
     satellites = integer(store, "EKF2_REQ_NSATS", 6)
-    return build(NavigationParameters, store, NAVIGATION, gps_required_satellites=max(4, min(12, satellites)))
+    return build(
+        NavigationParameters,
+        store,
+        NAVIGATION,
+        gps_required_satellites=max(4, min(12, satellites)),
+        use_gps=bool(integer(store, "EKF2_GPS_CTRL", 7) & _GPS_POSITION_OR_VELOCITY),
+        **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
+    )
 
 
 def _exempt(bits: int) -> frozenset[FlightMode]:

@@ -108,7 +108,6 @@ class Aiding:
 
     def restart(self) -> None:
         """As at boot, but for the origin and what follows from it."""
-        p = self._parameters
         self._clocks = Clocks()
         self._quality.restart()
         self._terrain.restart()
@@ -122,6 +121,20 @@ class Aiding:
         self.at_rest = False
         obs = self._solution.obs
         obs[:] = 0.0
+        self._tune()
+        if self._mag_ned is not None:
+            obs[f.MAG_NED : f.MAG_NED + 3] = self._mag_ned
+
+    def set_parameters(self, parameters: NavigationParameters) -> None:
+        """New tuning for the updates to come; what was decided and learnt until now stays."""
+        self._parameters = parameters
+        self._quality.set_parameters(parameters)
+        self._terrain.set_parameters(parameters)
+        self._tune()
+
+    def _tune(self) -> None:
+        """Variances and gates that don't depend on the measurement."""
+        p, obs = self._parameters, self._solution.obs
         obs[f.BARO_VAR] = p.barometer_noise_m**2
         obs[f.MAG_VAR] = p.magnetometer_noise_gauss**2
         obs[f.REST_VEL_VAR] = p.zero_velocity_noise_m_s**2
@@ -130,8 +143,6 @@ class Aiding:
         obs[f.GATE_GPS_VEL] = p.gps_velocity_gate
         obs[f.GATE_BARO] = p.barometer_gate
         obs[f.GATE_MAG] = p.magnetometer_gate
-        if self._mag_ned is not None:
-            obs[f.MAG_NED : f.MAG_NED + 3] = self._mag_ned
 
     def align(self, time_us: int, accel_frd_m_s2: Array, mag_frd_gauss: Array | None) -> None:
         """Start the solution from the averages of a vehicle about at rest."""
@@ -234,7 +245,7 @@ class Aiding:
         values, solution, p, obs = reading.values, self._solution, self._parameters, self._solution.obs
         usable = self._quality.judge(values, reading.time_us, time_us)
         row = solution.row_at(reading.time_us, time_us)
-        if not usable or row < 0 or not self._health.yaw_aligned:
+        if not (usable and p.use_gps) or row < 0 or not self._health.yaw_aligned:
             return -1
         lat, lon, alt = float(values[GPS_LAT_DEG]), float(values[GPS_LON_DEG]), float(values[GPS_ALT_M])
         if self.frame is None:

@@ -6,6 +6,8 @@ when, and what happens when something is missing or refused, is decided in `Aidi
 """
 
 import math
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +23,16 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import GYRO, GYRO_LAST
 from flightsim.interface import SensorReadings
+
+FIXED_IN_FLIGHT: Final = (
+    "covariance_rate_hz",
+    "history_s",
+    "alignment_time_s",
+    "gps_check_time_s",
+    "mag_ned_gauss",
+    "magnetic_year",
+)
+"""Fields of `NavigationParameters` that size buffers, or were used up when the filter started."""
 
 
 class NavigationFilter:
@@ -102,6 +114,25 @@ class NavigationFilter:
         view = self._solution.p.view()
         view.flags.writeable = False
         return view
+
+    @property
+    def parameters(self) -> NavigationParameters:
+        """The tuning in use."""
+        return self._parameters
+
+    def set_parameters(self, parameters: NavigationParameters) -> None:
+        """Take new tuning from the next update on; the estimate and its covariance stay.
+
+        `FIXED_IN_FLIGHT` fields keep their values: the firmwares take those at the next boot.
+        """
+        kept = {name: getattr(self._parameters, name) for name in FIXED_IN_FLIGHT}
+        p = replace(parameters, **kept)
+        if p == self._parameters:
+            return
+        self._parameters = p
+        self._limits = (p.gyro_range_rad_s, p.accel_range_m_s2, p.imu_timeout_s)
+        self._solution.set_parameters(p)
+        self._aiding.set_parameters(p)
 
     def set_origin(self, origin: GeodeticPosition) -> None:
         """Set the origin from outside (SET_GPS_GLOBAL_ORIGIN).

@@ -66,6 +66,10 @@ class GpsQuality:
         self._said: NDArray[np.float64] = np.zeros(GPS_SIZE)
         self.restart()
 
+    def set_parameters(self, parameters: NavigationParameters) -> None:
+        """New thresholds for the samples to come."""
+        self._parameters = parameters
+
     def restart(self) -> None:
         """Forget the past."""
         self.good = False

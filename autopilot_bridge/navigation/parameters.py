@@ -13,6 +13,7 @@ _MAY_BE_ZERO = frozenset(
         "barometer_offset_walk_m_per_sqrt_s",
         "terrain_walk_m_per_sqrt_s",
         "terrain_gradient",
+        "use_gps",
     }
 )
 
@@ -42,6 +43,7 @@ class NavigationParameters:
         gps_nominal_speed_accuracy_m_s: what the receiver reports in good conditions; when it reports worse,
             the velocity noise grows in proportion. What a reported position accuracy exceeds the white part
             by is taken as correlated: atmosphere and multipath wander slowly.
+        use_gps: GPS is fused; otherwise only its quality is judged (EKF2_GPS_CTRL, EK3_SRC1_POSXY).
         gps_required_satellites, gps_required_eph_m, gps_required_epv_m, gps_required_speed_accuracy_m_s,
             gps_required_hdop: quality checks before use (EKF2_REQ_NSATS, _EPH, _EPV, _SACC, _PDOP).
         gps_check_time_s: how long the checks must have passed before GPS is taken into use (EKF2_REQ_GPS_H).
@@ -93,6 +95,7 @@ class NavigationParameters:
     gps_position_tau_s: float = 100.0
     gps_velocity_noise_m_s: tuple[float, float, float] = (0.06, 0.077, 0.158)
     gps_nominal_speed_accuracy_m_s: float = 0.11
+    use_gps: bool = True
     gps_required_satellites: int = 6
     gps_required_eph_m: float = 3.0
     gps_required_epv_m: float = 5.0

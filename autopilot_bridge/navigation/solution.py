@@ -93,6 +93,14 @@ class Solution:
         self.gps_error_var = (horizontal**2, horizontal**2, vertical**2)
         self.clear()
 
+    def set_parameters(self, parameters: NavigationParameters) -> None:
+        """New tuning; the variances of the GPS error stay until the receiver reports its accuracy again."""
+        self._parameters = parameters
+        horizontal, _, vertical = self.gps_error_var
+        self.process[:] = process_from(parameters)
+        self.process[cov.GPS_VAR_HORIZONTAL] = horizontal
+        self.process[cov.GPS_VAR_VERTICAL] = vertical
+
     def clear(self) -> None:
         """Nothing is known, except where on Earth gravity and rotation were found."""
         gravity, rate = self.core[GRAVITY], self.core[EARTH_RATE : EARTH_RATE + 3].copy()

@@ -24,6 +24,10 @@ class TerrainEstimator:
         self._parameters = parameters
         self.restart()
 
+    def set_parameters(self, parameters: NavigationParameters) -> None:
+        """New tuning; what is known of the ground stays."""
+        self._parameters = parameters
+
     def restart(self) -> None:
         """Nothing is known of the ground."""
         self.down_m = math.nan
