@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
-from autopilot_bridge.flight.goto import GotoTask, RepositionTask
+from autopilot_bridge.flight.goto import RepositionTask
 from autopilot_bridge.flight.guided import GuidedKind, GuidedTask
 from autopilot_bridge.flight.hold import HoldTask
 from autopilot_bridge.flight.offboard import Vector
 from autopilot_bridge.flight.orbit import OrbitTask, OrbitYaw
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.takeoff import TakeoffTask
+from autopilot_bridge.flight.task import SpeedKind, SpeedTask
 
 if TYPE_CHECKING:
     from autopilot_bridge.commander.commander import Commander
@@ -33,16 +34,32 @@ class Guidance:
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
         self._parameters = commander.context.parameters
+        self._speeds_m_s: dict[SpeedKind, float] = {}  # commanded ones, over the parameters'
         self._target = np.full(3, math.nan)
 
     def set_parameters(self, parameters: FlightParameters) -> None:
-        """New flight parameters (a pilot changed one); a commanded speed is forgotten."""
-        self._parameters = parameters
-        self._commander.context.parameters = parameters
+        """New flight parameters (a pilot changed one); a commanded speed lasts on."""
+        if parameters != self._parameters:
+            self._parameters = parameters
+            self._apply_speeds()
 
     def forget_speed(self) -> None:
         """Back to the parameters' speeds; a commanded speed lasts until the next mode."""
-        self._commander.context.parameters = self._parameters
+        self._speeds_m_s.clear()
+        self._apply_speeds()
+
+    def _apply_speeds(self) -> None:
+        """The flight parameters with the commanded speeds in place of theirs."""
+        p, speeds = self._parameters, self._speeds_m_s
+        changes: dict[str, Any] = {}
+        if SpeedKind.GROUND_SPEED in speeds:
+            cruise = min(speeds[SpeedKind.GROUND_SPEED], p.max_speed_m_s)
+            changes = {"cruise_speed_m_s": cruise, "return_speed_m_s": cruise}
+        if SpeedKind.CLIMB in speeds:
+            changes["climb_speed_m_s"] = speeds[SpeedKind.CLIMB]
+        if SpeedKind.DESCENT in speeds:
+            changes["descend_speed_m_s"] = speeds[SpeedKind.DESCENT]
+        self._commander.context.parameters = replace(p, **changes) if changes else p
 
     def takeoff(self, *, down_m: float, yaw_rad: float) -> Verdict:
         """Climb straight up to a height; NaN: the parameter's height over home.
@@ -162,24 +179,26 @@ class Guidance:
         return verdict
 
     def change_speed(self, speed_m_s: float, *, kind: int) -> None:
-        """DO_CHANGE_SPEED until the next mode: SPEED_TYPE 0 and 1 cruise, 2 climb, 3 descent; <= 0: reset."""
-        context, limits = self._commander.context, self._parameters
+        """DO_CHANGE_SPEED, until the next mode; `kind` is a `SpeedKind`; <= 0: the parameters' again."""
         if not math.isfinite(speed_m_s):
             return
         if speed_m_s <= 0.0:
             self.forget_speed()
+            for each in (SpeedKind.GROUND_SPEED, SpeedKind.CLIMB, SpeedKind.DESCENT):
+                self._tell_speed(each, None)
             return
-        if kind == 2:
-            context.parameters = replace(context.parameters, climb_speed_m_s=min(speed_m_s, _MAX_SPEED_M_S))
-            return
-        if kind == 3:
-            context.parameters = replace(context.parameters, descend_speed_m_s=min(speed_m_s, _MAX_SPEED_M_S))
-            return
-        speed = min(speed_m_s, limits.max_speed_m_s)
-        context.parameters = replace(context.parameters, cruise_speed_m_s=speed, return_speed_m_s=speed)
-        task = self._commander.tasks.task
-        if isinstance(task, GotoTask):
-            task.set_speed(context, speed)
+        changed = SpeedKind(kind) if kind in (SpeedKind.CLIMB, SpeedKind.DESCENT) else SpeedKind.GROUND_SPEED
+        speed = min(speed_m_s, _MAX_SPEED_M_S)
+        self._speeds_m_s[changed] = speed
+        self._apply_speeds()
+        self._tell_speed(changed, speed)
+
+    def _tell_speed(self, kind: SpeedKind, speed_m_s: float | None) -> None:
+        """Have the task being flown, and one put aside for a pause, take the speed."""
+        tasks = self._commander.tasks
+        for task in (tasks.task, tasks.paused):
+            if isinstance(task, SpeedTask):
+                task.change_speed(self._commander.context, kind, speed_m_s)
 
     def turn(self, yaw_rad: float) -> None:
         """Point the nose somewhere, holding the place (CONDITION_YAW in GUIDED)."""

@@ -7,7 +7,7 @@ import numpy as np
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
 from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.motion import SmoothMotion
-from autopilot_bridge.flight.task import TaskStatus
+from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
 
 _WANTS_UP_M = 0.3
@@ -69,11 +69,12 @@ class GotoTask:
         if self._motion is not None:
             self._begin(ctx, self._motion)
 
-    def set_speed(self, ctx: FlightContext, speed_m_s: float) -> None:
+    def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Change the speed on the way (DO_CHANGE_SPEED)."""
-        self._speed_m_s = speed_m_s
+        if kind in (SpeedKind.AIRSPEED, SpeedKind.GROUND_SPEED):
+            self._speed_m_s = speed_m_s
         if self._motion is not None:
-            self._motion.trajectory.set_limits(ctx.parameters, speed_m_s=speed_m_s)
+            self._motion.change_speed(ctx, kind, speed_m_s)
 
     def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
         motion.trajectory.set_limits(ctx.parameters, speed_m_s=self._speed_m_s)

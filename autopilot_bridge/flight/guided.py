@@ -17,7 +17,7 @@ from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.hold import HoldTask
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.offboard import NAN3, Vector
-from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
+from autopilot_bridge.flight.task import SpeedKind, TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
 
@@ -101,6 +101,11 @@ class GuidedTask:
             self._goto_started = False
         self._position[:] = target
         self.kind = GuidedKind.POSITION
+
+    def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
+        """Another speed on the way to a place (DO_CHANGE_SPEED); streamed targets say theirs themselves."""
+        if self.kind is GuidedKind.POSITION and self._goto is not None:
+            self._goto.change_speed(ctx, kind, speed_m_s)
 
     def set_velocity(
         self,

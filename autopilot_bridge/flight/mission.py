@@ -30,8 +30,8 @@ from autopilot_bridge.flight.plan_reading import (
 )
 from autopilot_bridge.flight.return_home import ReturnTask
 from autopilot_bridge.flight.takeoff import TakeoffTask
-from autopilot_bridge.flight.task import FlightTask, TaskStatus
-from autopilot_bridge.flight.trajectory import SPEED, SPEED_DOWN, SPEED_UP
+from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
+from autopilot_bridge.flight.trajectory import SPEED
 from autopilot_bridge.flight.yaw import wrap_pi
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
@@ -46,6 +46,7 @@ _MAX_INSTANT_ITEMS: Final = 200  # per update: breaks loops of DO_JUMP without a
 class _Leg:
     """The leg being flown to a waypoint."""
 
+    start: Array
     target: Array
     radius_m: float
     yaw_rad: float
@@ -154,7 +155,7 @@ class MissionTask:
                 self._jumps[seq] = left - 1 if left > 0 else left
                 return target
         elif item.command == Command.DO_CHANGE_SPEED:
-            self._change_speed(ctx, round(item.param1) if math.isfinite(item.param1) else 1, item.param2)
+            self._change_by_item(ctx, round(item.param1) if math.isfinite(item.param1) else 1, item.param2)
         elif item.command == Command.DO_SET_HOME:
             here = item.param1 == 1.0
             place = ctx.nav[nav_layout.POS_NED_M] if here else target_of(item, ctx)
@@ -163,21 +164,29 @@ class MissionTask:
         ctx.events.append(WaypointReached(seq, navigation=False))
         return seq + 1
 
-    def _change_speed(self, ctx: FlightContext, kind: int, speed_m_s: float) -> None:
-        motion = self._motion
-        if motion is None or not math.isfinite(speed_m_s):
+    def _change_by_item(self, ctx: FlightContext, kind: int, speed_m_s: float) -> None:
+        """DO_CHANGE_SPEED in the plan; -2: back to the parameters' speed."""
+        if kind not in tuple(SpeedKind) or not math.isfinite(speed_m_s):
             return
-        if speed_m_s == -2.0 and kind in (0, 1):
-            self._speed_m_s = None
-            motion.trajectory.set_limits(ctx.parameters)
-        elif speed_m_s > 0.0:
-            if kind in (0, 1):
-                self._speed_m_s = speed_m_s
-                motion.trajectory.limits[SPEED] = min(speed_m_s, ctx.parameters.max_speed_m_s)
-            elif kind == 2:
-                motion.trajectory.limits[SPEED_UP] = speed_m_s
-            elif kind == 3:
-                motion.trajectory.limits[SPEED_DOWN] = speed_m_s
+        if speed_m_s > 0.0:
+            self.change_speed(ctx, SpeedKind(kind), speed_m_s)
+        elif speed_m_s == -2.0 and kind <= SpeedKind.GROUND_SPEED:
+            for each in (SpeedKind.GROUND_SPEED, SpeedKind.CLIMB, SpeedKind.DESCENT):
+                self.change_speed(ctx, each, None)
+
+    def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
+        """Fly on at this speed until an item or a command changes it, the present leg included."""
+        horizontal = kind in (SpeedKind.AIRSPEED, SpeedKind.GROUND_SPEED)
+        if horizontal:
+            self._speed_m_s = speed_m_s
+        motion, leg = self._motion, self._leg
+        if motion is not None:
+            motion.change_speed(ctx, kind, speed_m_s)
+        if isinstance(self._sub, SpeedTask):
+            self._sub.change_speed(ctx, kind, speed_m_s)
+        elif leg is not None and horizontal and leg.passing_m_s > 0.0:
+            item = self._store.items[self._seq]
+            leg.passing_m_s, leg.turn_in_m = self._corner(ctx, item, leg.start, leg.target, leg.radius_m)
 
     def _begin_timed(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         """Begin an item that takes time; False when there is nothing to do."""
@@ -256,7 +265,9 @@ class MissionTask:
             motion.turn_into_leg(came_from)
         start = motion.trajectory.position_ned_m if came_from is None else came_from
         speed, turn_in = self._corner(ctx, item, start, target, radius)
-        self._leg = _Leg(target, radius, self._yaw_rad if yaw is None else yaw, speed, turn_in, hold_s)
+        self._leg = _Leg(
+            start.copy(), target, radius, self._yaw_rad if yaw is None else yaw, speed, turn_in, hold_s
+        )
         return True
 
     def _corner(

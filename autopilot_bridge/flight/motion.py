@@ -8,8 +8,14 @@ import numpy as np
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.parameters import YawBehaviour
-from autopilot_bridge.flight.task import clear_setpoint
-from autopilot_bridge.flight.trajectory import SPEED_TURN, TrajectoryGenerator
+from autopilot_bridge.flight.task import SpeedKind, clear_setpoint
+from autopilot_bridge.flight.trajectory import (
+    SPEED,
+    SPEED_DOWN,
+    SPEED_TURN,
+    SPEED_UP,
+    TrajectoryGenerator,
+)
 from autopilot_bridge.flight.yaw import YawSteering
 from autopilot_bridge.navigation import layout as nav_layout
 
@@ -19,6 +25,7 @@ _TURN_DISTANCE_M: Final = 2.0  # the nose turns only to targets farther than thi
 _MIN_COURSE_SPEED_M_S: Final = 0.7
 _SLOWEST_TURN_M_S: Final = 0.5
 _SHORTEST_LEG_M: Final = 0.1
+_SLOWEST_LEG_M_S: Final = 0.05
 _NAV_YAW: Final = 27
 
 
@@ -97,6 +104,17 @@ class SmoothMotion:
             self.trajectory.velocity_ned_m_s[0:2] = ctx.nav[nav_layout.VEL_NED_M_S][0:2]
             self.trajectory.acceleration_ned_m_s2[0:2] = 0.0
         self._synchronised = ctx.position_valid
+
+    def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
+        """Another speed on the leg being flown; None: the parameters'. A corner is finished as it is."""
+        p, limits = ctx.parameters, self.trajectory.limits
+        if kind is SpeedKind.CLIMB:
+            limits[SPEED_UP] = p.climb_speed_m_s if speed_m_s is None else speed_m_s
+        elif kind is SpeedKind.DESCENT:
+            limits[SPEED_DOWN] = p.descend_speed_m_s if speed_m_s is None else speed_m_s
+        else:
+            speed = p.cruise_speed_m_s if speed_m_s is None else speed_m_s
+            limits[SPEED] = min(max(speed, _SLOWEST_LEG_M_S), p.max_speed_m_s)
 
     def begin_leg(self) -> None:
         """The next leg starts where the moving point is."""

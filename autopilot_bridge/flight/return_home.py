@@ -10,7 +10,7 @@ from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.land import LandTask
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.task import TaskStatus
+from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
 
 
@@ -77,6 +77,15 @@ class ReturnTask:
         brake_s = float(np.hypot(velocity[0], velocity[1])) / (2.0 * ctx.parameters.acceleration_m_s2)
         self._target[:] = position + velocity * brake_s
         self._target[2] = float(home[2]) - height
+
+    def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
+        """Another speed on the way home (DO_CHANGE_SPEED); the landing has speeds of its own."""
+        if self._motion is None:
+            return
+        horizontal = kind in (SpeedKind.AIRSPEED, SpeedKind.GROUND_SPEED)
+        if speed_m_s is None and horizontal:
+            speed_m_s = ctx.parameters.return_speed_m_s
+        self._motion.change_speed(ctx, kind, speed_m_s)
 
     @staticmethod
     def _can_return(ctx: FlightContext) -> bool:

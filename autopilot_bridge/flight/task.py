@@ -2,7 +2,7 @@
 
 import math
 from enum import IntEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext
@@ -29,6 +29,24 @@ class FlightTask(Protocol):
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         """Write `ctx.setpoint` for the next period."""
+        ...
+
+
+class SpeedKind(IntEnum):
+    """Which speed a DO_CHANGE_SPEED is about; AIRSPEED and GROUND_SPEED are one on a multicopter."""
+
+    AIRSPEED = 0
+    GROUND_SPEED = 1
+    CLIMB = 2
+    DESCENT = 3
+
+
+@runtime_checkable
+class SpeedTask(Protocol):
+    """A flight task that takes a new speed on the leg it is flying (DO_CHANGE_SPEED)."""
+
+    def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
+        """Fly on at this speed; None: at the one of the context's parameters."""
         ...
 
 
