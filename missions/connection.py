@@ -14,13 +14,13 @@ from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.mavlink import (
     Frame,
     FrameEncoder,
-    FrameParser,
     MAVLinkMessage,
     decode,
     definition,
     dialect,
 )
 from missions.errors import LinkClosed
+from missions.peers import NewestFrames, PeerParsers
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Link
@@ -60,7 +60,7 @@ class Connection:
         identity: own system and component id.
 
     Attributes:
-        parsers: one per peer heard on the link; their counters account for every byte.
+        parsers: one for each of the newest peers; their counters account for every byte ever received.
     """
 
     def __init__(
@@ -72,13 +72,12 @@ class Connection:
         identity: tuple[int, int] = GROUND_STATION,
     ) -> None:
         self.clock = clock
-        self.parsers: dict[object, FrameParser] = {}
+        self.parsers = PeerParsers()
         self.system_id, self.component_id = identity
         self._link = link
         self._recorder = recorder
         self._encoder = FrameEncoder(*identity)
-        self._newest: dict[tuple[int, int, int], Frame] = {}
-        self._decoded: dict[tuple[int, int, int], tuple[Frame, MAVLinkMessage]] = {}
+        self._newest = NewestFrames()
         self._listeners: dict[int, list[Listener]] = {}
         self._observed = clock if isinstance(clock, TelemetryClock) else None
         self._clock_source: int | None = None
@@ -132,19 +131,16 @@ class Connection:
             self._on_bytes(peer, data)
 
     def _on_bytes(self, peer: object, data: bytes) -> None:
-        parser = self.parsers.get(peer)
-        if parser is None:
-            parser = self.parsers[peer] = FrameParser()
-        frames = parser.feed(data)
+        frames = self.parsers.feed(peer, data)
         if frames:
             self._on_frames(frames)
 
     def _on_frames(self, frames: list[Frame]) -> None:
         time_us = self.clock.time_us
-        newest, listeners, recorder = self._newest, self._listeners, self._recorder
+        put, listeners, recorder = self._newest.put, self._listeners, self._recorder
         for frame in frames:
             message_id = frame.message_id
-            newest[frame.system_id, frame.component_id, message_id] = frame
+            put(frame)
             if self._observed is not None and message_id in _TIMESTAMPED:
                 time_us = self._observe(frame)
             if recorder is not None:
@@ -213,15 +209,11 @@ class Connection:
         self, name: str, system_id: int, component_id: int = AUTOPILOT_COMPONENT
     ) -> MAVLinkMessage | None:
         """Newest message of a name from one component, or None."""
-        key = (system_id, component_id, definition(name).message_id)
-        frame = self._newest.get(key)
-        if frame is None:
-            return None
-        known = self._decoded.get(key)
-        if known is None or known[0] is not frame:
-            known = (frame, decode(frame))
-            self._decoded[key] = known
-        return known[1]
+        return self._newest.latest((system_id, component_id), definition(name).message_id)
+
+    def keep(self, system_id: int) -> None:
+        """Never forget this system's autopilot, however many others are heard."""
+        self._newest.keep((system_id, AUTOPILOT_COMPONENT))
 
     def listen(self, name: str, listener: Listener) -> Callable[[], None]:
         """Call `listener` with each frame of a message name; returns what ends it."""

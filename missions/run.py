@@ -1,7 +1,10 @@
 """A run: the folder with the log, the summary and the picture. Nothing is ever overwritten."""
 
 import json
+import math
 import platform
+import tomllib
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -16,10 +19,11 @@ EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 LOG_NAME: Final = "flight.tlog"
 SUMMARY_NAME: Final = "summary.json"
 PICTURE_NAME: Final = "track.png"
+RUNS: Final = Path("runs")
 _PACKAGES: Final = ("flightstack", "jsbsim", "numpy", "numba", "pymavlink")
 
 
-def create_run_folder(out: Path | None, mission: str, runs: Path = Path("runs")) -> Path:
+def create_run_folder(out: Path | None, mission: str, runs: Path = RUNS) -> Path:
     """Make the folder of a new run.
 
     Args:
@@ -60,11 +64,23 @@ def versions() -> dict[str, str]:
             found[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
             found[package] = "not installed"
+    if found["flightstack"] == "not installed":
+        found["flightstack"] = _checkout_version() or found["flightstack"]
     return found
 
 
+def _checkout_version() -> str | None:
+    """What `pyproject.toml` says, when this runs from a checkout."""
+    try:
+        text = (Path(__file__).resolve().parents[1] / "pyproject.toml").read_text(encoding="utf-8")
+        project = tomllib.loads(text)["project"]
+    except (OSError, KeyError, tomllib.TOMLDecodeError):
+        return None
+    return str(project["version"]) if project.get("name") == "flightstack" else None
+
+
 def _rounded(value: float | None, digits: int = 4) -> float | None:
-    return None if value is None else round(value, digits)
+    return None if value is None or not math.isfinite(value) else round(value, digits)
 
 
 def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
@@ -72,7 +88,7 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
     block: dict[str, Any] = {
         "system_id": notes.system_id,
         "autopilot": notes.autopilot,
-        "distance_m": round(score.distance_m, 2),
+        "distance_m": _rounded(score.distance_m, 2),
         "error_reference": score.reference,
         "path_rms_error_m": _rounded(score.path_rms_error_m),
         "path_max_error_m": _rounded(score.path_max_error_m),
@@ -80,7 +96,8 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
         "path_rms_error_estimate_m": _rounded(score.path_rms_error_estimate_m),
         "max_attitude_error_deg": _rounded(score.max_attitude_error_deg),
         "max_attitude_tracking_error_deg": _rounded(score.max_attitude_tracking_error_deg),
-        "progress": round(notes.progress, 4),
+        "messages_not_finite": score.messages_not_finite,
+        "progress": _rounded(notes.progress),
         "phases": [
             {"name": p.name, "start_s": p.start_us * 1e-6, "end_s": p.end_us * 1e-6} for p in notes.phases
         ],
@@ -109,15 +126,25 @@ def team_figures(blocks: list[dict[str, Any]]) -> dict[str, Any]:
 
     keys = ("path_rms_error_m", "path_max_error_m", "max_attitude_error_deg")
     return {
-        "distance_m": round(sum(block["distance_m"] for block in blocks), 2),
+        "distance_m": round(sum(block["distance_m"] or 0.0 for block in blocks), 2),
         **{key: worst(key) for key in keys},
     }
 
 
-def write_summary(folder: Path, summary: dict[str, Any]) -> Path:
-    """Write `summary.json`."""
+def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
+    """Write `summary.json`, whole or not at all. Numbers that are not finite become null."""
+    text = json.dumps(_finite(summary), indent=2, allow_nan=False) + "\n"
     path = folder / SUMMARY_NAME
     with path.open("x", encoding="utf-8") as file:
-        json.dump(summary, file, indent=2, allow_nan=False)
-        file.write("\n")
+        file.write(text)
     return path
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_finite(entry) for entry in value]
+    return value

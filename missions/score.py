@@ -22,6 +22,10 @@ Array = NDArray[np.float64]
 _BACK_M: Final = 3.0  # how far back along the path the nearest point is looked for
 _AHEAD_M: Final = 15.0
 _IN_FLIGHT_M: Final = 0.5
+_TRUTH_ATTITUDE: Final = ("attitude_quaternion",)
+_TARGET_ATTITUDE: Final = ("q",)
+_EULER_ANGLES: Final = ("roll", "pitch", "yaw")
+_SHORTEST_QUATERNION: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +65,8 @@ class FlightScore:
         truth, estimate: tracks; times strictly increasing.
         error_time_s, error_m: distance to the commanded path along the pattern, of the reference track.
         reference: "truth" or "estimate".
+        messages_not_finite: messages that were left out because their attitude is no attitude: NaN,
+            infinite, or a quaternion of no length.
     """
 
     truth: Track | None
@@ -76,15 +82,20 @@ class FlightScore:
     max_attitude_error_deg: float | None
     max_attitude_tracking_error_deg: float | None
     waypoint_misses_m: tuple[float, ...]
+    messages_not_finite: int = 0
 
 
 def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
     """Score one vehicle's flight."""
     system_id = notes.system_id
     commanded = notes.commanded
-    truth_table = _in_time_order(records.table("HIL_STATE_QUATERNION", system_id), "time_usec")
+    truth_table, truth_bad = _usable(records.table("HIL_STATE_QUATERNION", system_id), _TRUTH_ATTITUDE)
+    attitude, attitude_bad = _usable(records.table("ATTITUDE", system_id, 1), _EULER_ANGLES)
+    target, target_bad = _usable(records.table("ATTITUDE_TARGET", system_id, 1), _TARGET_ATTITUDE)
+    truth_table = _in_time_order(truth_table, "time_usec")
+    attitude = _in_time_order(attitude, "time_boot_ms")
+    target = _in_time_order(target, "time_boot_ms")
     estimate_table = _in_time_order(records.table("GLOBAL_POSITION_INT", system_id, 1), "time_boot_ms")
-    attitude = _in_time_order(records.table("ATTITUDE", system_id, 1), "time_boot_ms")
     origin = commanded.origin if commanded else _first_place(truth_table, estimate_table)
     absolute = _track(truth_table, origin, "time_usec", 1e-6) if origin is not None else None
     estimate = _estimate_track(estimate_table, origin, attitude) if origin is not None else None
@@ -124,8 +135,9 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
         path_rms_error_absolute_m=absolute_rms,
         path_rms_error_estimate_m=estimate_rms,
         max_attitude_error_deg=_attitude_error_deg(truth_table, attitude, reference),
-        max_attitude_tracking_error_deg=_tracking_error_deg(records, system_id, attitude, reference),
+        max_attitude_tracking_error_deg=_tracking_error_deg(target, attitude, reference),
         waypoint_misses_m=misses,
+        messages_not_finite=truth_bad + attitude_bad + target_bad,
     )
 
 
@@ -175,6 +187,15 @@ def waypoint_misses_m(commanded: CommandedPath, track: Track) -> tuple[float, ..
 
 def _rms(values: Array) -> float | None:
     return float(np.sqrt(np.mean(values**2))) if len(values) else None
+
+
+def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np.void], int]:
+    """Rows whose attitude (three angles, or a quaternion) is one, and the number of the others."""
+    values = np.column_stack([table[name].astype(np.float64) for name in names])
+    kept: NDArray[np.bool_] = np.all(np.isfinite(values), axis=1)
+    if len(names) == 1:
+        kept &= np.linalg.norm(np.where(kept[:, None], values, 0.0), axis=1) > _SHORTEST_QUATERNION
+    return table[kept], int(np.count_nonzero(~kept))
 
 
 def _in_time_order(table: NDArray[np.void], field: str) -> NDArray[np.void]:
@@ -289,11 +310,8 @@ def _attitude_error_deg(truth: Any, attitude: Any, track: Track | None) -> float
     )
 
 
-def _tracking_error_deg(
-    records: FlightRecords, system_id: int, attitude: Any, track: Track | None
-) -> float | None:
+def _tracking_error_deg(target: Any, attitude: Any, track: Track | None) -> float | None:
     """Largest angle between the attitude the controller wanted and the autopilot's attitude, in flight."""
-    target = _in_time_order(records.table("ATTITUDE_TARGET", system_id, 1), "time_boot_ms")
     if len(target) < 2 or len(attitude) < 2:
         return None
     return _largest_angle_deg(

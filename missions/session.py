@@ -5,7 +5,7 @@ This is the shell around the missions: it opens things, starts the event loop, a
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, suppress
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -25,6 +25,7 @@ from missions.run import (
     EPOCH_UNIX_US,
     LOG_NAME,
     PICTURE_NAME,
+    RUNS,
     create_run_folder,
     team_figures,
     vehicle_summary,
@@ -131,23 +132,33 @@ def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | N
             f"{len(request.connect)} connections for {request.options.vehicles} vehicles; "
             "give --connect once for each vehicle"
         )
-    opener = _open_remote if request.connect else _open_embedded
-    session = opener(request)
+    made = _missing_folders(request.out or RUNS)
     folder = create_run_folder(request.out, mission.name)
+    try:
+        session = (_open_remote if request.connect else _open_embedded)(request)
+    except BaseException:
+        if request.out is None:
+            made.insert(0, folder)
+        with suppress(OSError):
+            for empty in made:
+                empty.rmdir()
+        raise
     flight = Flight()
     outcome, reason = COMPLETED, ""
-    with TlogWriter(folder / LOG_NAME) as log:
-        recorder = FlightRecorder(log, epoch_us=session.epoch_us, unix_time_us=unix_time_us)
-        session.on_truth(recorder.record_truth)
-        try:
-            run(_fly(mission, request, session, recorder, flight, on_progress), session.loop)
-        except KeyboardInterrupt:
-            outcome, reason = INTERRUPTED, "interrupted"
-        except (MissionError, PlanError, BridgeError) as error:
-            outcome, reason = FAILED, str(error)
-        finally:
-            session.close()
-            sim_time_s = session.time_us() * 1e-6
+    try:
+        with TlogWriter(folder / LOG_NAME) as log:
+            recorder = FlightRecorder(log, epoch_us=session.epoch_us, unix_time_us=unix_time_us)
+            session.on_truth(recorder.record_truth)
+            try:
+                run(_fly(mission, request, session, recorder, flight, on_progress), session.loop)
+            except KeyboardInterrupt:
+                outcome, reason = INTERRUPTED, "interrupted"
+            except (MissionError, PlanError, BridgeError) as error:
+                outcome, reason = FAILED, str(error)
+    finally:
+        session.close()
+        session.loop.close()
+    sim_time_s = session.time_us() * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
     summary = _summary(mission, request, recorder.records, flight, outcome, reason, sim_time_s, wall_s)
     scores = summary.pop("_scores")
@@ -157,6 +168,14 @@ def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | N
 
         draw_run(folder / PICTURE_NAME, _title(mission, request, summary), scores)
     return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
+
+
+def _missing_folders(folder: Path) -> list[Path]:
+    """Those of a folder and the folders it is in that are not there yet, innermost first."""
+    try:
+        return [path for path in (folder, *folder.parents) if not path.exists()]
+    except OSError:  # not to be looked at: making it will say why
+        return []
 
 
 def limits_before_flight(request: RunRequest) -> VehicleLimits:
@@ -234,7 +253,7 @@ def _open_remote(request: RunRequest) -> _Session:
     links: list[Link] = []
     try:
         links.extend(open_link(address) for address in addresses)
-    except BridgeError:
+    except BaseException:
         for link in links:
             link.close()
         raise

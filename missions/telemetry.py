@@ -10,6 +10,9 @@ from autopilot_bridge.geodesy import GeodeticPosition
 
 T = TypeVar("T")
 
+_CHUNK: Final = 50
+_UNFINISHED_TEXTS: Final = 8
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Position:
@@ -164,21 +167,27 @@ SOURCES: Final[Mapping[type, tuple[str, Callable[[Any], Any]]]] = MappingProxyTy
 
 
 class StatusTextAssembler:
-    """Joins STATUSTEXTs that came in chunks of 50 characters (id, chunk_seq)."""
+    """Joins STATUSTEXTs that came in chunks of 50 characters (id, chunk_seq).
+
+    A text whose end is lost is dropped when its id is used again, or when 8 others are unfinished.
+    """
 
     def __init__(self) -> None:
         self._parts: dict[int, dict[int, str]] = {}
 
     def add(self, m: Any) -> StatusText | None:
-        """Take one message; the text when it is complete. A text whose end is lost is dropped at its
-        next use.
-        """
+        """Take one message; the text when it is complete."""
         text = str(m.text)
         if not m.id:
             return StatusText(severity=m.severity, text=text.rstrip("\t"))
-        parts = self._parts.setdefault(m.id, {})
+        parts = self._parts.pop(m.id, {})
+        newest = max(parts, default=-1)
+        if m.chunk_seq < newest or parts.get(m.chunk_seq, text) != text:
+            parts = {}  # chunks come in order: the id is used for another text
         parts[m.chunk_seq] = text
-        if len(text) >= 50:
+        if len(text) >= _CHUNK:
+            self._parts[m.id] = parts  # as the newest
+            if len(self._parts) > _UNFINISHED_TEXTS:
+                del self._parts[next(iter(self._parts))]
             return None
-        del self._parts[m.id]
         return StatusText(severity=m.severity, text="".join(parts[k] for k in sorted(parts)).rstrip("\t"))

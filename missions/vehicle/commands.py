@@ -12,12 +12,15 @@ from missions.vehicle.link_view import VehicleView, describe_ack
 _ACK_S: Final = 1.0
 _SENDINGS: Final = 5
 _MODE_AGAIN_S: Final = 1.5
+_HEARTBEAT_AGE_US: Final = 500_000
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
 
 
 class VehicleCommands(VehicleView):
     """The commanding half of a vehicle."""
+
+    _arming_us: int | None = None  # when arming was asked for, or granted
 
     # sending
 
@@ -78,7 +81,24 @@ class VehicleCommands(VehicleView):
                 self.system_id, AUTOPILOT_COMPONENT, command, attempt, *values
             )
 
-        return await self._send_command(command, message, timeout_s)
+        if command != dialect.MAV_CMD_COMPONENT_ARM_DISARM or not values[0]:
+            return await self._send_command(command, message, timeout_s)
+        before_us, self._arming_us = self._arming_us, self.clock.time_us
+        result = await self._send_command(command, message, timeout_s)
+        self._arming_us = self.clock.time_us if result == _ACCEPTED else before_us
+        return result
+
+    @property
+    def may_be_armed(self) -> bool:
+        """Whether a heartbeat says armed, or none that knows has come since arming was asked for.
+
+        A heartbeat within half a second may have been made before.
+        """
+        if self.armed:
+            return True
+        if self._arming_us is None or self._heard_us is None:
+            return False
+        return self._heard_us < self._arming_us + _HEARTBEAT_AGE_US
 
     async def command_int(
         self,

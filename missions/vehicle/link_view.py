@@ -90,6 +90,7 @@ class VehicleView:
                 return
             self._adapter = make()
             self._system_id = frame.system_id
+            self.connection.keep(frame.system_id)
         self._heard_us = self.clock.time_us
 
     def _on_status_text(self, frame: Any) -> None:

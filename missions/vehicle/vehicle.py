@@ -3,7 +3,7 @@
 import asyncio
 import math
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
@@ -334,7 +334,7 @@ class Vehicle(VehicleCommands):
     @asynccontextmanager
     async def safe_on_exit(self, action: Mode = Mode.RETURN) -> AsyncIterator["Vehicle"]:
         """Leave the vehicle safe: when the block fails, is cancelled or interrupted in flight, `action` is
-        commanded.
+        commanded. On the ground it is disarmed first.
 
         Args:
             action: `Mode.RETURN` (then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is refused, the
@@ -347,12 +347,16 @@ class Vehicle(VehicleCommands):
             raise
 
     async def _make_safe(self, action: Mode) -> None:
-        if self._adapter is None or not self.armed:
-            return
-        order = [action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)]
-        for mode in order:
-            try:
-                await asyncio.shield(asyncio.ensure_future(self.set_mode(mode, 5.0)))
+        # heartbeats come once a second: a vehicle that was just armed doesn't say so yet
+        if self._adapter is not None and self.may_be_armed:
+            await asyncio.shield(asyncio.ensure_future(self._command_safe(action)))
+
+    async def _command_safe(self, action: Mode) -> None:
+        if self.landed_state == _GROUND:
+            with suppress(MissionError):  # refused when it has just left the ground
+                await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
+        # a disarmed vehicle too: in the mission's mode it would fly off when it is armed again
+        for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
+            with suppress(MissionError):
+                await self.set_mode(mode, 5.0)
                 return
-            except MissionError:
-                continue

@@ -405,6 +405,7 @@ class FakeSitl:
                 autopilot.on_truth = self._truth
             self.autopilots.append(autopilot)
             self.links.append(theirs)
+        self.closed = False
         self.loop = VirtualTimeLoop(self.advance, lambda: self.time_us, max_time_us=4_000_000_000)
 
     def advance(self):
@@ -420,6 +421,7 @@ class FakeSitl:
             listener(time_us, frame)
 
     def close(self):
+        self.closed = True
         for link in self.links:
             link.close()
 

@@ -13,7 +13,9 @@ from missions.connection import ONBOARD_COMPUTER, Connection
 from missions.errors import LinkClosed
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
+from missions.peers import MAX_COMPONENTS, MAX_PARSERS, PeerParsers
 from missions.session import RunRequest, fly
+from missions.vehicle import Vehicle
 
 
 class Recording:
@@ -111,8 +113,42 @@ def test_garbage_is_counted_and_does_no_harm():
         connection._link.on_receive(b"\xfd\x09garbage" * 50)
         send(attitude(3))
         assert connection.latest("ATTITUDE", 1).time_boot_ms == 3
-        (parser,) = connection.parsers.values()
-        assert parser.counters.bytes_dropped > 400
+        assert len(connection.parsers) == 1
+        assert connection.parsers.counters.bytes_dropped > 400
+
+    on_memory(script)
+
+
+def test_peers_that_come_and_go_are_forgotten_and_their_bytes_are_not():
+    parsers = PeerParsers()
+    whole = FrameEncoder(1, 1).encode(attitude(1))
+    fed = 0
+    for peer in range(500):
+        data = b"junk" + whole + whole[: peer % len(whole)]
+        assert len(parsers.feed(peer, data)) == 1
+        fed += len(data)
+    assert len(parsers) == MAX_PARSERS
+    counters = parsers.counters
+    assert counters.frames == 500
+    assert counters.bytes_in == fed
+    assert fed == counters.bytes_framed + counters.bytes_dropped + parsers.pending_bytes
+
+
+def test_a_crowd_of_components_is_forgotten_and_the_vehicle_is_not():
+    async def script(connection, send):
+        vehicle = Vehicle(connection)
+        send(dialect.MAVLink_heartbeat_message(2, 12, 129, 0, 4, 3))
+        send(attitude(7))
+        assert vehicle.armed
+        crowd = dialect.MAVLink_attitude_message(9, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for k in range(600):
+            connection._link.on_receive(FrameEncoder(2 + k % 200, 1 + k // 200).encode(crowd))
+            connection.latest("ATTITUDE", 2 + k % 200, 1 + k // 200)
+        assert len(connection._newest) == MAX_COMPONENTS
+        assert len(connection._newest._decoded) <= MAX_COMPONENTS
+        assert vehicle.message("ATTITUDE").time_boot_ms == 7
+        assert connection.latest("ATTITUDE", 2) is None
+        assert connection.latest("ATTITUDE", 201, 3).time_boot_ms == 9
 
     on_memory(script)
 

@@ -1,6 +1,8 @@
 """Scoring a flight from its frames: against made-up flights whose errors are known."""
 
+import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from missions.notes import PATTERN, CommandedPath, FlightNotes
 from missions.records import FlightRecords
+from missions.run import team_figures, vehicle_summary, versions, write_summary
 from missions.score import Track, path_errors_m, score, waypoint_misses_m
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
@@ -148,3 +151,47 @@ def test_records_count_and_decode_columns():
     assert table["attitude_quaternion"].shape == (2001, 4)
     assert len(records.table("HIL_STATE_QUATERNION", 2)) == 0
     assert len(records.table("ATTITUDE", 1, 240)) == 0
+
+
+def test_messages_without_a_number_are_left_out_and_counted(tmp_path):
+    records, notes = make_flight(offset_ned=(0.0, 0.3, -0.4), roll_error=math.radians(2.0))
+    autopilot, simulator = FrameEncoder(1, 1), FrameEncoder(1, 240)
+    for k, bad in enumerate((math.nan, math.inf, -math.inf)):
+        attitude = dialect.MAVLink_attitude_message(40_100 + k, bad, 0.0, 0.0, 0, 0, 0)
+        records.add(autopilot.encode(attitude))
+    for k, q in enumerate(([math.nan, 0.0, 0.0, 0.0], [0.0] * 4)):
+        target = dialect.MAVLink_attitude_target_message(20_000 + k, 0, q, 0.0, 0.0, 0.0, 0.5)
+        records.add(autopilot.encode(target))
+        truth = dialect.MAVLink_hil_state_quaternion_message
+        records.add(
+            simulator.encode(truth(40_000_001 + k, q, 0.0, 0.0, 0.0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0))
+        )
+    result = score(records, notes)
+    assert result.messages_not_finite == 7
+    assert result.max_attitude_error_deg == pytest.approx(2.0, abs=1e-3)
+    assert result.path_rms_error_m == pytest.approx(0.5, abs=0.01)
+    block = vehicle_summary(notes, result)
+    assert block["messages_not_finite"] == 7
+    write_summary(tmp_path, {"vehicles": [block]})
+
+
+def test_a_summary_is_written_whole_or_not_at_all(tmp_path):
+    path = write_summary(tmp_path, {"a": math.nan, "b": [math.inf, 1.5], "c": {"d": (2, -math.inf)}})
+    assert json.loads(path.read_text()) == {"a": None, "b": [None, 1.5], "c": {"d": [2, None]}}
+    other = tmp_path / "other"
+    other.mkdir()
+    with pytest.raises(TypeError):
+        write_summary(other, {"a": 1, "b": object()})
+    assert not list(other.iterdir())
+
+
+def test_result_that_is_no_number_is_none():
+    result = replace(score(*make_flight()), distance_m=math.nan, path_rms_error_m=math.inf)
+    block = vehicle_summary(FlightNotes(system_id=1), result)
+    assert block["distance_m"] is None
+    assert block["path_rms_error_m"] is None
+    assert team_figures([block, block | {"distance_m": 3.0}])["distance_m"] == 3.0
+
+
+def test_a_checkout_knows_its_version():
+    assert versions()["flightstack"][0].isdigit()

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 from pymavlink import mavutil
 
+from autopilot_bridge.errors import BridgeError
 from missions import cli, cli_fly
 from missions.errors import MissionError, PlanError
 from missions.library import MISSIONS, find_mission
@@ -206,6 +208,37 @@ def test_run_folders_are_numbered_and_never_overwritten(tmp_path):
     (given / "something").write_text("mine")
     with pytest.raises(PlanError, match="not empty"):
         create_run_folder(given, "x")
+
+
+def test_a_refused_run_folder_opens_nothing(embedded, tmp_path):
+    (tmp_path / "mine").write_text("x")
+    with pytest.raises(PlanError, match="not empty"):
+        fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path))
+    assert embedded == []
+
+
+def test_the_folder_of_a_run_whose_link_cannot_be_opened_is_removed_again(tmp_path):
+    out, mine = tmp_path / "some" / "run", tmp_path / "mine"
+    mine.mkdir()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        connect = [f"udpin:127.0.0.1:{taken.getsockname()[1]}"]
+        for folder in (out, mine):
+            with pytest.raises(BridgeError):
+                fly(find_mission("lissajous"), RunRequest(options=small(), connect=connect, out=folder))
+    assert not out.parent.exists()
+    assert mine.exists()
+
+
+def test_a_log_that_cannot_be_opened_leaves_no_link_open(embedded, tmp_path, monkeypatch):
+    def full(_path):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("missions.session.TlogWriter", full)
+    with pytest.raises(OSError, match="disk full"):
+        fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    assert embedded[0].loop.is_closed()
+    assert embedded[0].closed
 
 
 # command line

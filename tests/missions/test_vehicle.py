@@ -9,7 +9,7 @@ import pytest
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import CommandRejected, MissionError, VehicleTimeout
-from missions.telemetry import Attitude, Battery, LocalPosition, Position
+from missions.telemetry import Attitude, Battery, LocalPosition, Position, StatusTextAssembler
 from missions.vehicle import Mode, Setpoint
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
@@ -248,6 +248,67 @@ def test_a_cancelled_script_leaves_the_vehicle_safe_even_if_the_first_choice_is_
     assert flown(script) == "land"
 
 
+async def interrupted_after_arming(vehicle, autopilot, delay_s):
+    """A script that is cancelled a moment after the vehicle was armed, before a heartbeat says so."""
+
+    async def fly():
+        async with vehicle.safe_on_exit(Mode.RETURN):
+            await vehicle.command(400, 1.0)
+            await asyncio.sleep(100.0)
+
+    autopilot.due["HEARTBEAT"] = 10**12
+    task = asyncio.get_running_loop().create_task(fly())
+    await asyncio.sleep(delay_s)
+    assert autopilot.armed
+    assert not vehicle.armed
+    task.cancel()
+    autopilot.due["HEARTBEAT"] = autopilot.time_us + 500_000
+    with pytest.raises(asyncio.CancelledError):
+        await task
+
+
+@both
+def test_interrupted_between_arming_and_its_heartbeat_on_the_ground_it_is_disarmed(flown, flavour):
+    async def script(vehicle, autopilot):
+        await interrupted_after_arming(vehicle, autopilot, 0.1)
+        return autopilot.armed, autopilot.kind, autopilot.pos[2] > -0.1
+
+    assert flown(script, flavour) == (False, "return", True)
+
+
+def test_interrupted_between_arming_and_its_heartbeat_in_the_air_it_returns(flown):
+    async def script(vehicle, autopilot):
+        def up():
+            autopilot.pos[2] = -3.0  # disarming is refused
+
+        asyncio.get_running_loop().call_later(0.2, up)
+        await interrupted_after_arming(vehicle, autopilot, 0.21)
+        return autopilot.armed, autopilot.kind
+
+    assert flown(script) == (True, "return")
+
+
+def test_a_refused_arming_leaves_nothing_in_doubt(flown):
+    async def script(vehicle, autopilot):
+        autopilot.arm_refusals = 1000
+        with pytest.raises(CommandRejected):
+            await vehicle.command(400, 1.0)
+        return vehicle.may_be_armed
+
+    assert flown(script) is False
+
+
+def test_a_disarmed_heartbeat_long_after_arming_is_believed(flown):
+    async def script(vehicle, autopilot):
+        await vehicle.command(400, 1.0)
+        autopilot.armed = False
+        doubts = [vehicle.may_be_armed]
+        await asyncio.sleep(2.0)
+        return [*doubts, vehicle.may_be_armed]
+
+    assert flown(script) == [True, False]
+
+
 def test_telemetry_in_si_units(flown):
     async def script(vehicle, autopilot):
         autopilot.yaw = 1.0
@@ -287,3 +348,24 @@ def test_long_status_texts_are_joined(flown):
         assert vehicle.status_texts[-1].text == text
 
     flown(script)
+
+
+def chunk(text, identity, sequence):
+    return dialect.MAVLink_statustext_message(4, text.encode(), identity, sequence)
+
+
+def test_texts_whose_id_is_used_again_are_not_mixed():
+    assembler = StatusTextAssembler()
+    assert assembler.add(chunk("A" * 50, 7, 0)) is None
+    assert assembler.add(chunk("B" * 50, 7, 1)) is None  # the end is lost
+    assert assembler.add(chunk("C" * 50, 7, 0)) is None
+    assert assembler.add(chunk("C" * 50, 7, 0)) is None  # repeated
+    assert assembler.add(chunk("end", 7, 1)).text == "C" * 50 + "end"
+
+
+def test_few_unfinished_texts_are_kept():
+    assembler = StatusTextAssembler()
+    for identity in range(1, 1000):
+        assembler.add(chunk("A" * 50, identity, 0))
+    assert len(assembler._parts) == 8
+    assert assembler.add(chunk("end", 999, 1)).text == "A" * 50 + "end"

@@ -1,0 +1,112 @@
+"""What a connection keeps of those it hears: a parser for each peer, the newest frames of each component.
+
+Peers and components come and go, and anybody can send with any ids: both are kept for a limited number.
+"""
+
+from dataclasses import fields
+from typing import Final
+
+from autopilot_bridge.mavlink import Frame, FrameParser, MAVLinkMessage, ParserCounters, decode
+
+MAX_PARSERS: Final = 64
+MAX_COMPONENTS: Final = 64
+
+ComponentId = tuple[int, int]
+"""System and component id."""
+
+
+class PeerParsers:
+    """A parser for each of the newest 64 peers of a link."""
+
+    __slots__ = ("_parsers", "_retired")
+
+    def __init__(self) -> None:
+        self._parsers: dict[object, FrameParser] = {}
+        self._retired = ParserCounters()
+
+    def __len__(self) -> int:
+        return len(self._parsers)
+
+    @property
+    def counters(self) -> ParserCounters:
+        """Where every received byte went, over all peers ever heard; `sources` is left out."""
+        total = ParserCounters()
+        for counters in (self._retired, *(parser.counters for parser in self._parsers.values())):
+            _add(total, counters)
+        return total
+
+    @property
+    def pending_bytes(self) -> int:
+        """Bytes of frames that are not complete yet."""
+        return sum(parser.pending_bytes for parser in self._parsers.values())
+
+    def feed(self, peer: object, data: bytes) -> list[Frame]:
+        """The good frames in bytes of one peer, which may come in any pieces."""
+        parser = self._parsers.get(peer)
+        if parser is None:
+            if len(self._parsers) >= MAX_PARSERS:
+                self._retire(next(iter(self._parsers)))
+            parser = self._parsers[peer] = FrameParser()
+        return parser.feed(data)
+
+    def _retire(self, peer: object) -> None:
+        parser = self._parsers.pop(peer)
+        _add(self._retired, parser.counters)
+        self._retired.bytes_junk += parser.pending_bytes
+
+
+def _add(total: ParserCounters, more: ParserCounters) -> None:
+    for field in fields(ParserCounters):
+        value = getattr(more, field.name)
+        if isinstance(value, int):
+            setattr(total, field.name, getattr(total, field.name) + value)
+
+
+class NewestFrames:
+    """The newest frame of each message of up to 64 components, decoded when asked for.
+
+    The component that was heard first is forgotten first, until it is heard again; autopilots named with
+    `keep` never are.
+    """
+
+    __slots__ = ("_decoded", "_frames", "_kept")
+
+    def __init__(self) -> None:
+        self._frames: dict[ComponentId, dict[int, Frame]] = {}
+        self._decoded: dict[ComponentId, dict[int, tuple[Frame, MAVLinkMessage]]] = {}
+        self._kept: set[ComponentId] = set()
+
+    def __len__(self) -> int:
+        """Number of components."""
+        return len(self._frames)
+
+    def keep(self, component: ComponentId) -> None:
+        """Never forget this component."""
+        self._kept.add(component)
+
+    def put(self, frame: Frame) -> None:
+        """Take a frame."""
+        component = (frame.system_id, frame.component_id)
+        frames = self._frames.get(component)
+        if frames is None:
+            frames = self._add(component)
+        frames[frame.message_id] = frame
+
+    def _add(self, component: ComponentId) -> dict[int, Frame]:
+        if len(self._frames) >= MAX_COMPONENTS:
+            oldest = next((known for known in self._frames if known not in self._kept), None)
+            if oldest is not None:
+                del self._frames[oldest]
+                self._decoded.pop(oldest, None)
+        return self._frames.setdefault(component, {})
+
+    def latest(self, component: ComponentId, message_id: int) -> MAVLinkMessage | None:
+        """The newest message with an id from a component, or None; decoded once."""
+        frame = self._frames.get(component, {}).get(message_id)
+        if frame is None:
+            return None
+        messages = self._decoded.setdefault(component, {})
+        known = messages.get(message_id)
+        if known is None or known[0] is not frame:
+            known = messages[message_id] = (frame, decode(frame))
+        return known[1]
