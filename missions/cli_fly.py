@@ -61,6 +61,17 @@ def _arguments(pairs: tuple[str, ...]) -> dict[str, str]:
     return values
 
 
+def _ratio(text: str) -> tuple[float, float]:
+    """ "3:4", or a single number for so much to one."""
+    from missions.options import parse_pair
+
+    single = not any(mark in text for mark in ":/,")
+    x, y = parse_pair(f"{text.strip() or '?'}:1" if single else text, "--ratio", ":/,")
+    if not (x > 0.0 and y > 0.0):
+        raise click.UsageError(f"--ratio {text}: both frequencies must be above 0, for example 3:4")
+    return x, y
+
+
 def _options(given: dict[str, Any]) -> Any:
     from missions.options import FlightOptions, Via, parse_pair
 
@@ -69,7 +80,7 @@ def _options(given: dict[str, Any]) -> Any:
         width_m = 2.0 * given["amplitude_x"]
     if given["amplitude_y"] is not None:
         height_m = 2.0 * given["amplitude_y"]
-    ratio = None if given["ratio"] is None else parse_pair(given["ratio"], "--ratio", ":/,")
+    ratio = None if given["ratio"] is None else _ratio(given["ratio"])
     phase_x_deg = phase_y_deg = None
     if given["phase"] is not None:
         phase_x_deg, phase_y_deg = parse_pair(given["phase"], "--phase", ",")

@@ -228,6 +228,7 @@ class ScriptMission:
             )
         self._fly = fly
         self._file = str(path)
+        self._resolved = path.resolve()
         self._check = getattr(holder, "check", None)
 
     def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
@@ -241,7 +242,9 @@ class ScriptMission:
             raise
         except Exception as error:
             frames = traceback.extract_tb(error.__traceback__)
-            line = next((f.lineno for f in reversed(frames) if f.filename == self._file), "?")
+            line = next(
+                (f.lineno for f in reversed(frames) if Path(f.filename).resolve() == self._resolved), "?"
+            )
             raise MissionError(f"{self._file}, line {line}: {type(error).__name__}: {error}") from error
 
 

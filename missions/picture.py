@@ -35,15 +35,19 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
     """
     figure = Figure(figsize=(9.0, 11.6), dpi=130, layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(3, 1, height_ratios=(3.6, 1.0, 1.0))
-    above, altitude, error = (figure.add_subplot(grid[k]) for k in range(3))
-    altitude.sharex(error)
+    scored = any(notes.commanded is not None for notes, _ in flights)
+    ratios = (3.6, 1.0, 1.0) if scored else (4.6, 1.0)
+    grid = figure.add_gridspec(len(ratios), 1, height_ratios=ratios)
+    above, altitude, *rest = (figure.add_subplot(grid[k]) for k in range(len(ratios)))
     figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
     _draw_from_above(above, flights)
     _draw_altitude(altitude, flights)
-    _draw_error(error, flights)
-    for axes in (above, altitude, error):
+    for error in rest:  # there is a curve to be off from
+        altitude.sharex(error)
+        _draw_error(error, flights)
+    for axes in (above, altitude, *rest):
         _tidy(axes)
+    (rest or [altitude])[0].set_xlabel("vehicle time, s", fontsize=9, color=_INK)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
 
@@ -108,7 +112,8 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
             _draw_marks(axes, _shown(main, notes), north, east)
         label = f"vehicle {notes.system_id}" if team else "autopilot's estimate"
         handles.append(Line2D([], [], color=colour, linewidth=1.6, label=label))
-    handles.insert(0, Line2D([], [], color=_COMMANDED, linewidth=4.5, alpha=0.55, label="commanded"))
+    if any(notes.commanded is not None for notes, _ in flights):
+        handles.insert(0, Line2D([], [], color=_COMMANDED, linewidth=4.5, alpha=0.55, label="commanded"))
     if any(len(notes.commanded.waypoints_ned_m) for notes, _ in flights if notes.commanded):
         handles.insert(
             1,
@@ -234,4 +239,3 @@ def _draw_error(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> No
     axes.set_ylim(bottom=0.0)
     reference = flights[0][1].reference
     axes.set_ylabel(f"distance to path, m\n({reference})", fontsize=9, color=_INK)
-    axes.set_xlabel("vehicle time, s", fontsize=9, color=_INK)

@@ -16,7 +16,7 @@ from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.tlog import TlogWriter
 from missions.connection import GROUND_STATION, Connection
 from missions.errors import MissionError, PlanError
-from missions.library import Mission
+from missions.library import Mission, PatternMission
 from missions.notes import FlightNotes
 from missions.options import FlightOptions
 from missions.planning.limits import DEFAULT_LIMITS, WIDEST_LIMITS, VehicleLimits
@@ -104,12 +104,14 @@ class Flight:
     Attributes:
         vehicles: as soon as they are made.
         started_wall_s: wall clock when the run began.
+        started_us: vehicle time when the run began: boot of an embedded vehicle, else when one was first heard.
     """
 
     def __init__(self) -> None:
         self.vehicles: list[Vehicle] = []
         self.clock: Clock | None = None
         self.started_wall_s = wall_time_s()
+        self.started_us = 0
 
 
 ProgressListener = Callable[[Flight], None]
@@ -158,7 +160,7 @@ def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | N
     finally:
         session.close()
         session.loop.close()
-    sim_time_s = session.time_us() * 1e-6
+    sim_time_s = max(0, session.time_us() - flight.started_us) * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
     summary = _summary(mission, request, recorder.records, flight, outcome, reason, sim_time_s, wall_s)
     scores = summary.pop("_scores")
@@ -247,9 +249,12 @@ def _open_embedded(request: RunRequest) -> _Session:
 
 
 def _open_remote(request: RunRequest) -> _Session:
-    from autopilot_bridge.links import open_link, parse_address
+    from autopilot_bridge.links import ReplayLog, open_link, parse_address
 
     addresses = [parse_address(text) for text in request.connect]
+    for address in addresses:
+        if isinstance(address, ReplayLog):
+            raise PlanError(f"--connect {address}: a log can't be flown; give the link of a vehicle")
     links: list[Link] = []
     try:
         links.extend(open_link(address) for address in addresses)
@@ -290,7 +295,7 @@ async def _fly(
         flight.clock = session.clocks[0]
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
-            await _all([_prepare(vehicle, request) for vehicle in flight.vehicles])
+            await _all([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])
             centre = flight.vehicles[0].home if len(flight.vehicles) > 1 else request.options.centre
             await _all(
                 [
@@ -305,7 +310,7 @@ async def _fly(
             await asyncio.gather(reporter, return_exceptions=True)
 
 
-async def _prepare(vehicle: Vehicle, request: RunRequest) -> None:
+async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
     try:
         await vehicle.wait_heartbeat()
     except MissionError as error:
@@ -314,6 +319,8 @@ async def _prepare(vehicle: Vehicle, request: RunRequest) -> None:
     vehicle.notes.system_id = vehicle.system_id
     vehicle.notes.autopilot = vehicle.autopilot
     if request.connect:
+        if vehicle is flight.vehicles[0]:
+            flight.started_us = vehicle.clock.time_us
         await vehicle.set_parameters(request.parameters)
     await vehicle.wait_ready()
 
@@ -322,6 +329,11 @@ async def _fly_one(mission: Mission, vehicle: Vehicle, options: FlightOptions, r
     vehicle.notes.begin("flight", vehicle.clock.time_us)  # until the mission names a phase of its own
     async with vehicle.safe_on_exit(request.on_failure):
         await mission.fly(vehicle, options)
+        if vehicle.armed:
+            raise MissionError(
+                f"the mission ended with the vehicle armed; it was told to {request.on_failure}. "
+                "End a mission with return_to_launch() or land()"
+            )
         vehicle.notes.progress = 1.0
 
 
@@ -399,7 +411,9 @@ def _title(mission: Mission, request: RunRequest, summary: Mapping[str, Any]) ->
     parts = [mission.name]
     if mission.name == "lissajous":
         parts.append(options.pattern if options.ratio is None else "{:g}:{:g}".format(*options.ratio))
-    parts += [f"{options.width_m:g} m x {options.height_m:g} m", f"via {options.via}", summary["autopilot"]]
+    if isinstance(mission, PatternMission):
+        parts += [f"{options.width_m:g} m x {options.height_m:g} m", f"via {options.via}"]
+    parts.append(summary["autopilot"])
     rms = summary["path_rms_error_m"]
     figures = f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.0f} s"
     if rms is not None:

@@ -333,15 +333,15 @@ class Autopilot:
         self.commander.parameters = flavour.commander_parameters(store)
         self.navigation.set_parameters(flavour.navigation_parameters(store))
         if name.startswith("SR") and name[2:3].isdigit():
-            self._apply_stream_rates(int(name[2]))
+            self._apply_stream_rates(int(name[2]), changed=name)
 
-    def _apply_stream_rates(self, index: int) -> None:
-        """ArduPilot's SRn_* parameters: rates of the stream groups of channel n."""
+    def _apply_stream_rates(self, index: int, changed: str | None = None) -> None:
+        """ArduPilot's SRn_* parameters: rates of the stream groups of channel n (one that changed)."""
         if index >= len(self._table_list):
             return
         for group, ending in STREAM_RATE_PARAMETERS.items():
             name = f"SR{index}_{ending}"
-            if name not in self.parameters:
+            if name not in self.parameters or changed not in (None, name):
                 continue
             rate_hz = self.parameters.get(name)
             interval_us = round(MICROSECONDS / rate_hz) if rate_hz > 0 else -1
