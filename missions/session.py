@@ -104,7 +104,7 @@ class Flight:
     Attributes:
         vehicles: as soon as they are made.
         started_wall_s: wall clock when the run began.
-        started_us: vehicle time when the run began: boot of an embedded vehicle, else when one was first heard.
+        started_us: vehicle time when the run began: boot of an embedded one, else when it was first heard.
     """
 
     def __init__(self) -> None:
