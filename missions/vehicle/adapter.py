@@ -44,6 +44,7 @@ class Adapter(Protocol):
         bytewise_parameters: integers travel as bit patterns in PARAM_VALUE (PX4), not as numbers.
         setpoints_before_guided: setpoints must flow before the guided mode can be entered.
         first_mission_item_is_home: item 0 of a mission is home, whatever is uploaded there.
+        goto_mode: the mode DO_REPOSITION puts the vehicle into.
         unset: what stands in a command or item parameter that is not set.
     """
 
@@ -53,6 +54,7 @@ class Adapter(Protocol):
     bytewise_parameters: bool
     setpoints_before_guided: bool
     first_mission_item_is_home: bool
+    goto_mode: Mode
     unset: float
 
     def mode_name(self, custom_mode: int) -> str:

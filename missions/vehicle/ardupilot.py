@@ -77,6 +77,7 @@ class ArduCopter:
     bytewise_parameters = False
     setpoints_before_guided = False
     first_mission_item_is_home = True
+    goto_mode = Mode.GUIDED
     unset = 0.0  # NaN is refused
 
     def mode_name(self, custom_mode: int) -> str:

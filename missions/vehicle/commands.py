@@ -7,12 +7,12 @@ from autopilot_bridge.mavlink import MAVLinkMessage, definition, dialect
 from missions.connection import AUTOPILOT_COMPONENT
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.vehicle.adapter import Mode
-from missions.vehicle.link_view import VehicleView, describe_ack
+from missions.vehicle.link_view import VehicleView, command_name, describe_ack
 
 _ACK_S: Final = 1.0
 _SENDINGS: Final = 5
 _MODE_AGAIN_S: Final = 1.5
-_HEARTBEAT_AGE_US: Final = 500_000
+HEARTBEAT_AGE_US: Final = 500_000
 _ACCEPTED: Final = 0
 _IN_PROGRESS: Final = 5
 
@@ -50,7 +50,7 @@ class VehicleCommands(VehicleView):
         with self.messages(name) as stream:
             self._request_message(name)
             try:
-                async with self.clock.timeout(timeout_s):
+                async with self.deadline(timeout_s, name):
                     return await anext(stream)
             except TimeoutError:
                 raise VehicleTimeout(f"no {name} within {timeout_s:g} s of asking; {self.heard()}") from None
@@ -98,7 +98,7 @@ class VehicleCommands(VehicleView):
             return True
         if self._arming_us is None or self._heard_us is None:
             return False
-        return self._heard_us < self._arming_us + _HEARTBEAT_AGE_US
+        return self._heard_us < self._arming_us + HEARTBEAT_AGE_US
 
     async def command_int(
         self,
@@ -130,14 +130,12 @@ class VehicleCommands(VehicleView):
                         wait_s = 10.0
                 except TimeoutError:
                     continue
-        name = dialect.enums["MAV_CMD"].get(command)
         raise VehicleTimeout(
-            f"no answer to {name.name.removeprefix('MAV_CMD_') if name else command} "
-            f"after {_SENDINGS} attempts; {self.heard()}"
+            f"no answer to {command_name(command)} after {_SENDINGS} attempts; {self.heard()}"
         )
 
     async def _next_ack(self, acks: Any, command: int, timeout_s: float) -> Any:
-        async with self.clock.timeout(timeout_s):
+        async with self.deadline(timeout_s, f"the answer to {command_name(command)}"):
             while True:
                 ack = await anext(acks)
                 if ack.command == command and self.addressed_here(ack):
@@ -159,10 +157,11 @@ class VehicleCommands(VehicleView):
         """
         target = self.adapter.modes[mode]
         asked = self.adapter.mode_command(mode)
+        self._modes_asked.add(target)
         refused: Any = None
         with self.messages("COMMAND_ACK", "HEARTBEAT") as replies:
             try:
-                async with self.clock.timeout(timeout_s):
+                async with self.deadline(timeout_s, f"mode {mode}"):
                     while True:
                         self._send_mode(asked.main, asked.sub)
                         sent_us = self.clock.time_us

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from missions.errors import MissionError
+from missions.errors import MissionError, PlanError
 from missions.vehicle.adapter import Mode
 from missions.vehicle.setpoint import Setpoint, Vector
 
@@ -43,9 +43,10 @@ class GuidedSession:
         """Follow a source from its time 0 to its end.
 
         Raises:
-            MissionError: the vehicle left the guided mode (a failsafe, a pilot).
+            MissionError: the vehicle left the guided mode (a failsafe, a pilot), or its link was lost.
+            PlanError: the source gave something that is no setpoint.
         """
-        first = source(0.0)
+        first = _setpoint_of(source, 0.0)
         if first is None:
             return
         if not self._entered:
@@ -85,7 +86,7 @@ class GuidedSession:
         while True:
             if self._source is not None:
                 elapsed_s = max(0.0, (due_us - self._start_us + _LEAD * self._period_us) * 1e-6)
-                setpoint = self._source(elapsed_s)
+                setpoint = _setpoint_of(self._source, elapsed_s)
                 if setpoint is None:
                     self._source = None
                     self._done.set()
@@ -109,7 +110,8 @@ class GuidedSession:
         stop = self._vehicle.connection.listen("HEARTBEAT", look)
         done = asyncio.ensure_future(self._done.wait())
         try:
-            await asyncio.wait({done, left, stream}, return_when=asyncio.FIRST_COMPLETED)
+            async with self._vehicle.link_guard("the end of the setpoints"):
+                await asyncio.wait({done, left, stream}, return_when=asyncio.FIRST_COMPLETED)
             if stream.done():
                 await stream  # raises what ended it
             if left.done() and not done.done():
@@ -121,3 +123,12 @@ class GuidedSession:
             done.cancel()
             left.cancel()
             self._source = None
+
+
+def _setpoint_of(source: SetpointSource, time_s: float) -> Setpoint | None:
+    given: object = source(time_s)
+    if given is None or isinstance(given, Setpoint):
+        return given
+    raise PlanError(
+        f"follow's source gave a {type(given).__name__} ({given!r}); accepted: a Setpoint or None"
+    )

@@ -6,6 +6,7 @@ The lower half of `Vehicle`: it listens, and sends nothing but what it is given.
 import asyncio
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock
@@ -16,6 +17,7 @@ from missions.notes import FlightNotes
 from missions.telemetry import SOURCES, StatusText, StatusTextAssembler
 from missions.vehicle.adapter import Adapter
 from missions.vehicle.ardupilot import ArduCopter
+from missions.vehicle.link_watch import LinkWatch
 from missions.vehicle.px4 import Px4
 
 T = TypeVar("T")
@@ -47,8 +49,10 @@ class VehicleView:
         self._system_id = system_id
         self._adapter: Adapter | None = None
         self._last_ack: Any = None
+        self._modes_asked: set[int] = set()  # custom modes asked for since the present `goto` began
         self._heard_us: int | None = None
         self._assembler = StatusTextAssembler()
+        self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
         connection.listen("STATUSTEXT", self._on_status_text)
         connection.listen("COMMAND_ACK", self._on_ack)
         connection.listen("HEARTBEAT", self._on_heartbeat)
@@ -92,6 +96,7 @@ class VehicleView:
             self._system_id = frame.system_id
             self.connection.keep(frame.system_id)
         self._heard_us = self.clock.time_us
+        self._watch.on_heartbeat()
 
     def _on_status_text(self, frame: Any) -> None:
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
@@ -160,8 +165,8 @@ class VehicleView:
             self.connection.component_id,
         )
 
-    def heard(self) -> str:
-        """What was heard last, for error messages."""
+    def heard(self, *, silence: bool = True) -> str:
+        """What was heard last, for error messages; with `silence`, also how long ago when that is long."""
         if self._adapter is None or self._heard_us is None:
             return "nothing was heard from an autopilot"
         parts = [f"last heard: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
@@ -169,7 +174,7 @@ class VehicleView:
         if position is not None:
             parts.append(f"{position.relative_alt * 1e-3:.1f} m above home")
         silent_s = (self.clock.time_us - self._heard_us) * 1e-6
-        if silent_s > 3.0:
+        if silence and silent_s > 3.0:
             parts.append(f"no heartbeat for {silent_s:.0f} s")
         if self._last_ack is not None:
             parts.append(f"answer {describe_ack(self._last_ack)}")
@@ -178,6 +183,16 @@ class VehicleView:
         return ", ".join(parts)
 
     # waiting
+
+    def link_guard(self, awaited: str | Callable[[], str]) -> AbstractAsyncContextManager[None]:
+        """`async with`: LinkClosed when the heartbeats stop while the block waits for what is named."""
+        return self._watch.guard(awaited if callable(awaited) else lambda: awaited)
+
+    @asynccontextmanager
+    async def deadline(self, seconds: float, awaited: str | Callable[[], str]) -> AsyncIterator[None]:
+        """`async with`: TimeoutError after `seconds` of vehicle time, LinkClosed when the link is lost."""
+        async with self.link_guard(awaited), self.clock.timeout(seconds):
+            yield
 
     async def wait_until(
         self,
@@ -197,6 +212,7 @@ class VehicleView:
 
         Raises:
             VehicleTimeout: says what was awaited and what was heard last.
+            LinkClosed: the heartbeats stopped.
         """
         value = predicate()
         if value:
@@ -204,7 +220,7 @@ class VehicleView:
         changed = asyncio.Event()
         stops = [self.connection.listen(name, lambda _frame: changed.set()) for name in on]
         try:
-            async with self.clock.timeout(timeout_s):
+            async with self.deadline(timeout_s, what):
                 while True:
                     await changed.wait()
                     changed.clear()
@@ -219,10 +235,14 @@ class VehicleView:
                 stop()
 
 
+def command_name(command: int) -> str:
+    """A MAV_CMD in words: "NAV_TAKEOFF"."""
+    entry = dialect.enums["MAV_CMD"].get(command)
+    return entry.name.removeprefix("MAV_CMD_") if entry else f"command {command}"
+
+
 def describe_ack(ack: Any) -> str:
     """A COMMAND_ACK in words: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
-    command = dialect.enums["MAV_CMD"].get(ack.command)
     result = dialect.enums["MAV_RESULT"].get(ack.result)
-    command_name = command.name.removeprefix("MAV_CMD_") if command else f"command {ack.command}"
     result_name = result.name.removeprefix("MAV_RESULT_") if result else f"result {ack.result}"
-    return f"{command_name}: {result_name}"
+    return f"{command_name(ack.command)}: {result_name}"

@@ -79,7 +79,7 @@ async def upload(vehicle: "Vehicle", items: Sequence[MissionItem]) -> None:
         attempts = 0
         while True:
             try:
-                async with vehicle.clock.timeout(_RETRY_S if asked < 0 else 6.0):
+                async with vehicle.deadline(_RETRY_S if asked < 0 else 6.0, "a request for a mission item"):
                     reply = await anext(replies)
             except TimeoutError:
                 attempts += 1
@@ -120,7 +120,7 @@ async def download(vehicle: "Vehicle") -> list[MissionItem]:
             for _ in range(_RETRIES):
                 vehicle.send(message)
                 try:
-                    async with vehicle.clock.timeout(_RETRY_S):
+                    async with vehicle.deadline(_RETRY_S, name):
                         async for reply in replies:
                             if vehicle.addressed_here(reply) and (sequence is None or reply.seq == sequence):
                                 return reply
@@ -143,7 +143,7 @@ async def clear(vehicle: "Vehicle") -> None:
         for _ in range(_RETRIES):
             vehicle.send(dialect.MAVLink_mission_clear_all_message(vehicle.system_id, 1, 0))
             try:
-                async with vehicle.clock.timeout(_RETRY_S):
+                async with vehicle.deadline(_RETRY_S, "the clearing of the mission"):
                     async for reply in replies:
                         if not vehicle.addressed_here(reply):
                             continue

@@ -48,7 +48,7 @@ async def read(vehicle: "Vehicle", name: str) -> tuple[float, int]:
         for _ in range(_TRIES):
             vehicle.send(message)
             try:
-                async with vehicle.clock.timeout(_WAIT_S):
+                async with vehicle.deadline(_WAIT_S, f"parameter {name}"):
                     async for reply in replies:
                         if _name(reply).upper() == name.upper():
                             bytewise = vehicle.adapter.bytewise_parameters
@@ -78,7 +78,7 @@ async def write(vehicle: "Vehicle", name: str, value: float) -> None:
         for _ in range(_TRIES):
             vehicle.send(message)
             try:
-                async with vehicle.clock.timeout(_WAIT_S):
+                async with vehicle.deadline(_WAIT_S, f"parameter {name}"):
                     async for reply in replies:
                         if _name(reply).upper() != name.upper():
                             continue

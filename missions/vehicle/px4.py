@@ -64,6 +64,7 @@ class Px4:
     bytewise_parameters = True
     setpoints_before_guided = True
     first_mission_item_is_home = False
+    goto_mode = Mode.HOLD
     unset = math.nan
 
     def mode_name(self, custom_mode: int) -> str:

@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence, Set
 from contextlib import asynccontextmanager, suppress
 from typing import Final
 
@@ -11,15 +11,16 @@ from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions import telemetry
 from missions.connection import Connection
-from missions.errors import MissionError, VehicleTimeout
+from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.planning.limits import VehicleLimits
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
-from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.commands import HEARTBEAT_AGE_US, VehicleCommands
 from missions.vehicle.guided import GuidedSession, SetpointSource
 
 _GROUND: Final = 1
 _ACCEPTED: Final = 0
+_FARTHEST_M: Final = 10_000.0  # from home; beyond, latitude and longitude are more likely mistaken
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
@@ -91,7 +92,16 @@ class Vehicle(VehicleCommands):
         await self.wait_disarmed(5.0)
 
     async def takeoff(self, altitude_m: float, timeout_s: float | None = None) -> None:
-        """Arm if needed, take off, and wait until the height above home is reached and held."""
+        """Arm if needed, take off, and wait until the height above home is reached and held.
+
+        Raises:
+            PlanError: the altitude is not finite and above 0; nothing was sent.
+        """
+        if not (math.isfinite(altitude_m) and altitude_m > 0.0):
+            raise PlanError(
+                f"takeoff to {altitude_m:g} m is not possible; accepted: a finite altitude above 0 m "
+                "(altitude above home, positive up)"
+            )
         if not self.armed:
             await self.arm()
         await self.adapter.take_off(self, altitude_m)
@@ -124,7 +134,16 @@ class Vehicle(VehicleCommands):
         tolerance_m: float = 1.0,
         timeout_s: float | None = None,
     ) -> None:
-        """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow."""
+        """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow.
+
+        Raises:
+            PlanError: the target is more than 10 km from home; nothing was sent.
+            MissionError: the vehicle disarmed, or changed to a mode this mission did not ask for (a
+                failsafe, a pilot).
+        """
+        self._check_distance(target)
+        mode_before = self.custom_mode
+        self._modes_asked.clear()
         await self.command_int(
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL,
@@ -139,7 +158,15 @@ class Vehicle(VehicleCommands):
             p = self.latest(telemetry.Position)
             return math.hypot(*frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)) if p else math.inf
 
+        accepted_us = self.clock.time_us
+        goto_mode = self.adapter.modes[self.adapter.goto_mode]
+        expected = {mode_before, goto_mode}
+
         def there() -> bool:
+            if self._heard_us is not None and self._heard_us >= accepted_us + HEARTBEAT_AGE_US:
+                if self.custom_mode == goto_mode:  # from now on the mode before is a change too
+                    expected.intersection_update((goto_mode,))
+                self._require_flying(expected, lambda: f"{distance_m():.1f} m before the target")
             p = self.latest(telemetry.Position)
             return p is not None and distance_m() < tolerance_m and math.hypot(*p.vel_ned_m_s) < 0.7
 
@@ -148,9 +175,31 @@ class Vehicle(VehicleCommands):
         await self.wait_until(
             there,
             what=lambda: f"arrival (still {distance_m():.1f} m away)",
-            on=("GLOBAL_POSITION_INT",),
+            on=("GLOBAL_POSITION_INT", "HEARTBEAT"),
             timeout_s=limit_s,
         )
+
+    def _check_distance(self, target: GeodeticPosition) -> None:
+        if self.message("HOME_POSITION") is None:
+            return
+        ned = LocalFrame(self.home).ned_from_geodetic(target.lat_deg, target.lon_deg, target.alt_m)
+        away_m = math.hypot(*ned)
+        if not away_m <= _FARTHEST_M:
+            raise PlanError(
+                f"the target {target} is {away_m * 1e-3:.1f} km from home; accepted: at most "
+                f"{_FARTHEST_M * 1e-3:g} km"
+            )
+
+    def _require_flying(self, expected: Set[int], where: Callable[[], str]) -> None:
+        """Raise when the vehicle disarmed, or is in a mode neither expected nor asked for meanwhile."""
+        if not self.armed:
+            happened = "is disarmed"
+        elif self.custom_mode not in expected and self.custom_mode not in self._modes_asked:
+            happened = f"changed to mode {self.mode}, which this mission did not ask for,"
+        else:
+            return
+        told = f" ({self.status_texts[-1].text!r})" if self.status_texts else ""
+        raise MissionError(f"the vehicle {happened} {where()}{told}; {self.heard()}")
 
     async def goto_ned(
         self, north_m: float, east_m: float, down_m: float, *, tolerance_m: float = 1.0
@@ -285,7 +334,7 @@ class Vehicle(VehicleCommands):
         mission_mode = self.adapter.modes[Mode.MISSION]
         with self.messages("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT") as stream:
             try:
-                async with self.clock.timeout(timeout_s):
+                async with self.deadline(timeout_s, f"mission item {sequence}"):
                     async for m in stream:
                         kind = m.get_type()
                         if kind == "HEARTBEAT":
@@ -357,6 +406,10 @@ class Vehicle(VehicleCommands):
                 await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
         # a disarmed vehicle too: in the mission's mode it would fly off when it is armed again
         for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
-            with suppress(MissionError):
+            try:
                 await self.set_mode(mode, 5.0)
+            except LinkClosed:  # the vehicle may still hear us: what it was told first shall stand
                 return
+            except MissionError:
+                continue
+            return

@@ -1,0 +1,86 @@
+"""Whether a vehicle is still there: waits end when its heartbeats stop."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Final
+
+from autopilot_bridge.clock import Clock, TelemetryClock
+from missions.errors import LinkClosed
+
+LOST_AFTER_S: Final = 10.0
+_LOOK_EVERY_S: Final = 1.0
+
+
+class LinkWatch:
+    """Ends waits when no heartbeat has come for 10 s of the event loop's time.
+
+    That is wall time for a vehicle elsewhere, however fast it simulates, and vehicle time in the loop of an
+    embedded one. A vehicle slower than real time gets 10 s of its own. Time in which this process was busy
+    (the look at the link comes late by as much) is not silence. Before the first heartbeat nothing ends.
+
+    Args:
+        clock: vehicle time.
+        heard: what was heard last, for the error.
+    """
+
+    def __init__(self, clock: Clock, heard: Callable[[], str]) -> None:
+        self._clock = clock
+        self._heard = heard
+        self._heard_s: float | None = None
+        self._scopes: list[asyncio.Timeout] = []
+        self._timer: asyncio.TimerHandle | None = None
+
+    def on_heartbeat(self) -> None:
+        """A heartbeat of the vehicle came just now."""
+        self._heard_s = asyncio.get_running_loop().time()
+
+    @asynccontextmanager
+    async def guard(self, awaited: Callable[[], str]) -> AsyncIterator[None]:
+        """Raises LinkClosed when the heartbeats stop while the block waits.
+
+        Args:
+            awaited: what the block waits for, for the error.
+        """
+        scope = asyncio.timeout(None)
+        try:
+            async with scope:
+                self._scopes.append(scope)
+                self._start()
+                try:
+                    yield
+                finally:
+                    self._scopes.remove(scope)
+        except TimeoutError:
+            if not scope.expired():
+                raise
+            raise LinkClosed(
+                f"link lost: no heartbeat for {self._silence_s():.0f} s while waiting for {awaited()}; "
+                f"{self._heard()}"
+            ) from None
+
+    def _silence_s(self) -> float:
+        return 0.0 if self._heard_s is None else asyncio.get_running_loop().time() - self._heard_s
+
+    def _limit_s(self) -> float:
+        rate = self._clock.rate if isinstance(self._clock, TelemetryClock) else 1.0
+        return LOST_AFTER_S / min(1.0, rate)
+
+    def _start(self) -> None:
+        # goes on over the many short waits of a command, and ends with the last of them
+        if self._timer is None:
+            loop = asyncio.get_running_loop()
+            self._timer = loop.call_later(_LOOK_EVERY_S, self._look, loop.time() + _LOOK_EVERY_S)
+
+    def _look(self, due_s: float) -> None:
+        self._timer = None
+        if not self._scopes:
+            return
+        now_s = asyncio.get_running_loop().time()
+        if self._heard_s is not None:
+            self._heard_s = min(now_s, self._heard_s + max(0.0, now_s - due_s))
+        if self._silence_s() >= self._limit_s():
+            for scope in self._scopes:
+                if not scope.expired():
+                    scope.reschedule(now_s)
+        self._start()
