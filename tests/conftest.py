@@ -1,7 +1,7 @@
 """Settings of the whole suite.
 
-Property tests draw the same examples on every run, so that no run is luckier than another. Ctrl-C works in the
-tests and in the programs they start even where the suite runs in the background of a shell, which ignores it.
+Property tests draw the same examples on every run, so that no run is luckier than another. Ctrl-C works in
+the tests and the programs they start, even where the suite runs in the background of a shell.
 """
 
 import signal
