@@ -25,6 +25,7 @@ from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
 
 _TIME: Final = struct.Struct(">Q")
 _pack_time: Final = _TIME.pack
+_OVERHEAD_V2: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
 FLUSH_BYTES: Final = 64 * 1024
 FLUSH_INTERVAL_US: Final = 1_000_000
 _CHUNK_BYTES: Final = 1 << 20
@@ -79,6 +80,26 @@ class TlogWriter:
         if len(buffer) >= FLUSH_BYTES or abs(time_us - self._flushed_us) >= FLUSH_INTERVAL_US:
             self._flushed_us = time_us
             self.flush()
+
+    def write_packet(self, time_us: int, packet: bytes) -> None:
+        """Append the frames of a packet that a channel of ours has sent: whole unsigned MAVLink 2 frames.
+
+        They are told apart by their lengths only; what comes from elsewhere goes through a parser first.
+
+        Args:
+            time_us: microseconds of the Unix epoch.
+            packet: one or more frames, one behind the other.
+
+        Raises:
+            TlogError: the packet does not end with a frame, the log is closed, or the disk is full.
+        """
+        start, size = 0, len(packet)
+        while start < size:
+            end = start + _OVERHEAD_V2 + (packet[start + 1] if start + 1 < size else 0)
+            if end > size or packet[start] != MAGIC_V2:
+                raise TlogError(f"a packet of {size} bytes has no whole frame at byte {start}")
+            self.write(time_us, packet[start:end])
+            start = end
 
     def flush(self) -> None:
         """Hand everything to the operating system.

@@ -20,7 +20,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.geodesy import LocalFrame
-from autopilot_bridge.mavlink import FrameEncoder, FrameParser
+from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, team
 from autopilot_bridge.tlog import TlogWriter
@@ -54,20 +54,8 @@ class Flight:
             SitlConfiguration(vehicles=team(vehicles, model="iris", flavour="px4", parameters={}), seed=1)
         )
         self.log = TlogWriter(log)
-        self.frames = 0
-        self.links = [self.sitl.connect(index) for index in range(vehicles)]
         self.encoder = FrameEncoder(255, 190)
-        for link in self.links:
-            link.on_receive = self._recorder(FrameParser())
-        self.sitl.on_truth(lambda time_us, frame: self.log.write(time_us, frame))
-
-    def _recorder(self, parser: FrameParser) -> Callable[[bytes], None]:
-        def record(data: bytes) -> None:
-            for frame in parser.feed(data):
-                self.frames += 1
-                self.log.write(self.sitl.time_us, frame.raw)
-
-        return record
+        self.links = self.sitl.record(self.log)
 
     def take_off(self) -> None:
         """Store a mission that goes round and round, arm, take off."""
@@ -166,10 +154,10 @@ def main() -> None:
         for vehicles in (1, 2, 4, 8):
             flight = Flight(vehicles, Path(folder) / f"{vehicles}.tlog")
             flight.take_off()
-            before = flight.frames
+            before = flight.log.records
             wall_s = timed(lambda flight=flight: flight.run(seconds))
             speed = seconds / wall_s
-            rate = (flight.frames - before) / seconds / vehicles
+            rate = (flight.log.records - before) / seconds / vehicles
             share = speed * vehicles / base
             out(f"{vehicles:>8} {speed:>15.0f} {speed * vehicles:>19.0f} {share:>16.0%} {rate:>11.0f}\n")
             if vehicles == 1:

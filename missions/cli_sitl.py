@@ -62,6 +62,7 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
     show_default=True,
 )
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
+@click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
 @click.option(
     "--duration", type=FiniteRange(min=0.0, max=1e9), help="Stop after so many seconds of vehicle time."
@@ -78,6 +79,7 @@ def sitl(
     wind: str,
     turbulence: str,
     params: str | None,
+    log: str | None,
     no_wait: bool,
     duration: float | None,
 ) -> None:
@@ -98,6 +100,7 @@ def sitl(
         parse_home,
         team,
     )
+    from autopilot_bridge.tlog import TlogWriter
     from flightsim.environment import Environment
     from missions.options import parameters_from_file, parse_wind
 
@@ -129,7 +132,10 @@ def sitl(
         )
         compile_flight_code()
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
+        recorder = None if log is None else TlogWriter(log)
         opened = server.open(ports)
+        if recorder is not None:
+            world.record(recorder)
     except (ValueError, OSError, BridgeError) as error:
         raise click.UsageError(str(error)) from error
     signal.signal(signal.SIGINT, on_signal)
@@ -143,6 +149,8 @@ def sitl(
     if waits:
         click.echo(f"waiting for a client on {opened[0][2]}", err=True)
         if not server.wait_for_client(lambda: bool(stop)):
+            if recorder is not None:
+                recorder.close()
             return
 
     def report(pace: PaceReport) -> None:
@@ -156,5 +164,7 @@ def sitl(
         )
     finally:
         world.close()
+        if recorder is not None:
+            recorder.close()
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")

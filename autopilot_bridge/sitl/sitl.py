@@ -17,6 +17,7 @@ from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TruthEncoder
+from autopilot_bridge.tlog import TlogWriter
 from flightsim.sensors import (
     FIX_AT_BOOT,
     RTK_FIX_AFTER_10_S,
@@ -212,6 +213,19 @@ class Sitl:
         channel = vehicle.open(ours, role=role)
         ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
+
+    def record(self, log: TlogWriter) -> list[MemoryLink]:
+        """Log what every vehicle says on a link of its own, and the truth, stamped with the vehicles' clock.
+
+        Returns:
+            The client's ends of those links, by which the vehicles can be spoken to.
+        """
+        epoch_us = self.configuration.unix_epoch_us
+        links = [self.connect(index) for index in range(len(self.vehicles))]
+        for link in links:
+            link.on_receive = lambda packet: log.write_packet(epoch_us + self._time_us, packet)
+        self.on_truth(lambda time_us, frame: log.write(epoch_us + time_us, frame))
+        return links
 
     def on_truth(self, listener: TruthListener) -> None:
         """Have truth frames delivered at 50 Hz, for the log and the score."""

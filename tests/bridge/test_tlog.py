@@ -54,6 +54,21 @@ def test_round_trip(tmp_path):
     assert (counters.records, counters.bytes_skipped, counters.frames.frames_lost) == (3000, 0, 0)
 
 
+def test_packets_are_split_into_records(tmp_path):
+    frames = [frame for _, frame in records(5)]
+    with TlogWriter(tmp_path / "a.tlog") as log:
+        log.write_packet(EPOCH_US, b"".join(frames[:3]))
+        log.write_packet(EPOCH_US + 5, b"".join(frames[3:]))
+    read = [(time_us, frame.raw) for time_us, frame in TlogReader(tmp_path / "a.tlog")]
+    assert read == [(EPOCH_US + (0 if k < 3 else 5), frame) for k, frame in enumerate(frames)]
+
+
+@pytest.mark.parametrize("packet", [b"\xfd", b"\xfd\x09", b"abc", records(1)[0][1] + b"\xfe\x01"])
+def test_packets_that_are_no_frames_are_refused(tmp_path, packet):
+    with TlogWriter(tmp_path / "a.tlog") as log, pytest.raises(TlogError, match="no whole frame"):
+        log.write_packet(EPOCH_US, packet)
+
+
 def test_pymavlink_reads_it(tmp_path):
     path = tmp_path / "a.tlog"
     items = records(200)
