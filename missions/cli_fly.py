@@ -65,10 +65,12 @@ def _ratio(text: str) -> tuple[float, float]:
     """ "3:4", or a single number for so much to one."""
     from missions.options import parse_pair
 
-    single = not any(mark in text for mark in ":/,")
-    x, y = parse_pair(f"{text.strip() or '?'}:1" if single else text, "--ratio", ":/,")
-    if not (x > 0.0 and y > 0.0):
-        raise click.UsageError(f"--ratio {text}: both frequencies must be above 0, for example 3:4")
+    x, y = parse_pair(text, "--ratio", ":/,")
+    if not any(mark in text for mark in ":/,"):
+        y = 1.0
+    for frequency in (x, y):
+        if frequency <= 0.0:
+            raise click.UsageError(f"--ratio {text}: frequency {frequency:g} is not above 0; try --ratio 3:4")
     return x, y
 
 
