@@ -138,25 +138,21 @@ def sitl(
             world.record(recorder)
     except (ValueError, OSError, BridgeError) as error:
         raise click.UsageError(str(error)) from error
-    signal.signal(signal.SIGINT, on_signal)
-    signal.signal(signal.SIGTERM, on_signal)
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     for vehicle, port, address in opened:
         system_id = vehicle.specification.system_id
         click.echo(f"vehicle {system_id} ({autopilot} {vehicle.specification.model}): {address} {port.role}")
     click.echo("ready, Ctrl-C ends it")
     sys.stdout.flush()
     waits = autopilot == "ardupilot" and ports is None and not no_wait
-    if waits:
-        click.echo(f"waiting for a client on {opened[0][2]}", err=True)
-        if not server.wait_for_client(lambda: bool(stop)):
-            if recorder is not None:
-                recorder.close()
-            return
 
     def report(pace: PaceReport) -> None:
         click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
 
     try:
+        if waits:
+            click.echo(f"waiting for a client on {opened[0][2]}", err=True)
+            server.wait_for_client(lambda: bool(stop))
         server.run(
             lambda: bool(stop),
             report=report if sys.stderr.isatty() else None,
@@ -166,5 +162,7 @@ def sitl(
         world.close()
         if recorder is not None:
             recorder.close()
+        for number, handler in before.items():
+            signal.signal(number, handler)
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")
