@@ -40,6 +40,3 @@ class TimeSyncService:
             case _:
                 return False
         return True
-
-    def tick(self, time_us: int) -> None:
-        """Nothing is due."""
