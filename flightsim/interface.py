@@ -47,6 +47,15 @@ RANGE_MIN_M: Final = 1
 RANGE_MAX_M: Final = 2
 RANGE_SIZE: Final = 3
 
+# airspeed.values (pitot tube)
+AIRSPEED_DIFFERENTIAL_PRESSURE_PA: Final = 0  # total less static pressure
+AIRSPEED_TEMPERATURE_C: Final = 1
+AIRSPEED_SIZE: Final = 2
+# flow_vane.values (angle-of-attack and sideslip vanes)
+VANE_ANGLE_OF_ATTACK_RAD: Final = 0
+VANE_SIDESLIP_RAD: Final = 1
+VANE_SIZE: Final = 2
+
 
 class Reading:
     """Newest delivered sample of one sensor.
@@ -68,7 +77,16 @@ class Reading:
 class SensorReadings:
     """All readings of one vehicle: the autopilot's whole view of the world."""
 
-    __slots__ = ("barometer", "battery", "gps", "imu", "magnetometer", "rangefinder")
+    __slots__ = (
+        "airspeed",
+        "barometer",
+        "battery",
+        "flow_vane",
+        "gps",
+        "imu",
+        "magnetometer",
+        "rangefinder",
+    )
 
     def __init__(self) -> None:
         self.imu = Reading(IMU_SIZE)
@@ -77,7 +95,19 @@ class SensorReadings:
         self.gps = Reading(GPS_SIZE)
         self.battery = Reading(BATTERY_SIZE)
         self.rangefinder = Reading(RANGE_SIZE)
+        self.airspeed = Reading(AIRSPEED_SIZE)
+        self.flow_vane = Reading(VANE_SIZE)
 
 
 MAX_ACTUATORS: Final = 8
 """Actuator commands are a float64 array of this size: motors 0..1, surfaces -1..1, unused ones zero."""
+
+# Actuators of a fixed-wing vehicle, in ArduPilot's channel order. Positive rolls right, pitches the nose up,
+# turns the nose right; throttle, flaps and brake are 0..1.
+AILERON: Final = 0
+ELEVATOR: Final = 1
+THROTTLE: Final = 2
+RUDDER: Final = 3
+FLAPS: Final = 4
+STEERING: Final = 5  # nose or tail wheel
+BRAKE: Final = 6
