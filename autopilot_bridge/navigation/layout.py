@@ -17,4 +17,6 @@ SPECIFIC_FORCE_FRD_M_S2: Final = slice(22, 25)  # bias-corrected
 EULER_RAD: Final = slice(25, 28)  # roll, pitch, yaw
 HEIGHT_ABOVE_GROUND_M: Final = 28  # NaN when not known
 WIND_NED_M_S: Final = slice(29, 32)  # NaN when not estimated
-NAV_SIZE: Final = 32
+AIRSPEED_M_S: Final = 32  # equivalent; of the sensor, or by wind and speed while it is out; NaN: not known
+AIRSPEED_TRUE_M_S: Final = 33
+NAV_SIZE: Final = 34
