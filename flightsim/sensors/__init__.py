@@ -4,10 +4,12 @@ To add one: a module with its parameter dataclass and kernel (`SensorParameters`
 and `SensorSuite.add`. No other sensor's code or random stream changes.
 """
 
+from flightsim.sensors.airspeed import AirspeedParameters
 from flightsim.sensors.barometer import BarometerParameters
 from flightsim.sensors.battery import BatteryMonitorParameters
 from flightsim.sensors.fault_kinds import FaultTarget, FaultType, SensorUnit
 from flightsim.sensors.faults import FaultPanel, UnsupportedFaultError
+from flightsim.sensors.flow_vane import FlowVaneParameters
 from flightsim.sensors.gps import FIX_AT_BOOT, RTK_FIX_AFTER_10_S, GpsFixStage, GpsParameters
 from flightsim.sensors.imu import ImuParameters
 from flightsim.sensors.magnetometer import MagnetometerParameters
@@ -18,11 +20,13 @@ from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 __all__ = [
     "FIX_AT_BOOT",
     "RTK_FIX_AFTER_10_S",
+    "AirspeedParameters",
     "BarometerParameters",
     "BatteryMonitorParameters",
     "FaultPanel",
     "FaultTarget",
     "FaultType",
+    "FlowVaneParameters",
     "GpsFixStage",
     "GpsParameters",
     "ImuParameters",

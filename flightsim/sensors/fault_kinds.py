@@ -62,6 +62,8 @@ class FaultTarget:
         garbage_low, garbage_high: limits GARBAGE draws between; a channel with NaN limits stays as it is.
         add_bias: adds a bias in place (GPS: metres onto degrees).
         no_fix: the values of a receiver that runs without a fix; None for units that know no fix.
+        blocked: the values of a pitot tube whose opening is blocked; a channel with NaN stays as it is. None
+            for units that have nothing to block.
     """
 
     unit: SensorUnit
@@ -72,6 +74,7 @@ class FaultTarget:
     garbage_high: tuple[float, ...]
     add_bias: Callable[[Array, Array], None] = add
     no_fix: tuple[float, ...] | None = None
+    blocked: tuple[float, ...] | None = None
 
 
 class Fault(Protocol):
@@ -140,6 +143,23 @@ class NoFix:
     def apply(self, values: Array) -> bool:
         """Replace the values by those of a receiver without a fix."""
         values[:] = self._values
+        return True
+
+
+class Blocked:
+    """WRONG with `blocked`: a pitot tube that ice or an insect has closed, its drain hole open.
+
+    The pressure in it falls to that of the static ports, and the sensor reads no airspeed. When the drain is
+    closed as well, the pressure is trapped: that is STUCK.
+    """
+
+    def __init__(self, values: Array) -> None:
+        self._replaced = ~np.isnan(values)
+        self._values = values[self._replaced]
+
+    def apply(self, values: Array) -> bool:
+        """Replace the values."""
+        values[self._replaced] = self._values
         return True
 
 

@@ -48,6 +48,7 @@ class FaultPoint:
         mean_up_s: float | None,
         mean_down_s: float | None,
         no_fix: bool,
+        blocked: bool,
     ) -> None:
         """Put a failure in force in place of any other; options as in `FaultPanel.inject`."""
         options = {
@@ -58,6 +59,7 @@ class FaultPoint:
             "mean_up_s": mean_up_s is not None,
             "mean_down_s": mean_down_s is not None,
             "no_fix": no_fix,
+            "blocked": blocked,
         }
         accepted = _OPTIONS.get(failure, ())
         for option, given in options.items():
@@ -80,6 +82,10 @@ class FaultPoint:
                 if target.no_fix is None:
                     raise ValueError(f"option no_fix is for GPS, not for {target.unit.name}")
                 fault = kinds.NoFix(np.array(target.no_fix))
+            case FaultType.WRONG if blocked:
+                if target.blocked is None:
+                    raise ValueError(f"option blocked is for AIRSPEED, not for {target.unit.name}")
+                fault = kinds.Blocked(np.array(target.blocked))
             case FaultType.WRONG:
                 fault = kinds.Wrong(self._vector("bias", bias, target.wrong_bias), target.add_bias)
             case FaultType.SLOW:
@@ -112,7 +118,7 @@ class FaultPoint:
 
 
 _OPTIONS: Final = {
-    FaultType.WRONG: ("bias", "no_fix"),
+    FaultType.WRONG: ("bias", "no_fix", "blocked"),
     FaultType.SLOW: ("slow_factor",),
     FaultType.DELAYED: ("delay_s",),
     FaultType.INTERMITTENT: ("mean_up_s", "mean_down_s"),

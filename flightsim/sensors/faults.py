@@ -57,6 +57,7 @@ class FaultPanel:
         mean_up_s: float | None = None,
         mean_down_s: float | None = None,
         no_fix: bool = False,
+        blocked: bool = False,
     ) -> None:
         """Put a failure in force from the next sample on; `FaultType.OK` clears.
 
@@ -71,6 +72,8 @@ class FaultPanel:
             delay_s: DELAYED: extra delay, rounded to samples.
             mean_up_s, mean_down_s: INTERMITTENT: mean durations of delivering and silence.
             no_fix: WRONG on GPS: the receiver goes on reporting, but without a fix (OFF stops its messages).
+            blocked: WRONG on AIRSPEED: the opening of the pitot tube is closed and its drain open, so that it
+                reads no airspeed (STUCK: closed drain and all, the pressure stays in).
 
         Raises:
             UnsupportedFaultError: no such unit, failure or instance here.
@@ -91,6 +94,7 @@ class FaultPanel:
             mean_up_s=mean_up_s,
             mean_down_s=mean_down_s,
             no_fix=no_fix,
+            blocked=blocked,
         )
 
     def clear(self, unit: SensorUnit | int | None = None, *, instance: int = 0) -> None:

@@ -2,15 +2,18 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.interface import Reading, SensorReadings
+from flightsim.sensors.airspeed import AirspeedParameters
 from flightsim.sensors.barometer import BarometerParameters
 from flightsim.sensors.battery import BatteryMonitorParameters
 from flightsim.sensors.fault_stage import FaultPoint
 from flightsim.sensors.faults import FaultPanel
+from flightsim.sensors.flow_vane import FlowVaneParameters
 from flightsim.sensors.gps import GpsParameters
 from flightsim.sensors.imu import ImuParameters
 from flightsim.sensors.magnetometer import MagnetometerParameters
@@ -30,6 +33,17 @@ class SensorSuiteParameters:
     gps: GpsParameters | None = field(default_factory=GpsParameters)
     battery: BatteryMonitorParameters | None = field(default_factory=BatteryMonitorParameters)
     rangefinder: RangefinderParameters | None = field(default_factory=RangefinderParameters)
+    airspeed: AirspeedParameters | None = None
+    flow_vane: FlowVaneParameters | None = None
+
+    @classmethod
+    def fixed_wing(cls, **overrides: Any) -> "SensorSuiteParameters":
+        """What a small aircraft carries: a multicopter's sensors, a pitot tube, a lidar for the flare."""
+        fitted: dict[str, Any] = {
+            "rangefinder": RangefinderParameters.long_range(),
+            "airspeed": AirspeedParameters(),
+        }
+        return cls(**(fitted | overrides))
 
 
 class SensorSuite:
@@ -97,6 +111,8 @@ class SensorSuite:
             ("gps", readings.gps, parameters.gps),
             ("battery", readings.battery, parameters.battery),
             ("rangefinder", readings.rangefinder, parameters.rangefinder),
+            ("airspeed", readings.airspeed, parameters.airspeed),
+            ("flow_vane", readings.flow_vane, parameters.flow_vane),
         )
         for name, reading, sensor_parameters in fitted:
             if sensor_parameters is not None:

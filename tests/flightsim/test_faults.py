@@ -12,6 +12,7 @@ from flightsim import truth as t
 from flightsim.interface import Reading
 from flightsim.random_streams import RandomStreams
 from flightsim.sensors import (
+    AirspeedParameters,
     BarometerParameters,
     FaultType,
     SensorSuite,
@@ -36,7 +37,9 @@ UNITS = {
     SensorUnit.GPS: ("gps", slice(0, i.GPS_SIZE)),
     SensorUnit.DISTANCE_SENSOR: ("rangefinder", slice(0, i.RANGE_SIZE)),
     SensorUnit.BATTERY: ("battery", slice(0, i.BATTERY_SIZE)),
+    SensorUnit.AIRSPEED: ("airspeed", slice(0, i.AIRSPEED_SIZE)),
 }
+EVERYTHING = SensorSuiteParameters(airspeed=AirspeedParameters())
 every_unit = pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
 silencing_alone = pytest.mark.parametrize(
     "unit", [unit for unit, (name, _) in UNITS.items() if name != "imu"], ids=lambda unit: unit.name
@@ -62,7 +65,7 @@ def make_suite(parameters: SensorSuiteParameters | None = None) -> tuple[SensorS
     truth = np.zeros(t.TRUTH_SIZE)
     streams = RandomStreams(5)
     suite = SensorSuite(
-        parameters or SensorSuiteParameters(),
+        parameters or EVERYTHING,
         physics_rate_hz=RATE_HZ,
         truth=truth,
         seeds=lambda name: streams.child("sensor", name),
@@ -82,6 +85,7 @@ def write_truth(truth: Array, step: int) -> None:
     truth[t.HEIGHT_ABOVE_GROUND_M] = 4.0 + 0.5 * s
     truth[t.BATTERY_VOLTAGE_V], truth[t.BATTERY_CURRENT_A] = 16.0 - 0.1 * s, 14.0 + s
     truth[t.BATTERY_CAPACITY_AH] = 5.0
+    truth[t.DYNAMIC_PRESSURE_PA] = 300.0 + 10.0 * s
 
 
 def fly(unit: SensorUnit, failure: FaultType, **options: object) -> Trace:
@@ -110,7 +114,7 @@ def healthy() -> dict[str, Trace]:
 
 
 def rate_hz(unit: SensorUnit) -> int:
-    rate: int = getattr(SensorSuiteParameters(), UNITS[unit][0]).rate_hz
+    rate: int = getattr(EVERYTHING, UNITS[unit][0]).rate_hz
     return rate
 
 
@@ -269,6 +273,24 @@ def test_gps_without_a_fix_goes_on_reporting(healthy: dict[str, Trace]) -> None:
     assert np.all(np.isfinite(lost))
 
 
+def test_a_blocked_pitot_tube_reads_no_airspeed(healthy: dict[str, Trace]) -> None:
+    good = healthy["airspeed"]
+    trace = fly(SensorUnit.AIRSPEED, FaultType.WRONG, blocked=True)
+    during = trace.during()
+    np.testing.assert_array_equal(during, good.during())
+    assert np.all(good.values[during, i.AIRSPEED_DIFFERENTIAL_PRESSURE_PA] > 200.0)
+    np.testing.assert_array_equal(trace.values[during, i.AIRSPEED_DIFFERENTIAL_PRESSURE_PA], 0.0)
+    np.testing.assert_array_equal(
+        trace.values[:, i.AIRSPEED_TEMPERATURE_C], good.values[:, i.AIRSPEED_TEMPERATURE_C]
+    )
+
+
+def test_a_tube_blocked_with_its_drain_keeps_its_pressure() -> None:
+    trace = fly(SensorUnit.AIRSPEED, FaultType.STUCK)
+    pressures = trace.values[trace.during(), i.AIRSPEED_DIFFERENTIAL_PRESSURE_PA]
+    assert len(set(pressures.tolist())) == 1 and pressures[0] > 200.0
+
+
 @silencing_alone
 def test_slow_delivers_one_in_n(unit: SensorUnit, healthy: dict[str, Trace]) -> None:
     good = healthy[UNITS[unit][0]]
@@ -360,7 +382,7 @@ def test_panel_tells_what_is_in_force() -> None:
 @pytest.mark.parametrize(
     ("unit", "failure", "options", "message"),
     [
-        (SensorUnit.AIRSPEED, FaultType.OFF, {}, "no sensor unit .*AIRSPEED.*accepted: GYRO 0, ACCEL 1"),
+        (SensorUnit.VIO, FaultType.OFF, {}, "no sensor unit .*VIO.*accepted: GYRO 0, ACCEL 1"),
         (101, FaultType.OFF, {}, "no sensor unit 101; accepted: GYRO 0"),
         (SensorUnit.GPS, 55, {}, "failure 55 is not known; accepted: OK 0, OFF 1"),
         (SensorUnit.GPS, FaultType.OFF, {"instance": 2}, "instance 2 of GPS"),
@@ -379,6 +401,8 @@ def test_unsupported_failures_are_refused(
         (SensorUnit.GPS, FaultType.OFF, {"bias": (1.0,)}, "option bias does not go with OFF; accepted: none"),
         (SensorUnit.GPS, FaultType.SLOW, {"delay_s": 1.0}, "option delay_s .* SLOW; accepted: slow_factor"),
         (SensorUnit.MAG, FaultType.WRONG, {"no_fix": True}, "no_fix is for GPS, not for MAG"),
+        (SensorUnit.MAG, FaultType.WRONG, {"blocked": True}, "blocked is for AIRSPEED, not for MAG"),
+        (SensorUnit.AIRSPEED, FaultType.STUCK, {"blocked": True}, "option blocked does not go with STUCK"),
         (SensorUnit.MAG, FaultType.WRONG, {"bias": (1, 2, 3, 4)}, r"\(1, 2, 3, 4\) .* 1 to 3 finite numbers"),
         (SensorUnit.MAG, FaultType.DRIFT, {"drift_per_s": (np.nan,)}, "drift_per_s"),
         (SensorUnit.GPS, FaultType.SLOW, {"slow_factor": 1}, "slow_factor = 1"),

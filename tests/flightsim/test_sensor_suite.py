@@ -1,6 +1,6 @@
 """The suite: rates, latency, freshness, independence of streams, determinism, refusals."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,8 +10,10 @@ from flightsim import truth as t
 from flightsim.interface import Reading
 from flightsim.random_streams import RandomStreams
 from flightsim.sensors import (
+    AirspeedParameters,
     BarometerParameters,
     FaultType,
+    FlowVaneParameters,
     GpsParameters,
     ImuParameters,
     MagnetometerParameters,
@@ -28,6 +30,9 @@ Log = dict[str, list[tuple[int, int, bytes]]]
 RATE_HZ = 250
 STEP_US = 1_000_000 // RATE_HZ
 NAMES = tuple(field.name for field in fields(SensorSuiteParameters))
+AIRCRAFT_ONLY = ("airspeed", "flow_vane")
+QUADROTOR = SensorSuiteParameters()
+EVERYTHING = SensorSuiteParameters(airspeed=AirspeedParameters(), flow_vane=FlowVaneParameters())
 
 
 def make_suite(
@@ -36,7 +41,7 @@ def make_suite(
     truth = np.zeros(t.TRUTH_SIZE)
     streams = RandomStreams(seed)
     suite = SensorSuite(
-        parameters or SensorSuiteParameters(),
+        parameters or EVERYTHING,
         physics_rate_hz=physics_rate_hz,
         truth=truth,
         seeds=lambda name: streams.child("vehicle", 0, "sensor", name),
@@ -57,6 +62,8 @@ def write_truth(truth: Array, step: int) -> None:
     truth[t.HEIGHT_ABOVE_GROUND_M] = 5.0 + 0.5 * s
     truth[t.BATTERY_VOLTAGE_V], truth[t.BATTERY_CURRENT_A] = 16.0 - 0.1 * s, 14.0 + s
     truth[t.BATTERY_CAPACITY_AH] = 5.0
+    truth[t.ANGLE_OF_ATTACK_RAD], truth[t.SIDESLIP_RAD] = 0.05 + 0.1 * s, -0.05 * s
+    truth[t.DYNAMIC_PRESSURE_PA] = 300.0 + 10.0 * s
 
 
 def fly(suite: SensorSuite, truth: Array, steps: int) -> Log:
@@ -75,7 +82,7 @@ def fly(suite: SensorSuite, truth: Array, steps: int) -> Log:
 @pytest.mark.parametrize("name", NAMES)
 def test_rates_are_exact(name: str) -> None:
     suite, truth = make_suite()
-    parameters = getattr(SensorSuiteParameters(), name)
+    parameters = getattr(EVERYTHING, name)
     log = fly(suite, truth, 4 * RATE_HZ)
     measured = [measured_us for _, measured_us, _ in log[name]]
     interval_us = 1_000_000 // parameters.rate_hz
@@ -113,10 +120,27 @@ def test_nothing_is_read_before_the_first_delivery() -> None:
 @pytest.mark.parametrize("removed", NAMES)
 def test_removing_a_sensor_changes_no_other(removed: str) -> None:
     everything = fly(*make_suite(), 500)
-    without = fly(*make_suite(SensorSuiteParameters(**{removed: None})), 500)
+    without = fly(*make_suite(replace(EVERYTHING, **{removed: None})), 500)
     assert without.pop(removed) == []
     assert everything.pop(removed) != []
     assert without == everything
+
+
+def test_an_aircraft_s_sensors_are_absent_from_a_quadrotor_and_change_nothing_of_it() -> None:
+    quadrotor = fly(*make_suite(QUADROTOR), 500)
+    assert [name for name in NAMES if not quadrotor[name]] == list(AIRCRAFT_ONLY)
+    aircraft = fly(*make_suite(), 500)
+    for name in set(NAMES) - set(AIRCRAFT_ONLY):
+        assert quadrotor[name] == aircraft[name]
+
+
+def test_the_fixed_wing_suite() -> None:
+    suite, truth = make_suite(SensorSuiteParameters.fixed_wing())
+    log = fly(suite, truth, 250)
+    assert [name for name in NAMES if not log[name]] == ["flow_vane"]
+    assert suite.readings.rangefinder.values[2] == 100.0
+    assert SensorUnit.AIRSPEED in suite.faults.units
+    assert SensorSuiteParameters.fixed_wing(rangefinder=None).rangefinder is None
 
 
 @pytest.mark.parametrize("unit", list(make_suite()[0].faults.units), ids=lambda unit: unit.name)
@@ -129,6 +153,7 @@ def test_a_fault_changes_no_other_sensor(unit: SensorUnit) -> None:
         SensorUnit.GPS: "gps",
         SensorUnit.DISTANCE_SENSOR: "rangefinder",
         SensorUnit.BATTERY: "battery",
+        SensorUnit.AIRSPEED: "airspeed",
     }
     healthy = fly(*make_suite(), 500)
     suite, truth = make_suite()
@@ -145,9 +170,7 @@ def test_every_sensor_and_every_unit_has_a_stream_of_its_own() -> None:
         asked.append(name)
         return RandomStreams(1).child(name)
 
-    suite = SensorSuite(
-        SensorSuiteParameters(), physics_rate_hz=RATE_HZ, truth=np.zeros(t.TRUTH_SIZE), seeds=seeds
-    )
+    suite = SensorSuite(EVERYTHING, physics_rate_hz=RATE_HZ, truth=np.zeros(t.TRUTH_SIZE), seeds=seeds)
     assert sorted(asked) == sorted([*NAMES, *(f"fault_{unit.name.lower()}" for unit in suite.faults.units)])
 
 
@@ -178,9 +201,12 @@ def test_rate_that_does_not_divide_is_refused(rate_hz: int) -> None:
         make_suite(parameters)
 
 
-@pytest.mark.parametrize("truth", [np.zeros(39), np.zeros(40, dtype=np.float32), np.zeros(80)[::2]])
+@pytest.mark.parametrize(
+    "truth",
+    [np.zeros(t.TRUTH_SIZE - 1), np.zeros(t.TRUTH_SIZE, dtype=np.float32), np.zeros(2 * t.TRUTH_SIZE)[::2]],
+)
 def test_wrong_truth_vector_is_refused(truth: NDArray[np.floating]) -> None:
-    with pytest.raises(ValueError, match=r"accepted: contiguous float64 of \(40,\)"):
+    with pytest.raises(ValueError, match=rf"accepted: contiguous float64 of \({t.TRUTH_SIZE},\)"):
         SensorSuite(
             SensorSuiteParameters(),
             physics_rate_hz=250,
