@@ -25,10 +25,19 @@ class NavigationHealth:
         gps_quality: the receiver's fix passes the quality checks.
         accel_error: the accelerometer contradicts the height sensors, or the IMU delivers nothing usable.
         gps_in_use, barometer_in_use, magnetometer_in_use, rangefinder_in_use: fused lately.
-        dead_reckoning: horizontal position is valid but nothing has aided it for a second.
+        dead_reckoning: horizontal position is valid but nothing that knows the ground has aided it for a
+            second.
+        wind_dead_reckoning: airspeed and sideslip aid the velocity in its place, through the wind (PX4's
+            filter status of this name; ArduPilot's EKF then has a relative, but no absolute position). The
+            accuracies grow.
+        airspeed_in_use, sideslip_in_use: fused lately.
+        airspeed_valid: the navigation state's airspeed is the pitot tube's, and believed.
+        airspeed_synthetic: it is the ground velocity's less the wind instead.
+        wind_valid: the wind in the navigation state is known to some use.
+        wind_variance_m2_s2: of the wind to the north and to the east; NaN where none is estimated.
         velocity_test_ratio, position_horizontal_test_ratio, position_vertical_test_ratio,
-            magnetometer_test_ratio, height_above_ground_test_ratio, airspeed_test_ratio: as above; 0 when
-                unused.
+            magnetometer_test_ratio, height_above_ground_test_ratio, airspeed_test_ratio, sideslip_test_ratio:
+            as above; 0 when unused.
         position_horizontal_accuracy_m, position_vertical_accuracy_m, velocity_accuracy_m_s: 1-sigma, NaN
             before initialisation.
         attitude_accuracy_rad: 1-sigma of (tilt, yaw).
@@ -41,7 +50,10 @@ class NavigationHealth:
 
     __slots__ = (
         "accel_error",
+        "airspeed_in_use",
+        "airspeed_synthetic",
         "airspeed_test_ratio",
+        "airspeed_valid",
         "attitude",
         "attitude_accuracy_rad",
         "barometer_in_use",
@@ -69,6 +81,8 @@ class NavigationHealth:
         "predicted_position_horizontal_absolute",
         "predicted_position_horizontal_relative",
         "rangefinder_in_use",
+        "sideslip_in_use",
+        "sideslip_test_ratio",
         "time_since_gps_us",
         "uninitialised",
         "velocity_accuracy_m_s",
@@ -77,6 +91,9 @@ class NavigationHealth:
         "velocity_resets",
         "velocity_test_ratio",
         "velocity_vertical",
+        "wind_dead_reckoning",
+        "wind_valid",
+        "wind_variance_m2_s2",
         "yaw_aligned",
         "yaw_reset_rad",
         "yaw_resets",
@@ -93,6 +110,11 @@ class NavigationHealth:
         self.height_reset_down_m = 0.0
         self.yaw_reset_rad = 0.0
         self.clear()
+
+    @property
+    def position_horizontal_1sigma_m(self) -> float:
+        """The accuracy that is compared with COM_POS_FS_EPH: `position_horizontal_accuracy_m`."""
+        return self.position_horizontal_accuracy_m
 
     def clear(self) -> None:
         """Back to uninitialised. Reset counters go on, so that readers notice."""
@@ -116,12 +138,20 @@ class NavigationHealth:
         self.magnetometer_in_use = False
         self.rangefinder_in_use = False
         self.dead_reckoning = False
+        self.wind_dead_reckoning = False
+        self.airspeed_in_use = False
+        self.sideslip_in_use = False
+        self.airspeed_valid = False
+        self.airspeed_synthetic = False
+        self.wind_valid = False
+        self.wind_variance_m2_s2 = (math.nan, math.nan)
         self.velocity_test_ratio = 0.0
         self.position_horizontal_test_ratio = 0.0
         self.position_vertical_test_ratio = 0.0
         self.magnetometer_test_ratio = 0.0
         self.height_above_ground_test_ratio = 0.0
         self.airspeed_test_ratio = 0.0
+        self.sideslip_test_ratio = 0.0
         self.position_horizontal_accuracy_m = math.nan
         self.position_vertical_accuracy_m = math.nan
         self.velocity_accuracy_m_s = math.nan

@@ -14,6 +14,13 @@ _MAY_BE_ZERO = frozenset(
         "terrain_walk_m_per_sqrt_s",
         "terrain_gradient",
         "use_gps",
+        "fixed_wing",
+        "use_airspeed",
+        "airspeed_checks",
+        "use_sideslip",
+        "airspeed_sensor_heating_k",
+        "airspeed_lag_s",
+        "wind_height_scale",
     }
 )
 
@@ -78,6 +85,36 @@ class NavigationParameters:
         imu_timeout_s: without a valid IMU sample for this long the attitude is no longer valid.
         gyro_range_rad_s, accel_range_m_s2: samples beyond are garbage.
         history_s: how far back measurements can be delayed.
+        fixed_wing: the vehicle flies on wings: wind is estimated, airspeed and sideslip are fused. All that
+            follows is used only then.
+        use_airspeed: a pitot tube's airspeed is used (ARSPD_USE; EKF2_ARSP_THR 0 stands for False).
+        airspeed_threshold_m_s: true airspeed above which airspeed and sideslip are fused (EKF2_ARSP_THR).
+        airspeed_noise_m_s: least 1-sigma of the airspeed against that in the steady wind (EKF2_EAS_NOISE,
+            EK3_EAS_M_NSE). Turbulence adds what the innovations show of it.
+        airspeed_gate, sideslip_gate: innovation gates (EKF2_TAS_GATE, EK3_EAS_I_GATE; EKF2_BETA_GATE).
+        airspeed_scale: of the true over the indicated airspeed, from calibration (ASPD_SCALE_1; the root of
+            ARSPD_RATIO over its calibrated value).
+        airspeed_sensor_heating_k: how much warmer the transducer is than the air (PX4: 5 K).
+        airspeed_lag_s: of tubing and sensor, taken as a delay (EKF2_ASP_DELAY).
+        airspeed_smoothing_s: low-pass of the airspeed in the navigation state.
+        use_sideslip: no sideslip is taken as a measurement in flight (EKF2_FUSE_BETA).
+        sideslip_noise_rad: least 1-sigma of the sideslip (EKF2_BETA_NOISE); turbulence adds to it.
+        wind_walk_m_s_sqrt_s: random walk of the wind (EKF2_WIND_NSD, EK3_WIND_P_NSE).
+        wind_height_scale: by this times the vertical speed (in m/s) the walk is faster (EK3_WIND_PSCALE).
+        wind_prior_m_s: 1-sigma of the wind before anything is known of it, each way.
+        turbulence_length_m: over which turbulence is correlated (MIL-F-8785C: 250 m at 100 m). An airspeed
+            innovation says as little about the steady wind as one in this distance would, however often the
+            sensor is read.
+        airspeed_checks: an airspeed that contradicts ground velocity and wind is not believed any more
+            (ASPD_DO_CHECKS; ARSPD_OPTIONS bit 0).
+        airspeed_check_innovation_m_s, airspeed_check_integral_m: the innovation beyond the first, added up
+            over time, may reach the second (ASPD_FS_INNOV, ASPD_FS_INTEG).
+        airspeed_stop_delay_s: how long the checks fail until the sensor is no longer used (ASPD_FS_T_STOP).
+        airspeed_start_delay_s: how long they pass until it is used again (ASPD_FS_T_START; its -1, never, is
+            a very long time here).
+        assumed_airspeed_noise_m_s: 1-sigma of the airspeed that is assumed to have stayed as it was when
+            neither GPS nor a pitot tube can be used; it keeps the attitude bounded, as ArduPilot's EK3 does
+            with AIRSPEED_CRUISE.
     """
 
     covariance_rate_hz: int = 25
@@ -138,6 +175,28 @@ class NavigationParameters:
     gyro_range_rad_s: float = 60.0
     accel_range_m_s2: float = 400.0
     history_s: float = 0.5
+    fixed_wing: bool = False
+    use_airspeed: bool = True
+    airspeed_threshold_m_s: float = 8.0
+    airspeed_noise_m_s: float = 0.4
+    airspeed_gate: float = 5.0
+    airspeed_scale: float = 1.0
+    airspeed_sensor_heating_k: float = 5.0
+    airspeed_lag_s: float = 0.05
+    airspeed_smoothing_s: float = 0.2
+    use_sideslip: bool = True
+    sideslip_noise_rad: float = 0.03
+    sideslip_gate: float = 5.0
+    wind_walk_m_s_sqrt_s: float = 0.02
+    wind_height_scale: float = 0.5
+    wind_prior_m_s: float = 5.0
+    turbulence_length_m: float = 200.0
+    airspeed_checks: bool = True
+    airspeed_check_innovation_m_s: float = 5.0
+    airspeed_check_integral_m: float = 10.0
+    airspeed_stop_delay_s: float = 1.0
+    airspeed_start_delay_s: float = 5.0
+    assumed_airspeed_noise_m_s: float = 3.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
