@@ -1,0 +1,92 @@
+"""Which neighbouring cell a searcher flies to next: the utility of seed 003, equation 9."""
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from missions.errors import PlanError
+from missions.occupancy.occupancy_map import Cell, OccupancyMap
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DecisionParameters:
+    """One searcher's habits.
+
+    Attributes:
+        neighbourhood: how many cells in each direction are looked at; 1 is the paper's eight cells.
+        heading_penalty: alpha of equation 9, in mean prior scores of a cell for a turn by pi: large for
+            aircraft that turn badly, small for a helicopter; more than 0, for where scores are equal.
+
+    Raises:
+        PlanError: a value out of its range.
+    """
+
+    neighbourhood: int = 1
+    heading_penalty: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.neighbourhood <= 20:
+            raise PlanError(f"--neighbourhood {self.neighbourhood} is not in 1..20 cells")
+        if not (math.isfinite(self.heading_penalty) and self.heading_penalty > 0.0):
+            raise PlanError(
+                f"--heading-penalty {self.heading_penalty:g} is not possible; ask for more than 0"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """Where to fly.
+
+    Attributes:
+        cell: the one chosen.
+        heading_rad: direction from the searcher to its centre, 0..2 pi.
+        utility: J of equation 9, in mean prior scores.
+    """
+
+    cell: Cell
+    heading_rad: float
+    utility: float
+
+
+def decide(
+    occupancy: OccupancyMap,
+    *,
+    north_m: float,
+    east_m: float,
+    heading_rad: float,
+    parameters: DecisionParameters,
+    taken: Collection[Cell] = (),
+) -> Decision:
+    """The neighbouring cell of greatest utility J = B_i - alpha |psi - psi_i| (heading difference wrapped).
+
+    Off the map the neighbourhood is that of the nearest cell, which then is a choice itself. Equal utilities
+    are decided by the smaller cell number, so that a flight can be repeated.
+
+    Args:
+        occupancy: the shared map.
+        north_m, east_m, heading_rad: the searcher.
+        parameters: its habits.
+        taken: cells that others are on their way to; chosen only when there is nothing else.
+    """
+    layout = occupancy.layout
+    here = layout.cell_at(north_m, east_m)
+    reach = parameters.neighbourhood
+    cells = [
+        (row, column)
+        for row in range(max(0, here[0] - reach), min(layout.rows, here[0] + reach + 1))
+        for column in range(max(0, here[1] - reach), min(layout.columns, here[1] + reach + 1))
+        if (row, column) != here or not layout.contains(north_m, east_m)
+    ]
+    free = [cell for cell in cells if cell not in taken] or cells
+    scale = layout.rows * layout.columns
+    best: Decision | None = None
+    for cell in free:
+        centre_n_m, centre_e_m = layout.centre_of(cell)
+        bearing_rad = math.atan2(centre_e_m - east_m, centre_n_m - north_m)
+        turn_rad = abs(math.remainder(bearing_rad - heading_rad, math.tau))
+        utility = scale * float(occupancy.scores[cell]) - parameters.heading_penalty * turn_rad / math.pi
+        if best is None or utility > best.utility:
+            best = Decision(cell=cell, heading_rad=bearing_rad % math.tau, utility=utility)
+    if best is None:
+        raise PlanError("the map has no cell to fly to")
+    return best

@@ -1,0 +1,165 @@
+"""When a magnetometer reading is an anomaly, and how likely a passing searcher is to see one.
+
+Source: seed 003, sections III.C (an anomaly is what exceeds the noise) and IV.B (detection model).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from missions.errors import PlanError
+
+Array = NDArray[np.float64]
+
+_SQRT_2PI: Final = math.sqrt(2.0 * math.pi)
+_QUADRATURE: Final = np.polynomial.legendre.leggauss(8)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DetectionModel:
+    """Probability of detecting a target while flying by, p(D | searcher, target) of equation 10.
+
+    Detection is a hazard along the track that falls off with distance as a Gaussian, so that a pass may be
+    cut into stretches of any length: their probabilities of missing multiply to that of the whole.
+
+    Attributes:
+        probability_overhead: of detecting a target by one straight pass right over it, 0..1.
+        range_m: standard deviation of the fall-off with distance.
+
+    Raises:
+        PlanError: a value out of its range.
+    """
+
+    probability_overhead: float = 0.95
+    range_m: float = 60.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.probability_overhead < 1.0:
+            raise PlanError(f"--detection-probability {self.probability_overhead:g} is not between 0 and 1")
+        if not (math.isfinite(self.range_m) and self.range_m > 0.0):
+            raise PlanError(f"--detection-range {self.range_m:g} m is not possible; ask for more than 0")
+
+    def probability(
+        self, north_m: Array, east_m: Array, start_ne_m: tuple[float, float], end_ne_m: tuple[float, float]
+    ) -> Array:
+        """Probability of detecting targets from a straight stretch of track.
+
+        Args:
+            north_m, east_m: of the targets; shapes that broadcast.
+            start_ne_m, end_ne_m: ends of the stretch.
+
+        Returns:
+            Probabilities, of the broadcast shape.
+        """
+        along_n, along_e = end_ne_m[0] - start_ne_m[0], end_ne_m[1] - start_ne_m[1]
+        length_m = math.hypot(along_n, along_e)
+        exposure = np.zeros(np.broadcast_shapes(np.shape(north_m), np.shape(east_m)))
+        if length_m == 0.0:
+            return exposure
+        # pieces no longer than the fall-off, each integrated by Gauss and Legendre's rule
+        pieces = max(1, math.ceil(length_m / (2.0 * self.range_m)))
+        for piece in range(pieces):
+            for node, weight in zip(*_QUADRATURE, strict=True):
+                share = (piece + 0.5 * (1.0 + node)) / pieces
+                distance2 = (north_m - start_ne_m[0] - share * along_n) ** 2 + (
+                    east_m - start_ne_m[1] - share * along_e
+                ) ** 2
+                exposure += 0.5 * weight / pieces * length_m * np.exp(-0.5 * distance2 / self.range_m**2)
+        hazard_1_m = -math.log1p(-self.probability_overhead) / (self.range_m * _SQRT_2PI)
+        return -np.expm1(-hazard_1_m * exposure)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Anomaly:
+    """A place where the field differs from the map by more than the threshold.
+
+    Attributes:
+        time_us: vehicle time of the greatest difference.
+        north_m, east_m: where that was.
+        peak_nt: the difference there, with its sign.
+        samples: how many readings in a row were beyond the threshold.
+    """
+
+    time_us: int
+    north_m: float
+    east_m: float
+    peak_nt: float
+    samples: int
+
+
+class AnomalyDetector:
+    """Threshold on the differential measurement: reading less map.
+
+    What differs slowly (bias of the sensor, daily variation, a map that is off) is followed by a running
+    level, which stands still while a reading is beyond the threshold. Readings that aren't finite, or come
+    late, are dropped and counted.
+
+    Attributes:
+        residual_nt: newest differential measurement, level removed; NaN before the first.
+        dropped: readings that were no use.
+    """
+
+    def __init__(self, *, threshold_nt: float, least_samples: int = 2, level_time_s: float = 20.0) -> None:
+        """Begin.
+
+        Args:
+            threshold_nt: what counts as an anomaly; several standard deviations of the noise.
+            least_samples: readings in a row that make one; a single outlier is none.
+            level_time_s: time constant of the running level.
+
+        Raises:
+            PlanError: a value out of its range.
+        """
+        if not (math.isfinite(threshold_nt) and threshold_nt > 0.0):
+            raise PlanError(f"--threshold {threshold_nt:g} nT is not possible; ask for more than 0")
+        if least_samples < 1:
+            raise PlanError(f"{least_samples} samples make no anomaly; at least 1 is needed")
+        self.residual_nt = math.nan
+        self.dropped = 0
+        self._threshold_nt = threshold_nt
+        self._least_samples = least_samples
+        self._level_time_us = level_time_s * 1e6
+        self._level_nt = math.nan
+        self._time_us = -1
+        self._peak: Anomaly | None = None
+
+    def update(
+        self, time_us: int, reading_nt: float, map_nt: float, north_m: float, east_m: float
+    ) -> Anomaly | None:
+        """Take one reading and what the map says there.
+
+        Returns:
+            The anomaly that just ended, or None.
+        """
+        difference_nt = reading_nt - map_nt
+        if time_us <= self._time_us or not math.isfinite(difference_nt + north_m + east_m):
+            self.dropped += 1
+            return None
+        if math.isnan(self._level_nt):
+            self._level_nt = difference_nt
+        elapsed_us = 0 if self._time_us < 0 else time_us - self._time_us
+        self._time_us = time_us
+        residual_nt = self.residual_nt = difference_nt - self._level_nt
+        if abs(residual_nt) > self._threshold_nt:
+            peak = self._peak
+            samples = 1 if peak is None else peak.samples + 1
+            if peak is None or abs(residual_nt) > abs(peak.peak_nt):
+                peak = Anomaly(
+                    time_us=time_us, north_m=north_m, east_m=east_m, peak_nt=residual_nt, samples=samples
+                )
+            else:
+                peak = Anomaly(
+                    time_us=peak.time_us,
+                    north_m=peak.north_m,
+                    east_m=peak.east_m,
+                    peak_nt=peak.peak_nt,
+                    samples=samples,
+                )
+            self._peak = peak
+            return None
+        ended, self._peak = self._peak, None
+        self._level_nt += residual_nt * min(1.0, elapsed_us / self._level_time_us)
+        return ended if ended is not None and ended.samples >= self._least_samples else None

@@ -1,0 +1,196 @@
+"""The search of a team: one shared map, what was found, who flies where. No I/O; vehicles report to it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from missions.errors import PlanError
+from missions.occupancy.decision import Decision, DecisionParameters, decide
+from missions.occupancy.detection import Anomaly, DetectionModel
+from missions.occupancy.occupancy_map import Cell, GridLayout, OccupancyMap
+
+Array = NDArray[np.float64]
+
+_STEP_M: Final = 5.0  # least stretch of track that is worth an update
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SearchParameters:
+    """How a team searches.
+
+    Attributes:
+        detection: of a target by a pass.
+        raise_radius_m: scores are raised within this distance of an anomaly.
+        raise_height: by how much at its centre, in mean prior scores.
+        confirmations: passes that must see an anomaly at one place before it counts as the target.
+        same_place_m: anomalies within this distance are one.
+
+    Raises:
+        PlanError: a value out of its range.
+    """
+
+    detection: DetectionModel = field(default_factory=DetectionModel)
+    raise_radius_m: float = 250.0
+    raise_height: float = 4.0
+    confirmations: int = 2
+    same_place_m: float = 120.0
+
+    def __post_init__(self) -> None:
+        for name in ("raise_radius_m", "raise_height", "same_place_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise PlanError(f"--{name.removesuffix('_m').replace('_', '-')} {value:g} is not more than 0")
+        if self.confirmations < 1:
+            raise PlanError(f"--confirmations {self.confirmations} is not 1 or more")
+
+
+@dataclass(slots=True, kw_only=True)
+class Candidate:
+    """A place where anomalies were seen.
+
+    Attributes:
+        anomalies: (searcher, anomaly), in time.
+    """
+
+    anomalies: list[tuple[int, Anomaly]]
+
+    @property
+    def passes(self) -> int:
+        """How often it was seen."""
+        return len(self.anomalies)
+
+    @property
+    def place_ne_m(self) -> tuple[float, float]:
+        """Mean of the peaks, by their size."""
+        weights = np.array([abs(anomaly.peak_nt) for _, anomaly in self.anomalies])
+        places = np.array([(anomaly.north_m, anomaly.east_m) for _, anomaly in self.anomalies])
+        north_m, east_m = (weights @ places / weights.sum()).tolist()
+        return north_m, east_m
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """The map at one moment.
+
+    Attributes:
+        time_us: vehicle time.
+        scores: (rows, columns).
+        places_ne_m: of each searcher; NaN: not heard of yet.
+    """
+
+    time_us: int
+    scores: Array
+    places_ne_m: tuple[tuple[float, float], ...]
+
+
+class Search:
+    """Shared by all searchers of a team.
+
+    Attributes:
+        map: the occupancy map.
+        candidates: places where anomalies were seen.
+        found: the candidate that is the target; None while searching.
+        found_us: when it became that.
+        detection_curve: (time, cumulative probability of detection), one entry per update.
+        snapshots: the map at even intervals.
+    """
+
+    def __init__(
+        self,
+        layout: GridLayout,
+        parameters: SearchParameters,
+        decisions: Sequence[DecisionParameters],
+        *,
+        prior: Array | None = None,
+        snapshot_interval_s: float = 5.0,
+    ) -> None:
+        """Begin a search.
+
+        Args:
+            layout: the cells.
+            parameters: of the team.
+            decisions: of each searcher.
+            prior: see `OccupancyMap`.
+            snapshot_interval_s: between the maps that are kept for pictures.
+        """
+        self.map = OccupancyMap(layout, prior)
+        self.parameters = parameters
+        self.candidates: list[Candidate] = []
+        self.found: Candidate | None = None
+        self.found_us = -1
+        self.detection_curve: list[tuple[int, float]] = []
+        self.snapshots: list[Snapshot] = []
+        self._decisions = tuple(decisions)
+        self._targets: list[Cell | None] = [None] * len(self._decisions)
+        self._places: list[tuple[float, float]] = [(math.nan, math.nan)] * len(self._decisions)
+        self._searched: list[tuple[float, float] | None] = [None] * len(self._decisions)
+        self._snapshot_interval_us = round(snapshot_interval_s * 1e6)
+
+    def report_place(
+        self, searcher: int, time_us: int, north_m: float, east_m: float, *, anomalous: bool = False
+    ) -> None:
+        """A searcher is there: lower the scores along its way (eq. 11), unless it sees something there."""
+        place = (north_m, east_m)
+        self._places[searcher] = place
+        last = self._searched[searcher]
+        if last is None or anomalous:
+            self._searched[searcher] = place
+        elif math.dist(last, place) >= _STEP_M:
+            self._searched[searcher] = place
+            self.map.search(last, place, self.parameters.detection)
+            self.detection_curve.append((time_us, self.map.probability_of_detection))
+        if not self.snapshots or time_us - self.snapshots[-1].time_us >= self._snapshot_interval_us:
+            self.snapshots.append(
+                Snapshot(time_us=time_us, scores=self.map.scores.copy(), places_ne_m=tuple(self._places))
+            )
+
+    def report_anomaly(self, searcher: int, anomaly: Anomaly) -> None:
+        """A searcher has seen an anomaly: raise the scores around it, and see whether it is the target.
+
+        An anomaly off the map is no candidate: it belongs to what isn't searched.
+        """
+        parameters = self.parameters
+        if not self.map.layout.contains(anomaly.north_m, anomaly.east_m):
+            return
+        candidate = self._candidate_at(anomaly)
+        candidate.anomalies.append((searcher, anomaly))
+        north_m, east_m = candidate.place_ne_m
+        self.map.raise_around(
+            north_m, east_m, radius_m=parameters.raise_radius_m, height=parameters.raise_height
+        )
+        if self.found is None and candidate.passes >= parameters.confirmations:
+            self.found = candidate
+            self.found_us = anomaly.time_us
+
+    def next_cell(self, searcher: int, north_m: float, east_m: float, heading_rad: float) -> Decision:
+        """Where a searcher flies next (eq. 9); what others are on their way to is left to them."""
+        taken = {cell for index, cell in enumerate(self._targets) if index != searcher and cell is not None}
+        decision = decide(
+            self.map,
+            north_m=north_m,
+            east_m=east_m,
+            heading_rad=heading_rad,
+            parameters=self._decisions[searcher],
+            taken=taken,
+        )
+        self._targets[searcher] = decision.cell
+        return decision
+
+    def leave(self, searcher: int) -> None:
+        """A searcher is on its way home, or lost: its cell is free again."""
+        self._targets[searcher] = None
+
+    def _candidate_at(self, anomaly: Anomaly) -> Candidate:
+        place = (anomaly.north_m, anomaly.east_m)
+        near = [
+            (math.dist(candidate.place_ne_m, place), index) for index, candidate in enumerate(self.candidates)
+        ]
+        if near and min(near)[0] <= self.parameters.same_place_m:
+            return self.candidates[min(near)[1]]
+        candidate = Candidate(anomalies=[])
+        self.candidates.append(candidate)
+        return candidate
