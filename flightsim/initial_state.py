@@ -7,7 +7,7 @@ from typing import Final
 import jsbsim
 
 from flightsim import truth as t
-from flightsim.airframe import Airframe
+from flightsim.airframe import Airframe, AirframeError
 from flightsim.environment import Environment
 from flightsim.home import Home
 
@@ -60,7 +60,7 @@ def initialise(
     fdm: jsbsim.FGFDMExec, airframe: Airframe, home: Home, environment: Environment, start: InitialState
 ) -> None:
     """Put a freshly loaded JSBSim instance into its initial state, with its air and its charge."""
-    height_m = airframe.cg_height_at_rest_m if start.height_m is None else start.height_m
+    height_m = standing_height_m(airframe) if start.height_m is None else start.height_m
     lat_deg, lon_deg = home.offset(*start.offset_ne_m)
     yaw_rad = math.radians(home.heading_deg) if start.yaw_rad is None else start.yaw_rad
     values = (  # the order matters: JSBSim derives each from those before
@@ -82,6 +82,14 @@ def initialise(
     for name, value in values:
         fdm.set_property_value(name, value)
     fdm.run_ic()
+    for name, value in airframe.start:
+        node = fdm.get_property_manager().get_node(name)
+        if node is not None:
+            node.set_double_value(value)
+        elif not airframe.start_optional:
+            raise AirframeError(
+                f"the JSBSim model has no property '{name}', which [start] of '{airframe.name}' sets"
+            )
     for axis, speed in zip(("north", "east", "down"), environment.wind_ned_m_s, strict=True):
         fdm.set_property_value(f"atmosphere/wind-{axis}-fps", speed / _FT)
     rotors = [name for index, name in airframe.truth if t.ROTOR_RAD_S.start <= index < t.ROTOR_RAD_S.stop]
@@ -93,6 +101,13 @@ def initialise(
     for name, speed in zip(rotors, speeds, strict=True):
         fdm.set_property_value(name, speed)
     set_battery(fdm, airframe, start.battery_remaining)
+
+
+def standing_height_m(airframe: Airframe) -> float:
+    """Height of the centre of gravity over the ground from which a vehicle comes to stand."""
+    if airframe.cg_height_at_rest_m is not None:
+        return airframe.cg_height_at_rest_m
+    return 0.0
 
 
 def set_battery(fdm: jsbsim.FGFDMExec, airframe: Airframe, remaining: float) -> None:

@@ -73,6 +73,7 @@ def load_fdm(airframe: Airframe, physics_rate_hz: int) -> tuple[jsbsim.FGFDMExec
     fdm = jsbsim.FGFDMExec(str(airframe.folder))
     fdm.set_debug_level(0)
     fdm.set_aircraft_path(".")
+    fdm.set_dt(1.0 / physics_rate_hz)  # filters and actuators take it when they are made
     try:
         loaded = fdm.load_model(airframe.jsbsim, False)
     except RuntimeError as error:

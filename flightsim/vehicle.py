@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.airframe import Airframe, load_airframe
+from flightsim.actuation import FixedWingActuators
+from flightsim.airframe import Airframe, AirframeKind, Role, load_airframe
 from flightsim.environment import CosineGust, Environment, Turbulence
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
@@ -27,6 +28,7 @@ _PA_PER_PSF: Final = 47.88025898033584
 _KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
+_SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand on a tail wheel
 
 # What is read from JSBSim every step, in this order; `_write_truth` converts it.
 _STATE: Final = (
@@ -56,6 +58,9 @@ _STATE: Final = (
     "forces/fbx-gear-lbs",
     "forces/fby-gear-lbs",
     "forces/fbz-gear-lbs",
+    "aero/alpha-rad",
+    "aero/beta-rad",
+    "aero/qbar-psf",
 )
 _STATE_SIZE: Final = len(_STATE)
 # Motion is read every step; the rest and the model's own properties may be slower.
@@ -95,7 +100,9 @@ class Vehicle:
         "_slow_phase",
         "_slow_steps",
         "_steps",
+        "_surfaces",
         "_truth_extra",
+        "_truth_scale",
         "_turbulence",
         "airframe",
         "environment",
@@ -145,6 +152,9 @@ class Vehicle:
         self.truth: Array = np.zeros(t.TRUTH_SIZE)
         self._seed_sequence = seed_sequence
         self._truth_extra = np.array([index for index, _ in self.airframe.truth], dtype=np.int64)
+        self._truth_scale = np.array(
+            self.airframe.truth_scale or np.ones(len(self.airframe.truth)), dtype=float
+        )
         self._raw = np.zeros(_STATE_SIZE + len(self.airframe.truth))
         self._raw_view = self._raw.data  # its elements are set faster than the array's
         self._slow_steps = max(1, physics_rate_hz // (slow_rate_hz or physics_rate_hz))
@@ -156,7 +166,7 @@ class Vehicle:
     @property
     def actuator_count(self) -> int:
         """How many of the actuator commands the vehicle uses."""
-        return len(self.airframe.actuators)
+        return self.airframe.actuator_count
 
     @property
     def steps(self) -> int:
@@ -173,6 +183,8 @@ class Vehicle:
         fdm, self.load_warnings = load_fdm(self.airframe, self.physics_rate_hz)
         self._fdm = fdm
         self._run = fdm.run
+        fixed_wing = self.airframe.kind is AirframeKind.FIXED_WING
+        self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
         name = self.airframe.name
         properties = (*_STATE, *(prop for _, prop in self.airframe.truth))
         getters = tuple(
@@ -195,8 +207,11 @@ class Vehicle:
         self._turbulence: DrydenTurbulence | None = None
         self._gusts: list[CosineGust] = list(self.environment.gusts)
         initialise(fdm, self.airframe, self.home, self.environment, start)
+        for index, constant in self.airframe.constants:
+            self.truth[index] = constant
         if start.height_m is None:
-            for _ in range(round(_SETTLE_S * self.physics_rate_hz)):
+            settle_s = _SETTLE_FIXED_WING_S if fixed_wing else _SETTLE_S
+            for _ in range(round(settle_s * self.physics_rate_hz)):
                 fdm.run()
             set_battery(fdm, self.airframe, start.battery_remaining)
         else:
@@ -230,8 +245,15 @@ class Vehicle:
             turbulence.step(truth[t.HEIGHT_ABOVE_GROUND_M], truth[t.AIRSPEED_TRUE_M_S])
             for set_gust, value in zip(self._set_gust, turbulence.velocity_ned_m_s.tolist(), strict=True):
                 set_gust(value / _FT)
-        for set_actuator, value in zip(self._set_actuators, actuators.tolist(), strict=False):
-            set_actuator(value)
+        surfaces = self._surfaces
+        if surfaces is None:
+            for set_actuator, value in zip(self._set_actuators, actuators.tolist(), strict=False):
+                set_actuator(value)
+        else:
+            commands = actuators.tolist()
+            surfaces.write(commands)
+            if self._steps % self._slow_steps == 0:
+                surfaces.write_slow(commands)
         if self._gusts:
             self._start_due_gust()
         self._run()
@@ -242,18 +264,43 @@ class Vehicle:
 
     def motor_effectiveness(self, index: int) -> float:
         """Effectiveness of an actuator: 1 sound, 0 failed."""
+        if self._surfaces is not None and index == 0:
+            return self._surfaces.effectiveness(Role.THROTTLE)
         return float(self._effectiveness_node(index).get_double_value())
 
     def set_motor_effectiveness(self, index: int, value: float) -> None:
         """Weaken or fail an actuator in flight.
 
         Args:
-            index: 0 is the first actuator.
+            index: 0 is the first actuator; of a fixed-wing vehicle the motor.
             value: 1 sound, 0 failed.
         """
         if not 0.0 <= value <= 1.0:
             raise ValueError(f"motor effectiveness {value} is not in 0..1")
+        if self._surfaces is not None and index == 0:
+            self._surfaces.set_effectiveness(Role.THROTTLE, value)
+            return
         self._effectiveness_node(index).set_double_value(value)
+
+    def set_actuator_effectiveness(self, role: Role, value: float) -> None:
+        """Weaken or fail an actuator of a fixed-wing vehicle in flight.
+
+        Args:
+            role: which actuator; `Role.THROTTLE` is the motor.
+            value: 1 sound, 0 failed: a motor stops, a surface has no effect.
+        """
+        self._fixed_wing_actuators().set_effectiveness(role, value)
+
+    def set_actuator_stuck(self, role: Role, stuck: bool = True) -> None:
+        """Let an actuator of a fixed-wing vehicle stay where its command is now, or set it free."""
+        self._fixed_wing_actuators().set_stuck(role, stuck)
+
+    def _fixed_wing_actuators(self) -> FixedWingActuators:
+        if self._surfaces is None:
+            raise ValueError(
+                f"vehicle '{self.airframe.name}' is a {self.airframe.kind}; its actuators have numbers, no roles"
+            )
+        return self._surfaces
 
     def _effectiveness_node(self, index: int) -> Any:
         if not 0 <= index < len(self._motor_effectiveness):
@@ -270,7 +317,7 @@ class Vehicle:
         if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
             for i, get in self._getters_slow:
                 raw[i] = get()
-        if not _write_truth(self._raw, self._truth_extra, self.truth):
+        if not _write_truth(self._raw, self._truth_extra, self._truth_scale, self.truth):
             raise VehicleDivergedError(
                 f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
                 f"({self._steps / self.physics_rate_hz:.3f} s): its state is not finite"
@@ -309,7 +356,7 @@ class Vehicle:
 
 
 @kernel
-def _write_truth(raw: Array, extra: NDArray[np.int64], truth: Array) -> bool:
+def _write_truth(raw: Array, extra: NDArray[np.int64], scale: Array, truth: Array) -> bool:
     """Convert JSBSim's values (order of `_STATE`, then the model's own) to truth; False if not finite."""
     truth[0] = raw[0]
     truth[1] = raw[1]
@@ -325,11 +372,14 @@ def _write_truth(raw: Array, extra: NDArray[np.int64], truth: Array) -> bool:
     truth[18] = raw[17] * _KG_M3_PER_SLUG_FT3
     truth[25] = raw[21] * _FT
     truth[26] = raw[22] * _FT
+    truth[40] = raw[26]
+    truth[41] = raw[27]
+    truth[42] = raw[28] * _PA_PER_PSF
     truth[31] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
     total = 0.0
     for i in range(_STATE_SIZE):
         total += raw[i]
     for i in range(extra.shape[0]):
-        truth[extra[i]] = raw[_STATE_SIZE + i]
+        truth[extra[i]] = raw[_STATE_SIZE + i] * scale[i]
         total += raw[_STATE_SIZE + i]
     return math.isfinite(total)

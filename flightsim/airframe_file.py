@@ -1,0 +1,361 @@
+"""Reading vehicle descriptions: finding the file a user means, and its TOML."""
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+import jsbsim
+
+from flightsim import truth as t
+from flightsim.airframe_types import (
+    ActuatorChannel,
+    Airframe,
+    AirframeError,
+    AirframeKind,
+    FlightLimits,
+    LaunchKind,
+    LaunchParameters,
+    Role,
+)
+
+_MODELS_DIR: Final = Path(__file__).parent / "models"
+_DESCRIPTION: Final = "vehicle.toml"
+
+# JSBSim's standard pilot's commands: its elevator is positive nose down, its rudder positive nose left.
+_STANDARD: Final = (
+    ActuatorChannel(role=Role.AILERON, properties=("fcs/aileron-cmd-norm",)),
+    ActuatorChannel(role=Role.ELEVATOR, properties=("fcs/elevator-cmd-norm",), scale=-1.0),
+    ActuatorChannel(role=Role.THROTTLE, properties=tuple(f"fcs/throttle-cmd-norm[{i}]" for i in range(8))),
+    ActuatorChannel(role=Role.RUDDER, properties=("fcs/rudder-cmd-norm",), scale=-1.0),
+    ActuatorChannel(role=Role.FLAPS, properties=("fcs/flap-cmd-norm",)),
+    ActuatorChannel(role=Role.STEERING, properties=("fcs/steer-cmd-norm",)),
+    ActuatorChannel(
+        role=Role.BRAKE,
+        properties=tuple(f"fcs/{side}-brake-cmd-norm" for side in ("left", "right", "center")),
+    ),
+)
+_RANGE: Final = {role: (0.0, 1.0) for role in (Role.THROTTLE, Role.FLAPS, Role.BRAKE)}
+# What makes an aircraft ready to fly: engines running on a rich mixture, gear down.
+_READY: Final = (
+    ("gear/gear-cmd-norm", 1.0),
+    ("gear/gear-pos-norm", 1.0),
+    *((f"fcs/mixture-cmd-norm[{i}]", 1.0) for i in range(8)),
+    *((f"fcs/advance-cmd-norm[{i}]", 1.0) for i in range(8)),
+    ("propulsion/magneto_cmd", 3.0),
+    ("propulsion/set-running", -1.0),
+)
+# An aircraft with a generator: what its autopilot's power module sees.
+_GENERATOR: Final = (
+    (t.BATTERY_VOLTAGE_V, 14.0),
+    (t.BATTERY_CURRENT_A, 0.0),
+    (t.BATTERY_USED_AH, 0.0),
+    (t.BATTERY_CAPACITY_AH, 30.0),
+)
+_VEHICLE_KEYS: Final = ("name", "kind", "jsbsim", "cg_height_at_rest_m")
+_TABLES: Final = ("vehicle", "actuators", "start", "truth", "limits", "launch")
+_CHANNEL_KEYS: Final = ("property", "properties", "scale", "offset", "minimum", "maximum", "effectiveness")
+_HOW_TO: Final = (
+    'a description is a few lines of TOML: [vehicle] with name, kind = "fixed_wing" and jsbsim = the name '
+    "of an aircraft of the jsbsim package or of an .xml file beside it; see docs/vehicles.md"
+)
+
+
+def known_models() -> tuple[str, ...]:
+    """Names of the models that come with the package."""
+    return tuple(sorted(path.parent.name for path in _MODELS_DIR.glob(f"*/{_DESCRIPTION}")))
+
+
+def package_aircraft() -> tuple[str, ...]:
+    """Names of the aircraft of the `jsbsim` package."""
+    folders = (_package_root() / "aircraft").iterdir()
+    return tuple(sorted(path.name for path in folders if (path / f"{path.name}.xml").is_file()))
+
+
+def load_airframe(model: str | Path) -> Airframe:
+    """Read the description of a vehicle.
+
+    Args:
+        model: name of a model that comes with the package; path of a folder with a `vehicle.toml`, of such a
+            file by any name, or of a JSBSim aircraft (`.xml`); or name of an aircraft of the `jsbsim`
+            package. The last two need no description: the standard pilot's commands are taken, and the
+            limits are worked out.
+
+    Raises:
+        AirframeError: unknown model, or a description that cannot be used.
+    """
+    if isinstance(model, str):
+        if model in known_models():
+            return _read(_MODELS_DIR / model / _DESCRIPTION)
+        if model in package_aircraft() and not Path(model).is_dir():
+            return _bare(_package_root() / "aircraft" / model / f"{model}.xml")
+    path = Path(model)
+    if path.is_dir():
+        path = path / _DESCRIPTION
+    if not path.is_file():
+        raise AirframeError(
+            f"vehicle model '{model}' is unknown; accepted are {', '.join(known_models())}, the path of a "
+            f"folder with a {_DESCRIPTION} or of a description (.toml) or JSBSim aircraft (.xml), and aircraft "
+            f"of the jsbsim package ({', '.join(package_aircraft())}); {_HOW_TO}"
+        )
+    return _bare(path) if path.suffix == ".xml" else _read(path)
+
+
+def _package_root() -> Path:
+    return Path(jsbsim.get_default_root_dir())
+
+
+def _bare(xml: Path) -> Airframe:
+    """A JSBSim aircraft without a description: the standard commands, limits worked out."""
+    return Airframe(
+        name=xml.stem,
+        kind=AirframeKind.FIXED_WING,
+        folder=xml.parent.resolve(),
+        jsbsim=xml.stem,
+        cg_height_at_rest_m=None,
+        channels=tuple(_standard(role) for role in Role),
+        constants=_GENERATOR,
+        start=_READY,
+        start_optional=True,
+    )
+
+
+def _read(path: Path) -> Airframe:
+    try:
+        with path.open("rb") as file:
+            data = tomllib.load(file)
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise AirframeError(f"cannot read the vehicle description {path}: {error}") from None
+    _only(data, _TABLES, "tables", path)
+    vehicle = _table(data, "vehicle", path)
+    _only(vehicle, _VEHICLE_KEYS, "keys of [vehicle]", path)
+    kind_name = _text(vehicle, "kind", path)
+    try:
+        kind = AirframeKind(kind_name)
+    except ValueError:
+        accepted = ", ".join(member.value for member in AirframeKind)
+        raise AirframeError(f"{path}: kind '{kind_name}' is unknown; accepted are {accepted}") from None
+    fixed_wing = kind is AirframeKind.FIXED_WING
+    xml = _jsbsim_file(_text(vehicle, "jsbsim", path), path)
+    height_m = None
+    if not fixed_wing or "cg_height_at_rest_m" in vehicle:
+        height_m = _number(vehicle, "cg_height_at_rest_m", path)
+    truth, scale, constants = _truth(
+        data.get("truth", {}) if fixed_wing else _table(data, "truth", path), path
+    )
+    common: dict[str, Any] = {
+        "name": _text(vehicle, "name", path),
+        "kind": kind,
+        "folder": xml.parent.resolve(),
+        "jsbsim": xml.stem,
+        "cg_height_at_rest_m": height_m,
+        "truth": truth,
+        "truth_scale": scale,
+    }
+    if not fixed_wing:
+        actuators = _table(data, "actuators", path)
+        return Airframe(
+            **common,
+            actuators=_names(actuators, "properties", path),
+            effectiveness=_names(actuators, "effectiveness", path) if "effectiveness" in actuators else (),
+            constants=constants,
+        )
+    known = {index for index, _ in (*truth, *constants)}
+    own_start = _table(data, "start", path) if "start" in data else None
+    return Airframe(
+        **common,
+        channels=_channels(data.get("actuators", {}), path),
+        constants=(*constants, *(item for item in _GENERATOR if item[0] not in known)),
+        start=_READY if own_start is None else _start(own_start, path),
+        start_optional=own_start is None,
+        limits=_limits(data.get("limits", {}), path),
+        launch=_launch(data.get("launch", {}), path),
+    )
+
+
+def _jsbsim_file(name: str, path: Path) -> Path:
+    beside = (path.parent / name).with_suffix(".xml")
+    if beside.is_file():
+        return beside
+    packaged = _package_root() / "aircraft" / name / f"{name}.xml"
+    if packaged.is_file():
+        return packaged
+    raise AirframeError(
+        f"{path} names the JSBSim model {beside}, which does not exist; nor has the jsbsim package an aircraft "
+        f"'{name}' (it has {', '.join(package_aircraft())})"
+    )
+
+
+def _channels(table: Any, path: Path) -> tuple[ActuatorChannel, ...]:
+    if not isinstance(table, dict):
+        raise AirframeError(f"{path}: [actuators] is {table!r}; expected is a table")
+    _only(table, tuple(Role), "roles of [actuators]", path)
+    return tuple(
+        _channel(role, table[role], path) if role in table else _standard(role)
+        for role in Role
+        if table.get(role) is not False
+    )
+
+
+def _standard(role: Role) -> ActuatorChannel:
+    channel = next(channel for channel in _STANDARD if channel.role is role)
+    low, high = _RANGE.get(role, (-1.0, 1.0))
+    return ActuatorChannel(
+        role=role,
+        properties=channel.properties,
+        scale=channel.scale,
+        minimum=low,
+        maximum=high,
+        optional=True,
+    )
+
+
+def _channel(role: Role, value: Any, path: Path) -> ActuatorChannel:
+    where = f"[actuators] {role}"
+    if isinstance(value, str):
+        value = {"property": value}
+    elif isinstance(value, list):
+        value = {"properties": value}
+    if not isinstance(value, dict):
+        raise AirframeError(
+            f"{path}: {where} is {value!r}; expected is a JSBSim property name, a list of them, a table with "
+            f"{', '.join(_CHANNEL_KEYS)}, or false for an aircraft without"
+        )
+    _only(value, _CHANNEL_KEYS, f"keys of {where}", path)
+    standard = _standard(role)
+    names = standard.properties
+    if "property" in value:
+        names = (_text(value, "property", path),)
+    elif "properties" in value:
+        names = _names(value, "properties", path)
+    given = "property" in value or "properties" in value
+    channel = ActuatorChannel(
+        role=role,
+        properties=names,
+        scale=_number(value, "scale", path, standard.scale if names == standard.properties else 1.0),
+        offset=_number(value, "offset", path, 0.0),
+        minimum=_number(value, "minimum", path, -math.inf if given else standard.minimum),
+        maximum=_number(value, "maximum", path, math.inf if given else standard.maximum),
+        effectiveness=_text(value, "effectiveness", path) if "effectiveness" in value else None,
+        optional=not given,
+    )
+    if channel.scale == 0.0 or not channel.minimum < channel.maximum:
+        raise AirframeError(
+            f"{path}: {where} has scale {channel.scale}, minimum {channel.minimum} and maximum "
+            f"{channel.maximum}; accepted are a scale other than 0 and a minimum below the maximum"
+        )
+    return channel
+
+
+def _start(table: dict[str, Any], path: Path) -> tuple[tuple[str, float], ...]:
+    return tuple((name, _number(table, name, path)) for name in table)
+
+
+def _limits(table: Any, path: Path) -> FlightLimits:
+    return FlightLimits(**_converted(table, "limits", FlightLimits, path))
+
+
+def _launch(table: Any, path: Path) -> LaunchParameters:
+    values = _converted(table, "launch", LaunchParameters, path)
+    return LaunchParameters(**values)
+
+
+def _converted(table: Any, name: str, target: type, path: Path) -> dict[str, Any]:
+    """Fields of a dataclass from a TOML table; degrees become radians."""
+    if not isinstance(table, dict):
+        raise AirframeError(f"{path}: [{name}] is {table!r}; expected is a table")
+    fields = tuple(target.__dataclass_fields__)
+    accepted = tuple(key.removesuffix("_rad") + "_deg" if key.endswith("_rad") else key for key in fields)
+    _only(table, accepted, f"keys of [{name}]", path)
+    values: dict[str, Any] = {}
+    for key, fieldname in zip(accepted, fields, strict=True):
+        if key not in table:
+            continue
+        if fieldname == "kind":
+            text = _text(table, key, path)
+            if text not in tuple(LaunchKind):
+                raise AirframeError(
+                    f"{path}: launch kind '{text}' is unknown; accepted are {_list(LaunchKind)}"
+                )
+            values[fieldname] = LaunchKind(text)
+        else:
+            number = _number(table, key, path)
+            values[fieldname] = math.radians(number) if key != fieldname else number
+    return values
+
+
+def _truth(
+    table: Any, path: Path
+) -> tuple[tuple[tuple[int, str], ...], tuple[float, ...], tuple[tuple[int, float], ...]]:
+    """Properties, their factors, and constants of the truth vector."""
+    if not isinstance(table, dict):
+        raise AirframeError(f"{path}: [truth] is {table!r}; expected is a table")
+    found: list[tuple[int, str]] = []
+    scales: list[float] = []
+    constants: list[tuple[int, float]] = []
+    for key, value in table.items():
+        place = getattr(t, key, None) if key.isupper() else None
+        if key == "TRUTH_SIZE" or not isinstance(place, int | slice):
+            raise AirframeError(f"{path}: [truth] names {key}, which flightsim/truth.py does not have")
+        entries = value if isinstance(value, list) else [value]
+        first, room = (place.start, place.stop - place.start) if isinstance(place, slice) else (place, 1)
+        if len(entries) > room or isinstance(value, list) != isinstance(place, slice):
+            raise AirframeError(
+                f"{path}: {key} is {value!r}; "
+                + (f"a list of at most {room} properties fits" if room > 1 else "one property fits")
+            )
+        for index, entry in enumerate(entries, start=first):
+            if isinstance(entry, int | float) and not isinstance(entry, bool):
+                constants.append((index, float(entry)))
+                continue
+            scale = 1.0
+            if isinstance(entry, dict):
+                _only(entry, ("property", "scale"), f"keys of {key}", path)
+                scale = _number(entry, "scale", path, 1.0)
+                entry = entry.get("property")
+            if not isinstance(entry, str):
+                raise AirframeError(
+                    f"{path}: {key} is {value!r}; expected is a JSBSim property name, {{property, scale}} or a "
+                    "number"
+                )
+            found.append((index, entry))
+            scales.append(scale)
+    return tuple(found), tuple(scales), tuple(constants)
+
+
+def _list(names: Any) -> str:
+    return ", ".join(str(name) for name in names)
+
+
+def _only(table: dict[str, Any], accepted: Any, what: str, path: Path) -> None:
+    for key in table:
+        if key not in tuple(str(name) for name in accepted):
+            raise AirframeError(f"{path}: '{key}' is unknown; {what} are {_list(accepted)}")
+
+
+def _table(data: dict[str, Any], name: str, path: Path) -> dict[str, Any]:
+    table = data.get(name)
+    if not isinstance(table, dict):
+        raise AirframeError(f"{path} has no table [{name}]")
+    return table
+
+
+def _text(table: dict[str, Any], key: str, path: Path) -> str:
+    value = table.get(key)
+    if not isinstance(value, str):
+        raise AirframeError(f"{path}: {key} is {value!r}; expected is a text")
+    return value.removesuffix(".xml") if key == "jsbsim" else value
+
+
+def _number(table: dict[str, Any], key: str, path: Path, default: float | None = None) -> float:
+    value = table.get(key, default)
+    if not isinstance(value, int | float) or isinstance(value, bool) or math.isnan(value):
+        raise AirframeError(f"{path}: {key} is {value!r}; expected is a number")
+    return float(value)
+
+
+def _names(table: dict[str, Any], key: str, path: Path) -> tuple[str, ...]:
+    names = table.get(key)
+    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
+        raise AirframeError(f"{path}: {key} is {names!r}; expected is a list of JSBSim property names")
+    return tuple(names)
