@@ -1,0 +1,72 @@
+"""Simulated mission payload: what a vehicle carries for its mission, and what there is to be found with it.
+
+A camera on a gimbal with a detector behind it, over ground targets; a survey magnetometer over a magnetic
+map with targets' signatures in it. All read the vehicle's truth and give measurements.
+"""
+
+from flightsim.payload.camera import Camera, CameraParameters
+from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal, gimbal_from_camera
+from flightsim.payload.detection import CameraFrame, Detection, DetectionModel, ResolutionDetection
+from flightsim.payload.gimbal import LEVEL, Gimbal, GimbalFlags, GimbalParameters
+from flightsim.payload.home_frame import HomeFrame
+from flightsim.payload.magnetic_field import MagneticField
+from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
+from flightsim.payload.main_field import MainField
+from flightsim.payload.payload import Payload, PayloadParameters
+from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
+from flightsim.payload.survey_magnetometer import (
+    MagneticReading,
+    SurveyMagnetometer,
+    SurveyMagnetometerParameters,
+)
+from flightsim.payload.synthetic_map import SyntheticMapParameters, synthetic_map
+from flightsim.payload.target_motion import (
+    Circle,
+    ConstantVelocity,
+    RandomWalk,
+    Static,
+    TargetMotion,
+    Trajectory,
+)
+from flightsim.payload.targets import NO_TAG, GroundTarget, GroundTargetParameters, GroundTargets
+
+__all__ = [
+    "LEVEL",
+    "NO_TAG",
+    "Camera",
+    "CameraFrame",
+    "CameraParameters",
+    "Circle",
+    "ConstantVelocity",
+    "Detection",
+    "DetectionModel",
+    "DipoleSignature",
+    "GaussianSignature",
+    "Gimbal",
+    "GimbalFlags",
+    "GimbalParameters",
+    "GroundTarget",
+    "GroundTargetParameters",
+    "GroundTargets",
+    "HomeFrame",
+    "MagneticField",
+    "MagneticMap",
+    "MagneticMapError",
+    "MagneticReading",
+    "MainField",
+    "Payload",
+    "PayloadParameters",
+    "PinholeModel",
+    "RandomWalk",
+    "ResolutionDetection",
+    "Signature",
+    "Static",
+    "SurveyMagnetometer",
+    "SurveyMagnetometerParameters",
+    "SyntheticMapParameters",
+    "TargetMotion",
+    "Trajectory",
+    "camera_from_gimbal",
+    "gimbal_from_camera",
+    "synthetic_map",
+]

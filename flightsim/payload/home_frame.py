@@ -1,0 +1,49 @@
+"""Where a vehicle is in the world's own frame: local NED, metres, origin on the ground at home."""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim import truth as t
+from flightsim.home import Home
+
+Array = NDArray[np.float64]
+
+_WGS84_A_M: Final = 6378137.0
+_WGS84_E2: Final = 6.69437999014e-3
+
+
+class HomeFrame:
+    """Local NED at home, linear in latitude and longitude with the radii of curvature there.
+
+    The inverse of `Home.offset`, and the frame missions use, so that both sides mean the same place. (Against
+    the true tangent plane it is off by 10 m at 10 km.) Targets and magnetic maps live in it; the ground is
+    the plane down = 0.
+    """
+
+    __slots__ = ("_m_per_rad_lat", "_m_per_rad_lon", "home")
+
+    def __init__(self, home: Home) -> None:
+        self.home = home
+        sin_lat = math.sin(math.radians(home.lat_deg))
+        w2 = 1.0 - _WGS84_E2 * sin_lat * sin_lat
+        normal_m = _WGS84_A_M / math.sqrt(w2)
+        self._m_per_rad_lat = normal_m * (1.0 - _WGS84_E2) / w2 + home.alt_m
+        self._m_per_rad_lon = (normal_m + home.alt_m) * math.cos(math.radians(home.lat_deg))
+
+    def north_east_m(self, lat_deg: float, lon_deg: float) -> tuple[float, float]:
+        """(north, east) in metres of a place, WGS84."""
+        dlon_deg = (lon_deg - self.home.lon_deg + 180.0) % 360.0 - 180.0
+        return (
+            math.radians(lat_deg - self.home.lat_deg) * self._m_per_rad_lat,
+            math.radians(dlon_deg) * self._m_per_rad_lon,
+        )
+
+    def position_ned_m(self, truth: Array) -> tuple[float, float, float]:
+        """(north, east, down) in metres of the vehicle whose truth vector it is."""
+        north_m, east_m = self.north_east_m(
+            math.degrees(float(truth[t.LAT_RAD])), math.degrees(float(truth[t.LON_RAD]))
+        )
+        return north_m, east_m, self.home.alt_m - float(truth[t.ALT_M])

@@ -1,0 +1,68 @@
+"""The magnetic field as it is: the map that was surveyed once, and the targets that have come since."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.payload.magnetic_map import MagneticMap
+from flightsim.payload.main_field import MainField
+from flightsim.payload.signature import Signature
+
+Array = NDArray[np.float64]
+
+
+class MagneticField:
+    """Total field at any place: map and signatures.
+
+    The published map (a file, see `MagneticMap.save`) is this field without the signatures. So on the map,
+    reading - map is what the targets add, and noise. Beyond the map's edges and in its holes the field goes
+    on as at the nearest data, so that a magnetometer reads something everywhere.
+
+    Attributes:
+        published: the map.
+        signatures: the targets.
+    """
+
+    __slots__ = ("_background", "_field_ned_nt", "published", "signatures")
+
+    def __init__(
+        self,
+        published: MagneticMap,
+        signatures: Sequence[Signature] = (),
+        *,
+        decimal_year: float = 2026.0,
+    ) -> None:
+        """Put the targets onto the map.
+
+        Args:
+            published: the map.
+            signatures: the targets.
+            decimal_year: date of the main field, which gives the direction.
+
+        Raises:
+            MagneticMapError: a target outside the map.
+        """
+        for number, signature in enumerate(signatures, 1):
+            published.require_inside(f"target {number}", signature.north_m, signature.east_m)
+        self.published = published
+        self.signatures = tuple(signatures)
+        self._background = published.without_holes()
+        main = MainField(published.home, decimal_year)
+        self._field_ned_nt: Array = main.total_nt * main.direction_ned
+
+    def total_nt(self, north_m: float, east_m: float, height_m: float) -> float:
+        """Total field at a place, local NED of the map's home, and a height above it."""
+        return float(self.total_at_nt(np.array(north_m), np.array(east_m), height_m))
+
+    def total_at_nt(self, north_m: Array, east_m: Array, height_m: float) -> Array:
+        """Total field at places of any shape, at one height above home."""
+        background = self._background
+        total = background.interpolate(
+            np.clip(north_m, background.north_m[0], background.north_m[-1]),
+            np.clip(east_m, background.east_m[0], background.east_m[-1]),
+            height_m,
+        )
+        for signature in self.signatures:
+            total = total + signature.anomaly_nt(north_m, east_m, height_m, self._field_ned_nt)
+        return total

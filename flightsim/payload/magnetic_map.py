@@ -1,0 +1,256 @@
+"""A magnetic map: total field on a regular grid, as a survey publishes it.
+
+The file is a numpy `.npz` archive that needs nothing of this package to be read:
+
+    format                  "flightstack-magnetic-map-1"
+    north_m  (rows,)        grid lines, metres north of home, evenly spaced, rising
+    east_m   (columns,)     metres east of home, likewise
+    total_field_nt          (rows, columns) float64; NaN: no data there
+    vertical_gradient_nt_m  (rows, columns) change of the total field with height, upwards; absent: not known
+    height_m                height above home that the map is valid at
+    home_lat_deg, home_lon_deg, home_alt_m   the home whose local frame it is in
+
+Between grid points it is interpolated bilinearly in both arrays. A reading at a height h compares with
+total_field_nt + vertical_gradient_nt_m * (h - height_m).
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.home import Home
+
+Array = NDArray[np.float64]
+
+FORMAT: Final = "flightstack-magnetic-map-1"
+_CSV_HEADER: Final = "north_m,east_m,total_field_nt"
+
+
+class MagneticMapError(ValueError):
+    """A map that can't be used; the message says what is wrong with it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MagneticMap:
+    """Total field on a grid in the local frame of a home.
+
+    Attributes:
+        north_m, east_m: (rows,), (columns,) grid lines, evenly spaced and rising.
+        total_field_nt: (rows, columns); NaN where there is no data.
+        vertical_gradient_nt_m: (rows, columns) upward derivative; None: not known, taken as zero.
+        height_m: above home, what the map is valid at.
+        home: origin of its frame.
+    """
+
+    north_m: Array
+    east_m: Array
+    total_field_nt: Array
+    height_m: float
+    home: Home
+    vertical_gradient_nt_m: Array | None = None
+
+    def __post_init__(self) -> None:
+        for name, lines in (("north_m", self.north_m), ("east_m", self.east_m)):
+            steps = np.diff(lines)
+            if lines.ndim != 1 or lines.size < 2 or not np.all(steps > 0.0):
+                raise MagneticMapError(f"{name} of a magnetic map: accepted are two or more rising numbers")
+            if not np.allclose(steps, steps.mean(), rtol=1e-6):
+                raise MagneticMapError(
+                    f"{name} of a magnetic map is spaced {steps.min():g} to {steps.max():g} m; "
+                    "accepted is even spacing"
+                )
+        shape = (self.north_m.size, self.east_m.size)
+        for name, grid in (
+            ("total_field_nt", self.total_field_nt),
+            ("vertical_gradient_nt_m", self.vertical_gradient_nt_m),
+        ):
+            if grid is not None and grid.shape != shape:
+                raise MagneticMapError(
+                    f"{name} of a magnetic map has shape {grid.shape}; its grid lines make {shape}"
+                )
+        if np.any(np.isinf(self.total_field_nt)) or not np.any(np.isfinite(self.total_field_nt)):
+            raise MagneticMapError("a magnetic map without data: total_field_nt needs finite numbers")
+        if not math.isfinite(self.height_m):
+            raise MagneticMapError(f"height_m = {self.height_m} of a magnetic map is not finite")
+
+    @property
+    def spacing_m(self) -> tuple[float, float]:
+        """Distance of the grid lines, north and east."""
+        return (
+            float(self.north_m[-1] - self.north_m[0]) / (self.north_m.size - 1),
+            float(self.east_m[-1] - self.east_m[0]) / (self.east_m.size - 1),
+        )
+
+    def contains(self, north_m: float, east_m: float) -> bool:
+        """Whether the map has data at a place: inside its edges, and no corner of the cell missing."""
+        return math.isfinite(self.total_at_nt(north_m, east_m))
+
+    def require_inside(self, what: str, north_m: float, east_m: float) -> None:
+        """Refuse a place that the map says nothing about.
+
+        Raises:
+            MagneticMapError: it names `what`, the place and what the map covers.
+        """
+        if not self.contains(north_m, east_m):
+            raise MagneticMapError(
+                f"{what} at north {north_m:g} m, east {east_m:g} m is outside the magnetic map, which covers "
+                f"north {self.north_m[0]:g} to {self.north_m[-1]:g} m, "
+                f"east {self.east_m[0]:g} to {self.east_m[-1]:g} m where it has data"
+            )
+
+    def total_at_nt(self, north_m: float, east_m: float) -> float:
+        """Total field at a place, at the map's height; NaN where there is no data."""
+        return float(self.interpolate(np.array(north_m), np.array(east_m)))
+
+    def interpolate(self, north_m: Array, east_m: Array, height_m: float | None = None) -> Array:
+        """Total field at places of any shape; NaN where there is no data.
+
+        Args:
+            north_m, east_m: local NED of home.
+            height_m: above home; None: the map's height.
+        """
+        total = self._bilinear(self.total_field_nt, north_m, east_m)
+        if height_m is None or self.vertical_gradient_nt_m is None:
+            return total
+        gradient = self._bilinear(self.vertical_gradient_nt_m, north_m, east_m)
+        return total + gradient * (height_m - self.height_m)
+
+    def _bilinear(self, grid: Array, north_m: Array, east_m: Array) -> Array:
+        rows, columns = grid.shape
+        row_step, column_step = self.spacing_m
+        y = (np.asarray(north_m) - self.north_m[0]) / row_step
+        x = (np.asarray(east_m) - self.east_m[0]) / column_step
+        # A hair of slack at the edges: places come out of divisions.
+        inside = (y >= -1e-9) & (y <= rows - 1 + 1e-9) & (x >= -1e-9) & (x <= columns - 1 + 1e-9)
+        row = np.clip(np.floor(np.where(inside, y, 0.0)), 0, rows - 2).astype(np.intp)
+        column = np.clip(np.floor(np.where(inside, x, 0.0)), 0, columns - 2).astype(np.intp)
+        v, u = y - row, x - column
+        value: Array = (
+            grid[row, column] * (1.0 - v) * (1.0 - u)
+            + grid[row, column + 1] * (1.0 - v) * u
+            + grid[row + 1, column] * v * (1.0 - u)
+            + grid[row + 1, column + 1] * v * u
+        )
+        return np.where(inside, value, np.nan)
+
+    def without_holes(self) -> "MagneticMap":
+        """The same map with missing points filled from their nearest neighbours, for a field without end."""
+        if np.all(np.isfinite(self.total_field_nt)):
+            return self
+        gradient = self.vertical_gradient_nt_m
+        return MagneticMap(
+            north_m=self.north_m,
+            east_m=self.east_m,
+            total_field_nt=_fill(self.total_field_nt),
+            vertical_gradient_nt_m=None if gradient is None else _fill(gradient),
+            height_m=self.height_m,
+            home=self.home,
+        )
+
+    def save(self, path: Path) -> None:
+        """Write the map; the file's contents are described at the head of this module."""
+        contents: dict[str, Any] = {
+            "format": FORMAT,
+            "north_m": self.north_m,
+            "east_m": self.east_m,
+            "total_field_nt": self.total_field_nt,
+            "height_m": self.height_m,
+            "home_lat_deg": self.home.lat_deg,
+            "home_lon_deg": self.home.lon_deg,
+            "home_alt_m": self.home.alt_m,
+        }
+        if self.vertical_gradient_nt_m is not None:
+            contents["vertical_gradient_nt_m"] = self.vertical_gradient_nt_m
+        with path.open("wb") as file:  # an open file: numpy would add .npz to a name without it
+            np.savez_compressed(file, **contents)
+
+    @classmethod
+    def load(cls, path: Path) -> "MagneticMap":
+        """Read a map that `save` has written.
+
+        Raises:
+            MagneticMapError: no such file, or not such a file.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                found = {name: archive[name] for name in archive.files}
+        except (OSError, ValueError, EOFError) as error:
+            raise MagneticMapError(f"{path} is not a magnetic map (.npz): {error}") from None
+        needed = (
+            *("format", "north_m", "east_m", "total_field_nt", "height_m"),
+            *("home_lat_deg", "home_lon_deg", "home_alt_m"),
+        )
+        missing = [name for name in needed if name not in found]
+        if missing or str(found["format"]) != FORMAT:
+            raise MagneticMapError(
+                f"{path} is not a magnetic map: "
+                + (f"it has no {', '.join(missing)}" if missing else f"its format is {found['format']}")
+                + f"; accepted is format {FORMAT}"
+            )
+        gradient = found.get("vertical_gradient_nt_m")
+        try:
+            return cls(
+                north_m=found["north_m"].astype(np.float64),
+                east_m=found["east_m"].astype(np.float64),
+                total_field_nt=found["total_field_nt"].astype(np.float64),
+                vertical_gradient_nt_m=None if gradient is None else gradient.astype(np.float64),
+                height_m=float(found["height_m"]),
+                home=Home(
+                    lat_deg=float(found["home_lat_deg"]),
+                    lon_deg=float(found["home_lon_deg"]),
+                    alt_m=float(found["home_alt_m"]),
+                ),
+            )
+        except (TypeError, ValueError) as error:
+            raise MagneticMapError(f"{path}: {error}") from None
+
+    @classmethod
+    def load_csv(cls, path: Path, *, home: Home, height_m: float) -> "MagneticMap":
+        """Read a grid from a table with the header `north_m,east_m,total_field_nt`, in any order of lines.
+
+        Points of the grid that have no line, or an empty or nan value, have no data.
+
+        Raises:
+            MagneticMapError: no such file, or not such a table.
+        """
+        try:
+            with path.open(encoding="utf-8") as file:
+                header = file.readline().strip()
+                if header != _CSV_HEADER:
+                    raise MagneticMapError(
+                        f"{path} begins with {header[:60]!r}; accepted is the header {_CSV_HEADER!r}"
+                    )
+                table = np.genfromtxt(file, delimiter=",", dtype=np.float64, ndmin=2)
+        except (OSError, UnicodeDecodeError) as error:
+            raise MagneticMapError(f"{path}: {error}") from None
+        except ValueError as error:
+            raise MagneticMapError(f"{path}: {str(error).splitlines()[0]}") from None
+        if table.size == 0 or table.shape[1] != 3 or not np.all(np.isfinite(table[:, :2])):
+            raise MagneticMapError(f"{path}: accepted are lines of three numbers, with finite places")
+        north_m, rows = np.unique(table[:, 0], return_inverse=True)
+        east_m, columns = np.unique(table[:, 1], return_inverse=True)
+        total = np.full((north_m.size, east_m.size), np.nan)
+        total[rows, columns] = table[:, 2]
+        try:
+            return cls(north_m=north_m, east_m=east_m, total_field_nt=total, height_m=height_m, home=home)
+        except MagneticMapError as error:
+            raise MagneticMapError(f"{path}: {error}") from None
+
+
+def _fill(grid: Array) -> Array:
+    """Grow the data into its holes, one ring of grid points at a time, each the mean of its neighbours."""
+    filled = grid.copy()
+    while True:
+        known = np.isfinite(filled)
+        if np.all(known):
+            return filled
+        padded = np.pad(np.where(known, filled, 0.0), 1)
+        weight = np.pad(known.astype(np.float64), 1)
+        around = padded[:-2, 1:-1] + padded[2:, 1:-1] + padded[1:-1, :-2] + padded[1:-1, 2:]
+        count = weight[:-2, 1:-1] + weight[2:, 1:-1] + weight[1:-1, :-2] + weight[1:-1, 2:]
+        reached = ~known & (count > 0.0)
+        filled[reached] = around[reached] / count[reached]

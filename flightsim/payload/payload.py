@@ -1,0 +1,109 @@
+"""The payload of one vehicle, composed and stepped together: gimbal, camera, survey magnetometer."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.home import Home
+from flightsim.payload.camera import Camera, CameraParameters
+from flightsim.payload.detection import CameraFrame
+from flightsim.payload.gimbal import Gimbal, GimbalParameters
+from flightsim.payload.magnetic_field import MagneticField
+from flightsim.payload.survey_magnetometer import (
+    MagneticReading,
+    SurveyMagnetometer,
+    SurveyMagnetometerParameters,
+)
+from flightsim.payload.targets import GroundTargets
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PayloadParameters:
+    """What a vehicle carries; None leaves it out. A camera without a gimbal is fixed to the body."""
+
+    gimbal: GimbalParameters | None = None
+    camera: CameraParameters | None = None
+    magnetometer: SurveyMagnetometerParameters | None = None
+
+
+class Payload:
+    """Mission payload of one vehicle. Call `step` once per physics step, after the vehicle's.
+
+    Attributes:
+        gimbal, camera, magnetometer: the devices; None: not carried.
+        frame: the camera's frame delivered on this step, or None.
+        reading: the magnetometer's reading delivered on this step, or None.
+    """
+
+    __slots__ = ("camera", "frame", "gimbal", "magnetometer", "reading")
+
+    def __init__(
+        self,
+        parameters: PayloadParameters,
+        *,
+        truth: NDArray[np.float64],
+        home: Home,
+        physics_rate_hz: int,
+        seeds: Callable[[str], np.random.SeedSequence],
+        targets: GroundTargets | None = None,
+        magnetic_field: MagneticField | None = None,
+    ) -> None:
+        """Fit the devices.
+
+        Args:
+            parameters: what is carried.
+            truth: the vehicle's truth vector.
+            home: origin of the world.
+            physics_rate_hz: calls of `step` per second.
+            seeds: a seed sequence of its own for each name ("gimbal", "camera", "camera_target_0", ...,
+                "survey_magnetometer"): `lambda name: streams.child("vehicle", i, "sensor", name)`.
+            targets: what a camera sees; None: nothing.
+            magnetic_field: what a magnetometer measures.
+
+        Raises:
+            ValueError: a rate that doesn't divide the physics rate; a magnetometer without a field.
+        """
+        self.gimbal: Gimbal | None = None
+        self.camera: Camera | None = None
+        self.magnetometer: SurveyMagnetometer | None = None
+        self.frame: CameraFrame | None = None
+        self.reading: MagneticReading | None = None
+        if parameters.gimbal is not None:
+            self.gimbal = Gimbal(
+                parameters.gimbal, truth=truth, physics_rate_hz=physics_rate_hz, seed=seeds("gimbal")
+            )
+        if parameters.camera is not None:
+            self.camera = Camera(
+                parameters.camera,
+                truth=truth,
+                home=home,
+                targets=GroundTargets(seeds=_no_seeds) if targets is None else targets,
+                gimbal=self.gimbal,
+                physics_rate_hz=physics_rate_hz,
+                seeds=seeds,
+            )
+        if parameters.magnetometer is not None:
+            if magnetic_field is None:
+                raise ValueError("a survey magnetometer needs a magnetic map; give the world one")
+            self.magnetometer = SurveyMagnetometer(
+                parameters.magnetometer,
+                truth=truth,
+                field=magnetic_field,
+                physics_rate_hz=physics_rate_hz,
+                seed=seeds("survey_magnetometer"),
+            )
+
+    def step(self, time_us: int) -> None:
+        """One physics step ending at `time_us`: gimbal, then what hangs on it, then the magnetometer."""
+        if self.gimbal is not None:
+            self.gimbal.step(time_us)
+        if self.camera is not None:
+            self.frame = self.camera.step(time_us)
+        if self.magnetometer is not None:
+            self.reading = self.magnetometer.step(time_us)
+
+
+def _no_seeds(index: int) -> np.random.SeedSequence:
+    raise IndexError(f"there is no target {index}")

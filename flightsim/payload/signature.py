@@ -1,0 +1,115 @@
+"""What a target adds to the total field around it."""
+
+import math
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.payload.checks import require_finite
+from flightsim.sensors.checks import require_positive
+
+Array = NDArray[np.float64]
+
+_MU0_4PI_NT: Final = 1e-7 * 1e9
+"""mu_0 / 4 pi in nT m / A."""
+
+
+class Signature(Protocol):
+    """A target's part of the total field."""
+
+    @property
+    def north_m(self) -> float:
+        """Where the target is, metres north of home."""
+
+    @property
+    def east_m(self) -> float:
+        """Metres east of home."""
+
+    def anomaly_nt(self, north_m: Array, east_m: Array, height_m: float, field_ned_nt: Array) -> Array:
+        """What it adds at places of any shape, at a height above home, in an Earth's field (3,)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GaussianSignature:
+    """A two-dimensional Gaussian, the same at every height (Lum, Rysdyk and Pongpunwattana, figure 3).
+
+    Attributes:
+        north_m, east_m: centre, local NED of home.
+        amplitude_nt: at the centre; below zero for a hole.
+        sigma_along_m, sigma_across_m: standard deviations along and across the target's axis.
+        heading_rad: of that axis, clockwise from north.
+    """
+
+    north_m: float
+    east_m: float
+    amplitude_nt: float = 30.0
+    sigma_along_m: float = 250.0
+    sigma_across_m: float = 120.0
+    heading_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_finite(
+            north_m=self.north_m,
+            east_m=self.east_m,
+            amplitude_nt=self.amplitude_nt,
+            heading_rad=self.heading_rad,
+        )
+        require_positive(sigma_along_m=self.sigma_along_m, sigma_across_m=self.sigma_across_m)
+
+    def anomaly_nt(self, north_m: Array, east_m: Array, height_m: float, field_ned_nt: Array) -> Array:
+        """The Gaussian; height and field don't matter."""
+        north, east = np.asarray(north_m) - self.north_m, np.asarray(east_m) - self.east_m
+        cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        along = (north * cosine + east * sine) / self.sigma_along_m
+        across = (east * cosine - north * sine) / self.sigma_across_m
+        value: Array = self.amplitude_nt * np.exp(-0.5 * (along * along + across * across))
+        return value
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DipoleSignature:
+    """A magnetic dipole: what any compact body looks like from some of its lengths away.
+
+    B = mu_0 / 4 pi (3 (m r) r / |r|^5 - m / |r|^3) adds as a vector to the Earth's field; a scalar
+    magnetometer reads what that does to the magnitude (Blakely, Potential theory in gravity and magnetic
+    applications, sections 4.2 and 8.3).
+
+    Attributes:
+        north_m, east_m: place, local NED of home.
+        height_m: above home; below the ground or the water it is negative.
+        moment_ned_a_m2: dipole moment. Steel has some 0.1 to 1 A m2 per kilogram, a submarine 1e5.
+    """
+
+    north_m: float
+    east_m: float
+    height_m: float
+    moment_ned_a_m2: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        require_finite(north_m=self.north_m, east_m=self.east_m, height_m=self.height_m)
+        if len(self.moment_ned_a_m2) != 3 or not all(map(math.isfinite, self.moment_ned_a_m2)):
+            raise ValueError(
+                f"moment_ned_a_m2 = {self.moment_ned_a_m2!r} is not accepted: 3 finite numbers are"
+            )
+
+    def field_ned_nt(self, north_m: Array, east_m: Array, height_m: float) -> Array:
+        """Field vectors (..., 3) of the dipole."""
+        north, east = np.asarray(north_m) - self.north_m, np.asarray(east_m) - self.east_m
+        down = np.full_like(north, self.height_m - height_m)
+        offset = np.stack([north, east, down], axis=-1)
+        # Nobody measures inside the body: a metre is the least distance.
+        distance = np.maximum(1.0, np.sqrt(np.sum(offset * offset, axis=-1, keepdims=True)))
+        moment = np.array(self.moment_ned_a_m2)
+        along = np.sum(offset * moment, axis=-1, keepdims=True)
+        field: Array = _MU0_4PI_NT * (3.0 * along * offset / distance**5 - moment / distance**3)
+        return field
+
+    def anomaly_nt(self, north_m: Array, east_m: Array, height_m: float, field_ned_nt: Array) -> Array:
+        """Change of the magnitude of the Earth's field."""
+        total = field_ned_nt + self.field_ned_nt(
+            np.asarray(north_m, dtype=np.float64), np.asarray(east_m, dtype=np.float64), height_m
+        )
+        value: Array = np.sqrt(np.sum(total * total, axis=-1)) - math.sqrt(float(field_ned_nt @ field_ned_nt))
+        return value

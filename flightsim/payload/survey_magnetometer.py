@@ -1,0 +1,160 @@
+"""Survey magnetometer: total field, as an optically pumped sensor on an aircraft reads it."""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim import truth as t
+from flightsim.payload.home_frame import HomeFrame
+from flightsim.payload.magnetic_field import MagneticField
+from flightsim.rotations import rotate_inverse
+from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
+from flightsim.sensors.kernels import gauss_markov
+from flightsim.sensors.schedule import steps_per_sample
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurveyMagnetometerParameters:
+    """A caesium or potassium magnetometer on a small aircraft, compensated.
+
+    Attributes:
+        rate_hz: readings per second.
+        latency_s: from measurement to delivery; rounded to physics steps.
+        noise_nt: white, per reading: engine, servos and payload currents; the sensor itself has 0.01.
+        heading_error_nt: one sigma of each of the three permanent terms of Tolles and Lawson that
+            compensation leaves: proportional to the direction cosines of the field in the body frame, so it
+            changes with heading and attitude (Leliak 1961, IRE Transactions on Aerospace 8).
+        drift_nt, drift_time_constant_s: Gauss-Markov; what base-station correction leaves of the field's
+            daily variation, and the sensor's own wandering.
+        quantum_nt: of the digital output.
+    """
+
+    rate_hz: int = 10
+    latency_s: float = 0.0
+    noise_nt: float = 0.2
+    heading_error_nt: float = 0.3
+    drift_nt: float = 0.2
+    drift_time_constant_s: float = 600.0
+    quantum_nt: float = 0.001
+
+    def __post_init__(self) -> None:
+        require_rate(self.rate_hz)
+        require_positive(drift_time_constant_s=self.drift_time_constant_s)
+        require_not_negative(
+            latency_s=self.latency_s,
+            noise_nt=self.noise_nt,
+            heading_error_nt=self.heading_error_nt,
+            drift_nt=self.drift_nt,
+            quantum_nt=self.quantum_nt,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class MagneticReading:
+    """One reading.
+
+    Attributes:
+        time_us: when it was taken, microseconds since boot.
+        total_field_nt: magnitude of the field.
+    """
+
+    time_us: int
+    total_field_nt: float
+
+
+class SurveyMagnetometer:
+    """One magnetometer on one vehicle.
+
+    Attributes:
+        parameters: as given.
+        reading: newest delivered reading; None before the first.
+    """
+
+    __slots__ = (
+        "_body_field",
+        "_countdown",
+        "_decay",
+        "_drift_nt",
+        "_drive_nt",
+        "_field",
+        "_home_frame",
+        "_interval_steps",
+        "_latency_us",
+        "_permanent_nt",
+        "_rng",
+        "_truth",
+        "_waiting",
+        "parameters",
+        "reading",
+    )
+
+    def __init__(
+        self,
+        parameters: SurveyMagnetometerParameters | None = None,
+        *,
+        truth: Array,
+        field: MagneticField,
+        physics_rate_hz: int,
+        seed: np.random.SeedSequence,
+    ) -> None:
+        """Mount a magnetometer; its constant errors are drawn from its stream.
+
+        Args:
+            parameters: the magnetometer.
+            truth: the vehicle's truth vector, read when a reading is due.
+            field: what there is to measure.
+            physics_rate_hz: calls of `step` per second.
+            seed: its random stream.
+
+        Raises:
+            ValueError: the rate doesn't divide the physics rate.
+        """
+        p = self.parameters = parameters or SurveyMagnetometerParameters()
+        self._interval_steps = steps_per_sample(p.rate_hz, physics_rate_hz)
+        self._latency_us = round(p.latency_s * physics_rate_hz) * 1_000_000 // physics_rate_hz
+        self._countdown = 0
+        self._truth = truth
+        self._field = field
+        self._home_frame = HomeFrame(field.published.home)
+        self._rng = np.random.Generator(np.random.PCG64(seed))
+        self._permanent_nt: Array = p.heading_error_nt * self._rng.standard_normal(3)
+        self._drift_nt = p.drift_nt * float(self._rng.standard_normal())
+        self._decay, self._drive_nt = gauss_markov(p.drift_nt, p.drift_time_constant_s, 1.0 / p.rate_hz)
+        self._body_field: Array = np.zeros(3)
+        self._waiting: deque[MagneticReading] = deque()
+        self.reading: MagneticReading | None = None
+
+    def step(self, time_us: int) -> MagneticReading | None:
+        """One physics step; the reading that is delivered on it, if there is one."""
+        if self._countdown:
+            self._countdown -= 1
+        else:
+            self._countdown = self._interval_steps - 1
+            self._waiting.append(MagneticReading(time_us, self._measure()))
+        if self._waiting and self._waiting[0].time_us + self._latency_us <= time_us:
+            self.reading = self._waiting.popleft()
+            return self.reading
+        return None
+
+    def _measure(self) -> float:
+        p, truth = self.parameters, self._truth
+        north_m, east_m, down_m = self._home_frame.position_ned_m(truth)
+        white, drive = self._rng.standard_normal(2).tolist()
+        rotate_inverse(truth[t.Q_NED_FROM_FRD], truth[t.MAG_NED_GAUSS], self._body_field)
+        strength = math.sqrt(float(self._body_field @ self._body_field))
+        heading_error_nt = float(self._permanent_nt @ self._body_field) / strength if strength else 0.0
+        value_nt = (
+            self._field.total_nt(north_m, east_m, -down_m)
+            + heading_error_nt
+            + self._drift_nt
+            + p.noise_nt * white
+        )
+        self._drift_nt = self._decay * self._drift_nt + self._drive_nt * drive
+        if p.quantum_nt > 0.0:
+            value_nt = math.floor(value_nt / p.quantum_nt + 0.5) * p.quantum_nt
+        return value_nt

@@ -1,0 +1,128 @@
+"""Made-up geology: a magnetic map with the spectrum of a real one.
+
+A layer of randomly magnetised rock at depth d gives an anomaly whose amplitude spectrum falls with the
+wavenumber k as k^(-b/2) exp(-k d): the exponential from the distance (Spector and Grant 1970, Geophysics 35),
+the power from magnetisation that is correlated over all scales (Maus and Dimri 1994, Geophysical Research
+Letters 21). Above its sources the field is harmonic, so its upward derivative is -k in the spectrum (Blakely,
+section 12.1).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.home import Home
+from flightsim.payload.checks import require_finite
+from flightsim.payload.magnetic_map import MagneticMap
+from flightsim.payload.main_field import MainField
+from flightsim.sensors.checks import require_not_negative, require_positive
+
+Array = NDArray[np.float64]
+
+_MAX_POINTS = 4_000_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SyntheticMapParameters:
+    """A map to be made.
+
+    Attributes:
+        south_m, west_m, north_m, east_m: edges, local NED of home.
+        spacing_m: of the grid lines; edges are stretched to the next line.
+        height_m: above home, what the map is valid at: the height to fly at.
+        anomaly_nt: root mean square of the anomaly.
+        source_depth_m: of the rock below the survey height.
+        spectral_exponent: b above; 3 is common for crust.
+    """
+
+    south_m: float = -2000.0
+    west_m: float = -2000.0
+    north_m: float = 2000.0
+    east_m: float = 2000.0
+    spacing_m: float = 100.0
+    height_m: float = 100.0
+    anomaly_nt: float = 60.0
+    source_depth_m: float = 500.0
+    spectral_exponent: float = 3.0
+
+    def __post_init__(self) -> None:
+        require_finite(
+            south_m=self.south_m,
+            west_m=self.west_m,
+            north_m=self.north_m,
+            east_m=self.east_m,
+            height_m=self.height_m,
+        )
+        require_positive(spacing_m=self.spacing_m, source_depth_m=self.source_depth_m)
+        require_not_negative(anomaly_nt=self.anomaly_nt, spectral_exponent=self.spectral_exponent)
+        for low, high, names in (
+            (self.south_m, self.north_m, "south_m and north_m"),
+            (self.west_m, self.east_m, "west_m and east_m"),
+        ):
+            if not high - low >= self.spacing_m:
+                raise ValueError(
+                    f"{names} = {low}, {high} are not accepted: apart by {self.spacing_m} m or more is"
+                )
+        rows, columns = self.shape
+        if rows * columns > _MAX_POINTS:
+            raise ValueError(
+                f"spacing_m = {self.spacing_m} is not accepted: it makes {rows} x {columns} points; "
+                f"up to {_MAX_POINTS} are"
+            )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the grid."""
+        return (
+            math.ceil((self.north_m - self.south_m) / self.spacing_m - 1e-9) + 1,
+            math.ceil((self.east_m - self.west_m) / self.spacing_m - 1e-9) + 1,
+        )
+
+
+def synthetic_map(
+    parameters: SyntheticMapParameters,
+    *,
+    home: Home,
+    seed: np.random.SeedSequence,
+    decimal_year: float = 2026.0,
+) -> MagneticMap:
+    """Make a map: main field and anomaly, with its vertical gradient.
+
+    Args:
+        parameters: the map.
+        home: origin of its frame.
+        seed: of the geology.
+        decimal_year: date of the main field (WMM-2025).
+    """
+    p = parameters
+    rows, columns = p.shape
+    rng = np.random.Generator(np.random.PCG64(seed))
+    # A field made by Fourier transform repeats itself; of twice the size only a quarter is shown.
+    noise = np.fft.rfft2(rng.standard_normal((2 * rows, 2 * columns)))
+    k_north = 2.0 * math.pi * np.fft.fftfreq(2 * rows, p.spacing_m)
+    k_east = 2.0 * math.pi * np.fft.rfftfreq(2 * columns, p.spacing_m)
+    k = np.hypot(k_north[:, None], k_east[None, :])
+    k[0, 0] = np.inf  # no mean: that is the main field's
+    spectrum = noise * k ** (-0.5 * p.spectral_exponent) * np.exp(-np.minimum(k, 1e9) * p.source_depth_m)
+    spectrum[0, 0] = 0.0
+    k[0, 0] = 0.0
+    size = (2 * rows, 2 * columns)
+    anomaly: Array = np.fft.irfft2(spectrum, s=size)[:rows, :columns]
+    gradient: Array = np.fft.irfft2(-k * spectrum, s=size)[:rows, :columns]
+    anomaly = anomaly - anomaly.mean()
+    scale = p.anomaly_nt / float(np.sqrt(np.mean(anomaly**2)))
+
+    main = MainField(home, decimal_year)
+    north_m: Array = p.south_m + p.spacing_m * np.arange(rows, dtype=np.float64)
+    east_m: Array = p.west_m + p.spacing_m * np.arange(columns, dtype=np.float64)
+    main_nt = main.total_at_nt(north_m[:, None], east_m[None, :], p.height_m)
+    return MagneticMap(
+        north_m=north_m,
+        east_m=east_m,
+        total_field_nt=main_nt + scale * anomaly,
+        vertical_gradient_nt_m=main.gradient_up_nt_m + scale * gradient,
+        height_m=p.height_m,
+        home=home,
+    )
