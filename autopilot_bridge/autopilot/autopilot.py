@@ -19,9 +19,8 @@ from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.flavours.flavour import Flavour
-from autopilot_bridge.flight import FlightContext, LandDetector
+from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
@@ -43,6 +42,7 @@ from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.px4 import Px4Messages
 from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
+from flightsim.flight_envelope import FlightEnvelope
 from flightsim.interface import SensorReadings
 
 SLOW_RATE_HZ: Final = 50
@@ -92,6 +92,7 @@ class Autopilot:
         readings: the vehicle's sensors, written before each `step`.
         physics_rate_hz: calls of `step` per second.
         parameters: values that differ from the flavour's defaults.
+        envelope: what the aircraft can do; None for a multicopter.
         unix_epoch_us: Unix time of boot.
         inject_failure: takes MAV_CMD_INJECT_FAILURE; None: not supported.
 
@@ -112,12 +113,13 @@ class Autopilot:
         readings: SensorReadings,
         physics_rate_hz: int,
         parameters: Mapping[str, float] | None = None,
+        envelope: FlightEnvelope | None = None,
         unix_epoch_us: int = 0,
         inject_failure: FailureHook | None = None,
     ) -> None:
         if physics_rate_hz % SLOW_RATE_HZ:
             raise ValueError(f"physics rate {physics_rate_hz} Hz is not a multiple of {SLOW_RATE_HZ} Hz")
-        firmware = FIRMWARES[flavour.name]
+        firmware = FIRMWARES[flavour.name, flavour.kind]
         self.flavour = flavour
         self.system_id = system_id
         self.channels: list[AutopilotChannel] = []
@@ -129,13 +131,14 @@ class Autopilot:
         self._until_slow = self._divisor
         self._time_us = 0
 
-        self.parameters = ParameterStore(
-            flavour.parameter_definitions(), {**flavour.airframe, **(parameters or {})}
-        )
+        airframe = dict(flavour.airframe)
+        if envelope is not None and flavour.airframe_of is not None:
+            airframe.update(flavour.airframe_of(envelope))
+        self.parameters = ParameterStore(flavour.parameter_definitions(), {**airframe, **(parameters or {})})
         self.navigation = NavigationFilter(
             flavour.navigation_parameters(self.parameters), readings=readings, physics_rate_hz=physics_rate_hz
         )
-        self.controller = MulticopterController(
+        self.controller = flavour.controller(
             flavour.controller_parameters(self.parameters),
             physics_rate_hz=physics_rate_hz,
             nav=self.navigation.state,
@@ -151,8 +154,11 @@ class Autopilot:
             self.context,
             policy=flavour.policy,
             parameters=flavour.commander_parameters(self.parameters),
-            health=HealthMonitor(readings, NavigationJudgement(self.navigation)),
-            land_detector=LandDetector(),
+            vehicle=flavour.vehicle_tasks(self.context, stores[MissionType.MISSION], flavour.policy),
+            health=HealthMonitor(
+                readings, NavigationJudgement(self.navigation), airspeed=flavour.has_airspeed
+            ),
+            land_detector=flavour.land_detector(),
             thrust=lambda: self.controller.thrust,
             missions=stores[MissionType.MISSION],
             fence=stores[MissionType.FENCE],

@@ -21,6 +21,7 @@ from autopilot_bridge.services.parameters import (
     ParameterPolicy,
 )
 from autopilot_bridge.telemetry import ardupilot, px4
+from flightsim.airframe import AirframeKind
 
 _ARDUPILOT_MAX_RATE_HZ: Final = 0.8 * 400.0  # of SCHED_LOOP_RATE
 
@@ -46,9 +47,9 @@ class Firmware:
     position_pushed_at_arm: bool
 
 
-FIRMWARES: Final[Mapping[str, Firmware]] = MappingProxyType(
+FIRMWARES: Final[Mapping[tuple[str, AirframeKind], Firmware]] = MappingProxyType(
     {
-        "px4": Firmware(
+        ("px4", AirframeKind.MULTICOPTER): Firmware(
             address=px4_address_rule,
             parameters=PX4_PARAMETER_POLICY,
             missions=PX4_MISSION_POLICY,
@@ -63,7 +64,7 @@ FIRMWARES: Final[Mapping[str, Firmware]] = MappingProxyType(
             answers_ping=True,
             position_pushed_at_arm=False,
         ),
-        "ardupilot": Firmware(
+        ("ardupilot", AirframeKind.MULTICOPTER): Firmware(
             address=ardupilot_address_rule,
             parameters=ARDUPILOT_PARAMETER_POLICY,
             missions=ARDUPILOT_MISSION_POLICY,

@@ -1,6 +1,5 @@
 """The autopilot's own state as each flavour tells it: HEARTBEAT, SYS_STATUS, AUTOPILOT_VERSION."""
 
-from dataclasses import dataclass
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -13,35 +12,6 @@ from autopilot_bridge.telemetry.streams import Values
 
 MAVLINK_VERSION: Final = 3
 PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SensorBits:
-    """SYS_STATUS bits of a healthy vehicle; broken sensors are taken out of `health`."""
-
-    present: int
-    enabled: int
-    enabled_armed: int
-    health: int
-    health_armed: int
-
-
-SENSOR_BITS: Final = {
-    "px4": SensorBits(
-        present=0x0300402F,
-        enabled=0x0301402F,
-        enabled_armed=0x0301402F,
-        health=0x1320C83F,
-        health_armed=0x1320C83F,
-    ),
-    "ardupilot": SensorBits(
-        present=0x5371FC2F,
-        enabled=0x52619C2F,
-        enabled_armed=0x5361FC2F,
-        health=0x57719C2F,
-        health_armed=0x5771FC2F,
-    ),
-}
 
 
 class NavigationJudgement:
@@ -69,8 +39,21 @@ class NavigationJudgement:
 
     @property
     def position_valid(self) -> bool:
-        """The horizontal position is good, on Earth."""
-        return self._navigation.health.position_horizontal_absolute
+        """The horizontal position is good, on Earth; dead-reckoned through the wind counts, as in PX4."""
+        health = self._navigation.health
+        return health.position_horizontal_absolute or (
+            health.wind_dead_reckoning and health.position_horizontal_relative
+        )
+
+    @property
+    def position_accuracy_m(self) -> float:
+        """1-sigma of the horizontal position."""
+        return self._navigation.health.position_horizontal_accuracy_m
+
+    @property
+    def airspeed_rejected(self) -> bool:
+        """The filter doesn't believe the pitot tube any more."""
+        return self._navigation.health.airspeed_synthetic
 
 
 class StatusReport:
@@ -84,7 +67,7 @@ class StatusReport:
     def __init__(self, flavour: Flavour, commander: Commander) -> None:
         self._flavour = flavour
         self._commander = commander
-        self._bits = SENSOR_BITS[flavour.name]
+        self._bits = flavour.sensor_bits
         self._boot_us = round(flavour.policy.boot_s * 1e6)
 
     def heartbeat(self) -> Values:
@@ -140,6 +123,7 @@ def _sensors(health: VehicleHealth) -> tuple[tuple[int, bool], ...]:
         (mavlink.MAV_SYS_STATUS_SENSOR_GPS, health.gps and health.position),
         (mavlink.MAV_SYS_STATUS_AHRS, health.attitude),
         (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY, health.battery),
+        (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, health.airspeed or not health.has_airspeed),
     )
 
 

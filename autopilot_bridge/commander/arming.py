@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
-from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
+from autopilot_bridge.commander.modes import FlightMode, Need
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.situation import Situation
@@ -27,9 +27,11 @@ MODE_REASONS: Final = frozenset({Reason.MODE_NOT_ARMABLE, Reason.MISSION_MISSING
 """Reasons that lie in the chosen mode, not in the vehicle."""
 
 
-def shortfalls(mode: FlightMode, situation: Situation, parameters: CommanderParameters) -> tuple[Reason, ...]:
+def shortfalls(
+    mode: FlightMode, situation: Situation, policy: CommanderPolicy, parameters: CommanderParameters
+) -> tuple[Reason, ...]:
     """What a mode needs and does not have, in the order a pilot would mend it; empty when it can be flown."""
-    needs = MODE_NEEDS[mode]
+    needs = policy.mode_needs[mode]
     health = situation.health
     reasons = []
     if Need.ATTITUDE in needs and not health.attitude:
@@ -78,14 +80,19 @@ def arming_reasons(
         (health.accelerometer, Reason.ACCELEROMETER),
         (health.barometer, Reason.BAROMETER),
         (health.magnetometer, Reason.COMPASS),
+        (health.airspeed or not health.has_airspeed, Reason.AIRSPEED),
     )
     reasons.extend(reason for healthy, reason in sensors if not healthy)
-    needs = MODE_NEEDS[mode]
+    needs = policy.mode_needs[mode]
+    by_position = Need.POSITION in needs or policy.position_needed_to_arm
     if not health.attitude:
         reasons.append(Reason.ATTITUDE)
-    if Need.POSITION in needs and not health.gps:
+    if by_position and not health.gps:
         reasons.append(Reason.GPS)
-    reasons.extend(reason for reason in shortfalls(mode, situation, parameters) if reason not in reasons)
+    missing = shortfalls(mode, situation, policy, parameters)
+    reasons.extend(reason for reason in missing if reason not in reasons)
+    if by_position and not situation.position and Reason.POSITION not in reasons:
+        reasons.append(Reason.POSITION)
     if situation.battery_level >= BatteryLevel.CRITICAL:
         reasons.append(Reason.BATTERY_FAILSAFE)
     elif situation.battery_level >= BatteryLevel.LOW:
@@ -101,5 +108,6 @@ def arming_reasons(
     if heard and lost and parameters.gcs_loss_action > FailsafeAction.WARN:
         reasons.append(Reason.GCS_LOST)
     if not parameters.check_arming or (forced and policy.force_arm_skips_checks):
-        reasons = [reason for reason in reasons if reason in _MANDATORY]
+        optional = frozenset() if Need.POSITION in needs else frozenset({Reason.POSITION})
+        reasons = [reason for reason in reasons if reason in _MANDATORY - optional]
     return tuple(reasons)

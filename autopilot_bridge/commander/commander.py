@@ -13,6 +13,7 @@ from autopilot_bridge.commander.arming import MODE_REASONS, arming_reasons, shor
 from autopilot_bridge.commander.battery import BatteryMonitor
 from autopilot_bridge.commander.disarming import AutoDisarm
 from autopilot_bridge.commander.events import (
+    AirspeedChanged,
     Armed,
     ArmingDenied,
     BatteryLevel,
@@ -22,6 +23,8 @@ from autopilot_bridge.commander.events import (
     DisarmReason,
     Event,
     FailsafeAction,
+    FailsafeCleared,
+    FailsafeKind,
     HomeSet,
     MissionFinished,
     MissionItemReached,
@@ -42,17 +45,18 @@ from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.setpoints import SetpointStream
 from autopilot_bridge.commander.situation import Situation
 from autopilot_bridge.commander.tasks import TaskRunner
+from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
 from autopilot_bridge.flight import context as flight
-from autopilot_bridge.flight.context import FlightContext, LandedState
-from autopilot_bridge.flight.hold import HoldTask
-from autopilot_bridge.flight.land_detector import LandDetector
-from autopilot_bridge.flight.takeoff import TakeoffTask
+from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav
 
 # Health, failsafes and arming checks run at 10 Hz, as in PX4's commander; flight tasks at 50 Hz.
 _SUPERVISE_EVERY: Final = 5
+_POSITION_HYSTERESIS: Final = (
+    2.5  # how much worse than required a position may become before it is lost (PX4)
+)
 
 
 class Commander:
@@ -63,6 +67,7 @@ class Commander:
             through it.
         policy: the flavour's rules.
         parameters: time-outs, thresholds, actions.
+        vehicle: makes the flight tasks of this class of vehicle.
         health: judge of sensors and navigation.
         land_detector: writes `context.landed_state`.
         thrust: the collective given by the motors, 0..1.
@@ -79,6 +84,7 @@ class Commander:
         home: where to return to.
         battery: warning level.
         failsafes: conditions that are up.
+        vehicle: makes the flight tasks.
         tasks: the flight task being flown.
         guidance: requests that send the vehicle somewhere.
     """
@@ -89,6 +95,7 @@ class Commander:
         *,
         policy: CommanderPolicy,
         parameters: CommanderParameters,
+        vehicle: VehicleTasks,
         health: HealthMonitor,
         land_detector: LandDetector,
         thrust: Callable[[], float],
@@ -100,25 +107,19 @@ class Commander:
         self.policy = policy
         self.parameters = parameters
         self.missions = missions
-        self.mode = policy.boot_mode
-        self.commanded_mode = policy.boot_mode
+        self.vehicle = vehicle
+        self.mode = policy.initialising_mode or policy.boot_mode
+        self.commanded_mode = self.mode
         self.armed = False
         self.terminated = False
         self.pilot = PilotInput(built_in_radio=policy.manual_control_always)
-        self.setpoints = SetpointStream()
+        self.setpoints = SetpointStream(vehicle)
         self.home = Home(context)
         self.battery = BatteryMonitor()
-        self.failsafes = FailsafeMonitor(keeps_mode=policy.recovers)
-        self.tasks = TaskRunner(
-            context,
-            missions,
-            self.setpoints,
-            mission_waits=policy.mission_waits_for_start,
-            first_item=policy.mission_first_item,
-            hold_by_sticks=policy.manual_control_always,
-        )
+        self.failsafes = FailsafeMonitor(policy)
+        self.tasks = TaskRunner(context, vehicle)
         self.guidance = Guidance(self)
-        self.situation = Situation(health=health.health, mode=policy.boot_mode)
+        self.situation = Situation(health=health.health, mode=self.mode)
         self.arming_reasons: tuple[Reason, ...] = (Reason.BOOTING,)
         self._health = health
         self._land_detector = land_detector
@@ -132,6 +133,8 @@ class Commander:
         self._disarming = AutoDisarm()
         self._last_prearm_report_us = 0
         self._sticks_at_command = flight.ManualInput()
+        self._airspeed_valid = True
+        self._mode_before_radio_loss: FlightMode | None = None
 
     @property
     def time_us(self) -> int:
@@ -188,7 +191,7 @@ class Commander:
             return SystemStatus.ACTIVE
         if self.policy.standby_when_armable:
             return SystemStatus.STANDBY if self.armable else SystemStatus.UNINIT
-        return SystemStatus.STANDBY if self._booted else SystemStatus.BOOT
+        return SystemStatus.STANDBY if self._booted else self.policy.boot_status
 
     def drain_events(self) -> list[Event]:
         """Everything that happened since the last call, in order."""
@@ -208,6 +211,7 @@ class Commander:
             self.emit(ModeDenied(time_us=self.time_us, mode=mode, reason=reason))
             return Verdict(result=self.policy.mode_denied, reasons=(reason,))
         self.failsafes.override()
+        self._mode_before_radio_loss = None
         self._command(mode)
         self._select()
         return ACCEPTED
@@ -300,6 +304,9 @@ class Commander:
         if not self._booted and time_us >= self.policy.boot_s * 1e6:
             self._booted = True
             self.emit(Booted(time_us=time_us))
+            if self.mode is self.policy.initialising_mode:
+                self._command(self.policy.boot_mode)
+                self._enter(self.policy.boot_mode)
         self._health.update(time_us)
         warning = self.battery.update(self.situation.health, self.parameters, time_us)
         if warning is not None:
@@ -309,8 +316,11 @@ class Commander:
         if not self.armed:
             self._check_arming()
             self._report_prearm()
-        self._events.extend(self.failsafes.update(self.situation, self.parameters))
+        self._follow_airspeed()
+        told = self.failsafes.update(self.situation, self.parameters)
+        self._events.extend(told)
         self._select()
+        self._restore_mode(told)
 
     def _tell_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
         mode = self.commanded_mode
@@ -329,9 +339,16 @@ class Commander:
         situation.mode = self.commanded_mode
         situation.armed = self.armed
         situation.airborne = self.airborne
+        situation.landing = self.airborne and context.phase is FlightPhase.LANDING
         situation.ready = time_us >= self.policy.armable_s * 1e6
         was_ready = situation.position
-        situation.position = situation.health.position and time_us >= self.policy.position_ready_s * 1e6
+        situation.position_accuracy_m = situation.health.position_accuracy_m
+        limit_m = parameters.position_accuracy_max_m * (_POSITION_HYSTERESIS if was_ready else 1.0)
+        situation.position = (
+            situation.health.position
+            and time_us >= self.policy.position_ready_s * 1e6
+            and not situation.position_accuracy_m > limit_m
+        )
         if situation.position and not was_ready:
             self.emit(NavigationReady(time_us=time_us))
         situation.setpoint_age_s = self.setpoints.age_s(time_us)
@@ -343,6 +360,7 @@ class Commander:
         situation.mission_problem = self.mission_problem
         situation.battery_level = self.battery.level
         roll, pitch, _ = context.nav[nav.EULER_RAD].tolist()
+        situation.roll_rad, situation.pitch_rad = roll, pitch
         situation.tilt_rad = math.acos(math.cos(roll) * math.cos(pitch))
         situation.terminated = self.terminated
         home = tuple(context.home_ned_m.tolist()) if situation.home_set else None
@@ -364,7 +382,7 @@ class Commander:
             return None if mode in self.policy.ground_modes else Reason.MODE_UNAVAILABLE
         if mode not in self.policy.flown_modes:
             return Reason.MODE_UNAVAILABLE
-        missing = shortfalls(mode, self.situation, self.parameters)
+        missing = shortfalls(mode, self.situation, self.policy, self.parameters)
         return missing[0] if missing else None
 
     def _command(self, mode: FlightMode) -> None:
@@ -382,6 +400,7 @@ class Commander:
             action = self.failsafes.action(self.time_us, self.parameters)
         else:
             action = max((action for _, action in self.failsafes.started), default=FailsafeAction.NONE)
+            self._remember_mode()
             self.failsafes.started.clear()
             if action > FailsafeAction.WARN:
                 # what is up already and left to nobody goes before a weaker newcomer
@@ -390,7 +409,9 @@ class Commander:
             self._enter(self.commanded_mode)
         elif action is FailsafeAction.TERMINATE:
             self.terminate()
-        elif action is FailsafeAction.DISARM or (not self.policy.recovers and self.context.on_ground):
+        elif action is FailsafeAction.DISARM or (
+            self.policy.failsafe_disarms_landed and self.context.on_ground
+        ):
             self._disarm(DisarmReason.FAILSAFE)
         else:
             mode = failsafe_mode(action, self.situation, self.policy, sticks_valid=self.context.sticks.valid)
@@ -456,6 +477,34 @@ class Commander:
             self._last_prearm_report_us = self.time_us
             self._tell_reasons(self.arming_reasons, check_only=True)
 
+    def _follow_airspeed(self) -> None:
+        """Tell when the airspeed sensor is given up in flight, or used again."""
+        health = self.situation.health
+        if not health.has_airspeed:
+            return
+        if not self.armed:
+            self._airspeed_valid = True
+        elif health.airspeed is not self._airspeed_valid:
+            self._airspeed_valid = health.airspeed
+            self.emit(AirspeedChanged(time_us=self.time_us, valid=health.airspeed))
+
+    def _remember_mode(self) -> None:
+        """The mode to come back to when a lost radio is soon heard again (ArduPlane)."""
+        for kind, action in self.failsafes.started:
+            if kind is FailsafeKind.MANUAL_LOST and action > FailsafeAction.WARN:
+                self._mode_before_radio_loss = self.commanded_mode
+            elif action > FailsafeAction.WARN:
+                self._mode_before_radio_loss = None
+
+    def _restore_mode(self, told: list[Event]) -> None:
+        """ArduPlane: back to the mode before a short loss of the radio, unless somebody chose another."""
+        for event in told:
+            if isinstance(event, FailsafeCleared) and event.kind is FailsafeKind.MANUAL_LOST:
+                mode, self._mode_before_radio_loss = self._mode_before_radio_loss, None
+                if mode is not None and self.armed and self.policy.radio_restores_mode:
+                    self._command(mode)
+                    self._enter(mode)
+
     def _take_over_by_sticks(self) -> None:
         """PX4 COM_RC_OVERRIDE: moved sticks end automatic flight."""
         parameters = self.parameters
@@ -480,6 +529,10 @@ class Commander:
                     self.emit(MissionItemReached(time_us=self.time_us, index=event.seq))
             elif isinstance(event, flight.MissionFinished):
                 self.emit(MissionFinished(time_us=self.time_us))
+                end = self.policy.mission_end_mode
+                if end is not None and self.airborne and self.mode is FlightMode.MISSION:
+                    self._command(end)
+                    self._enter(end)
             elif isinstance(event, flight.MissionModeRequested):
                 if self.policy.mission_return_is_mode and self.mode is self.commanded_mode:
                     self._command(FlightMode.RETURN)
@@ -493,8 +546,7 @@ class Commander:
                 and self.mode is self.policy.takeoff_mode
                 and self.mode is self.commanded_mode
             ):
-                task = self.tasks.task
-                if isinstance(task, TakeoffTask):  # hold the height that was asked for, not the one reached
-                    self.tasks.prepare(FlightMode.HOLD, partial(HoldTask, task.place_ned_m))
+                source = partial(self.vehicle.hold_after_takeoff, self.tasks.task)
+                self.tasks.prepare(FlightMode.HOLD, source)
                 self._command(FlightMode.HOLD)
                 self._enter(FlightMode.HOLD)

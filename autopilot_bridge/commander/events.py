@@ -30,6 +30,9 @@ class FailsafeKind(Enum):
     BATTERY_EMERGENCY = auto()
     POSITION_LOST = auto()
     GEOFENCE = auto()
+    MANUAL_LOST_LONG = auto()  # the second stage of a lost radio (ArduPlane's long failsafe)
+    POSITION_INACCURATE = auto()
+    ATTITUDE_EXCESSIVE = auto()
 
 
 class FailsafeAction(IntEnum):
@@ -41,12 +44,15 @@ class FailsafeAction(IntEnum):
     ALTITUDE = 3
     STABILIZED = 4
     HOLD = 5
-    BRAKE = 6
-    RETURN = 7
-    LAND = 8
-    DESCEND = 9
-    TERMINATE = 10
-    DISARM = 11
+    CIRCLE = 6  # where the aircraft is, without a position if need be (ArduPlane)
+    BRAKE = 7
+    RETURN = 8
+    MISSION = 9  # the plan, with its landing (ArduPlane)
+    LAND = 10
+    GLIDE = 11  # level, without power (ArduPlane)
+    DESCEND = 12
+    TERMINATE = 13
+    DISARM = 14
 
 
 class BatteryLevel(IntEnum):
@@ -191,6 +197,13 @@ class BatteryWarning(Event):
     level: BatteryLevel
     voltage_v: float
     used_ah: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AirspeedChanged(Event):
+    """The airspeed sensor was given up in flight, or is used again."""
+
+    valid: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,12 +18,14 @@ from autopilot_bridge.commander.events import (
     FailsafeCleared,
     FailsafeKind,
 )
-from autopilot_bridge.commander.modes import MODE_NEEDS, STICK_MODES, FlightMode, Need
+from autopilot_bridge.commander.modes import STICK_MODES, FlightMode, Need
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.situation import Situation
 
-_LINKS: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST})
+_LINKS: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST, FailsafeKind.MANUAL_LOST_LONG})
+_BY_ACCURATE_POSITION: Final = frozenset({FlightMode.MISSION, FlightMode.HOLD})
+"""Modes that a low accuracy of the position ends (PX4 COM_POS_LOW_ACT)."""
 _LATCHING: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST, FailsafeKind.GEOFENCE})
 """Kinds whose RETURN stays although the condition clears (PX4's ClearCondition::OnModeChangeOrDisarm)."""
 _NOT_OVERRIDABLE: Final = frozenset({FailsafeKind.POSITION_LOST})
@@ -34,9 +36,12 @@ _ACTION_MODES: Final = {
     FailsafeAction.ALTITUDE: FlightMode.ALTITUDE,
     FailsafeAction.STABILIZED: FlightMode.STABILIZED,
     FailsafeAction.HOLD: FlightMode.HOLD,
+    FailsafeAction.CIRCLE: FlightMode.CIRCLE,
     FailsafeAction.BRAKE: FlightMode.BRAKE,
     FailsafeAction.RETURN: FlightMode.RETURN,
+    FailsafeAction.MISSION: FlightMode.MISSION,
     FailsafeAction.LAND: FlightMode.LAND,
+    FailsafeAction.GLIDE: FlightMode.FBWA,
     FailsafeAction.DESCEND: FlightMode.DESCEND,
     FailsafeAction.TERMINATE: FlightMode.TERMINATION,
 }
@@ -54,15 +59,18 @@ class FailsafeMonitor:
     """Which failsafe conditions are up, since when, and what they ask for.
 
     Args:
-        keeps_mode: the commanded mode stays commanded during a failsafe (PX4); else the failsafe replaces it.
+        policy: whether the commanded mode stays commanded during a failsafe (PX4) or is replaced by it; what
+            the modes need.
     """
 
-    __slots__ = ("_active", "_keeps_mode", "_position_lost_us", "started")
+    __slots__ = ("_active", "_keeps_mode", "_policy", "_position_lost_us", "_tilted_us", "started")
 
-    def __init__(self, *, keeps_mode: bool) -> None:
-        self._keeps_mode = keeps_mode
+    def __init__(self, policy: CommanderPolicy) -> None:
+        self._policy = policy
+        self._keeps_mode = policy.recovers
         self._active: dict[FailsafeKind, _Active] = {}
         self._position_lost_us: int | None = None
+        self._tilted_us: int | None = None
         self.started: list[tuple[FailsafeKind, FailsafeAction]] = []
 
     @property
@@ -134,18 +142,29 @@ class FailsafeMonitor:
             situation.mode is FlightMode.OFFBOARD and situation.setpoint_age_s > parameters.offboard_loss_s,
             parameters.offboard_loss_action,
         )
+        links_matter = not (self._policy.landing_ignores_links and situation.landing)
         yield (
             FailsafeKind.GCS_LOST,
-            0.0 < parameters.gcs_loss_s < situation.gcs_age_s < math.inf
+            links_matter
+            and 0.0 < parameters.gcs_loss_s < situation.gcs_age_s < math.inf
             and situation.mode not in parameters.gcs_loss_exempt,
             parameters.gcs_loss_action,
         )
         yield (
             FailsafeKind.MANUAL_LOST,
-            situation.sticks_at_arming
+            links_matter
+            and situation.sticks_at_arming
             and 0.0 < parameters.manual_loss_s < situation.sticks_age_s
-            and situation.mode not in parameters.manual_loss_exempt,
+            and (situation.mode not in parameters.manual_loss_exempt or self._chose_mode),
             parameters.manual_loss_action,
+        )
+        yield (
+            FailsafeKind.MANUAL_LOST_LONG,
+            links_matter
+            and situation.sticks_at_arming
+            and 0.0 < parameters.manual_long_loss_s < situation.sticks_age_s
+            and situation.mode not in parameters.manual_long_loss_exempt,
+            parameters.manual_long_loss_action,
         )
         level = situation.battery_level
         yield FailsafeKind.BATTERY_LOW, level >= BatteryLevel.LOW, parameters.battery_low_action
@@ -164,7 +183,24 @@ class FailsafeMonitor:
             self._position_lost(situation, parameters),
             parameters.position_loss_action,
         )
+        yield (
+            FailsafeKind.POSITION_INACCURATE,
+            situation.position
+            and situation.mode in _BY_ACCURATE_POSITION
+            and 0.0 < parameters.position_accuracy_low_m < situation.position_accuracy_m,
+            parameters.position_accuracy_low_action,
+        )
+        yield (
+            FailsafeKind.ATTITUDE_EXCESSIVE,
+            self._tilted(situation, parameters),
+            parameters.attitude_action,
+        )
         yield FailsafeKind.GEOFENCE, situation.outside_fence, parameters.fence_action
+
+    @property
+    def _chose_mode(self) -> bool:
+        """The lost radio's failsafe has changed the mode (ArduPlane): the new mode doesn't end it."""
+        return self._policy.radio_restores_mode and FailsafeKind.MANUAL_LOST in self._active
 
     def _position_lost(self, situation: Situation, parameters: CommanderParameters) -> bool:
         """Without a position for too long in a mode that needs one."""
@@ -179,7 +215,20 @@ class FailsafeMonitor:
             return True  # the mode it has chosen needs no position any more
         if situation.mode is FlightMode.OFFBOARD:
             return situation.setpoint_needs_position
-        return Need.POSITION in MODE_NEEDS[situation.mode]
+        return Need.POSITION in self._policy.mode_needs[situation.mode]
+
+    def _tilted(self, situation: Situation, parameters: CommanderParameters) -> bool:
+        """Beyond the limits of roll or pitch for too long, in the air."""
+        tilted = situation.airborne and (
+            0.0 < parameters.attitude_roll_max_rad < abs(situation.roll_rad)
+            or 0.0 < parameters.attitude_pitch_max_rad < abs(situation.pitch_rad)
+        )
+        if not tilted:
+            self._tilted_us = None
+            return False
+        if self._tilted_us is None:
+            self._tilted_us = situation.time_us
+        return situation.time_us - self._tilted_us >= parameters.attitude_time_s * 1e6
 
 
 def failsafe_mode(
@@ -199,4 +248,6 @@ def failsafe_mode(
         return mode
     if mode is FlightMode.RETURN and not situation.home_set:
         mode = FlightMode.LAND
-    return mode if situation.position else policy.fallback_land
+    if situation.position or policy.fallback_land is None:
+        return mode
+    return policy.fallback_land

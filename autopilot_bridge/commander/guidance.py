@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
+from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, Place
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
-from autopilot_bridge.flight.goto import RepositionTask
-from autopilot_bridge.flight.guided import GuidedKind, GuidedTask
-from autopilot_bridge.flight.hold import HoldTask
 from autopilot_bridge.flight.offboard import Vector
-from autopilot_bridge.flight.orbit import OrbitTask, OrbitYaw
-from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.takeoff import TakeoffTask
-from autopilot_bridge.flight.task import SpeedKind, SpeedTask
+from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask
 
 if TYPE_CHECKING:
     from autopilot_bridge.commander.commander import Commander
@@ -33,11 +27,11 @@ class Guidance:
 
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
-        self._parameters = commander.context.parameters
+        self._vehicle = commander.vehicle
+        self._parameters: Any = commander.context.parameters
         self._speeds_m_s: dict[SpeedKind, float] = {}  # commanded ones, over the parameters'
-        self._target = np.full(3, math.nan)
 
-    def set_parameters(self, parameters: FlightParameters) -> None:
+    def set_parameters(self, parameters: Any) -> None:
         """New flight parameters (a pilot changed one); a commanded speed lasts on."""
         if parameters != self._parameters:
             self._parameters = parameters
@@ -50,32 +44,34 @@ class Guidance:
 
     def _apply_speeds(self) -> None:
         """The flight parameters with the commanded speeds in place of theirs."""
-        p, speeds = self._parameters, self._speeds_m_s
-        changes: dict[str, Any] = {}
-        if SpeedKind.GROUND_SPEED in speeds:
-            cruise = min(speeds[SpeedKind.GROUND_SPEED], p.max_speed_m_s)
-            changes = {"cruise_speed_m_s": cruise, "return_speed_m_s": cruise}
-        if SpeedKind.CLIMB in speeds:
-            changes["climb_speed_m_s"] = speeds[SpeedKind.CLIMB]
-        if SpeedKind.DESCENT in speeds:
-            changes["descend_speed_m_s"] = speeds[SpeedKind.DESCENT]
-        self._commander.context.parameters = replace(p, **changes) if changes else p
+        changed = self._vehicle.with_speeds(self._parameters, self._speeds_m_s)
+        self._commander.context.parameters = changed
 
-    def takeoff(self, *, down_m: float, yaw_rad: float) -> Verdict:
-        """Climb straight up to a height; NaN: the parameter's height over home.
+    def takeoff(
+        self, *, down_m: float, yaw_rad: float, north_m: float = math.nan, east_m: float = math.nan
+    ) -> Verdict:
+        """Climb to a height; NaN: the parameter's height over home.
 
         Where taking off is a mode of its own it can be commanded before arming. Elsewhere the vehicle must
-        be armed, on the ground, in the mode that flies to places.
+        be armed, on the ground, in the mode that flies to places. An aircraft circles around the place when
+        it is up.
         """
         commander = self._commander
         height_m = self._height_over_home(down_m)
         yaw = yaw_rad if math.isfinite(yaw_rad) else None
+        place = _place(north_m, east_m, down_m)
+
+        def make() -> FlightTask:
+            return self._vehicle.takeoff(height_m, yaw, place)
+
+        if not commander.policy.takeoff_by_command:
+            return failed(Reason.WRONG_MODE)
         mode = commander.policy.takeoff_mode
         if mode is not None:
-            commander.tasks.prepare(mode, lambda: TakeoffTask(height_m, yaw_rad=yaw))
+            commander.tasks.prepare(mode, make)
             verdict = commander.set_mode(mode)
             if verdict.accepted and commander.mode is mode:
-                commander.tasks.prepare(mode, lambda: TakeoffTask(height_m, yaw_rad=yaw))
+                commander.tasks.prepare(mode, make)
                 commander.tasks.enter(mode)
             return verdict
         if not commander.armed:
@@ -86,7 +82,7 @@ class Guidance:
             return failed(Reason.ALREADY_FLYING)
         if height_m is None or height_m < _MIN_TAKEOFF_M:
             return failed(Reason.BAD_ALTITUDE)
-        commander.tasks.start(TakeoffTask(height_m, yaw_rad=yaw))
+        commander.tasks.start(make())
         return ACCEPTED
 
     def land(self) -> Verdict:
@@ -97,6 +93,17 @@ class Guidance:
         """Fly home and land."""
         return self._commander.set_mode(FlightMode.RETURN)
 
+    def go_around(self, height_m: float = math.nan) -> Verdict:
+        """Break off a landing and climb.
+
+        Args:
+            height_m: over home, up to which the aircraft climbs; NaN: as its landing says.
+        """
+        task = self._commander.tasks.task
+        if isinstance(task, GoAroundTask) and task.go_around(self._commander.context, height_m):
+            return ACCEPTED
+        return failed(Reason.WRONG_MODE)
+
     def reposition(
         self,
         *,
@@ -105,36 +112,47 @@ class Guidance:
         down_m: float,
         yaw_rad: float = math.nan,
         speed_m_s: float = math.nan,
+        radius_m: float = math.nan,
     ) -> Verdict:
-        """Fly to a place and hold there; changes to the mode that does so."""
+        """Fly to a place and hold there; changes to the mode that does so.
+
+        Args:
+            north_m, east_m, down_m: the place.
+            yaw_rad: heading there (multicopter).
+            speed_m_s: on the way; not positive: the parameter's.
+            radius_m: of an aircraft's circle there, positive clockwise; 0 or NaN: the parameter's.
+        """
         commander = self._commander
         verdict = commander.set_mode(commander.policy.reposition_mode)
         if not verdict.accepted or not commander.armed or commander.mode is not commander.commanded_mode:
             return verdict
-        place = np.array([_within(value, _MAX_DISTANCE_M) for value in (north_m, east_m, down_m)])
-        yaw = _within(yaw_rad, 2.0 * math.pi)
-        speed = speed_m_s if 0.0 < speed_m_s <= _MAX_SPEED_M_S else None
-        if commander.policy.takeoff_mode is not None:
-            commander.tasks.start(RepositionTask(place, yaw_rad=yaw, speed_m_s=speed))
-        else:
-            guided = self.guided()
-            if guided is not None:
-                self.go_to(guided, place, yaw_rad=yaw, speed_m_s=speed)
+        target = _place(
+            north_m,
+            east_m,
+            down_m,
+            yaw_rad=_within(yaw_rad, 2.0 * math.pi),
+            speed_m_s=speed_m_s if 0.0 < speed_m_s <= _MAX_SPEED_M_S else None,
+            radius_m=radius_m if 0.0 < abs(radius_m) <= _MAX_RADIUS_M else None,
+        )
+        if commander.policy.reposition_mode not in GUIDED_MODES:
+            commander.tasks.start(self._vehicle.reposition(target))
+        elif self.guided() is not None:
+            self._vehicle.guide_to(commander.context, target)
         return verdict
 
     def go_to(
         self,
-        guided: GuidedTask,
+        guided: Any,
         position_ned_m: Vector,
         *,
         yaw_rad: float = math.nan,
         speed_m_s: float | None = None,
     ) -> None:
-        """Give the guided task a place to fly to."""
-        self._target[:] = position_ned_m
-        guided.set_position(self._commander.context, position_ned_m, yaw_rad=yaw_rad, speed_m_s=speed_m_s)
+        """Give the guided task (the one `guided` returned) a place to fly to."""
+        place = Place(ned_m=np.array(position_ned_m), yaw_rad=yaw_rad, speed_m_s=speed_m_s)
+        self._vehicle.guide_to(self._commander.context, place)
 
-    def guided(self) -> GuidedTask | None:
+    def guided(self) -> Any:
         """The task that flies guided targets, made the active one; None where there is nothing to guide.
 
         On the ground only a takeoff is flown (ArduPilot).
@@ -142,11 +160,46 @@ class Guidance:
         commander = self._commander
         if not commander.airborne or commander.mode not in (FlightMode.GUIDED, FlightMode.GUIDED_NOGPS):
             return None
-        guided = commander.setpoints.guided
+        guided = self._vehicle.guided
         if commander.tasks.task is not guided:
             guided.set_hold(commander.context)
             commander.tasks.start(guided)
         return guided
+
+    def change_heading(self, heading_rad: float, *, course: bool, acceleration_m_s2: float) -> Verdict:
+        """Fly a heading, or a course over ground, until something else is asked for (GUIDED).
+
+        Args:
+            heading_rad: clockwise from north.
+            course: over ground; else through the air.
+            acceleration_m_s2: lateral, of the turn; NaN: the bank limit's.
+        """
+        guided = self._guided_aircraft()
+        if guided is None:
+            return failed(Reason.WRONG_MODE)
+        guided.set_heading(self._commander.context, heading_rad, course, acceleration_m_s2)
+        return ACCEPTED
+
+    def change_altitude(self, down_m: float, *, rate_m_s: float) -> Verdict:
+        """Go to a height (GUIDED); a rate of NaN: as fast as the limits allow."""
+        guided = self._guided_aircraft()
+        if guided is None:
+            return failed(Reason.WRONG_MODE)
+        guided.set_altitude(self._commander.context, down_m, rate_m_s)
+        return ACCEPTED
+
+    def change_airspeed(self, airspeed_m_s: float, *, acceleration_m_s2: float) -> Verdict:
+        """Go to an equivalent airspeed (GUIDED); an acceleration of NaN: as the limits allow."""
+        guided = self._guided_aircraft()
+        if guided is None:
+            return failed(Reason.WRONG_MODE)
+        guided.set_airspeed(self._commander.context, airspeed_m_s, acceleration_m_s2)
+        return ACCEPTED
+
+    def _guided_aircraft(self) -> Any:
+        """The guided task of an aircraft, whose heading, height and airspeed can be changed one by one."""
+        guided = self.guided() if self._commander.mode is FlightMode.GUIDED else None
+        return guided if hasattr(guided, "set_heading") else None
 
     def orbit(
         self,
@@ -160,22 +213,24 @@ class Guidance:
     ) -> Verdict:
         """Circle around a place; a negative radius circles counter-clockwise."""
         commander = self._commander
-        centre = np.array([_within(value, _MAX_DISTANCE_M) for value in (north_m, east_m, down_m)])
-        radius = radius_m if 0.0 < abs(radius_m) <= _MAX_RADIUS_M else None
-        speed = abs(speed_m_s) if 0.0 < abs(speed_m_s) <= _MAX_SPEED_M_S else None
-        if radius is not None and radius < 0.0:
-            speed = -(commander.context.parameters.orbit_speed_m_s if speed is None else speed)
-        behaviours = {behaviour.value for behaviour in OrbitYaw}
-        yaw = OrbitYaw(yaw_behaviour) if yaw_behaviour in behaviours else OrbitYaw.FRONT_TO_CENTRE
+        circle = Circle(
+            centre_ned_m=_place(north_m, east_m, down_m).ned_m,
+            radius_m=abs(radius_m) if 0.0 < abs(radius_m) <= _MAX_RADIUS_M else None,
+            speed_m_s=abs(speed_m_s) if 0.0 < abs(speed_m_s) <= _MAX_SPEED_M_S else None,
+            clockwise=not -_MAX_RADIUS_M <= radius_m < 0.0,
+            yaw_behaviour=yaw_behaviour,
+        )
 
-        def make() -> OrbitTask:
-            return OrbitTask(centre, radius, speed, yaw_behaviour=yaw)
+        def make() -> FlightTask:
+            return self._vehicle.orbit(circle)
 
-        commander.tasks.prepare(FlightMode.ORBIT, make)
-        verdict = commander.set_mode(FlightMode.ORBIT)
-        if verdict.accepted and commander.mode is FlightMode.ORBIT:
-            commander.tasks.prepare(FlightMode.ORBIT, make)
-            commander.tasks.enter(FlightMode.ORBIT)
+        mode = commander.policy.orbit_mode
+        if commander.armed:
+            commander.tasks.prepare(mode, make)
+        verdict = commander.set_mode(mode)
+        if verdict.accepted and commander.armed and commander.mode is mode:
+            commander.tasks.prepare(mode, make)
+            commander.tasks.enter(mode)
         return verdict
 
     def change_speed(self, speed_m_s: float, *, kind: int) -> None:
@@ -184,10 +239,10 @@ class Guidance:
             return
         if speed_m_s <= 0.0:
             self.forget_speed()
-            for each in (SpeedKind.GROUND_SPEED, SpeedKind.CLIMB, SpeedKind.DESCENT):
+            for each in dict.fromkeys(self._vehicle.speed_kind(kind) for kind in SpeedKind):
                 self._tell_speed(each, None)
             return
-        changed = SpeedKind(kind) if kind in (SpeedKind.CLIMB, SpeedKind.DESCENT) else SpeedKind.GROUND_SPEED
+        changed = self._vehicle.speed_kind(kind)
         speed = min(speed_m_s, _MAX_SPEED_M_S)
         self._speeds_m_s[changed] = speed
         self._apply_speeds()
@@ -205,13 +260,9 @@ class Guidance:
         commander = self._commander
         if not commander.airborne or commander.mode is not commander.policy.reposition_mode:
             return
-        guided = commander.setpoints.guided
-        active = commander.tasks.task is guided
-        if active and guided.kind in (GuidedKind.VELOCITY, GuidedKind.ACCELERATION, GuidedKind.TRAJECTORY):
-            guided.set_yaw(yaw_rad)
-            return
-        place = self._target.copy() if active and guided.kind is GuidedKind.POSITION else np.full(3, math.nan)
-        commander.tasks.start(RepositionTask(place, yaw_rad=yaw_rad))
+        task = self._vehicle.turn(commander.context, commander.tasks.task, yaw_rad)
+        if task is not None:
+            commander.tasks.start(task)
 
     def start_mission(self) -> Verdict:
         """Fly the stored mission from its current item."""
@@ -219,7 +270,7 @@ class Guidance:
         verdict = commander.set_mode(FlightMode.MISSION)
         if verdict.accepted and commander.armed and not commander.tasks.mission_started:
             commander.tasks.mission_started = True
-            if commander.landed:
+            if commander.landed and commander.policy.mission_waits_for_start:
                 commander.tasks.enter(FlightMode.MISSION)
         return verdict
 
@@ -230,7 +281,7 @@ class Guidance:
             return failed(Reason.WRONG_MODE)
         if tasks.paused is None and tasks.task is not None and self._commander.airborne:
             paused = tasks.task
-            tasks.start(HoldTask())
+            tasks.start(self._vehicle.hold())
             tasks.paused = paused
         return ACCEPTED
 
@@ -255,3 +306,9 @@ class Guidance:
 def _within(value: float, limit: float) -> float:
     """`value`, or NaN for what is not finite or beyond any sense."""
     return value if abs(value) <= limit else math.nan
+
+
+def _place(north_m: float, east_m: float, down_m: float, **how: Any) -> Place:
+    """A place; coordinates beyond any sense become NaN."""
+    ned_m = np.array([_within(value, _MAX_DISTANCE_M) for value in (north_m, east_m, down_m)])
+    return Place(ned_m=ned_m, **how)

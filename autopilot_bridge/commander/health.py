@@ -21,12 +21,14 @@ _STALE_US: Final = {
     "magnetometer": 500_000,
     "gps": 1_000_000,
     "battery": 3_000_000,
+    "airspeed": 1_000_000,
 }
 _FROZEN_SAMPLES: Final = 20  # judged at 10 Hz: the same for 2 s is frozen (PX4's DataValidator)
 _MAX_RATE_RAD_S: Final = 40.0
 _MAX_ACCEL_M_S2: Final = 250.0
 _PRESSURE_PA: Final = (10_000.0, 120_000.0)
 _FIELD_GAUSS: Final = (0.1, 1.2)
+_DIFFERENTIAL_PRESSURE_PA: Final = (-2_000.0, 20_000.0)
 _GPS_MIN_SATELLITES: Final = 6
 _GPS_MAX_EPH_M: Final = 5.0
 _FIX_3D: Final = 3
@@ -43,6 +45,10 @@ class NavigationStatus(Protocol):
     def velocity_valid(self) -> bool: ...
     @property
     def position_valid(self) -> bool: ...
+    @property
+    def position_accuracy_m(self) -> float: ...
+    @property
+    def airspeed_rejected(self) -> bool: ...
 
 
 @dataclass(slots=True)
@@ -55,10 +61,13 @@ class VehicleHealth:
     magnetometer: bool = False
     gps: bool = False
     rangefinder: bool = False
+    airspeed: bool = False
+    has_airspeed: bool = False
     attitude: bool = False
     altitude: bool = False
     velocity: bool = False
     position: bool = False
+    position_accuracy_m: float = math.nan
     battery: bool = False
     battery_voltage_v: float = math.nan
     battery_used_ah: float = math.nan
@@ -95,9 +104,11 @@ class HealthMonitor:
     Args:
         readings: the vehicle's newest sensor samples.
         navigation: the filter's own judgement.
+        airspeed: the vehicle has, and needs, a pitot tube.
     """
 
     __slots__ = (
+        "_airspeed",
         "_barometer",
         "_battery",
         "_gps",
@@ -109,8 +120,10 @@ class HealthMonitor:
         "navigation",
     )
 
-    def __init__(self, readings: SensorReadings, navigation: NavigationStatus) -> None:
-        self.health = VehicleHealth()
+    def __init__(
+        self, readings: SensorReadings, navigation: NavigationStatus, *, airspeed: bool = False
+    ) -> None:
+        self.health = VehicleHealth(has_airspeed=airspeed)
         self.navigation = navigation
         self._readings = readings
         self._imu = _Watch(readings.imu, _STALE_US["imu"])
@@ -118,6 +131,7 @@ class HealthMonitor:
         self._magnetometer = _Watch(readings.magnetometer, _STALE_US["magnetometer"])
         self._gps = _Watch(readings.gps, _STALE_US["gps"])
         self._battery = _Watch(readings.battery, _STALE_US["battery"])
+        self._airspeed = _Watch(readings.airspeed, _STALE_US["airspeed"]) if airspeed else None
         self._rangefinder = _Watch(readings.rangefinder, _STALE_US["barometer"])
 
     def update(self, time_us: int) -> None:
@@ -142,10 +156,16 @@ class HealthMonitor:
             and bool(gps[interface.GPS_EPH_M] <= _GPS_MAX_EPH_M)
         )
         health.rangefinder = self._rangefinder.alive(time_us)
+        if self._airspeed is not None:
+            pressure_pa = float(readings.airspeed.values[interface.AIRSPEED_DIFFERENTIAL_PRESSURE_PA])
+            low_pa, high_pa = _DIFFERENTIAL_PRESSURE_PA
+            sound = self._airspeed.alive(time_us) and low_pa < pressure_pa < high_pa
+            health.airspeed = sound and not navigation.airspeed_rejected
         health.attitude = navigation.attitude_valid
         health.altitude = navigation.altitude_valid
         health.velocity = navigation.velocity_valid
         health.position = navigation.position_valid
+        health.position_accuracy_m = navigation.position_accuracy_m
         battery = readings.battery.values
         health.battery = self._battery.alive(time_us) and bool(battery[interface.BATTERY_VOLTAGE_V] > 0.0)
         health.battery_voltage_v = float(battery[interface.BATTERY_VOLTAGE_V])

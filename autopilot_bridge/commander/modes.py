@@ -40,6 +40,12 @@ class FlightMode(Enum):
     DRIFT = "drift"
     THROW = "throw"
     ZIGZAG = "zigzag"
+    FBWA = "fbwa"  # ArduPlane: bank and pitch by stick, limited; throttle by stick
+    FBWB = "fbwb"  # ArduPlane: bank by stick, height and airspeed held
+    CRUISE = "cruise"  # ArduPlane: FBWB that holds a course while the sticks are centred
+    TRAINING = "training"  # ArduPlane: MANUAL within the limits of FBWA
+    AUTOTUNE = "autotune"  # ArduPlane; flown like FBWA
+    INITIALISING = "initialising"  # ArduPlane until it has booted
     TERMINATION = "termination"
 
 
@@ -89,6 +95,12 @@ MODE_NEEDS: Final[Mapping[FlightMode, Need]] = MappingProxyType(
         FlightMode.THROW: _HEIGHT,
         FlightMode.ZIGZAG: _PLACE | Need.MANUAL_CONTROL,
         FlightMode.TERMINATION: Need.NONE,
+        FlightMode.FBWA: Need.ATTITUDE | Need.MANUAL_CONTROL,
+        FlightMode.FBWB: _HEIGHT | Need.MANUAL_CONTROL,
+        FlightMode.CRUISE: _HEIGHT | Need.MANUAL_CONTROL,
+        FlightMode.TRAINING: Need.ATTITUDE | Need.MANUAL_CONTROL,
+        FlightMode.AUTOTUNE: Need.ATTITUDE | Need.MANUAL_CONTROL,
+        FlightMode.INITIALISING: Need.NONE,
     }
 )
 
@@ -101,6 +113,11 @@ STICK_MODES: Final = frozenset(
         FlightMode.POSITION,
         FlightMode.POSITION_SLOW,
         FlightMode.POSHOLD,
+        FlightMode.FBWA,
+        FlightMode.FBWB,
+        FlightMode.CRUISE,
+        FlightMode.TRAINING,
+        FlightMode.AUTOTUNE,
     }
 )
 """Modes whose setpoint is the pilot's sticks."""

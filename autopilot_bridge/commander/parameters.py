@@ -20,6 +20,12 @@ class CommanderParameters:
         battery_*_remaining: remaining fraction below which the level is reached; 0 switches it off.
         battery_*_v: voltage below which the level is reached after `battery_timer_s`; 0 switches it off.
         position_loss_s: how long the filter may be without a position before the failsafe acts.
+        position_accuracy_max_m: with a worse 1-sigma accuracy there is no position (twice and a half of it
+            once there was one); infinite: never.
+        position_accuracy_low_m: worse than this a mission and a hold end; 0 switches it off.
+        manual_long_loss_*: a second stage of lost sticks (ArduPlane); 0 s switches it off.
+        attitude_roll_max_rad, attitude_pitch_max_rad: beyond them for `attitude_time_s` the attitude is
+            excessive; 0 switches it off.
         fence_radius_m, fence_height_max_m: cylinder around home; 0 switches that wall off.
         fence_polygons: the uploaded fence counts too.
         disarm_preflight_s, disarm_landed_s: automatic disarming; 0 or less switches it off.
@@ -60,9 +66,20 @@ class CommanderParameters:
     stick_override_offboard: bool
     stick_override_threshold: float
     check_arming: bool
+    position_accuracy_max_m: float = math.inf
+    position_accuracy_low_m: float = 0.0
+    position_accuracy_low_action: FailsafeAction = FailsafeAction.NONE
+    manual_long_loss_s: float = 0.0
+    manual_long_loss_action: FailsafeAction = FailsafeAction.NONE
+    manual_long_loss_exempt: frozenset[FlightMode] = frozenset()
+    attitude_roll_max_rad: float = 0.0
+    attitude_pitch_max_rad: float = 0.0
+    attitude_time_s: float = 0.3
+    attitude_action: FailsafeAction = FailsafeAction.NONE
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if isinstance(value, float) and not math.isfinite(value):
+            unlimited = field.name == "position_accuracy_max_m" and value == math.inf
+            if isinstance(value, float) and not (math.isfinite(value) or unlimited):
                 raise ValueError(f"{field.name} = {value} is not a finite number")

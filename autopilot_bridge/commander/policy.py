@@ -1,8 +1,10 @@
 """What a flavour fixes in the commander: boot timeline, mode rules, answers. Data, not code."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.events import SystemStatus
+from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
 from autopilot_bridge.commander.verdict import Result
 
 
@@ -32,7 +34,8 @@ class CommanderPolicy:
         manual_control_always: sticks are there without anybody sending them (ArduPilot's simulated radio).
         recovers: the commanded mode comes back by itself when a failsafe condition clears (PX4);
             else a failsafe is a mode change like any other (ArduPilot).
-        fallback_land: what lands the vehicle when there is no position.
+        fallback_land: what lands the vehicle when there is no position; None: nothing, the action's mode is
+            flown all the same, by dead reckoning (ArduPlane).
         critical_on_warning: system status is CRITICAL for failsafes that only warn, too (ArduPilot).
         active_when_landed: system status is ACTIVE as soon as armed (PX4), not only in the air.
         standby_when_armable: system status is UNINIT while not armable in the commanded mode (PX4).
@@ -43,6 +46,17 @@ class CommanderPolicy:
         arming_denied, mode_denied, disarm_in_air_denied: results of refused requests.
         gcs_needed_to_arm: with a ground-station failsafe set, arming waits for a ground station (PX4); else
             only one that was heard and lost is in the way.
+        mode_needs: what each mode needs; ArduPlane flies most modes without a position, by dead reckoning.
+        position_needed_to_arm: in every mode (ArduPlane), not only in those that fly by it.
+        initialising_mode: shown until the boot phase is over (ArduPlane); None: the boot mode from the start.
+        boot_status: MAV_STATE until then, where the policy doesn't go by armability.
+        takeoff_by_command: NAV_TAKEOFF as a command takes off (not on ArduPlane).
+        orbit_mode: mode in which a commanded circle is flown; an aircraft holds by circling.
+        failsafe_disarms_landed: a failsafe that acts on the ground stops the motors (ArduCopter).
+        landing_ignores_links: a lost link doesn't end a landing (ArduPlane).
+        radio_restores_mode: the mode comes back when a radio does before the second stage of its failsafe
+            (ArduPlane).
+        mission_end_mode: mode after the last item of a mission, in the air; None: stays.
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
     """
 
@@ -64,7 +78,7 @@ class CommanderPolicy:
     reports_do_items: bool
     manual_control_always: bool
     recovers: bool
-    fallback_land: FlightMode
+    fallback_land: FlightMode | None
     critical_on_warning: bool
     active_when_landed: bool
     standby_when_armable: bool
@@ -76,3 +90,13 @@ class CommanderPolicy:
     disarm_in_air_denied: Result
     gcs_needed_to_arm: bool
     force_arm_skips_checks: bool
+    mode_needs: Mapping[FlightMode, Need] = field(default_factory=lambda: MODE_NEEDS)
+    position_needed_to_arm: bool = False
+    initialising_mode: FlightMode | None = None
+    boot_status: SystemStatus = SystemStatus.BOOT
+    takeoff_by_command: bool = True
+    orbit_mode: FlightMode = FlightMode.ORBIT
+    failsafe_disarms_landed: bool = False
+    landing_ignores_links: bool = False
+    radio_restores_mode: bool = False
+    mission_end_mode: FlightMode | None = None

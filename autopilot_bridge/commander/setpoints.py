@@ -1,9 +1,9 @@
 """The stream of setpoints that offboard (PX4) and guided (ArduPilot) flying follow, and its age."""
 
 import math
+from typing import Any
 
-from autopilot_bridge.flight.guided import GuidedKind, GuidedTask
-from autopilot_bridge.flight.offboard import OffboardKind, OffboardTask
+from autopilot_bridge.commander.vehicle_tasks import VehicleTasks
 
 
 class SetpointStream:
@@ -11,19 +11,29 @@ class SetpointStream:
 
     The stream is taken in every mode, since PX4 enters OFFBOARD only while one is running.
 
+    Args:
+        vehicle: makes the vehicle's tasks.
+
     Attributes:
-        offboard: flies setpoints as they come (PX4).
-        guided: flies targets smoothly (ArduPilot).
         needs_position: the newest setpoint can't be flown without a position.
     """
 
-    __slots__ = ("_time_us", "guided", "needs_position", "offboard")
+    __slots__ = ("_time_us", "_vehicle", "needs_position")
 
-    def __init__(self) -> None:
-        self.offboard = OffboardTask()
-        self.guided = GuidedTask()
+    def __init__(self, vehicle: VehicleTasks) -> None:
+        self._vehicle = vehicle
         self.needs_position = False
         self._time_us = -1
+
+    @property
+    def offboard(self) -> Any:
+        """The task that flies setpoints as they come (PX4); which class depends on the vehicle."""
+        return self._vehicle.offboard
+
+    @property
+    def guided(self) -> Any:
+        """The task that flies targets smoothly (ArduPilot); which class depends on the vehicle."""
+        return self._vehicle.guided
 
     def note(self, time_us: int, *, needs_position: bool) -> None:
         """A setpoint was taken."""
@@ -37,9 +47,9 @@ class SetpointStream:
     @property
     def attitude_setpoints(self) -> bool:
         """The offboard stream asks for positions, velocities or attitudes (PX4 shows it in base_mode)."""
-        return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
+        return self._vehicle.asks_attitude
 
     @property
     def thrust_setpoints(self) -> bool:
         """Guided flying follows attitudes (ArduPilot shows it in base_mode)."""
-        return self.guided.kind is GuidedKind.ATTITUDE
+        return self._vehicle.follows_thrust

@@ -17,6 +17,7 @@ class Situation:
         time_us: vehicle time.
         mode: the commanded mode.
         armed, airborne: motors may turn; off the ground.
+        landing: what is flown is landing.
         ready: the boot timeline allows arming.
         health: sensors and navigation.
         position: navigation gives a position, and has been doing so long enough after boot.
@@ -30,6 +31,8 @@ class Situation:
         mission_problem: why the stored mission can't be flown; None when it can.
         battery_level: warning level.
         outside_fence: beyond the geofence.
+        position_accuracy_m: 1-sigma of the horizontal position; NaN while not known.
+        roll_rad, pitch_rad: attitude.
         tilt_rad: angle between the body's down axis and the vertical.
         terminated: flight termination was commanded.
     """
@@ -38,6 +41,7 @@ class Situation:
     mode: FlightMode = FlightMode.HOLD
     armed: bool = False
     airborne: bool = False
+    landing: bool = False
     ready: bool = False
     health: VehicleHealth = field(default_factory=VehicleHealth)
     position: bool = False
@@ -51,5 +55,8 @@ class Situation:
     mission_problem: Reason | None = Reason.MISSION_MISSING
     battery_level: BatteryLevel = BatteryLevel.OK
     outside_fence: bool = False
+    position_accuracy_m: float = math.nan
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
     tilt_rad: float = 0.0
     terminated: bool = False

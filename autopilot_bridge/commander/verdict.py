@@ -25,6 +25,7 @@ class Reason(Enum):
     ACCELEROMETER = auto()
     BAROMETER = auto()
     COMPASS = auto()
+    AIRSPEED = auto()
     GPS = auto()
     ATTITUDE = auto()  # no attitude estimate
     ALTITUDE = auto()  # no height estimate

@@ -2,19 +2,30 @@
 
 from typing import TYPE_CHECKING, Final
 
+from flightsim.airframe import AirframeKind
+
 if TYPE_CHECKING:
     from autopilot_bridge.flavours.flavour import Flavour
 
 FLAVOUR_NAMES: Final = ("px4", "ardupilot")
 
 
-def get_flavour(name: str) -> "Flavour":
-    """The flavour of that name.
+def get_flavour(name: str, kind: AirframeKind = AirframeKind.MULTICOPTER) -> "Flavour":
+    """The flavour of that name for a kind of vehicle.
 
     Raises:
         ValueError: there is none; the message lists the names.
     """
     # imported on demand: a program flies one flavour, and each brings a parameter table of its own
+    fixed_wing = kind is AirframeKind.FIXED_WING
+    if name == "px4" and fixed_wing:
+        from autopilot_bridge.flavours.px4_plane import PX4_PLANE
+
+        return PX4_PLANE
+    if name == "ardupilot" and fixed_wing:
+        from autopilot_bridge.flavours.ardupilot_plane import ARDUPILOT_PLANE
+
+        return ARDUPILOT_PLANE
     if name == "px4":
         from autopilot_bridge.flavours.px4 import PX4
 

@@ -3,16 +3,20 @@
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours import ardupilot_mapping, ardupilot_modes
 from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
 from autopilot_bridge.flavours.ardupilot_texts import notices
-from autopilot_bridge.flavours.flavour import Flavour, Identity
+from autopilot_bridge.flavours.flavour import Flavour, Identity, SensorBits
 from autopilot_bridge.flavours.mapping import airframe_overrides
 from autopilot_bridge.flavours.texts import Notice, Severity
+from autopilot_bridge.flight.land_detector import LandDetector
 from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rule
+from flightsim.airframe import AirframeKind
 
 _FLOWN: Final = frozenset(
     {
@@ -64,6 +68,7 @@ POLICY: Final = CommanderPolicy(
     kept_after_disarm=frozenset(),
     takeoff_mode=None,
     reposition_mode=FlightMode.GUIDED,
+    failsafe_disarms_landed=True,
     mission_return_is_mode=False,
     mission_waits_for_start=True,
     mission_first_item=1,
@@ -105,6 +110,7 @@ def _command_address(system_id: int) -> AddressRule:
 
 ARDUPILOT: Final = Flavour(
     name="ardupilot",
+    kind=AirframeKind.MULTICOPTER,
     autopilot=3,  # MAV_AUTOPILOT_ARDUPILOTMEGA
     vehicle_type=2,  # MAV_TYPE_QUADROTOR
     custom_modes=ardupilot_modes.CUSTOM_MODES,
@@ -121,6 +127,18 @@ ARDUPILOT: Final = Flavour(
     command_address=_command_address,
     parameter_definitions=lambda: ARDUPILOT_PARAMETERS,
     airframe=airframe_overrides(MulticopterParameters(), ardupilot_mapping.CONTROLLER, ARDUPILOT_PARAMETERS),
+    airframe_of=None,
+    sensor_bits=SensorBits(
+        present=0x5371FC2F,
+        enabled=0x52619C2F,
+        enabled_armed=0x5361FC2F,
+        health=0x57719C2F,
+        health_armed=0x5771FC2F,
+    ),
+    has_airspeed=False,
+    controller=MulticopterController,
+    vehicle_tasks=MulticopterTasks,
+    land_detector=LandDetector,
     commander_parameters=ardupilot_mapping.commander_parameters,
     flight_parameters=ardupilot_mapping.flight_parameters,
     controller_parameters=ardupilot_mapping.controller_parameters,

@@ -2,18 +2,26 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
-from autopilot_bridge.control.parameters import MulticopterParameters
+from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
 from autopilot_bridge.flavours.texts import Notice
-from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 from autopilot_bridge.services.channel import AddressRule
+from flightsim.airframe import AirframeKind
+from flightsim.flight_envelope import FlightEnvelope
+
+Array = NDArray[np.float64]
 
 
 class ModeDisplay(NamedTuple):
@@ -34,6 +42,57 @@ class ModeDisplay(NamedTuple):
     landed: bool
     attitude_setpoints: bool
     thrust_setpoints: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorBits:
+    """SYS_STATUS bits of a healthy vehicle; broken sensors are taken out of `health`."""
+
+    present: int
+    enabled: int
+    enabled_armed: int
+    health: int
+    health_armed: int
+
+
+class Controller(Protocol):
+    """Control laws of a class of vehicle, as the autopilot holds them.
+
+    Attributes:
+        setpoint: what to fly, written by the flight task.
+        actuators: commands for the vehicle (MAX_ACTUATORS,), written in place by every `step`.
+    """
+
+    setpoint: Array
+    actuators: Array
+
+    @property
+    def thrust(self) -> float:
+        """Collective of a multicopter or throttle of an aircraft, 0..1."""
+        ...
+
+    @property
+    def hover_thrust(self) -> float:
+        """Estimated thrust of level flight, 0..1."""
+        ...
+
+    def step(self) -> None:
+        """One physics step."""
+        ...
+
+    def set_parameters(self, parameters: Any) -> None:
+        """New gains and limits; states stay."""
+        ...
+
+    def set_ground_contact(self, contact: bool) -> None:
+        """The land detector feels the ground."""
+        ...
+
+
+class ControllerFactory(Protocol):
+    """Makes the control laws."""
+
+    def __call__(self, parameters: Any, *, physics_rate_hz: int, nav: Array) -> Controller: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +133,7 @@ class Flavour:
 
     Attributes:
         name: as the user types it.
+        kind: the vehicle class.
         autopilot: MAV_AUTOPILOT.
         vehicle_type: MAV_TYPE.
         custom_modes: HEARTBEAT.custom_mode of every mode this firmware knows.
@@ -85,7 +145,14 @@ class Flavour:
         identity: versions and capabilities.
         command_address: target ids of commands this firmware takes for its own, for a system id.
         parameter_definitions: the parameter table in listing order.
-        airframe: parameter values of the iris frame that differ from the firmware's defaults.
+        airframe: parameter values of the vehicle class that differ from the firmware's defaults, as in an
+            airframe file.
+        airframe_of: what an aircraft's envelope changes beyond that; None: nothing (a multicopter).
+        sensor_bits: of SYS_STATUS.
+        has_airspeed: a pitot tube belongs to the vehicle and is looked after.
+        controller: makes the control laws from `controller_parameters`.
+        vehicle_tasks: makes the flight tasks.
+        land_detector: makes the land detector.
         commander_parameters, flight_parameters, controller_parameters, navigation_parameters: typed
             parameters from the store's current values; called again after a change. They clamp what a ground
             station may have set beyond reason, and never raise.
@@ -95,6 +162,7 @@ class Flavour:
     """
 
     name: str
+    kind: AirframeKind
     autopilot: int
     vehicle_type: int
     custom_modes: Mapping[FlightMode, int]
@@ -107,9 +175,15 @@ class Flavour:
     command_address: Callable[[int], AddressRule]
     parameter_definitions: Callable[[], tuple[ParameterDefinition, ...]]
     airframe: Mapping[str, float]
+    airframe_of: Callable[[FlightEnvelope], Mapping[str, float]] | None
+    sensor_bits: SensorBits
+    has_airspeed: bool
+    controller: ControllerFactory
+    vehicle_tasks: Callable[[FlightContext, MissionStore, CommanderPolicy], VehicleTasks]
+    land_detector: Callable[[], LandDetector]
     commander_parameters: Callable[[ParameterStore], CommanderParameters]
-    flight_parameters: Callable[[ParameterStore], FlightParameters]
-    controller_parameters: Callable[[ParameterStore], MulticopterParameters]
+    flight_parameters: Callable[[ParameterStore], Any]
+    controller_parameters: Callable[[ParameterStore], Any]
     navigation_parameters: Callable[[ParameterStore], NavigationParameters]
     text_needs_heartbeat: bool
     heartbeat_on_mode_change: bool

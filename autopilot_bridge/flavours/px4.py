@@ -2,22 +2,31 @@
 
 from typing import Final
 
-from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours import px4_mapping, px4_modes
-from autopilot_bridge.flavours.flavour import Flavour, Identity
+from autopilot_bridge.flavours.flavour import Flavour, Identity, SensorBits
 from autopilot_bridge.flavours.mapping import airframe_overrides
 from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
 from autopilot_bridge.flavours.px4_texts import notices
+from autopilot_bridge.flight.land_detector import LandDetector
 from autopilot_bridge.services.channel import AddressRule
+from flightsim.airframe import AirframeKind
 
 _AUTOPILOT_COMPONENT: Final = 1
 
 _SELECTABLE: Final = frozenset(
     {
-        *STICK_MODES - {FlightMode.POSHOLD},
+        FlightMode.MANUAL,
+        FlightMode.STABILIZED,
+        FlightMode.ACRO,
+        FlightMode.ALTITUDE,
+        FlightMode.POSITION,
+        FlightMode.POSITION_SLOW,
         FlightMode.HOLD,
         FlightMode.TAKEOFF,
         FlightMode.MISSION,
@@ -94,6 +103,7 @@ def _command_address(system_id: int) -> AddressRule:
 
 PX4: Final = Flavour(
     name="px4",
+    kind=AirframeKind.MULTICOPTER,
     autopilot=12,  # MAV_AUTOPILOT_PX4
     vehicle_type=2,  # MAV_TYPE_QUADROTOR
     custom_modes=px4_modes.CUSTOM_MODES,
@@ -106,6 +116,18 @@ PX4: Final = Flavour(
     command_address=_command_address,
     parameter_definitions=lambda: PX4_PARAMETERS,
     airframe=airframe_overrides(MulticopterParameters(), px4_mapping.CONTROLLER, PX4_PARAMETERS),
+    airframe_of=None,
+    sensor_bits=SensorBits(
+        present=0x0300402F,
+        enabled=0x0301402F,
+        enabled_armed=0x0301402F,
+        health=0x1320C83F,
+        health_armed=0x1320C83F,
+    ),
+    has_airspeed=False,
+    controller=MulticopterController,
+    vehicle_tasks=MulticopterTasks,
+    land_detector=LandDetector,
     commander_parameters=px4_mapping.commander_parameters,
     flight_parameters=px4_mapping.flight_parameters,
     controller_parameters=px4_mapping.controller_parameters,

@@ -32,6 +32,8 @@ class Judgement:
         self.altitude_valid = True
         self.velocity_valid = True
         self.position_valid = True
+        self.position_accuracy_m = 0.5
+        self.airspeed_rejected = False
 
 
 class FollowerLandDetector:
@@ -83,6 +85,7 @@ class Rig:
             self.context,
             policy=self.flavour.policy,
             parameters=self.flavour.commander_parameters(self.store),
+            vehicle=self.flavour.vehicle_tasks(self.context, self.missions, self.flavour.policy),
             health=HealthMonitor(self.readings, self.judgement),
             land_detector=self.detector,
             thrust=lambda: 0.3,

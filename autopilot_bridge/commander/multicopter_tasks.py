@@ -1,0 +1,174 @@
+"""The flight tasks of a multicopter."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
+from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.flight.context import FlightContext, FlightPhase
+from autopilot_bridge.flight.goto import RepositionTask
+from autopilot_bridge.flight.guided import GuidedKind, GuidedTask
+from autopilot_bridge.flight.hold import BrakeTask, HoldTask, IdleTask
+from autopilot_bridge.flight.land import LandTask
+from autopilot_bridge.flight.loiter import LoiterTask
+from autopilot_bridge.flight.manual import ManualMode, ManualTask
+from autopilot_bridge.flight.mission import MissionTask
+from autopilot_bridge.flight.offboard import OffboardKind, OffboardTask
+from autopilot_bridge.flight.orbit import OrbitTask, OrbitYaw, circle_ahead
+from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.flight.return_home import ReturnTask
+from autopilot_bridge.flight.takeoff import TakeoffTask
+from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.mission_plan import MissionStore
+
+_MANUAL: Final = {
+    FlightMode.MANUAL: ManualMode.STABILIZED,
+    FlightMode.STABILIZED: ManualMode.STABILIZED,
+    FlightMode.ACRO: ManualMode.ACRO,
+    FlightMode.ALTITUDE: ManualMode.ALTITUDE,
+    FlightMode.POSITION: ManualMode.POSITION,
+    FlightMode.POSITION_SLOW: ManualMode.POSITION,
+    FlightMode.POSHOLD: ManualMode.POSITION,
+}
+_YAW_BEHAVIOURS: Final = frozenset(behaviour.value for behaviour in OrbitYaw)
+
+
+class MulticopterTasks:
+    """`VehicleTasks` of a multicopter.
+
+    Args:
+        context: shared with the tasks.
+        missions: the plan the mission task flies.
+        policy: the flavour's rules.
+    """
+
+    def __init__(self, context: FlightContext, missions: MissionStore, policy: CommanderPolicy) -> None:
+        self._context = context
+        self._missions = missions
+        self._policy = policy
+        self._target = np.full(3, math.nan)
+        self.offboard = OffboardTask()
+        self.guided = GuidedTask()
+
+    @property
+    def asks_attitude(self) -> bool:
+        """The offboard stream asks for positions, velocities or attitudes."""
+        return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
+
+    @property
+    def follows_thrust(self) -> bool:
+        """Guided flying follows attitudes."""
+        return self.guided.kind is GuidedKind.ATTITUDE
+
+    def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
+        """The task a mode starts with."""
+        context, policy = self._context, self._policy
+        parameters: Any = context.parameters
+        manual = _MANUAL.get(mode)
+        if manual is not None:
+            return ManualTask(manual)
+        match mode:
+            case FlightMode.TAKEOFF:
+                return TakeoffTask()
+            case FlightMode.MISSION:
+                if policy.mission_waits_for_start and context.on_ground and not mission_started:
+                    return IdleTask()
+                return MissionTask(self._missions, first_item=policy.mission_first_item)
+            case FlightMode.OFFBOARD:
+                return self.offboard
+            case FlightMode.GUIDED | FlightMode.GUIDED_NOGPS:
+                self.guided.set_hold(context)
+                return self.guided
+            case FlightMode.RETURN | FlightMode.SMART_RETURN | FlightMode.AUTO_RETURN:
+                return ReturnTask()
+            case FlightMode.LAND | FlightMode.PRECISION_LAND | FlightMode.DESCEND:
+                return LandTask()
+            case FlightMode.ORBIT:
+                return OrbitTask(np.full(3, math.nan))
+            case FlightMode.CIRCLE:
+                return OrbitTask(circle_ahead(context, parameters.orbit_radius_m))
+            case FlightMode.BRAKE:
+                return BrakeTask()
+            case FlightMode.TERMINATION:
+                return IdleTask()
+            case FlightMode.HOLD if policy.manual_control_always:
+                return LoiterTask()  # the sticks move the vehicle (ArduPilot)
+        return HoldTask()
+
+    def hold(self) -> FlightTask:
+        """Brake and stay here."""
+        return HoldTask()
+
+    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
+        """Climb straight up."""
+        return TakeoffTask(height_m, yaw_rad=yaw_rad)
+
+    def hold_after_takeoff(self, task: FlightTask | None) -> FlightTask:
+        """Hold the place where the climb was to end."""
+        return HoldTask(task.place_ned_m) if isinstance(task, TakeoffTask) else HoldTask()
+
+    def reposition(self, place: Place) -> FlightTask:
+        """Fly to a place and hold it."""
+        return RepositionTask(place.ned_m, yaw_rad=place.yaw_rad, speed_m_s=place.speed_m_s)
+
+    def guide_to(self, context: FlightContext, place: Place) -> None:
+        """Give the guided task a place to fly to."""
+        self._target[:] = place.ned_m
+        self.guided.set_position(context, place.ned_m, yaw_rad=place.yaw_rad, speed_m_s=place.speed_m_s)
+
+    def orbit(self, circle: Circle) -> FlightTask:
+        """Circle around a place."""
+        speed = circle.speed_m_s
+        if not circle.clockwise:
+            parameters: Any = self._context.parameters
+            speed = -(parameters.orbit_speed_m_s if speed is None else speed)
+        known = circle.yaw_behaviour in _YAW_BEHAVIOURS
+        yaw = OrbitYaw(circle.yaw_behaviour) if known else OrbitYaw.FRONT_TO_CENTRE
+        return OrbitTask(circle.centre_ned_m, circle.radius_m, speed, yaw_behaviour=yaw)
+
+    def turn(self, context: FlightContext, active: FlightTask | None, yaw_rad: float) -> FlightTask | None:
+        """Point the nose somewhere, holding the place or going on with a streamed motion."""
+        guided = self.guided
+        kind = guided.kind if active is guided else GuidedKind.HOLD
+        if kind in (GuidedKind.VELOCITY, GuidedKind.ACCELERATION, GuidedKind.TRAJECTORY):
+            guided.set_yaw(yaw_rad)
+            return None
+        place = self._target.copy() if kind is GuidedKind.POSITION else np.full(3, math.nan)
+        return RepositionTask(place, yaw_rad=yaw_rad)
+
+    def ends_on_ground(self, task: FlightTask | None) -> bool:
+        """Landings, returns and missions end on the ground."""
+        return isinstance(task, LandTask | ReturnTask | MissionTask)
+
+    def wants_up(self, context: FlightContext) -> bool:
+        """Whatever turns the motors faster than idle lifts."""
+        return bool(context.setpoint[sp.LEVEL] > sp.IDLE) or context.phase is FlightPhase.TAKEOFF
+
+    def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
+        """The circle of an `OrbitTask`, once on it."""
+        if not isinstance(task, OrbitTask) or not task.circling:
+            return None
+        north_m, east_m, down_m = (float(value) for value in task.centre_ned_m)
+        return CircleFlown(math.copysign(task.radius_m, task.velocity_m_s), north_m, east_m, down_m)
+
+    def speed_kind(self, kind: int) -> SpeedKind:
+        """Climb, descent, and everything else the ground speed."""
+        return SpeedKind(kind) if kind in (SpeedKind.CLIMB, SpeedKind.DESCENT) else SpeedKind.GROUND_SPEED
+
+    def with_speeds(self, parameters: FlightParameters, speeds_m_s: Mapping[SpeedKind, float]) -> Any:
+        """Cruise, return, climb and descend speeds; air and ground speed are one."""
+        changes: dict[str, Any] = {}
+        if SpeedKind.GROUND_SPEED in speeds_m_s:
+            cruise = min(speeds_m_s[SpeedKind.GROUND_SPEED], parameters.max_speed_m_s)
+            changes = {"cruise_speed_m_s": cruise, "return_speed_m_s": cruise}
+        if SpeedKind.CLIMB in speeds_m_s:
+            changes["climb_speed_m_s"] = speeds_m_s[SpeedKind.CLIMB]
+        if SpeedKind.DESCENT in speeds_m_s:
+            changes["descend_speed_m_s"] = speeds_m_s[SpeedKind.DESCENT]
+        return replace(parameters, **changes) if changes else parameters
