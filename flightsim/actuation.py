@@ -5,10 +5,13 @@ from typing import Any, Final
 import jsbsim
 
 from flightsim.airframe import ActuatorChannel, Airframe, AirframeError, AirframeKind, Role
+from flightsim.interface import BRAKE, THROTTLE
 from flightsim.jsbsim_model import find_property
 
 _GROUND_ROLES: Final = (Role.FLAPS, Role.STEERING, Role.BRAKE)
 """Roles that need not be written every step."""
+
+_MOVING_THROTTLE: Final = 0.05
 
 # (setter, index of the command, scale, offset, minimum, maximum)
 _Entry = tuple[Any, int, float, float, float, float]
@@ -19,6 +22,7 @@ class FixedWingActuators:
 
     Attributes:
         roles: those the vehicle has.
+        parked: chocks are before the wheels, until throttle is given or it is launched: brakes are full on.
     """
 
     __slots__ = (
@@ -30,6 +34,7 @@ class FixedWingActuators:
         "_nodes",
         "_slow",
         "_stuck",
+        "parked",
         "roles",
     )
 
@@ -64,6 +69,7 @@ class FixedWingActuators:
                 self._nodes[channel.role] = nodes
                 self._effectiveness[channel.role] = 1.0
         self.roles = tuple(self._channels)
+        self.parked = False
         self._arrange()
 
     def write(self, commands: list[float]) -> None:
@@ -73,7 +79,10 @@ class FixedWingActuators:
             set_value(low if value < low else high if value > high else value)
 
     def write_slow(self, commands: list[float]) -> None:
-        """Write flaps, steering and brake."""
+        """Write flaps, steering and brake; may change `commands`."""
+        if self.parked:
+            self.parked = commands[THROTTLE] <= _MOVING_THROTTLE
+            commands[BRAKE] = 1.0
         for set_value, index, scale, offset, low, high in self._slow:
             value = commands[index] * scale + offset
             set_value(low if value < low else high if value > high else value)
@@ -143,6 +152,6 @@ class FixedWingActuators:
             entries = slow if role in _GROUND_ROLES else fast
             for node in self._nodes[role]:
                 entries.append(
-                    (node.set_double_value, role.index, scale, offset, channel.minimum, channel.maximum)
+                    (node.set_double_value, role.command, scale, offset, channel.minimum, channel.maximum)
                 )
         self._fast, self._slow = tuple(fast), tuple(slow)

@@ -2,6 +2,7 @@
 
 import math
 import tomllib
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -9,6 +10,7 @@ import jsbsim
 
 from flightsim import truth as t
 from flightsim.airframe_types import (
+    DEFAULT_LAUNCHES,
     ActuatorChannel,
     Airframe,
     AirframeError,
@@ -94,9 +96,9 @@ def load_airframe(model: str | Path) -> Airframe:
         path = path / _DESCRIPTION
     if not path.is_file():
         raise AirframeError(
-            f"vehicle model '{model}' is unknown; accepted are {', '.join(known_models())}, the path of a "
-            f"folder with a {_DESCRIPTION} or of a description (.toml) or JSBSim aircraft (.xml), and aircraft "
-            f"of the jsbsim package ({', '.join(package_aircraft())}); {_HOW_TO}"
+            f"vehicle model '{model}' is unknown; accepted are {_list(known_models())}, the path of a folder "
+            f"with a {_DESCRIPTION}, of a description (.toml) or of a JSBSim aircraft (.xml), and aircraft "
+            f"of the jsbsim package ({_list(package_aircraft())}); {_HOW_TO}"
         )
     return _bare(path) if path.suffix == ".xml" else _read(path)
 
@@ -126,7 +128,9 @@ def _read(path: Path) -> Airframe:
             data = tomllib.load(file)
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise AirframeError(f"cannot read the vehicle description {path}: {error}") from None
-    _only(data, _TABLES, "tables", path)
+    if unknown := [name for name in data if name not in _TABLES]:
+        accepted = ", ".join(f"[{name}]" for name in _TABLES)
+        raise AirframeError(f"{path}: '{unknown[0]}' is unknown; tables are {accepted}")
     vehicle = _table(data, "vehicle", path)
     _only(vehicle, _VEHICLE_KEYS, "keys of [vehicle]", path)
     kind_name = _text(vehicle, "kind", path)
@@ -161,6 +165,7 @@ def _read(path: Path) -> Airframe:
             constants=constants,
         )
     known = {index for index, _ in (*truth, *constants)}
+    kind_of_launch, launches = _launch(data.get("launch", {}), path)
     own_start = _table(data, "start", path) if "start" in data else None
     return Airframe(
         **common,
@@ -169,7 +174,8 @@ def _read(path: Path) -> Airframe:
         start=_READY if own_start is None else _start(own_start, path),
         start_optional=own_start is None,
         limits=_limits(data.get("limits", {}), path),
-        launch=_launch(data.get("launch", {}), path),
+        launch_kind=kind_of_launch,
+        launches=launches,
     )
 
 
@@ -181,8 +187,8 @@ def _jsbsim_file(name: str, path: Path) -> Path:
     if packaged.is_file():
         return packaged
     raise AirframeError(
-        f"{path} names the JSBSim model {beside}, which does not exist; nor has the jsbsim package an aircraft "
-        f"'{name}' (it has {', '.join(package_aircraft())})"
+        f"{path} names the JSBSim model {beside}, which does not exist; nor has the jsbsim package an "
+        f"aircraft '{name}' (it has {', '.join(package_aircraft())})"
     )
 
 
@@ -255,30 +261,34 @@ def _limits(table: Any, path: Path) -> FlightLimits:
     return FlightLimits(**_converted(table, "limits", FlightLimits, path))
 
 
-def _launch(table: Any, path: Path) -> LaunchParameters:
-    values = _converted(table, "launch", LaunchParameters, path)
-    return LaunchParameters(**values)
+def _launch(table: Any, path: Path) -> tuple[LaunchKind, tuple[LaunchParameters, ...]]:
+    """The usual kind, and how catapult and hand do it: [launch] kind, [launch.catapult], [launch.hand]."""
+    if not isinstance(table, dict):
+        raise AirframeError(f"{path}: [launch] is {table!r}; expected is a table")
+    _only(table, ("kind", *(launch.kind for launch in DEFAULT_LAUNCHES)), "keys of [launch]", path)
+    text = _text(table, "kind", path) if "kind" in table else LaunchKind.RUNWAY.value
+    if text not in tuple(LaunchKind):
+        raise AirframeError(f"{path}: launch kind '{text}' is unknown; accepted are {_list(LaunchKind)}")
+    launches = tuple(
+        replace(
+            launch,
+            **_converted(table.get(launch.kind, {}), f"launch.{launch.kind}", LaunchParameters, path, "kind"),
+        )
+        for launch in DEFAULT_LAUNCHES
+    )
+    return LaunchKind(text), launches
 
 
-def _converted(table: Any, name: str, target: type, path: Path) -> dict[str, Any]:
+def _converted(table: Any, name: str, target: Any, path: Path, *left_out: str) -> dict[str, Any]:
     """Fields of a dataclass from a TOML table; degrees become radians."""
     if not isinstance(table, dict):
         raise AirframeError(f"{path}: [{name}] is {table!r}; expected is a table")
-    fields = tuple(target.__dataclass_fields__)
-    accepted = tuple(key.removesuffix("_rad") + "_deg" if key.endswith("_rad") else key for key in fields)
+    names = tuple(field.name for field in fields(target) if field.name not in left_out)
+    accepted = tuple(key.removesuffix("_rad") + "_deg" if key.endswith("_rad") else key for key in names)
     _only(table, accepted, f"keys of [{name}]", path)
     values: dict[str, Any] = {}
-    for key, fieldname in zip(accepted, fields, strict=True):
-        if key not in table:
-            continue
-        if fieldname == "kind":
-            text = _text(table, key, path)
-            if text not in tuple(LaunchKind):
-                raise AirframeError(
-                    f"{path}: launch kind '{text}' is unknown; accepted are {_list(LaunchKind)}"
-                )
-            values[fieldname] = LaunchKind(text)
-        else:
+    for key, fieldname in zip(accepted, names, strict=True):
+        if key in table:
             number = _number(table, key, path)
             values[fieldname] = math.radians(number) if key != fieldname else number
     return values
@@ -315,8 +325,8 @@ def _truth(
                 entry = entry.get("property")
             if not isinstance(entry, str):
                 raise AirframeError(
-                    f"{path}: {key} is {value!r}; expected is a JSBSim property name, {{property, scale}} or a "
-                    "number"
+                    f"{path}: {key} is {value!r}; expected is a JSBSim property name, {{property, scale}} or "
+                    "a number"
                 )
             found.append((index, entry))
             scales.append(scale)

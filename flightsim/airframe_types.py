@@ -1,9 +1,11 @@
 """What a vehicle's description says, checked and typed. `flightsim.airframe` reads it from files."""
 
+import itertools
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import Final
 
 from flightsim.interface import (
     AILERON,
@@ -51,12 +53,12 @@ class Role(StrEnum):
     BRAKE = "brake"
 
     @property
-    def index(self) -> int:
+    def command(self) -> int:
         """Place in the actuator vector (`flightsim.interface`)."""
-        return _ROLE_INDEX[self]
+        return _COMMANDS[self]
 
 
-_ROLE_INDEX = {
+_COMMANDS: Final = {
     Role.AILERON: AILERON,
     Role.ELEVATOR: ELEVATOR,
     Role.THROTTLE: THROTTLE,
@@ -126,7 +128,7 @@ class FlightLimits:
         for name, value in speeds:
             if not 1.0 <= value <= 300.0:
                 raise AirframeError(f"{name} {value} is not in 1..300 m/s")
-        for (low, slower), (high, faster) in zip(speeds, speeds[1:], strict=False):
+        for (low, slower), (high, faster) in itertools.pairwise(speeds):
             if not slower < faster:
                 raise AirframeError(f"{high} {faster} must be higher than {low} {slower}")
         for name, low_deg, high_deg in (("bank_max", 5, 80), ("pitch_min", -60, -1), ("pitch_max", 1, 80)):
@@ -142,22 +144,21 @@ class LaunchParameters:
     """How the launch crew brings the vehicle into the air.
 
     Attributes:
-        kind: runway (it stands on its wheels and takes off by itself), catapult or winch (a straight rail),
-            hand.
+        kind: catapult (a straight rail; a long one is a winch) or hand; with runway, where the vehicle takes
+            off by itself, the rest means nothing.
         pitch_rad: of the rail or the throw, and of the vehicle on it.
         acceleration_m_s2: along the rail.
         speed_m_s: over ground at which the vehicle is let go, or at which it goes on until `length_m`.
         length_m: shortest way along the rail; 0: let go as soon as the speed is reached.
-        height_m: of the centre of gravity over the ground before the launch; None: that of the vehicle
-            standing, or 1.6 m for a hand launch.
+        height_m: of the centre of gravity over the ground before the launch.
     """
 
-    kind: LaunchKind = LaunchKind.RUNWAY
-    pitch_rad: float = math.radians(12.0)
-    acceleration_m_s2: float = 40.0
-    speed_m_s: float = 18.0
+    kind: LaunchKind
+    pitch_rad: float
+    acceleration_m_s2: float
+    speed_m_s: float
     length_m: float = 0.0
-    height_m: float | None = None
+    height_m: float = 1.6
 
     def __post_init__(self) -> None:
         accepted = (
@@ -165,11 +166,21 @@ class LaunchParameters:
             ("acceleration_m_s2", self.acceleration_m_s2, 0.5, 500.0),
             ("speed_m_s", self.speed_m_s, 1.0, 200.0),
             ("length_m", self.length_m, 0.0, 2000.0),
-            ("height_m", 1.0 if self.height_m is None else self.height_m, 0.0, 1000.0),
+            ("height_m", self.height_m, 0.0, 1000.0),
         )
         for name, value, low, high in accepted:
             if not low <= round(value, 9) <= high:
                 raise AirframeError(f"launch {name} {value:.6g} is not in {low:g}..{high:g}")
+
+
+DEFAULT_LAUNCHES: Final = (
+    LaunchParameters(
+        kind=LaunchKind.CATAPULT, pitch_rad=math.radians(12.0), acceleration_m_s2=50.0, speed_m_s=20.0
+    ),
+    LaunchParameters(
+        kind=LaunchKind.HAND, pitch_rad=math.radians(10.0), acceleration_m_s2=30.0, speed_m_s=10.0
+    ),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,7 +202,8 @@ class Airframe:
         start: (property, value) set once after the initial conditions: engine running, gear down.
         start_optional: whether properties of `start` that the model has not are left out.
         limits: for the autopilot.
-        launch: unless told otherwise.
+        launch_kind: how it is launched unless told otherwise.
+        launches: how a catapult or a hand does it.
     """
 
     name: str
@@ -208,7 +220,8 @@ class Airframe:
     start: tuple[tuple[str, float], ...] = ()
     start_optional: bool = False
     limits: FlightLimits = field(default_factory=FlightLimits)
-    launch: LaunchParameters = field(default_factory=LaunchParameters)
+    launch_kind: LaunchKind = LaunchKind.RUNWAY
+    launches: tuple[LaunchParameters, ...] = DEFAULT_LAUNCHES
 
     def __post_init__(self) -> None:
         fixed_wing = self.kind is AirframeKind.FIXED_WING
@@ -237,8 +250,19 @@ class Airframe:
     def actuator_count(self) -> int:
         """How many places of the actuator vector it uses."""
         if self.kind is AirframeKind.FIXED_WING:
-            return 1 + max((channel.role.index for channel in self.channels), default=-1)
+            return 1 + max((channel.role.command for channel in self.channels), default=-1)
         return len(self.actuators)
+
+    def launch(self, kind: LaunchKind) -> LaunchParameters:
+        """How a catapult or a hand launches it.
+
+        Raises:
+            AirframeError: a runway has no parameters.
+        """
+        for launch in self.launches:
+            if launch.kind is kind:
+                return launch
+        raise AirframeError(f"vehicle '{self.name}' has no launch '{kind}'; accepted are catapult and hand")
 
     def channel(self, role: Role) -> ActuatorChannel | None:
         """The actuator with a role, if there is one."""

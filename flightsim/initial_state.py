@@ -1,17 +1,20 @@
 """How a vehicle starts, and putting a JSBSim instance into that state."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
+from xml.etree import ElementTree
 
 import jsbsim
 
 from flightsim import truth as t
-from flightsim.airframe import Airframe, AirframeError
+from flightsim.airframe import Airframe, AirframeError, LaunchKind, LaunchParameters
 from flightsim.environment import Environment
 from flightsim.home import Home
 
 _FT: Final = 0.3048
+_INCH: Final = 0.0254
+_UNITS_M: Final = {"IN": _INCH, "FT": _FT, "M": 1.0}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +30,9 @@ class InitialState:
         rates_frd_rad_s: body rates against the Earth (only in the air).
         rotor_rad_s: speed of every rotor.
         battery_remaining: charge left, 0..1.
+        actuators: commands that the actuators have followed already (only in the air); None: at rest.
+        launch: how a fixed-wing vehicle gets into the air: "runway", "catapult" or "hand"; None is what its
+            description says. With the last two it is held on the launcher until `Vehicle.launch()`.
     """
 
     height_m: float | None = None
@@ -38,12 +44,25 @@ class InitialState:
     rates_frd_rad_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
     rotor_rad_s: float | tuple[float, ...] = 0.0
     battery_remaining: float = 1.0
+    actuators: tuple[float, ...] | None = None
+    launch: LaunchKind | str | None = None
 
     def __post_init__(self) -> None:
         if self.height_m is not None and not 0.0 <= self.height_m <= 10_000.0:
             raise ValueError(f"initial height {self.height_m} m is not in 0..10000 m")
         if not 0.0 <= self.battery_remaining <= 1.0:
             raise ValueError(f"battery remaining {self.battery_remaining} is not in 0..1")
+        if self.launch is not None and self.launch not in tuple(LaunchKind):
+            raise ValueError(
+                f"launch '{self.launch}' is unknown; accepted are "
+                f"{', '.join(kind.value for kind in LaunchKind)}"
+            )
+        if self.height_m is None and self.actuators is not None:
+            raise ValueError("actuators of a vehicle standing on the ground are at rest; give height_m")
+        if self.height_m is not None and self.launch not in (None, LaunchKind.RUNWAY):
+            raise ValueError(
+                f"a vehicle that starts in the air (height_m) cannot be launched by {self.launch}"
+            )
         moving = (
             any(self.vel_ned_m_s)
             or any(self.rates_frd_rad_s)
@@ -57,10 +76,25 @@ class InitialState:
 
 
 def initialise(
-    fdm: jsbsim.FGFDMExec, airframe: Airframe, home: Home, environment: Environment, start: InitialState
+    fdm: jsbsim.FGFDMExec,
+    airframe: Airframe,
+    home: Home,
+    environment: Environment,
+    start: InitialState,
+    launch: LaunchParameters | None = None,
 ) -> None:
-    """Put a freshly loaded JSBSim instance into its initial state, with its air and its charge."""
-    height_m = standing_height_m(airframe) if start.height_m is None else start.height_m
+    """Put a freshly loaded JSBSim instance into its initial state, with its air and its charge.
+
+    Args:
+        fdm, airframe: the model.
+        home: origin of the world.
+        environment: the air.
+        start: how it starts.
+        launch: it starts on this launcher.
+    """
+    if launch is not None:
+        start = replace(start, height_m=launch.height_m, pitch_rad=launch.pitch_rad, launch=None)
+    height_m = standing_height_m(fdm, airframe) if start.height_m is None else start.height_m
     lat_deg, lon_deg = home.offset(*start.offset_ne_m)
     yaw_rad = math.radians(home.heading_deg) if start.yaw_rad is None else start.yaw_rad
     values = (  # the order matters: JSBSim derives each from those before
@@ -103,11 +137,23 @@ def initialise(
     set_battery(fdm, airframe, start.battery_remaining)
 
 
-def standing_height_m(airframe: Airframe) -> float:
-    """Height of the centre of gravity over the ground from which a vehicle comes to stand."""
+def standing_height_m(fdm: jsbsim.FGFDMExec, airframe: Airframe) -> float:
+    """Height of the centre of gravity over the ground from which a level vehicle comes to stand.
+
+    Where the description does not say: that at which its lowest contact point touches the ground.
+    """
     if airframe.cg_height_at_rest_m is not None:
         return airframe.cg_height_at_rest_m
-    return 0.0
+    fdm.run_ic()  # the centre of gravity is known after that, fuel included
+    cg_m = fdm.get_property_value("inertia/cg-z-in") * _INCH
+    lowest_m = cg_m
+    for contact in ElementTree.parse(airframe.xml_path).iterfind("ground_reactions/contact"):
+        location = contact.find("location")
+        text = None if location is None else location.findtext("z")
+        if location is not None and text is not None:
+            unit_m = _UNITS_M.get(location.get("unit", "IN"), _INCH)
+            lowest_m = min(lowest_m, float(text) * unit_m)
+    return cg_m - lowest_m
 
 
 def set_battery(fdm: jsbsim.FGFDMExec, airframe: Airframe, remaining: float) -> None:

@@ -1,7 +1,11 @@
 """JSBSim behind a quiet, typed edge: load a model, find its properties. Its messages go to `logging`."""
 
 import logging
+import shutil
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Final
+from xml.etree import ElementTree
 
 import jsbsim
 
@@ -9,6 +13,10 @@ from flightsim.airframe import Airframe, AirframeError
 
 _LOG: Final = logging.getLogger("flightsim.jsbsim")
 _LOG.addHandler(logging.NullHandler())
+
+LAUNCHER_FORCE: Final = "launcher"
+LAUNCHER_MOMENT: Final = "launcher-moment"
+"""Names among a model's external reactions; the force in pounds, the moment in foot-pounds, body axes."""
 
 _EULER: Final = 1.0
 _ADAMS_BASHFORTH_2: Final = 3.0
@@ -57,10 +65,17 @@ class _Messages(jsbsim.FGLogger):
             _LOG.debug("%s", text)
 
 
-def load_fdm(airframe: Airframe, physics_rate_hz: int) -> tuple[jsbsim.FGFDMExec, tuple[str, ...]]:
+def load_fdm(
+    airframe: Airframe, physics_rate_hz: int, *, launcher: bool = False
+) -> tuple[jsbsim.FGFDMExec, tuple[str, ...]]:
     """A new, independent JSBSim instance with the model loaded. Prints nothing.
 
     JSBSim keeps its logger per thread; this leaves ours installed in the calling thread.
+
+    Args:
+        airframe: which model. Its engines and systems may lie in its folder or in the `jsbsim` package.
+        physics_rate_hz: steps per second.
+        launcher: add a force and a moment for a `Launcher` to a copy of the model.
 
     Returns:
         The instance, and the warnings JSBSim had about the model (none for a clean one).
@@ -68,11 +83,22 @@ def load_fdm(airframe: Airframe, physics_rate_hz: int) -> tuple[jsbsim.FGFDMExec
     Raises:
         AirframeError: JSBSim refuses the model; the message carries its reasons.
     """
+    if launcher:
+        with TemporaryDirectory(prefix="flightsim-") as folder:
+            _copy_with_launcher(airframe, Path(folder))
+            return _load(airframe, Path(folder), physics_rate_hz)
+    return _load(airframe, airframe.folder, physics_rate_hz)
+
+
+def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsim.FGFDMExec, tuple[str, ...]]:
     messages = _Messages()
     jsbsim.set_logger(messages)
-    fdm = jsbsim.FGFDMExec(str(airframe.folder))
+    fdm = jsbsim.FGFDMExec(str(folder))
     fdm.set_debug_level(0)
     fdm.set_aircraft_path(".")
+    package = Path(jsbsim.get_default_root_dir())
+    fdm.set_engine_path(str(package / "engine"))
+    fdm.set_systems_path(str(package / "systems"))
     fdm.set_dt(1.0 / physics_rate_hz)  # filters and actuators take it when they are made
     try:
         loaded = fdm.load_model(airframe.jsbsim, False)
@@ -84,6 +110,31 @@ def load_fdm(airframe: Airframe, physics_rate_hz: int) -> tuple[jsbsim.FGFDMExec
     for name, method in _INTEGRATORS:
         fdm.set_property_value(f"simulation/integrator/{name}", method)
     return fdm, tuple(messages.warnings)
+
+
+def _copy_with_launcher(airframe: Airframe, folder: Path) -> None:
+    """Copy the model's XML files, with an external force and moment added to the aircraft's."""
+
+    def not_xml(directory: str, names: list[str]) -> list[str]:
+        return [name for name in names if not name.endswith(".xml") and not Path(directory, name).is_dir()]
+
+    shutil.copytree(airframe.folder, folder, ignore=not_xml, dirs_exist_ok=True)
+    copy = folder / airframe.xml_path.name
+    try:
+        tree = ElementTree.parse(copy)
+    except (OSError, ElementTree.ParseError) as error:
+        raise AirframeError(_refusal(airframe, [str(error)])) from None
+    root = tree.getroot()
+    reactions = root.find("external_reactions")
+    if reactions is None:
+        reactions = ElementTree.SubElement(root, "external_reactions")
+    for kind, name in (("force", LAUNCHER_FORCE), ("moment", LAUNCHER_MOMENT)):
+        element = ElementTree.SubElement(reactions, kind, {"name": name, "frame": "BODY"})
+        for tag, attributes in (("location", {"unit": "IN"}), ("direction", {})):
+            place = ElementTree.SubElement(element, tag, attributes)
+            for axis in "xyz":
+                ElementTree.SubElement(place, axis).text = "0"
+    tree.write(copy)
 
 
 def find_property(fdm: jsbsim.FGFDMExec, name: str, *, needed_by: str) -> Any:

@@ -9,12 +9,21 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.actuation import FixedWingActuators
-from flightsim.airframe import Airframe, AirframeKind, Role, load_airframe
+from flightsim.airframe import (
+    Airframe,
+    AirframeKind,
+    LaunchKind,
+    LaunchParameters,
+    Role,
+    load_airframe,
+)
 from flightsim.environment import CosineGust, Environment, Turbulence
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
+from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, load_fdm
 from flightsim.kernels import kernel
+from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.rotations import quaternion_from_euler
 from flightsim.turbulence import DrydenTurbulence
@@ -26,6 +35,7 @@ Array = NDArray[np.float64]
 _FT: Final = 0.3048
 _PA_PER_PSF: Final = 47.88025898033584
 _KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
+_FOLLOW_S: Final = 3.0  # in which actuators and engines follow the commands of a start in the air
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
 _SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand on a tail wheel
@@ -63,6 +73,12 @@ _STATE: Final = (
     "aero/qbar-psf",
 )
 _STATE_SIZE: Final = len(_STATE)
+# a-pilot is at the eye point, which our multicopter has at its centre of gravity; other models have not.
+_LOAD_FACTORS: Final = {
+    f"accelerations/a-pilot-{axis}-ft_sec2": f"accelerations/N{axis}" for axis in ("x", "y", "z")
+}
+_ACCEL_SCALE: Final = np.array([_FT, _FT, _FT])
+_LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * 9.80665
 # Motion is read every step; the rest and the model's own properties may be slower.
 _MOTION_SIZE: Final = _STATE.index("atmosphere/P-psf")
 
@@ -79,6 +95,7 @@ class Vehicle:
         airframe: the model's description.
         home: origin of the world.
         environment: the air.
+        launcher: what holds it and launches it; None for a vehicle without.
         physics_rate_hz: steps per second.
         load_warnings: what JSBSim had to say about the model; empty for a clean one.
     """
@@ -107,6 +124,7 @@ class Vehicle:
         "airframe",
         "environment",
         "home",
+        "launcher",
         "load_warnings",
         "physics_rate_hz",
         "truth",
@@ -180,13 +198,15 @@ class Vehicle:
             initial: how to start; by default as at construction.
         """
         start = initial or self._initial
-        fdm, self.load_warnings = load_fdm(self.airframe, self.physics_rate_hz)
+        fixed_wing = self.airframe.kind is AirframeKind.FIXED_WING
+        launch = _launch_parameters(self.airframe, start)
+        fdm, self.load_warnings = load_fdm(self.airframe, self.physics_rate_hz, launcher=launch is not None)
         self._fdm = fdm
         self._run = fdm.run
-        fixed_wing = self.airframe.kind is AirframeKind.FIXED_WING
         self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
         name = self.airframe.name
-        properties = (*_STATE, *(prop for _, prop in self.airframe.truth))
+        state = [_LOAD_FACTORS.get(prop, prop) for prop in _STATE] if fixed_wing else _STATE
+        properties = (*state, *(prop for _, prop in self.airframe.truth))
         getters = tuple(
             (i, find_property(fdm, prop, needed_by="the truth vector").get_double_value)
             for i, prop in enumerate(properties)
@@ -204,15 +224,18 @@ class Vehicle:
             for axis in ("north", "east", "down")
         )
         self._steps = 0
+        self.launcher: Launcher | None = None
         self._turbulence: DrydenTurbulence | None = None
         self._gusts: list[CosineGust] = list(self.environment.gusts)
-        initialise(fdm, self.airframe, self.home, self.environment, start)
+        initialise(fdm, self.airframe, self.home, self.environment, start, launch)
         for index, constant in self.airframe.constants:
             self.truth[index] = constant
+        if start.actuators is not None:
+            self._let_actuators_follow(start)
+        if launch is not None:
+            self.launcher = Launcher(fdm, launch, physics_rate_hz=self.physics_rate_hz)
         if start.height_m is None:
-            settle_s = _SETTLE_FIXED_WING_S if fixed_wing else _SETTLE_S
-            for _ in range(round(settle_s * self.physics_rate_hz)):
-                fdm.run()
+            self._settle(_SETTLE_FIXED_WING_S if fixed_wing else _SETTLE_S)
             set_battery(fdm, self.airframe, start.battery_remaining)
         else:
             fdm.suspend_integration()  # forces of this state, then the specific force out of them
@@ -256,11 +279,19 @@ class Vehicle:
                 surfaces.write_slow(commands)
         if self._gusts:
             self._start_due_gust()
+        if self.launcher is not None:
+            self.launcher.step()
         self._run()
         self._steps += 1
         self._observe()
         if self._steps % self._magnetic_steps == 0:
             self._refresh_magnetic_field()
+
+    def launch(self) -> None:
+        """Let the launch crew launch it; nothing for a vehicle that takes off from a runway or flies."""
+        if self.launcher is not None:
+            self.launcher.launch()
+            self._fixed_wing_actuators().parked = False
 
     def motor_effectiveness(self, index: int) -> float:
         """Effectiveness of an actuator: 1 sound, 0 failed."""
@@ -298,7 +329,7 @@ class Vehicle:
     def _fixed_wing_actuators(self) -> FixedWingActuators:
         if self._surfaces is None:
             raise ValueError(
-                f"vehicle '{self.airframe.name}' is a {self.airframe.kind}; its actuators have numbers, no roles"
+                f"vehicle '{self.airframe.name}' is a {self.airframe.kind}: its actuators have no roles"
             )
         return self._surfaces
 
@@ -310,6 +341,30 @@ class Vehicle:
             )
         return self._motor_effectiveness[index]
 
+    def _settle(self, duration_s: float) -> None:
+        """Let it come to rest where it stands or is held."""
+        if self._surfaces is not None:
+            self._surfaces.parked = self.launcher is None
+            self._surfaces.write([0.0] * MAX_ACTUATORS)
+            self._surfaces.write_slow([0.0] * MAX_ACTUATORS)
+        for _ in range(round(duration_s * self.physics_rate_hz)):
+            if self.launcher is not None:
+                self.launcher.step()
+            self._run()
+
+    def _let_actuators_follow(self, start: InitialState) -> None:
+        """Run the actuators to their commands, then start again with them there."""
+        commands = [*(start.actuators or ()), *([0.0] * MAX_ACTUATORS)][:MAX_ACTUATORS]
+        if self._surfaces is None:
+            for set_actuator, value in zip(self._set_actuators, commands, strict=False):
+                set_actuator(value)
+        else:
+            self._surfaces.write(commands)
+            self._surfaces.write_slow(commands)
+        for _ in range(round(_FOLLOW_S * self.physics_rate_hz)):
+            self._run()
+        initialise(self._fdm, self.airframe, self.home, self.environment, start)
+
     def _observe(self) -> None:
         raw = self._raw_view
         for i, get in self._getters_motion:
@@ -317,11 +372,14 @@ class Vehicle:
         if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
             for i, get in self._getters_slow:
                 raw[i] = get()
-        if not _write_truth(self._raw, self._truth_extra, self._truth_scale, self.truth):
+        accel_scale = _ACCEL_SCALE if self._surfaces is None else _LOAD_FACTOR_SCALE
+        if not _write_truth(self._raw, accel_scale, self._truth_extra, self._truth_scale, self.truth):
             raise VehicleDivergedError(
                 f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
                 f"({self._steps / self.physics_rate_hz:.3f} s): its state is not finite"
             )
+        if self.launcher is not None and not self.launcher.released:
+            self.truth[t.ON_GROUND] = 1.0  # the launcher carries its weight
 
     def _start_due_gust(self) -> None:
         gust = self._gusts[0]
@@ -355,8 +413,22 @@ class Vehicle:
         )
 
 
+def _launch_parameters(airframe: Airframe, start: InitialState) -> LaunchParameters | None:
+    """The launcher on which it starts, if any."""
+    if start.height_m is not None:
+        return None
+    if airframe.kind is not AirframeKind.FIXED_WING:
+        if start.launch is not None:
+            raise ValueError(f"vehicle '{airframe.name}' is a {airframe.kind}; only a fixed wing is launched")
+        return None
+    kind = LaunchKind(start.launch or airframe.launch_kind)
+    return None if kind is LaunchKind.RUNWAY else airframe.launch(kind)
+
+
 @kernel
-def _write_truth(raw: Array, extra: NDArray[np.int64], scale: Array, truth: Array) -> bool:
+def _write_truth(
+    raw: Array, accel_scale: Array, extra: NDArray[np.int64], scale: Array, truth: Array
+) -> bool:
     """Convert JSBSim's values (order of `_STATE`, then the model's own) to truth; False if not finite."""
     truth[0] = raw[0]
     truth[1] = raw[1]
@@ -365,7 +437,7 @@ def _write_truth(raw: Array, extra: NDArray[np.int64], scale: Array, truth: Arra
     quaternion_from_euler(raw[6], raw[7], raw[8], truth[6:10])
     for i in range(3):
         truth[10 + i] = raw[9 + i]
-        truth[13 + i] = raw[12 + i] * _FT
+        truth[13 + i] = raw[12 + i] * accel_scale[i]
         truth[19 + i] = raw[18 + i] * _FT
     truth[16] = raw[15] * _PA_PER_PSF
     truth[17] = raw[16] / 1.8
