@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.air_aiding import AirAiding
 from autopilot_bridge.navigation.alignment import magnetic_heading_rad, tilt_from_accel
 from autopilot_bridge.navigation.earth import pressure_altitude_m
 from autopilot_bridge.navigation.gps_quality import GpsQuality
@@ -51,6 +52,7 @@ _REPORT_RATE_HZ: Final = 10
 _GAP_US: Final = 2_000_000  # silence after which a sensor's refusal is counted from the beginning
 _CONTRADICTION_MEMORY_US: Final = 10_000_000
 _TOO_MANY_CONTRADICTIONS: Final = 4  # within that time of each other: the estimate is worth nothing
+_GROUND_SILENCE_US: Final = 1_000_000  # no GPS for this long: air data take over
 _HELD_VELOCITY_M_S: Final = 2.0  # 1-sigma of the velocity when the position begins to be held in flight
 
 
@@ -58,11 +60,13 @@ class Aiding:
     """Turns readings into updates of a `Solution`.
 
     Attributes:
+        air: airspeed, sideslip and wind; None unless on a fixed wing.
         frame: NED frame at the origin; None before it is set.
         at_rest: the vehicle stands still on the ground.
     """
 
     __slots__ = (
+        "_adrift",
         "_baro_known",
         "_clocks",
         "_contradicted_us",
@@ -74,12 +78,14 @@ class Aiding:
         "_parameters",
         "_quality",
         "_readings",
+        "_rejoining",
         "_report_every",
         "_rested",
         "_slow_every",
         "_solution",
         "_terrain",
         "_tick",
+        "air",
         "at_rest",
         "frame",
     )
@@ -104,6 +110,9 @@ class Aiding:
         if parameters.mag_ned_gauss is not None:
             self._mag_ned = np.array(parameters.mag_ned_gauss)
         self.frame: LocalFrame | None = None
+        self.air: AirAiding | None = None
+        if parameters.fixed_wing:
+            self.air = AirAiding(parameters, readings=readings, solution=solution, health=health)
         self.restart()
 
     def restart(self) -> None:
@@ -115,10 +124,14 @@ class Aiding:
         self._gps_height_known = False
         self._rested = False
         self._held = False
+        self._adrift = False
+        self._rejoining = False
         self._contradictions = 0
         self._contradicted_us = 0
         self._tick = 0
         self.at_rest = False
+        if self.air is not None:
+            self.air.restart()
         obs = self._solution.obs
         obs[:] = 0.0
         self._tune()
@@ -130,6 +143,8 @@ class Aiding:
         self._parameters = parameters
         self._quality.set_parameters(parameters)
         self._terrain.set_parameters(parameters)
+        if self.air is not None:
+            self.air.set_parameters(parameters)
         self._tune()
 
     def _tune(self) -> None:
@@ -192,6 +207,9 @@ class Aiding:
         """Fuse what is pending (bits of `fusion` and `HAS_RANGE`) at `time_us`; returns what was accepted."""
         solution, clocks, health = self._solution, self._clocks, self._health
         slow = self._tick % self._slow_every == 0
+        if self.air is not None:
+            self.air.look(time_us)
+            self.at_rest = self.at_rest and self.air.stands_still(time_us)
         has = self._prepare_slow(time_us) if slow else 0
         gps_row = baro_row = mag_row = 0
         if pending & f.HAS_GPS:
@@ -206,6 +224,7 @@ class Aiding:
             mag_row = self._prepare_mag(time_us)
             if mag_row >= 0:
                 has |= f.HAS_MAG
+        before = solution.core[X_VEL : X_POS + 2].copy() if self._rejoining else None
         accepted = f.update(
             solution.p,
             solution.core,
@@ -229,6 +248,10 @@ class Aiding:
             self._mag_refused(time_us)
         if has & f.HAS_GPS:
             self._gps_fused(time_us, accepted)
+            if before is not None:
+                self._rejoined(solution.core[X_VEL : X_POS + 2] - before)
+        if self.air is not None and slow:
+            accepted |= self._fuse_air(self.air, time_us)
         self._update_terrain(time_us, bool(pending & HAS_RANGE), slow)
         if self._tick % self._report_every == 0:
             report(health, self._parameters, solution, clocks, time_us, held=self._held, at_rest=self.at_rest)
@@ -237,6 +260,8 @@ class Aiding:
             health.rangefinder_in_use = self._terrain.in_use
             health.height_above_ground_test_ratio = self._terrain.test_ratio
             health.position_vertical_agl = self._terrain.valid(time_us)
+            if self.air is not None:
+                self.air.report(time_us)
         self._tick += 1
         return f.UNSOUND if self._contradictions >= _TOO_MANY_CONTRADICTIONS else accepted
 
@@ -264,8 +289,11 @@ class Aiding:
         solution.set_gps_accuracy(float(values[GPS_EPH_M]), float(values[GPS_EPV_M]))
         clocks = self._clocks
         timeout_us = p.gps_timeout_s * 1e6
-        if self._held or clocks.horizontal_aid_us < 0:
+        if self._held or clocks.gps_position_us < 0:
             self._reset_to_gps(row, time_us)
+        elif self.air is not None and time_us - clocks.gps_judged_us > timeout_us:
+            self._rejoining = True  # the covariance has grown with the error: the gate can judge it
+            clocks.gps_position_us = clocks.gps_velocity_us = time_us
         elif time_us - min(clocks.gps_position_us, clocks.gps_velocity_us) > timeout_us:
             self._contradicted(time_us)
             self._reset_to_gps(row, time_us)
@@ -298,6 +326,24 @@ class Aiding:
         health.position_reset_ne_m = (float(step[0]), float(step[1]))
         health.velocity_resets += 1
         health.velocity_reset_ne_m_s = (float(change[0]), float(change[1]))
+
+    def _rejoined(self, jump: Array) -> None:
+        """The first fix after dead reckoning has moved velocity and position (`jump`) by what had built up."""
+        health = self._health
+        self._rejoining = False
+        health.velocity_resets += 1
+        health.velocity_reset_ne_m_s = (float(jump[0]), float(jump[1]))
+        health.position_resets += 1
+        health.position_reset_ne_m = (float(jump[3]), float(jump[4]))
+
+    def _fuse_air(self, air: AirAiding, time_us: int) -> int:
+        """Airspeed and sideslip; without GPS they aid the velocity, and so end holding the position."""
+        clocks = self._clocks
+        soundness = air.update(time_us, at_rest=self.at_rest, gps_us=clocks.gps_us, drifting=self._held)
+        if air.wind_us == time_us and (clocks.gps_us < 0 or time_us - clocks.gps_us > _GROUND_SILENCE_US):
+            clocks.horizontal_aid_us = time_us
+            self._held = self._adrift = False
+        return soundness & f.UNSOUND
 
     def _reset_height_to_gps(self, row: int, time_us: int) -> None:
         solution, obs = self._solution, self._solution.obs
@@ -407,8 +453,14 @@ class Aiding:
         lost = clocks.horizontal_aid_us < 0 or time_us - clocks.horizontal_aid_us > p.no_aid_timeout_s * 1e6
         if lost and not self._held:
             self._hold()
-        sigma = p.at_rest_noise_m if self.at_rest or clocks.gps_us < 0 else p.no_aid_noise_m
-        if self._held:
+        flying = self.air is not None and self.air.flying
+        may_leave = clocks.gps_us >= 0 or self.air is not None  # a launch must not be held back
+        sigma = p.no_aid_noise_m if may_leave and not self.at_rest else p.at_rest_noise_m
+        if self._held and flying:
+            self._adrift = True  # a wing is not where it was
+        elif self._held:
+            if self._adrift:
+                self._hold()
             obs[f.HOLD_VAR] = sigma * sigma
             has |= f.HAS_HOLD
         if time_us - clocks.height_us > p.height_timeout_s * 1e6:
@@ -422,11 +474,14 @@ class Aiding:
         return has
 
     def _hold(self) -> None:
-        """From now on the position is held where it is, and the velocity taken as about zero."""
+        """From now on the position is held where it is, and the velocity taken as about zero; not of a wing
+        in flight, whose attitude that would spoil."""
         solution, core = self._solution, self._solution.core
         solution.obs[f.HOLD : f.HOLD + 2] = core[X_POS : X_POS + 2]
         self._held = True
-        self._forget_velocity()
+        self._adrift = self.air is not None and self.air.flying
+        if not self._adrift:
+            self._forget_velocity()
 
     def _forget_velocity(self) -> None:
         """About zero is the best guess of a horizontal velocity that nothing has measured lately."""

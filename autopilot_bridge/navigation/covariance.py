@@ -5,7 +5,7 @@ The transition over T seconds, with S = integral of r_ned_from_frd, u = integral
     theta' = theta - S gyro_bias
     v'     = v + theta x u - S accel_bias
     p'     = p + v T + (theta x u - S accel_bias) T / 2
-    biases and the GPS error decay as Gauss-Markov processes; the barometer's offset stays.
+    biases and the GPS error decay as Gauss-Markov processes; the barometer's offset and the wind stay.
 
 The magnetometer's bias stands for hard iron and for soft iron, whose effect changes as the vehicle turns, so
 it decays with the angle turned as well as with time. The gyro's scale and cross-axis errors come in as noise
@@ -28,7 +28,6 @@ from autopilot_bridge.navigation.states import (
     CORRECTION_POS,
     CORRECTION_VEL,
     DX,
-    ERROR_SIZE,
     GPS_ERROR,
     GYRO_BIAS,
     MAG_BIAS,
@@ -39,6 +38,7 @@ from autopilot_bridge.navigation.states import (
     SUM_TIME,
     SUM_TURN,
     VEL,
+    WIND,
     X_POS,
     X_VEL,
     Q,
@@ -64,7 +64,8 @@ MAG_BIAS_TAU = 12
 MAG_BIAS_TURN = 13  # rad
 TURN_TILT = 14  # about the horizontal axes: rad^2 per rad turned about them
 TURN_CROSS = 15  # about the horizontal axes: rad^2 per rad turned about the vertical
-PROCESS_SIZE = 16
+WIND_WALK = 16  # m^2/s^3, each way
+PROCESS_SIZE = 17
 
 
 @kernel
@@ -76,7 +77,7 @@ def carry(p: Array, core: Array, t: float, along_rows: bool) -> None:
     s10, s11, s12 = core[s + 3], core[s + 4], core[s + 5]
     s20, s21, s22 = core[s + 6], core[s + 7], core[s + 8]
     half = 0.5 * t
-    for k in range(ERROR_SIZE):
+    for k in range(p.shape[0]):
         line = p[k] if along_rows else p[:, k]
         ax, ay, az = line[ATT], line[ATT + 1], line[ATT + 2]
         gx, gy, gz = line[GYRO_BIAS], line[GYRO_BIAS + 1], line[GYRO_BIAS + 2]
@@ -103,7 +104,7 @@ def _decay(
     """Gauss-Markov decay of three states in mean and covariance; `var_*` are their stationary variances."""
     for i in range(first, first + 3):
         core[i + 1] *= factor
-        for k in range(ERROR_SIZE):
+        for k in range(p.shape[0]):
             p[i, k] *= factor
             p[k, i] *= factor
     q = 1.0 - factor * factor
@@ -114,7 +115,7 @@ def _decay(
 
 @kernel
 def predict(p: Array, core: Array, process: Array) -> None:
-    """Carry `p` (22, 22) over the time summed up in `core`, and clear the sums. Stays exactly symmetric."""
+    """Carry `p` (22, 22), with wind (24, 24), over the time summed up in `core`, and clear the sums. Stays exactly symmetric."""
     t = core[SUM_TIME]
     if t <= 0.0:
         return
@@ -139,7 +140,9 @@ def predict(p: Array, core: Array, process: Array) -> None:
         p[VEL + i, VEL + i] += process[NOISE_VEL] * t
         p[POS + i, POS + i] += process[NOISE_VEL] * t * t * t / 3.0
     p[BARO_OFFSET, BARO_OFFSET] += process[BARO_WALK] * t
-    for i in range(ERROR_SIZE):
+    for i in range(WIND, p.shape[0]):
+        p[i, i] += process[WIND_WALK] * t
+    for i in range(p.shape[0]):
         for j in range(i):
             mean = 0.5 * (p[i, j] + p[j, i])
             p[i, j] = mean
@@ -159,7 +162,7 @@ def apply_scalar(p: Array, work: Array, residual: float, variance: float) -> Non
     Adds to the error estimate in `work[DX]`; P <- P - PH PH^T / S on one triangle, mirrored.
     """
     inverse = 1.0 / variance
-    for i in range(ERROR_SIZE):
+    for i in range(p.shape[0]):
         gain = work[PH + i] * inverse
         work[DX + i] += gain * residual
         for j in range(i + 1):
@@ -179,12 +182,12 @@ def inject(core: Array, work: Array) -> None:
     nz = z + hz * w + hx * y - hy * x
     n = 1.0 / math.sqrt(nw * nw + nx * nx + ny * ny + nz * nz)
     core[Q], core[Q + 1], core[Q + 2], core[Q + 3] = nw * n, nx * n, ny * n, nz * n
-    for i in range(VEL, ERROR_SIZE):
+    for i in range(VEL, PH):
         core[i + 1] += work[DX + i]
     for i in range(3):
         core[CORRECTION_VEL + i] += work[DX + VEL + i]
         core[CORRECTION_POS + i] += work[DX + POS + i]
-    for i in range(ERROR_SIZE):
+    for i in range(PH):
         work[DX + i] = 0.0
 
 
@@ -202,7 +205,7 @@ def shift(core: Array, first: int, dx: float, dy: float, dz: float) -> None:
 @kernel
 def forget(p: Array, index: int, variance: float) -> None:
     """State `index` is unknown again: no correlations, the given variance."""
-    for k in range(ERROR_SIZE):
+    for k in range(p.shape[0]):
         p[index, k] = 0.0
         p[k, index] = 0.0
     p[index, index] = variance
@@ -211,7 +214,7 @@ def forget(p: Array, index: int, variance: float) -> None:
 @kernel
 def is_sound(p: Array, core: Array) -> bool:
     """No NaN, no negative variance, no absurd nominal state (|v| over 1 km/s, |p| over 1000 km)."""
-    for i in range(ERROR_SIZE):
+    for i in range(p.shape[0]):
         if not 0.0 <= p[i, i] < 1e12:
             return False
         if not abs(core[i + 1]) < 1e6:

@@ -1,4 +1,4 @@
-"""The Earth as the filter knows it: gravity, rotation and pressure altitude."""
+"""The Earth as the filter knows it: gravity, rotation, pressure altitude and density."""
 
 import math
 from typing import Final
@@ -8,7 +8,9 @@ STANDARD_GRAVITY_M_S2: Final = 9.80665
 _ISA_PRESSURE_PA: Final = 101325.0
 _ISA_TEMPERATURE_K: Final = 288.15
 _ISA_LAPSE_K_M: Final = 0.0065
-_ISA_EXPONENT: Final = 287.05287 * _ISA_LAPSE_K_M / STANDARD_GRAVITY_M_S2
+_GAS_CONSTANT_J_KG_K: Final = 287.05287
+_ISA_EXPONENT: Final = _GAS_CONSTANT_J_KG_K * _ISA_LAPSE_K_M / STANDARD_GRAVITY_M_S2
+SEA_LEVEL_DENSITY_KG_M3: Final = _ISA_PRESSURE_PA / (_GAS_CONSTANT_J_KG_K * _ISA_TEMPERATURE_K)
 
 
 def normal_gravity_m_s2(lat_deg: float, alt_m: float) -> float:
@@ -35,3 +37,13 @@ def pressure_altitude_m(pressure_pa: float) -> float:
     if not 0.0 < pressure_pa < 2.0e5:
         return math.nan
     return _ISA_TEMPERATURE_K / _ISA_LAPSE_K_M * (1.0 - (pressure_pa / _ISA_PRESSURE_PA) ** _ISA_EXPONENT)
+
+
+def standard_temperature_k(pressure_pa: float) -> float:
+    """Temperature where the standard atmosphere's troposphere has this pressure (ISO 2533)."""
+    return _ISA_TEMPERATURE_K * (pressure_pa / _ISA_PRESSURE_PA) ** _ISA_EXPONENT
+
+
+def air_density_kg_m3(pressure_pa: float, temperature_k: float) -> float:
+    """Density of dry air (ISO 2533, equation of state)."""
+    return pressure_pa / (_GAS_CONSTANT_J_KG_K * temperature_k)

@@ -18,7 +18,13 @@ from autopilot_bridge.navigation.aiding import HAS_RANGE, Aiding
 from autopilot_bridge.navigation.alignment import Alignment
 from autopilot_bridge.navigation.fusion import HAS_BARO, HAS_GPS, HAS_MAG, UNSOUND
 from autopilot_bridge.navigation.health import NavigationHealth
-from autopilot_bridge.navigation.layout import HEIGHT_ABOVE_GROUND_M, NAV_SIZE, WIND_NED_M_S
+from autopilot_bridge.navigation.layout import (
+    AIRSPEED_M_S,
+    AIRSPEED_TRUE_M_S,
+    HEIGHT_ABOVE_GROUND_M,
+    NAV_SIZE,
+    WIND_NED_M_S,
+)
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import GYRO, GYRO_LAST
@@ -28,6 +34,7 @@ FIXED_IN_FLIGHT: Final = (
     "covariance_rate_hz",
     "history_s",
     "alignment_time_s",
+    "fixed_wing",
     "gps_check_time_s",
     "mag_ned_gauss",
     "magnetic_year",
@@ -110,7 +117,8 @@ class NavigationFilter:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Read-only view (22, 22) of the error state's covariance (`navigation/states.py`)."""
+        """Read-only view of the error state's covariance (`navigation/states.py`): (22, 22), with wind (24,
+        24)."""
         view = self._solution.p.view()
         view.flags.writeable = False
         return view
@@ -157,6 +165,7 @@ class NavigationFilter:
         self.state[0] = 1.0
         self.state[HEIGHT_ABOVE_GROUND_M] = math.nan
         self.state[WIND_NED_M_S] = math.nan
+        self.state[AIRSPEED_M_S] = self.state[AIRSPEED_TRUE_M_S] = math.nan
 
     def step(self, time_us: int) -> None:
         """One physics step at vehicle time `time_us`: take fresh readings, write `state`."""
@@ -200,6 +209,8 @@ class NavigationFilter:
             if self._aiding.update(time_us, pending) & UNSOUND:
                 self.health.filter_resets += 1
                 self.reset()
+            elif self._aiding.air is not None:
+                self._aiding.air.write(self.state, self._divisor * self._dt_s)
 
     def _align(self, time_us: int) -> None:
         alignment = self._alignment

@@ -22,7 +22,6 @@ from autopilot_bridge.navigation.states import (
     CORRECTION_VEL,
     DX,
     EARTH_RATE,
-    ERROR_SIZE,
     GPS_ERROR,
     GRAVITY,
     GYRO_BIAS,
@@ -95,7 +94,7 @@ UNSOUND: Final = 32
 @kernel
 def single_ph(p: Array, work: Array, index: int) -> None:
     """PH of a measurement of state `index` itself."""
-    for i in range(ERROR_SIZE):
+    for i in range(p.shape[0]):
         work[PH + i] = p[i, index]
 
 
@@ -109,7 +108,7 @@ def position_dot(work: Array, base: int, axis: int, delay: float) -> float:
 def position_ph(p: Array, work: Array, axis: int, delay: float) -> float:
     """PH of a GPS position axis; returns H P H^T."""
     a, b, c = POS + axis, VEL + axis, GPS_ERROR + axis
-    for i in range(ERROR_SIZE):
+    for i in range(p.shape[0]):
         work[PH + i] = p[i, a] - delay * p[i, b] + p[i, c]
     return position_dot(work, PH, axis, delay)
 
@@ -135,7 +134,7 @@ def velocity_ph(
 ) -> float:
     """PH of a GPS velocity axis; returns H P H^T."""
     a, n, m = VEL + axis, ATT + (axis + 2) % 3, ATT + (axis + 1) % 3
-    for i in range(ERROR_SIZE):
+    for i in range(p.shape[0]):
         work[PH + i] = (
             p[i, a]
             + u_next * p[i, n]
@@ -156,7 +155,7 @@ def baro_dot(work: Array, base: int, delay: float) -> float:
 @kernel
 def baro_ph(p: Array, work: Array, delay: float) -> float:
     """PH of the pressure altitude; returns H P H^T."""
-    for i in range(ERROR_SIZE):
+    for i in range(p.shape[0]):
         work[PH + i] = -p[i, POS + 2] + delay * p[i, VEL + 2] + p[i, BARO_OFFSET]
     return baro_dot(work, PH, delay)
 
@@ -175,7 +174,7 @@ def mag_dot(work: Array, base: int, axis: int, h0: float, h1: float, h2: float) 
 @kernel
 def mag_ph(p: Array, work: Array, axis: int, h0: float, h1: float, h2: float) -> float:
     """PH of a magnetometer axis; returns H P H^T."""
-    for i in range(ERROR_SIZE):
+    for i in range(p.shape[0]):
         work[PH + i] = h0 * p[i, ATT] + h1 * p[i, ATT + 1] + h2 * p[i, ATT + 2] + p[i, MAG_BIAS + axis]
     return mag_dot(work, PH, axis, h0, h1, h2)
 

@@ -190,7 +190,7 @@ class NavigationParameters:
     wind_walk_m_s_sqrt_s: float = 0.02
     wind_height_scale: float = 0.5
     wind_prior_m_s: float = 5.0
-    turbulence_length_m: float = 200.0
+    turbulence_length_m: float = 250.0
     airspeed_checks: bool = True
     airspeed_check_innovation_m_s: float = 5.0
     airspeed_check_integral_m: float = 10.0

@@ -78,7 +78,8 @@ def report(
     health.attitude = bool(imu_alive and tilt_var < _MAX_TILT_SIGMA_RAD**2)
     health.constant_position = held
     health.position_horizontal_relative = aided and bool(imu_alive)
-    health.position_horizontal_absolute = health.position_horizontal_relative
+    on_earth = clocks.gps_position_us >= 0
+    health.position_horizontal_absolute = health.position_horizontal_relative and on_earth
     # at rest the velocity is good as soon as the zero-velocity updates have brought it there
     speed = math.hypot(solution.core[X_VEL], solution.core[X_VEL + 1])
     still = at_rest and max(speed, health.velocity_accuracy_m_s) < _STILL_M_S

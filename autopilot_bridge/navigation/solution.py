@@ -21,6 +21,7 @@ from autopilot_bridge.navigation.states import (
     CORRECTION_VEL,
     EARTH_RATE,
     ERROR_SIZE,
+    ERROR_SIZE_WITH_WIND,
     FORCE_NED,
     GPS_ERROR,
     GRAVITY,
@@ -33,6 +34,7 @@ from autopilot_bridge.navigation.states import (
     POS,
     TERRAIN_DOWN,
     VEL,
+    WIND,
     WORK_SIZE,
     X_BARO_OFFSET,
     X_GPS_ERROR,
@@ -83,7 +85,8 @@ class Solution:
             + physics_rate_hz // parameters.covariance_rate_hz
         )
         self.core: Array = np.zeros(CORE_SIZE)
-        self.p: Array = np.zeros((ERROR_SIZE, ERROR_SIZE))
+        size = ERROR_SIZE_WITH_WIND if parameters.fixed_wing else ERROR_SIZE
+        self.p: Array = np.zeros((size, size))
         self.history: Array = np.zeros((self.rows, HISTORY_COLUMNS))
         self.work: Array = np.zeros(WORK_SIZE)
         self.obs: Array = np.zeros(OBS_SIZE)
@@ -161,6 +164,8 @@ class Solution:
             cov.forget(self.p, GPS_ERROR + i, self.gps_error_var[i])
             cov.forget(self.p, POS + i, p.at_rest_noise_m**2 if i < 2 else 0.1**2)
         cov.forget(self.p, BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
+        for i in range(WIND, len(self.p)):
+            cov.forget(self.p, i, p.wind_prior_m_s**2)
         self.widen_attitude(yaw_sigma_rad)
 
     def widen_attitude(self, yaw_sigma_rad: float) -> None:
@@ -264,4 +269,5 @@ def process_from(p: NavigationParameters) -> Array:
     out[cov.MAG_BIAS_VAR] = p.magnetometer_bias_gauss**2
     out[cov.MAG_BIAS_TAU] = p.magnetometer_bias_tau_s
     out[cov.MAG_BIAS_TURN] = p.magnetometer_bias_turn_rad
+    out[cov.WIND_WALK] = p.wind_walk_m_s_sqrt_s**2
     return out

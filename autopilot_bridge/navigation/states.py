@@ -6,9 +6,10 @@ another aiding source only appends rows. Errors are true minus estimated; `R_tru
 R_estimated`.
 
 Error state, 22 entries: attitude, velocity, position, gyro bias, accelerometer bias, GPS position error
-(Gauss-Markov), barometer offset, magnetometer bias. The nominal state (first part of the `core` array) has
-the same order with a quaternion for the attitude, so entry `i >= 3` of the error belongs to entry `i + 1` of
-`core`.
+(Gauss-Markov), barometer offset, magnetometer bias. A fixed wing has two more, the wind; kernels take the
+size of the error state from the covariance they are given. The nominal state (first part of the `core` array)
+has the same order with a quaternion for the attitude, so entry `i >= 3` of the error belongs to entry `i + 1`
+of `core`.
 """
 
 from typing import Final
@@ -22,7 +23,9 @@ ACCEL_BIAS: Final = 12  # FRD, m/s^2
 GPS_ERROR: Final = 15  # slowly varying part of the GPS position error, NED, m
 BARO_OFFSET: Final = 18  # pressure altitude minus height over the origin, m
 MAG_BIAS: Final = 19  # residual hard iron, FRD, gauss
-ERROR_SIZE: Final = 22  # wind states (fixed wing) are appended here
+ERROR_SIZE: Final = 22
+WIND: Final = ERROR_SIZE  # north and east, m/s; of a fixed wing only
+ERROR_SIZE_WITH_WIND: Final = WIND + 2
 
 # core: nominal state
 Q: Final = 0  # q_ned_from_frd
@@ -33,7 +36,8 @@ X_ACCEL_BIAS: Final = ACCEL_BIAS + 1
 X_GPS_ERROR: Final = GPS_ERROR + 1
 X_BARO_OFFSET: Final = BARO_OFFSET + 1
 X_MAG_BIAS: Final = MAG_BIAS + 1
-NOMINAL_SIZE: Final = ERROR_SIZE + 1
+X_WIND: Final = WIND + 1  # stays zero without wind states
+NOMINAL_SIZE: Final = ERROR_SIZE_WITH_WIND + 1
 
 # core: mechanisation
 R: Final = NOMINAL_SIZE  # 9 entries, r_ned_from_frd by rows
@@ -69,5 +73,5 @@ HISTORY_COLUMNS: Final = 10
 
 # work: scratch of the update
 DX: Final = 0  # error-state estimate of this update
-PH: Final = ERROR_SIZE  # P H^T of the scalar being fused
-WORK_SIZE: Final = 2 * ERROR_SIZE
+PH: Final = ERROR_SIZE_WITH_WIND  # P H^T of the scalar being fused
+WORK_SIZE: Final = 2 * ERROR_SIZE_WITH_WIND
