@@ -1,0 +1,71 @@
+"""Airspeed and its rate for the fixed-wing control laws: PX4 TECS's steady-state Kalman filter.
+
+Model: a constant rate of change; measured are the equivalent airspeed and, along the body's x axis, the
+acceleration. Of a gust the accelerometer knows nothing, so the filter follows gusts at its own pace.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.control.fixed_wing import layout as c
+from flightsim.kernels import kernel
+
+Array = NDArray[np.float64]
+
+_NAV_ACC: Final = 13
+_NAV_EAS: Final = 32
+_NAV_TAS: Final = 33
+_RATIO_SPEED_M_S: Final = 3.0  # below it true over equivalent airspeed isn't taken from the two
+
+
+@kernel
+def update_air(nav: Array, p: Array, s: Array, dt: float) -> None:
+    """One step: writes EAS, EAS_RATE, EAS_TO_TAS and EAS_KNOWN."""
+    measured = nav[_NAV_EAS]
+    known = math.isfinite(measured)
+    if s[c.EAS_TO_TAS] <= 0.0:
+        s[c.EAS_TO_TAS] = 1.0
+    if known and measured > _RATIO_SPEED_M_S and math.isfinite(nav[_NAV_TAS]):
+        s[c.EAS_TO_TAS] = min(3.0, max(0.8, nav[_NAV_TAS] / measured))
+    if not known:
+        s[c.EAS] = p[c.AIRSPEED_TRIM]
+        s[c.EAS_RATE] = 0.0
+        s[c.EAS_KNOWN] = 0.0
+        return
+    measured = max(0.0, measured)
+    if s[c.EAS_KNOWN] == 0.0:
+        s[c.EAS] = measured
+        s[c.EAS_RATE] = 0.0
+        s[c.EAS_KNOWN] = 1.0
+        return
+    w, x, y, z = nav[0], nav[1], nav[2], nav[3]
+    forward = (
+        (1.0 - 2.0 * (y * y + z * z)) * nav[_NAV_ACC]
+        + 2.0 * (x * y + w * z) * nav[_NAV_ACC + 1]
+        + 2.0 * (x * z - w * y) * nav[_NAV_ACC + 2]
+    ) / s[c.EAS_TO_TAS]
+    if not math.isfinite(forward):
+        forward = s[c.EAS_RATE]
+    # gains of the continuous filter, from its Riccati equation
+    speed_information = 1.0 / p[c.AIRSPEED_NOISE]
+    process = p[c.AIRSPEED_PROCESS]
+    rate_information = process / (p[c.AIRSPEED_RATE_NOISE] * p[c.AIRSPEED_RATE_NOISE])
+    total = speed_information + rate_information
+    root = math.sqrt(process * (2.0 * speed_information + rate_information))
+    speed = s[c.EAS] + dt * s[c.EAS_RATE]
+    speed_error = measured - speed
+    rate_error = forward - s[c.EAS_RATE]
+    s[c.EAS] = max(
+        0.0, speed + dt * (speed_information * root * speed_error + rate_information * rate_error) / total
+    )
+    s[c.EAS_RATE] += (
+        dt
+        * (
+            speed_information * speed_information * process * speed_error
+            + rate_information * root * rate_error
+        )
+        / total
+    )

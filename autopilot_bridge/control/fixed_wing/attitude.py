@@ -1,0 +1,114 @@
+"""Attitude and body rates of a fixed wing to surfaces; the wheels' heading on the ground.
+
+Attitude: the error of each angle over a time constant is the wanted Euler rate, the turn rate of a
+coordinated turn joins them, and their sum in body axes is what the rate loops fly (PX4
+FixedwingAttitudeControl). Rates: PID and feed-forward; a surface's moment grows with the square of airspeed
+and the steady rate it gives in proportion to it, so the PID scales with the inverse square, the feed-
+forward with the inverse. The wanted yaw rate leans against lateral acceleration (ArduPilot's YAW2SRV_SLIP),
+so that the rudder nulls it in steady flight.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, ROLL_MAX_RAD, stall_speed
+from flightsim.kernels import kernel
+from flightsim.rotations import wrap_pi
+
+Array = NDArray[np.float64]
+
+_NAV_RATES: Final = 4  # navigation slots, as in navigation.layout
+_NAV_VEL: Final = 7
+_NAV_FORCE: Final = 22
+_NAV_ROLL: Final = 25
+_NAV_PITCH: Final = 26
+_NAV_YAW: Final = 27
+_STEERING_HEADING: Final = 15  # setpoint slot, as in control.fixed_wing_setpoint
+
+_WHEEL_SPEED_SHARE: Final = 0.6  # of the lowest airspeed: below it wheel gains stay as they are (PX4)
+_SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
+
+
+@kernel
+def attitude_control(nav: Array, p: Array, s: Array) -> None:
+    """Write RATE_SETPOINT (FRD) for ROLL_SETPOINT and PITCH_SETPOINT."""
+    roll, pitch = nav[_NAV_ROLL], nav[_NAV_PITCH]
+    roll_rate = wrap_pi(s[c.ROLL_SETPOINT] - roll) / p[c.ROLL_TC]
+    pitch_rate = (s[c.PITCH_SETPOINT] - pitch) / p[c.PITCH_TC]
+    airspeed = max(0.7 * p[c.AIRSPEED_MIN], s[c.EAS]) * s[c.EAS_TO_TAS]
+    bank = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, roll))
+    turn_rate = GRAVITY_M_S2 * math.tan(bank) * math.cos(pitch) / airspeed
+    if s[c.GROUND_CONTACT] != 0.0:
+        turn_rate = 0.0
+    cos_roll, sin_roll = math.cos(roll), math.sin(roll)
+    cos_pitch, sin_pitch = math.cos(pitch), math.sin(pitch)
+    x = roll_rate - sin_pitch * turn_rate
+    y = cos_roll * pitch_rate + cos_pitch * sin_roll * turn_rate
+    z = -sin_roll * pitch_rate + cos_pitch * cos_roll * turn_rate
+    slip = nav[_NAV_FORCE + 1]
+    if s[c.GROUND_CONTACT] == 0.0 and math.isfinite(slip):
+        z -= p[c.SIDESLIP_GAIN] * min(_SLIP_MAX_M_S2, max(-_SLIP_MAX_M_S2, slip))
+    s[c.RATE_SETPOINT] = min(p[c.ROLL_RATE_MAX], max(-p[c.ROLL_RATE_MAX], x))
+    s[c.RATE_SETPOINT + 1] = min(p[c.PITCH_RATE_UP], max(-p[c.PITCH_RATE_DOWN], y))
+    s[c.RATE_SETPOINT + 2] = min(p[c.YAW_RATE_MAX], max(-p[c.YAW_RATE_MAX], z))
+
+
+@kernel
+def rate_control(nav: Array, p: Array, s: Array, surfaces: Array) -> None:
+    """surfaces (3,) = aileron, elevator, rudder that fly RATE_SETPOINT."""
+    dt = s[c.DT]
+    scale = 1.0
+    if p[c.AIRSPEED_SCALING] != 0.0:
+        airspeed = min(1.5 * p[c.AIRSPEED_MAX], max(stall_speed(p), s[c.EAS]))
+        scale = p[c.SCALING_AIRSPEED] / airspeed
+    alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
+    for i in range(3):
+        g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i
+        rate, wanted = nav[_NAV_RATES + i], s[c.RATE_SETPOINT + i]
+        error = wanted - rate
+        raw = (rate - s[c.RATE_PREVIOUS + i]) / dt
+        s[c.RATE_PREVIOUS + i] = rate
+        s[c.RATE_DERIVATIVE + i] += alpha * (raw - s[c.RATE_DERIVATIVE + i])
+        moment = p[g] * error + s[c.RATE_INTEGRAL + i] - p[g + 2] * s[c.RATE_DERIVATIVE + i]
+        surface = scale * (scale * moment + p[g + 3] * wanted) + p[c.TRIM_SURFACES + i]
+        missing = s[c.UNALLOCATED + i]
+        if s[c.GROUND_CONTACT] != 0.0:
+            s[c.RATE_INTEGRAL + i] = 0.0  # the wheels hold the vehicle: it would only store a kick
+        elif not ((missing > 0.0 and error > 0.0) or (missing < 0.0 and error < 0.0)):
+            limit = p[g + 4]
+            s[c.RATE_INTEGRAL + i] = min(limit, max(-limit, s[c.RATE_INTEGRAL + i] + p[g + 1] * error * dt))
+        surfaces[i] = surface
+
+
+@kernel
+def limit_surfaces(p: Array, s: Array, yaw_stick: float, surfaces: Array) -> None:
+    """Add to the rudder what goes with the aileron and the stick; stop at the stops."""
+    aileron = min(1.0, max(-1.0, surfaces[0]))
+    surfaces[2] += p[c.ROLL_TO_RUDDER] * aileron + yaw_stick
+    for i in range(3):
+        limited = min(1.0, max(-1.0, surfaces[i]))
+        s[c.UNALLOCATED + i] = surfaces[i] - limited
+        surfaces[i] = limited
+
+
+@kernel
+def wheel_control(nav: Array, sp: Array, p: Array, s: Array) -> float:
+    """Steering -1..1 that holds the setpoint's heading on the ground; its yaw rate is the rudder's too."""
+    error = wrap_pi(sp[_STEERING_HEADING] - nav[_NAV_YAW])
+    limit = p[c.WHEEL_RATE_MAX]
+    wanted = min(limit, max(-limit, error / p[c.WHEEL_TC]))
+    s[c.RATE_SETPOINT + 2] = wanted
+    speed = math.sqrt(nav[_NAV_VEL] * nav[_NAV_VEL] + nav[_NAV_VEL + 1] * nav[_NAV_VEL + 1])
+    slow = _WHEEL_SPEED_SHARE * p[c.AIRSPEED_MIN]
+    scale = slow / speed if speed > slow else 1.0  # false for NaN
+    rate_error = wanted - nav[_NAV_RATES + 2]
+    command = scale * (p[c.WHEEL_FF] * wanted + scale * (p[c.WHEEL_P] * rate_error + s[c.WHEEL_INTEGRAL]))
+    if speed > 1.0 and abs(command) < 1.0:
+        limit = p[c.WHEEL_INTEGRAL_MAX]
+        integral = s[c.WHEEL_INTEGRAL] + p[c.WHEEL_I] * rate_error * s[c.DT]
+        s[c.WHEEL_INTEGRAL] = min(limit, max(-limit, integral))
+    return min(1.0, max(-1.0, command))

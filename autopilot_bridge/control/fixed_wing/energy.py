@@ -1,0 +1,242 @@
+"""Total-energy control of height and airspeed (TECS) to pitch and throttle.
+
+Throttle adds energy, pitch shares it out: the throttle flies the rate of the specific total energy, the
+pitch the rate of its balance, potential less kinetic (Lambregts, "Vertical flight path and speed control
+autopilot design using total energy principles", AIAA 83-2239). Structure, gains and limits are those of
+PX4's TECS; what is added: the angle of attack that an airspeed and a bank ask for is fed forward, and the
+underspeed band lies between stall and lowest airspeed.
+
+Energies are per mass: m^2/s^2, their rates m^2/s^3.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
+from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, stall_speed
+from flightsim.kernels import kernel
+
+Array = NDArray[np.float64]
+
+_DOWN: Final = 4  # setpoint slots, as in control.fixed_wing_setpoint
+_HEIGHT_RATE: Final = 5
+_AIRSPEED: Final = 6
+_PITCH: Final = 7
+_THROTTLE: Final = 8
+_PITCH_MIN: Final = 16
+_PITCH_MAX: Final = 17
+_THROTTLE_MAX: Final = 18
+_NAV_VEL_DOWN: Final = 9  # navigation slots, as in navigation.layout
+_NAV_POS_DOWN: Final = 12
+
+PITCH_LIMIT_RAD: Final = math.radians(80.0)  # of a pitch angle given past the energy control
+_MIN_SPEED_M_S: Final = 3.0  # for divisions
+_UNDERSPEED_START: Final = 0.75  # share of the way from stall to lowest airspeed
+_UNDERSPEED_FULL: Final = 0.25
+_PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change asked for when pitch alone flies the airspeed
+
+
+@kernel
+def _clip(value: float, low: float, high: float) -> float:
+    return min(high, max(low, value))
+
+
+@kernel
+def _load_factor(s: Array) -> float:
+    """Load factor of a level turn at the commanded bank."""
+    return 1.0 / max(0.2, math.cos(s[c.ROLL_SETPOINT]))
+
+
+@kernel
+def _underspeed(p: Array, s: Array, load_factor: float) -> float:
+    """How much too slow the vehicle is: 0 not at all, 1 near the stall."""
+    if s[c.EAS_KNOWN] == 0.0:
+        return 0.0
+    raised = math.sqrt(load_factor)
+    stall = stall_speed(p)
+    room = p[c.AIRSPEED_MIN] - stall
+    full = raised * (stall + _UNDERSPEED_FULL * room)
+    start = raised * (stall + _UNDERSPEED_START * room)
+    return _clip((start - s[c.EAS]) / max(1e-3, start - full), 0.0, 1.0)
+
+
+@kernel
+def _trim_throttle(airspeed: float, p: Array) -> float:
+    """Throttle of level flight at an airspeed, between the three that are known."""
+    trim, at = p[c.TRIM_THROTTLE], p[c.AIRSPEED_TRIM]
+    if airspeed < at:
+        end, end_at = p[c.TRIM_THROTTLE_MIN_SPEED], p[c.AIRSPEED_MIN]
+    else:
+        end, end_at = p[c.TRIM_THROTTLE_MAX_SPEED], p[c.AIRSPEED_MAX]
+    if end <= 0.0 or abs(end_at - at) < 1e-3:
+        return trim
+    return trim + (end - trim) * (airspeed - at) / (end_at - at)
+
+
+@kernel
+def _trim_pitch(airspeed: float, p: Array, s: Array) -> float:
+    """Pitch of level flight at an airspeed and the commanded bank.
+
+    The lift angle grows with the load factor and falls with the square of airspeed; in a level turn
+    tan(pitch) = cos(bank) tan(angle of attack).
+    """
+    lift = p[c.LIFT_ANGLE]
+    if lift == 0.0:
+        return p[c.TRIM_PITCH]
+    ratio = p[c.AIRSPEED_TRIM] / max(_MIN_SPEED_M_S, airspeed)
+    return (p[c.TRIM_PITCH] - lift) / _load_factor(s) + lift * min(4.0, ratio * ratio)
+
+
+@kernel
+def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bool) -> float:
+    """Climb rate to fly, m/s; NaN where nothing asks for one. `hold`: the present height unless told else."""
+    height, climb = -nav[_NAV_POS_DOWN], -nav[_NAV_VEL_DOWN]
+    wanted, rate = -sp[_DOWN], sp[_HEIGHT_RATE]
+    if math.isfinite(wanted) or not (math.isfinite(rate) or not hold):
+        if not math.isfinite(height):
+            return 0.0 if not math.isfinite(rate) else rate
+        if s[c.HEIGHT_CONTROLLED] == 0.0:
+            reset_height(height, climb, s)
+        slope = rate if math.isfinite(rate) else 0.0
+        if not math.isfinite(wanted):
+            wanted = s[c.HEIGHT_REFERENCE]
+        elif s[c.HEIGHT_CONTROLLED] == 0.0:
+            s[c.HEIGHT_RATE_REFERENCE] -= slope
+        follow_height(wanted, slope, height, p, s, dt)
+        return _clip(
+            (s[c.HEIGHT_REFERENCE] - height) / p[c.HEIGHT_TC]
+            + p[c.HEIGHT_RATE_FF] * s[c.HEIGHT_RATE_REFERENCE]
+            + slope,
+            -p[c.SINK_MAX],
+            p[c.CLIMB_MAX],
+        )
+    reset_height(height, climb, s)
+    return rate
+
+
+@kernel
+def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
+    """One guidance step: writes PITCH_SETPOINT, THROTTLE and what led to them."""
+    pitch_given, throttle_given = math.isfinite(sp[_PITCH]), math.isfinite(sp[_THROTTLE])
+    powered, known = p[c.POWERED] != 0.0, s[c.EAS_KNOWN] != 0.0
+    climb = -nav[_NAV_VEL_DOWN] if math.isfinite(nav[_NAV_VEL_DOWN]) else 0.0
+    if entering or s[c.GROUND_CONTACT] != 0.0:
+        reset_height(-nav[_NAV_POS_DOWN], climb, s)
+        s[c.PITCH_INTEGRAL] = 0.0
+        s[c.THROTTLE_INTEGRAL] = 0.0
+    load_factor = _load_factor(s)
+    wanted_climb = _wanted_climb(nav, sp, p, s, dt, not pitch_given and not throttle_given)
+    climb_given = math.isfinite(wanted_climb)
+    flare = throttle_given and not pitch_given and climb_given and s[c.HEIGHT_CONTROLLED] == 0.0
+    s[c.HEIGHT_RATE_SETPOINT] = wanted_climb
+    s[c.VEL_SETPOINT + 2] = -wanted_climb
+    under = 0.0 if flare else _underspeed(p, s, load_factor)
+    s[c.UNDERSPEED] = under
+
+    # airspeed
+    airspeed_min = min(p[c.AIRSPEED_MAX], p[c.AIRSPEED_MIN] * math.sqrt(load_factor))
+    airspeed = sp[_AIRSPEED] if math.isfinite(sp[_AIRSPEED]) else p[c.AIRSPEED_TRIM]
+    airspeed = max(airspeed, s[c.AIRSPEED_FLOOR])
+    airspeed = _clip(under * airspeed_min + (1.0 - under) * airspeed, airspeed_min, p[c.AIRSPEED_MAX])
+    s[c.AIRSPEED_SETPOINT] = airspeed
+    speed = max(_MIN_SPEED_M_S, s[c.EAS] * s[c.EAS_TO_TAS])
+    energy_max, energy_min = GRAVITY_M_S2 * p[c.CLIMB_MAX], -GRAVITY_M_S2 * p[c.SINK_MIN]
+
+    weight = p[c.SPEED_WEIGHT] if powered else 2.0
+    if not known or flare:
+        weight = 0.0
+    elif throttle_given and not climb_given:
+        weight = 2.0
+    weight = 2.0 * under + (1.0 - under) * weight
+    speed_rate = 0.0
+    if known:
+        faster, slower = 0.5 * energy_max / speed, 0.5 * energy_min / speed
+        if weight >= 2.0:
+            faster, slower = _PITCH_ONLY_ACCELERATION_M_S2, -_PITCH_ONLY_ACCELERATION_M_S2
+        wanted_speed = airspeed * s[c.EAS_TO_TAS]
+        speed_rate = _clip((wanted_speed - speed) / p[c.AIRSPEED_TC], slower, faster)
+    if not powered and not known:
+        wanted_climb = -p[c.SINK_MIN]  # its glide, by the attitude it should have
+    potential_rate = GRAVITY_M_S2 * climb
+    kinetic_rate = speed * s[c.EAS_RATE] * s[c.EAS_TO_TAS]
+    wanted_potential_rate = GRAVITY_M_S2 * wanted_climb if climb_given or not powered else potential_rate
+    if not math.isfinite(wanted_potential_rate):
+        wanted_potential_rate = potential_rate
+    wanted_kinetic_rate = speed * speed_rate
+
+    # pitch
+    height_share, speed_share = _clip(2.0 - weight, 0.0, 1.0), _clip(weight, 0.0, 1.0)
+    balance = height_share * potential_rate - speed_share * kinetic_rate
+    wanted_balance = height_share * wanted_potential_rate - speed_share * wanted_kinetic_rate
+    s[c.BALANCE_RATE] = balance
+    s[c.BALANCE_RATE_SETPOINT] = wanted_balance
+    if pitch_given:
+        s[c.PITCH_SETPOINT] = _clip(sp[_PITCH], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
+    else:
+        lowest = sp[_PITCH_MIN] if math.isfinite(sp[_PITCH_MIN]) else p[c.PITCH_MIN]
+        highest = sp[_PITCH_MAX] if math.isfinite(sp[_PITCH_MAX]) else p[c.PITCH_MAX]
+        # a climb-out's least pitch gives way before the wing stalls
+        lowest = (1.0 - under) * lowest + under * min(lowest, p[c.PITCH_MIN])
+        highest = max(highest, lowest)
+        per_rad = speed * GRAVITY_M_S2
+        missing = (wanted_balance - balance) / per_rad
+        step = p[c.PITCH_I] * missing * dt
+        previous = s[c.PITCH_SETPOINT]
+        if (previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0):
+            step = 0.0
+        if s[c.GROUND_CONTACT] == 0.0:
+            s[c.PITCH_INTEGRAL] = _clip(s[c.PITCH_INTEGRAL] + step, lowest - highest, highest - lowest)
+        pitch = (
+            _trim_pitch(airspeed, p, s)
+            + p[c.PITCH_DAMPING] * missing
+            + p[c.BALANCE_FF] * wanted_balance / per_rad
+            + s[c.PITCH_INTEGRAL]
+        )
+        change = dt * p[c.VERTICAL_ACCELERATION] / speed
+        pitch = _clip(pitch, lowest, highest)
+        s[c.PITCH_SETPOINT] = _clip(pitch, previous - change, previous + change)
+
+    # throttle
+    energy_gain = min(1.0, dt / (dt + p[c.ENERGY_RATE_TC]))
+    if entering:
+        energy_gain = 1.0
+    s[c.ENERGY_RATE] += energy_gain * (potential_rate + kinetic_rate - s[c.ENERGY_RATE])
+    wanted_energy_rate = _clip(
+        wanted_potential_rate + wanted_kinetic_rate + p[c.TURN_ENERGY] * (load_factor - 1.0),
+        energy_min,
+        energy_max,
+    )
+    s[c.ENERGY_RATE_SETPOINT] = wanted_energy_rate
+    if throttle_given:
+        s[c.THROTTLE] = _clip(sp[_THROTTLE], 0.0, 1.0)
+        return
+    if not powered:
+        s[c.THROTTLE] = 0.0
+        return
+    lowest, highest = p[c.THROTTLE_MIN], p[c.THROTTLE_MAX]
+    if math.isfinite(sp[_THROTTLE_MAX]):
+        highest = _clip(sp[_THROTTLE_MAX], 0.0, highest)
+        lowest = min(lowest, highest)
+    trim = _clip(_trim_throttle(airspeed, p), lowest, highest)
+    if wanted_energy_rate >= 0.0:
+        throttle = trim + wanted_energy_rate / energy_max * (highest - trim)
+    else:
+        throttle = trim + wanted_energy_rate / energy_min * (lowest - trim)
+    missing = (wanted_energy_rate - s[c.ENERGY_RATE]) / (energy_max - energy_min)
+    previous = s[c.THROTTLE]
+    if known and s[c.GROUND_CONTACT] == 0.0:
+        step = p[c.THROTTLE_I] * missing * dt * (1.0 - under)
+        if not ((previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)):
+            s[c.THROTTLE_INTEGRAL] = _clip(s[c.THROTTLE_INTEGRAL] + step, -1.0, 1.0)
+    # without airspeed a positive integral stays: it was needed when there was one (PX4)
+    integral = s[c.THROTTLE_INTEGRAL] if known else max(0.0, s[c.THROTTLE_INTEGRAL])
+    throttle += p[c.THROTTLE_DAMPING] * missing + integral
+    throttle = _clip(under * highest + (1.0 - under) * throttle, lowest, highest)
+    if p[c.THROTTLE_SLEW] > 0.0:
+        change = p[c.THROTTLE_SLEW] * dt
+        throttle = _clip(throttle, previous - change, previous + change)
+    s[c.THROTTLE] = _clip(throttle, lowest, highest)

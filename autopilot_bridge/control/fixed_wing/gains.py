@@ -1,0 +1,136 @@
+"""Gains and limits for an aircraft, derived from its flight envelope.
+
+Rate loops: roll is a lag, p = K a / (tau s + 1): the feed-forward is 1/K, the proportional gain quickens
+the lag to `_ROLL_BANDWIDTH_RAD_S`. Pitch and yaw are second order (short period, Dutch roll): the
+proportional gain on the rate adds the damping that is missing, the feed-forward of pitch is the inverse of
+its steady gain. Attitude loops are as slow as the rate loops inside them ask for, height and airspeed loops
+as slow as the attitude loops ask for. Energy rates come from the envelope's climb and sink; the extra drag
+of a turn from its best glide, where induced drag is half of all drag.
+"""
+
+import math
+from typing import Final
+
+from flightsim.flight_envelope import FlightEnvelope
+
+_G: Final = 9.80665
+_ROLL_BANDWIDTH_RAD_S: Final = 12.0
+_PITCH_DAMPING: Final = 1.0  # of the short period with the rate loop closed
+_YAW_DAMPING: Final = 0.6  # of the Dutch roll
+_SIDE_FORCE_SLOPE_PER_RAD: Final = 0.7  # usual size of the side-force slope, for the sideslip loop alone
+_SIDESLIP_BANDWIDTH_RAD_S: Final = 0.8
+_LOAD_FACTOR_MAX: Final = 2.5
+
+
+def gains_for(envelope: FlightEnvelope) -> dict[str, float | bool]:
+    """Fields of `FixedWingParameters` for an aircraft.
+
+    Raises:
+        ValueError: a control has no effect, or the wrong sign.
+    """
+    for name in (
+        "roll_rate_per_aileron_rad_s",
+        "roll_time_constant_s",
+        "pitch_acceleration_per_elevator_rad_s2",
+        "pitch_rate_per_elevator_rad_s",
+        "short_period_frequency_rad_s",
+        "yaw_acceleration_per_rudder_rad_s2",
+        "dutch_roll_frequency_rad_s",
+    ):
+        if not getattr(envelope, name) > 0.0:
+            raise ValueError(
+                f"{envelope.name}: {name} = {getattr(envelope, name)}; a control law needs more than zero"
+            )
+    values: dict[str, float | bool] = {
+        "airspeed_stall_m_s": envelope.stall_speed_m_s,
+        "airspeed_min_m_s": envelope.airspeed_min_m_s,
+        "airspeed_trim_m_s": envelope.airspeed_trim_m_s,
+        "airspeed_max_m_s": envelope.airspeed_max_m_s,
+        "scaling_airspeed_m_s": envelope.airspeed_trim_m_s,
+        "roll_limit_rad": envelope.bank_max_rad,
+        "load_factor_max": max(_LOAD_FACTOR_MAX, 1.0 / math.cos(envelope.bank_max_rad)),
+        "pitch_min_rad": envelope.pitch_min_rad,
+        "pitch_max_rad": envelope.pitch_max_rad,
+        "trim_aileron": envelope.trim_aileron,
+        "trim_elevator": envelope.trim_elevator,
+        "trim_rudder": envelope.trim_rudder,
+    }
+    roll_s, pitch_s = _rate_gains(envelope, values)
+    _energy_gains(envelope, values, pitch_s)
+    values["roll_slew_rad_s"] = min(math.radians(90.0), 0.6 / roll_s)
+    return values
+
+
+def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> tuple[float, float]:
+    """Write the gains of attitude and rates; time constants of roll and pitch angle."""
+    roll_gain = envelope.roll_rate_per_aileron_rad_s
+    lag_s = envelope.roll_time_constant_s
+    values["rate_roll_ff"] = 1.0 / roll_gain
+    values["rate_roll_p"] = max(0.2, lag_s * _ROLL_BANDWIDTH_RAD_S - 1.0) / roll_gain
+    values["rate_roll_i"] = 1.0 / roll_gain
+    values["rate_roll_integral_max"] = 0.3
+    roll_s = max(0.35, 1.5 * min(lag_s, 0.5))
+    values["roll_time_constant_s"] = roll_s
+    values["roll_rate_max_rad_s"] = min(math.radians(90.0), 0.6 * roll_gain)
+
+    pitch_gain = envelope.pitch_rate_per_elevator_rad_s
+    natural = envelope.short_period_frequency_rad_s
+    missing = max(2.0 * (_PITCH_DAMPING - envelope.short_period_damping) * natural, 0.2 * natural)
+    values["rate_pitch_ff"] = 1.0 / pitch_gain
+    values["rate_pitch_p"] = missing / envelope.pitch_acceleration_per_elevator_rad_s2
+    values["rate_pitch_i"] = 1.0 / pitch_gain
+    values["rate_pitch_integral_max"] = 0.5
+    pitch_s = max(0.4, 2.0 / natural)
+    values["pitch_time_constant_s"] = pitch_s
+    pitch_rate = min(math.radians(60.0), 0.6 * pitch_gain)
+    values["pitch_rate_max_up_rad_s"] = pitch_rate
+    values["pitch_rate_max_down_rad_s"] = pitch_rate
+
+    turn = envelope.dutch_roll_frequency_rad_s
+    missing = max(2.0 * (_YAW_DAMPING - envelope.dutch_roll_damping) * turn, 0.5)
+    yaw_p = missing / envelope.yaw_acceleration_per_rudder_rad_s2
+    values["rate_yaw_p"] = yaw_p
+    values["rate_yaw_i"] = 2.0 * yaw_p
+    values["rate_yaw_ff"] = 0.0
+    values["rate_yaw_integral_max"] = 0.4
+    pressure_pa = 0.5 * 1.225 * envelope.airspeed_trim_m_s**2
+    side_m_s2_per_rad = pressure_pa * envelope.wing_area_m2 * _SIDE_FORCE_SLOPE_PER_RAD / envelope.mass_kg
+    side_per_rudder_m_s2 = side_m_s2_per_rad * max(0.05, abs(envelope.sideslip_per_rudder_rad))
+    values["sideslip_gain_rad_s_per_m_s2"] = _SIDESLIP_BANDWIDTH_RAD_S / (2.0 * yaw_p * side_per_rudder_m_s2)
+    return roll_s, pitch_s
+
+
+def _energy_gains(envelope: FlightEnvelope, values: dict[str, float | bool], pitch_s: float) -> None:
+    """Write the gains of height and airspeed; `pitch_s` is the time constant of the pitch angle."""
+    climb_max = max(0.5, envelope.climb_max_m_s) if envelope.powered else 1.0
+    sink_min = max(0.2, envelope.sink_min_m_s)
+    sink_max = max(1.2 * sink_min, envelope.sink_max_m_s)
+    values["powered"] = envelope.powered
+    values["throttle_max"] = envelope.throttle_max if envelope.powered else 1.0
+    values["trim_throttle"] = envelope.trim_throttle
+    values["trim_throttle_min_speed"] = envelope.trim_throttle_min_speed
+    values["trim_throttle_max_speed"] = envelope.trim_throttle_max_speed
+    values["throttle_slew_1_s"] = 2.0
+    values["climb_max_m_s"] = climb_max
+    values["sink_min_m_s"] = sink_min
+    values["sink_max_m_s"] = sink_max
+    values["climb_rate_target_m_s"] = 0.6 * climb_max
+    values["sink_rate_target_m_s"] = min(0.6 * sink_max, 0.8 * climb_max) if envelope.powered else sink_min
+
+    pressure_pa = 0.5 * 1.225 * envelope.airspeed_trim_m_s**2
+    lift = envelope.mass_kg * _G / (pressure_pa * envelope.wing_area_m2)
+    values["trim_pitch_rad"] = envelope.trim_pitch_rad
+    values["lift_angle_rad"] = lift / envelope.lift_slope_per_rad
+
+    values["height_time_constant_s"] = max(1.5, 3.0 * pitch_s)
+    values["airspeed_time_constant_s"] = max(1.5, 3.0 * pitch_s)
+    values["height_rate_ff"] = 1.0
+    values["pitch_damping"] = 0.6
+    values["pitch_integral_1_s"] = 0.3
+    values["throttle_damping"] = 0.6
+    values["throttle_integral_1_s"] = 0.3
+    values["speed_weight"] = 1.0 if envelope.powered else 2.0
+    # induced drag grows with the square of the load factor, n^2 - 1 = 2.2 (n - 1) about n = 1.2
+    slow = (envelope.best_glide_speed_m_s / envelope.airspeed_trim_m_s) ** 2
+    induced_share = 0.5 * _G / envelope.glide_ratio * slow
+    values["turn_energy_rate_m2_s3"] = 2.2 * induced_share * envelope.airspeed_trim_m_s

@@ -1,0 +1,130 @@
+"""Lateral guidance of a fixed wing: course, heading or lateral acceleration to a bank angle within limits.
+
+The structure of PX4 1.16: a course is mapped to a heading through the wind triangle
+(CourseToAirspeedRefMapper), the error of the direction through the air gives a lateral acceleration
+(AirspeedDirectionController), and that a bank angle. A course is flown by the air velocity, ground velocity
+less estimated wind: an error of the wind estimate then bends both the wanted and the flown direction and
+falls out of the course. A heading is flown by the nose.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.control.fixed_wing import layout as c
+from flightsim.kernels import kernel
+from flightsim.rotations import wrap_pi
+
+Array = NDArray[np.float64]
+
+GRAVITY_M_S2: Final = 9.80665
+_COURSE: Final = 0  # setpoint slots, as in control.fixed_wing_setpoint
+_HEADING: Final = 1
+_ACCELERATION: Final = 2
+_ROLL: Final = 3
+_ROLL_LIMIT: Final = 20
+_NAV_VEL: Final = 7  # navigation slots, as in navigation.layout
+_NAV_YAW: Final = 27
+_NAV_WIND: Final = 29
+
+ROLL_MAX_RAD: Final = math.radians(80.0)  # of a bank angle given past the guidance
+_BANK_ALWAYS_RAD: Final = math.radians(15.0)  # left for turning however slow the vehicle is
+_STALL_SHARE_UNKNOWN: Final = 0.8  # of the lowest airspeed, where the stall speed isn't given
+
+
+@kernel
+def stall_speed(p: Array) -> float:
+    """Stall speed at 1 g, equivalent, m/s."""
+    if p[c.AIRSPEED_STALL] > 0.0:
+        return p[c.AIRSPEED_STALL]
+    return _STALL_SHARE_UNKNOWN * p[c.AIRSPEED_MIN]
+
+
+@kernel
+def heading_for_course(course: float, airspeed: float, wind_n: float, wind_e: float) -> float:
+    """Heading through the air, rad, that makes a course over ground in a wind.
+
+    Where the wind lets no heading make the course, the one that comes nearest: flying against the wind so
+    that the vehicle drifts as little as possible from the bearing (PX4 CourseToAirspeedRefMapper). Angles in
+    rad, speeds in m/s, wind is the air's velocity.
+    """
+    cos_course, sin_course = math.cos(course), math.sin(course)
+    cross = wind_e * cos_course - wind_n * sin_course  # to the right of the course
+    along = wind_n * cos_course + wind_e * sin_course
+    wind = math.sqrt(wind_n * wind_n + wind_e * wind_e)
+    if abs(cross) < airspeed and (along > 0.0 or wind < airspeed):
+        return wrap_pi(course - math.asin(cross / airspeed))
+    reach = math.sqrt(max(0.0, wind * wind - airspeed * airspeed))
+    return math.atan2(reach * sin_course - wind_e, reach * cos_course - wind_n)
+
+
+@kernel
+def airspeed_for_ground_speed(course: float, ground_speed: float, wind_n: float, wind_e: float) -> float:
+    """True airspeed, m/s, that gives a ground speed along a course in a wind."""
+    cos_course, sin_course = math.cos(course), math.sin(course)
+    cross = wind_e * cos_course - wind_n * sin_course
+    missing = ground_speed - (wind_n * cos_course + wind_e * sin_course)
+    if missing <= 0.0:
+        return 0.0
+    return math.sqrt(cross * cross + missing * missing)
+
+
+@kernel
+def bank_limit(sp: Array, p: Array, s: Array) -> float:
+    """Largest bank angle, rad: of parameters, setpoint, load factor, and stall at the present airspeed."""
+    limit = min(p[c.ROLL_LIMIT], math.acos(1.0 / p[c.LOAD_FACTOR_MAX]))
+    if sp[_ROLL_LIMIT] >= 0.0:  # false for NaN
+        limit = min(limit, sp[_ROLL_LIMIT])
+    if p[c.STALL_PREVENTION] != 0.0 and s[c.EAS_KNOWN] != 0.0:
+        ratio = s[c.EAS] / (p[c.STALL_MARGIN] * stall_speed(p))
+        by_stall = math.acos(1.0 / (ratio * ratio)) if ratio > 1.0 else 0.0
+        limit = min(limit, max(by_stall, _BANK_ALWAYS_RAD))
+    return limit
+
+
+@kernel
+def lateral_control(nav: Array, sp: Array, p: Array, s: Array, dt: float) -> None:
+    """One guidance step: writes ROLL_SETPOINT and what led to it."""
+    true_airspeed = s[c.EAS] * s[c.EAS_TO_TAS]
+    limit = bank_limit(sp, p, s)
+    s[c.ROLL_LIMITED] = limit
+    s[c.HEADING_SETPOINT] = math.nan
+    s[c.COURSE_SETPOINT] = math.nan
+    s[c.AIRSPEED_FLOOR] = 0.0
+    if math.isfinite(sp[_ROLL]):
+        roll = min(ROLL_MAX_RAD, max(-ROLL_MAX_RAD, sp[_ROLL]))
+        s[c.ROLL_SETPOINT] = roll
+        s[c.LATERAL_ACCELERATION] = GRAVITY_M_S2 * math.tan(roll)
+        return
+    acceleration = sp[_ACCELERATION] if math.isfinite(sp[_ACCELERATION]) else 0.0
+    present, wanted = math.nan, math.nan
+    yaw = nav[_NAV_YAW]
+    if math.isfinite(sp[_COURSE]):
+        wind_n, wind_e = nav[_NAV_WIND], nav[_NAV_WIND + 1]
+        if not math.isfinite(wind_n + wind_e):
+            wind_n, wind_e = 0.0, 0.0
+        air_n, air_e = nav[_NAV_VEL] - wind_n, nav[_NAV_VEL + 1] - wind_e
+        if not math.isfinite(air_n + air_e):
+            air_n, air_e = true_airspeed * math.cos(yaw), true_airspeed * math.sin(yaw)
+        airspeed = max(1.0, math.sqrt(air_n * air_n + air_e * air_e))
+        present = math.atan2(air_e, air_n)
+        wanted = heading_for_course(sp[_COURSE], airspeed, wind_n, wind_e)
+        s[c.COURSE_SETPOINT] = wrap_pi(sp[_COURSE])
+        s[c.AIRSPEED_FLOOR] = (
+            airspeed_for_ground_speed(sp[_COURSE], p[c.GROUND_SPEED_MIN], wind_n, wind_e) / s[c.EAS_TO_TAS]
+        )
+    elif math.isfinite(sp[_HEADING]):
+        present = yaw
+        wanted = wrap_pi(sp[_HEADING])
+    if math.isfinite(wanted):
+        error = wrap_pi(wanted - present)
+        # beyond a right angle: turn at full strength, whichever way is shorter
+        turn = math.sin(error) if abs(error) < 0.5 * math.pi else math.copysign(1.0, error)
+        acceleration += p[c.HEADING_P] * true_airspeed * turn
+        s[c.HEADING_SETPOINT] = wanted
+    s[c.LATERAL_ACCELERATION] = acceleration
+    roll = min(limit, max(-limit, math.atan(acceleration / GRAVITY_M_S2)))
+    step = p[c.ROLL_SLEW] * dt
+    s[c.ROLL_SETPOINT] += min(step, max(-step, roll - s[c.ROLL_SETPOINT]))
