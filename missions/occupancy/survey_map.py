@@ -1,0 +1,156 @@
+"""The magnetic map a survey has published, as a mission reads it from a file.
+
+The file is a numpy `.npz` archive, in the format "flightstack-magnetic-map-1": grid lines `north_m` (rows,)
+and `east_m` (columns,) from the map's home, `total_field_nt` (rows, columns) with NaN where there is no
+data, `height_m` above home that the map is valid at, its home (`home_lat_deg`, `home_lon_deg`,
+`home_alt_m`), and, where it is known, `vertical_gradient_nt_m` (rows, columns), the change with height.
+"""
+
+import math
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from missions.errors import PlanError
+
+Array = NDArray[np.float64]
+
+FORMAT: Final = "flightstack-magnetic-map-1"
+_NEEDED: Final = (
+    "format",
+    "north_m",
+    "east_m",
+    "total_field_nt",
+    "height_m",
+    "home_lat_deg",
+    "home_lon_deg",
+    "home_alt_m",
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SurveyMap:
+    """Total field on a grid.
+
+    Attributes:
+        north_m, east_m: (rows,), (columns,) grid lines from the map's home, rising.
+        total_field_nt: (rows, columns); NaN where there is no data.
+        vertical_gradient_nt_m: (rows, columns), upwards; zeros where it isn't known.
+        height_m: above home, what the map is valid at.
+        home: origin of the map's frame.
+    """
+
+    north_m: Array
+    east_m: Array
+    total_field_nt: Array
+    vertical_gradient_nt_m: Array
+    height_m: float
+    home: GeodeticPosition
+
+    def total_nt(self, north_m: float, east_m: float, height_m: float) -> float:
+        """Field at a place and height from the map's home, bilinear; NaN without data."""
+        row = np.interp(north_m, self.north_m, np.arange(self.north_m.size), left=np.nan, right=np.nan)
+        column = np.interp(east_m, self.east_m, np.arange(self.east_m.size), left=np.nan, right=np.nan)
+        if not math.isfinite(row + column):
+            return math.nan
+        i = min(int(row), self.north_m.size - 2)
+        j = min(int(column), self.east_m.size - 2)
+        v, u = float(row) - i, float(column) - j
+        weights = np.array([[(1.0 - v) * (1.0 - u), (1.0 - v) * u], [v * (1.0 - u), v * u]])
+        corners = np.s_[i : i + 2, j : j + 2]
+        gradient = float(np.sum(weights * self.vertical_gradient_nt_m[corners]))
+        return float(np.sum(weights * self.total_field_nt[corners])) + gradient * (height_m - self.height_m)
+
+    def frame(self) -> LocalFrame:
+        """The map's local frame."""
+        return LocalFrame(self.home)
+
+    def require_data(
+        self, *, south_m: float, north_m: float, west_m: float, east_m: float, what: str
+    ) -> None:
+        """Refuse an area that the map doesn't cover whole.
+
+        Raises:
+            PlanError: it names what the map covers.
+        """
+        inside = (
+            self.north_m[0] <= south_m
+            and north_m <= self.north_m[-1]
+            and self.west_m <= west_m
+            and east_m <= self.east_m[-1]
+        )
+        if inside:
+            rows = slice(
+                int(np.searchsorted(self.north_m, south_m, "right")) - 1,
+                int(np.searchsorted(self.north_m, north_m, "left")) + 1,
+            )
+            columns = slice(
+                int(np.searchsorted(self.east_m, west_m, "right")) - 1,
+                int(np.searchsorted(self.east_m, east_m, "left")) + 1,
+            )
+            if np.all(np.isfinite(self.total_field_nt[rows, columns])):
+                return
+        why = "has no data in part of it" if inside else "does not cover it"
+        raise PlanError(
+            f"{what}, north {south_m:.0f} to {north_m:.0f} m and east {west_m:.0f} to {east_m:.0f} m: the "
+            f"magnetic map {why}; it reaches from north {self.north_m[0]:.0f} to {self.north_m[-1]:.0f} m, "
+            f"east {self.east_m[0]:.0f} to {self.east_m[-1]:.0f} m. Give a smaller --size or another --map"
+        )
+
+    @property
+    def west_m(self) -> float:
+        """Western edge."""
+        return float(self.east_m[0])
+
+
+def load_survey_map(path: Path) -> SurveyMap:
+    """Read a published map.
+
+    Raises:
+        PlanError: no such file, not such a file, or a map without data.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise PlanError(f"--map {path} is not a magnetic map (.npz): {error}") from None
+    missing = [name for name in _NEEDED if name not in found]
+    if missing:
+        raise PlanError(f"--map {path} is not a magnetic map: it has no {', '.join(missing)}")
+    if str(found["format"]) != FORMAT:
+        raise PlanError(f"--map {path} has the format {found['format']}; accepted is {FORMAT}")
+    try:
+        north_m, east_m, total_nt = (
+            np.asarray(found[name], dtype=np.float64) for name in ("north_m", "east_m", "total_field_nt")
+        )
+        gradient = np.asarray(found.get("vertical_gradient_nt_m", np.zeros(total_nt.shape)), dtype=np.float64)
+        height_m, lat_deg, lon_deg, alt_m = (float(found[name]) for name in _NEEDED[4:])
+    except (TypeError, ValueError) as error:
+        raise PlanError(f"--map {path}: {error}") from None
+    shape = (north_m.size, east_m.size)
+    rising = all(
+        lines.ndim == 1 and lines.size >= 2 and bool(np.all(np.diff(lines) > 0.0))
+        for lines in (north_m, east_m)
+    )
+    if not rising or total_nt.shape != shape or gradient.shape != shape:
+        raise PlanError(
+            f"--map {path}: its grid of {total_nt.shape} does not fit {north_m.size} rising lines north and "
+            f"{east_m.size} east"
+        )
+    if not np.any(np.isfinite(total_nt)) or np.any(np.isinf(total_nt)):
+        raise PlanError(f"--map {path} has no data: total_field_nt needs finite numbers")
+    if not (math.isfinite(height_m) and abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+        raise PlanError(f"--map {path}: height {height_m}, home {lat_deg}, {lon_deg} are not a place")
+    return SurveyMap(
+        north_m=north_m,
+        east_m=east_m,
+        total_field_nt=total_nt,
+        vertical_gradient_nt_m=gradient,
+        height_m=height_m,
+        home=GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m),
+    )
