@@ -93,6 +93,8 @@ def arming_reasons(
     reasons.extend(reason for reason in missing if reason not in reasons)
     if by_position and not situation.position and Reason.POSITION not in reasons:
         reasons.append(Reason.POSITION)
+    if mode is FlightMode.MISSION and situation.mission_problem not in (None, *reasons):
+        reasons.append(situation.mission_problem)
     if situation.battery_level >= BatteryLevel.CRITICAL:
         reasons.append(Reason.BATTERY_FAILSAFE)
     elif situation.battery_level >= BatteryLevel.LOW:

@@ -56,6 +56,7 @@ class CommanderPolicy:
         landing_ignores_links: a lost link doesn't end a landing (ArduPlane).
         radio_restores_mode: the mode comes back when a radio does before the second stage of its failsafe
             (ArduPlane).
+        ground_speed_apart: a commanded ground speed isn't an airspeed (ArduPlane's least ground speed).
         mission_end_mode: mode after the last item of a mission, in the air; None: stays.
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
     """
@@ -99,4 +100,5 @@ class CommanderPolicy:
     failsafe_disarms_landed: bool = False
     landing_ignores_links: bool = False
     radio_restores_mode: bool = False
+    ground_speed_apart: bool = False
     mission_end_mode: FlightMode | None = None

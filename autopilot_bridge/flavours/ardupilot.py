@@ -1,5 +1,6 @@
 """ArduCopter 4.6.3 (reference: ArduPilot 4.6.3, sections 1, 3 and 6)."""
 
+from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
@@ -128,6 +129,7 @@ ARDUPILOT: Final = Flavour(
     parameter_definitions=lambda: ARDUPILOT_PARAMETERS,
     airframe=airframe_overrides(MulticopterParameters(), ardupilot_mapping.CONTROLLER, ARDUPILOT_PARAMETERS),
     airframe_of=None,
+    launch_parameters=MappingProxyType({}),
     sensor_bits=SensorBits(
         present=0x5371FC2F,
         enabled=0x52619C2F,

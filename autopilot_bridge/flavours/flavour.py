@@ -18,7 +18,7 @@ from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 from autopilot_bridge.services.channel import AddressRule
-from flightsim.airframe import AirframeKind
+from flightsim.airframe import AirframeKind, LaunchKind
 from flightsim.flight_envelope import FlightEnvelope
 
 Array = NDArray[np.float64]
@@ -148,6 +148,7 @@ class Flavour:
         airframe: parameter values of the vehicle class that differ from the firmware's defaults, as in an
             airframe file.
         airframe_of: what an aircraft's envelope changes beyond that; None: nothing (a multicopter).
+        launch_parameters: parameters that fit the ways an aircraft is launched.
         sensor_bits: of SYS_STATUS.
         has_airspeed: a pitot tube belongs to the vehicle and is looked after.
         controller: makes the control laws from `controller_parameters`.
@@ -176,6 +177,7 @@ class Flavour:
     parameter_definitions: Callable[[], tuple[ParameterDefinition, ...]]
     airframe: Mapping[str, float]
     airframe_of: Callable[[FlightEnvelope], Mapping[str, float]] | None
+    launch_parameters: Mapping[LaunchKind, Mapping[str, float]]
     sensor_bits: SensorBits
     has_airspeed: bool
     controller: ControllerFactory

@@ -1,5 +1,6 @@
 """PX4 v1.16.1 for a multicopter (reference: PX4 v1.16.1, sections 3 to 9)."""
 
+from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
@@ -117,6 +118,7 @@ PX4: Final = Flavour(
     parameter_definitions=lambda: PX4_PARAMETERS,
     airframe=airframe_overrides(MulticopterParameters(), px4_mapping.CONTROLLER, PX4_PARAMETERS),
     airframe_of=None,
+    launch_parameters=MappingProxyType({}),
     sensor_bits=SensorBits(
         present=0x0300402F,
         enabled=0x0301402F,

@@ -1,0 +1,168 @@
+"""The flight tasks of a fixed-wing aircraft."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Final
+
+import numpy as np
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
+from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.flight.context import FlightContext, FlightPhase
+from autopilot_bridge.flight.fixed_wing import (
+    DescendTask,
+    GuidedKind,
+    GuidedTask,
+    LandTask,
+    LoiterTask,
+    ManualMode,
+    ManualTask,
+    MissionTask,
+    OffboardTask,
+    ReturnTask,
+    TakeoffTask,
+)
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
+from autopilot_bridge.flight.hold import IdleTask
+from autopilot_bridge.flight.offboard import OffboardKind
+from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.mission_plan import MissionStore
+
+_MANUAL: Final = {
+    FlightMode.MANUAL: ManualMode.MANUAL,
+    FlightMode.STABILIZED: ManualMode.STABILIZED,
+    FlightMode.ACRO: ManualMode.ACRO,
+    FlightMode.ALTITUDE: ManualMode.ALTITUDE,
+    FlightMode.POSITION: ManualMode.POSITION,
+    FlightMode.POSITION_SLOW: ManualMode.POSITION,
+    FlightMode.TRAINING: ManualMode.TRAINING,
+    FlightMode.FBWA: ManualMode.FBWA,
+    FlightMode.AUTOTUNE: ManualMode.FBWA,
+    FlightMode.FBWB: ManualMode.FBWB,
+    FlightMode.CRUISE: ManualMode.CRUISE,
+}
+_LIFTING_THROTTLE: Final = 0.1
+
+
+class FixedWingTasks:
+    """`VehicleTasks` of a fixed-wing aircraft.
+
+    Args:
+        context: shared with the tasks.
+        missions: the plan the mission task flies.
+        policy: the flavour's rules.
+    """
+
+    def __init__(self, context: FlightContext, missions: MissionStore, policy: CommanderPolicy) -> None:
+        self._context = context
+        self._missions = missions
+        self._policy = policy
+        self.offboard = OffboardTask()
+        self.guided = GuidedTask()
+
+    @property
+    def asks_attitude(self) -> bool:
+        """The offboard stream asks for positions, velocities or attitudes."""
+        return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
+
+    @property
+    def follows_thrust(self) -> bool:
+        """Guided flying follows attitudes."""
+        return self.guided.kind is GuidedKind.ATTITUDE
+
+    def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
+        """The task a mode starts with."""
+        manual = _MANUAL.get(mode)
+        if manual is not None:
+            return ManualTask(manual)
+        match mode:
+            case FlightMode.TAKEOFF:
+                return TakeoffTask()
+            case FlightMode.MISSION:
+                return MissionTask(self._missions, first_item=self._policy.mission_first_item)
+            case FlightMode.OFFBOARD:
+                return self.offboard
+            case FlightMode.GUIDED:
+                self.guided.set_hold(self._context)
+                return self.guided
+            case FlightMode.RETURN:
+                return ReturnTask()
+            case FlightMode.LAND:
+                return LandTask()
+            case FlightMode.DESCEND:
+                return DescendTask()
+            case FlightMode.TERMINATION:
+                return IdleTask()
+        return LoiterTask()
+
+    def hold(self) -> FlightTask:
+        """Circle here."""
+        return LoiterTask()
+
+    def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
+        """Take off straight ahead; the heading is that of runway or launcher."""
+        known = bool(np.isfinite(place.ned_m[0:2]).all())
+        return TakeoffTask(height_m, place_ned_m=place.ned_m if known else None)
+
+    def hold_after_takeoff(self, task: FlightTask | None) -> FlightTask:
+        """Circle at the place and the height the take-off was to reach."""
+        return LoiterTask(task.place_ned_m) if isinstance(task, TakeoffTask) else LoiterTask()
+
+    def reposition(self, place: Place) -> FlightTask:
+        """Fly to a place and circle there."""
+        return LoiterTask(place.ned_m, place.radius_m, place.speed_m_s)
+
+    def guide_to(self, context: FlightContext, place: Place) -> None:
+        """Give the guided task a place to circle at."""
+        self.guided.set_position(context, place.ned_m, radius_m=place.radius_m, airspeed_m_s=place.speed_m_s)
+
+    def orbit(self, circle: Circle) -> FlightTask:
+        """Circle around a place."""
+        radius_m = circle.radius_m
+        if not circle.clockwise:
+            radius_m = -(abs(self._context.fixed_wing.loiter_radius_m) if radius_m is None else radius_m)
+        return LoiterTask(circle.centre_ned_m, radius_m, circle.speed_m_s)
+
+    def turn(self, context: FlightContext, active: FlightTask | None, yaw_rad: float) -> FlightTask | None:
+        """An aircraft can't turn on the spot."""
+        return None
+
+    def ends_on_ground(self, task: FlightTask | None) -> bool:
+        """Landings, returns and missions end on the ground."""
+        return isinstance(task, LandTask | DescendTask | ReturnTask | MissionTask)
+
+    def wants_up(self, context: FlightContext) -> bool:
+        """A take-off is under way, or power is asked for."""
+        setpoint = context.setpoint
+        if context.phase is FlightPhase.TAKEOFF:
+            return True
+        if not setpoint[sp.LEVEL] > sp.IDLE or context.phase is FlightPhase.LANDING:
+            return False
+        throttle = float(setpoint[sp.THROTTLE])
+        return math.isnan(throttle) or throttle > _LIFTING_THROTTLE
+
+    def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
+        """The circle of a `LoiterTask`, once it is captured."""
+        if not isinstance(task, LoiterTask) or not task.circling:
+            return None
+        north_m, east_m, down_m = (float(value) for value in task.centre_ned_m)
+        return CircleFlown(task.radius_m, north_m, east_m, down_m)
+
+    def speed_kind(self, kind: int) -> SpeedKind:
+        """PX4's aircraft take any speed for an airspeed; ArduPlane knows a ground speed too."""
+        if kind == SpeedKind.GROUND_SPEED and self._policy.ground_speed_apart:
+            return SpeedKind.GROUND_SPEED
+        return SpeedKind.AIRSPEED
+
+    def with_speeds(
+        self, parameters: FixedWingFlightParameters, speeds_m_s: Mapping[SpeedKind, float]
+    ) -> Any:
+        """The cruising airspeed, within the limits; a least ground speed is not flown."""
+        wanted = speeds_m_s.get(SpeedKind.AIRSPEED)
+        if wanted is None:
+            return parameters
+        low, high = parameters.airspeed_min_m_s, parameters.airspeed_max_m_s
+        return replace(parameters, airspeed_trim_m_s=min(high, max(low, wanted)))

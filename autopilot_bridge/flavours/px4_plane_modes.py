@@ -1,0 +1,25 @@
+"""PX4 fixed-wing modes: custom_mode numbers, names and base_mode (reference: PX4 v1.16.1, section 4)."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.flavours import px4_modes
+from autopilot_bridge.flavours.flavour import ModeDisplay
+
+_STABILIZE: Final = 0x10
+_MULTICOPTER_ONLY: Final = frozenset({FlightMode.ORBIT, FlightMode.POSITION_SLOW, FlightMode.PRECISION_LAND})
+
+CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
+    {mode: number for mode, number in px4_modes.CUSTOM_MODES.items() if mode not in _MULTICOPTER_ONLY}
+)
+MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
+    {mode: name for mode, name in px4_modes.MODE_NAMES.items() if mode not in _MULTICOPTER_ONLY}
+)
+
+
+def base_mode(display: ModeDisplay) -> int:
+    """HEARTBEAT.base_mode: as a multicopter's, but MANUAL drives the surfaces directly."""
+    bits = px4_modes.base_mode(display)
+    return bits & ~_STABILIZE if display.mode is FlightMode.MANUAL else bits
