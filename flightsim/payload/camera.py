@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from flightsim import truth as t
 from flightsim.home import Home
-from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal
+from flightsim.payload import camera_kernel as k
+from flightsim.payload.camera_model import PinholeModel
 from flightsim.payload.checks import require_finite
 from flightsim.payload.detection import CameraFrame, Detection, DetectionModel, ResolutionDetection
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.targets import NO_TAG, GroundTargets
-from flightsim.rotations import matrix_from_quaternion, multiply, quaternion_from_euler
+from flightsim.rotations import quaternion_from_euler
 from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
 from flightsim.sensors.schedule import steps_per_sample
 
@@ -94,7 +95,9 @@ class Camera:
 
     __slots__ = (
         "_clutter",
+        "_constants",
         "_countdown",
+        "_focal_px",
         "_generators",
         "_gimbal",
         "_home_frame",
@@ -103,13 +106,12 @@ class Camera:
         "_normals",
         "_number",
         "_q_frd_from_mount",
-        "_q_ned_from_gimbal",
-        "_r_ned_from_frd",
-        "_r_ned_from_gimbal",
         "_row",
         "_targets",
         "_truth",
         "_uniforms",
+        "_vehicle_ned_m",
+        "_view",
         "_waiting",
         "frame",
         "parameters",
@@ -152,9 +154,18 @@ class Camera:
         self._gimbal = gimbal
         self._q_frd_from_mount: Array = np.zeros(4)
         quaternion_from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad, self._q_frd_from_mount)
-        self._q_ned_from_gimbal: Array = np.zeros(4)
-        self._r_ned_from_gimbal: Array = np.zeros((3, 3))
-        self._r_ned_from_frd: Array = np.zeros((3, 3))
+        self._focal_px = p.model.focal_px
+        self._constants: Array = np.zeros(k.CONSTANTS)
+        self._constants[k.FOCAL_PX] = p.model.focal_px
+        self._constants[k.WIDTH_PX] = p.model.width_px
+        self._constants[k.HEIGHT_PX] = p.model.height_px
+        self._constants[k.MAX_RANGE_M] = p.max_range_m
+        self._constants[k.MIN_SINE] = math.sin(p.min_depression_rad)
+        self._constants[k.POSITION_FRD_M] = p.position_frd_m
+        self._constants[k.PIXEL_NOISE] = p.pixel_noise_px
+        self._constants[k.SIZE_NOISE] = p.size_noise
+        self._vehicle_ned_m: Array = np.zeros(3)
+        self._view: Array = np.zeros((len(targets), k.VIEW))
         self._clutter = np.random.Generator(np.random.PCG64(seeds("camera")))
         self._generators = tuple(
             np.random.Generator(np.random.PCG64(seeds(f"camera_target_{index}")))
@@ -196,37 +207,34 @@ class Camera:
         return frame
 
     def _detections(self, time_us: int, uniforms: Array, normals: Array) -> list[Detection]:
-        p, targets = self.parameters, self._targets
+        targets, view = self._targets, self._view
         if not len(targets):
             return []
         targets.step(time_us)
         truth = self._truth
-        q_ned_from_frd = truth[t.Q_NED_FROM_FRD]
-        q_frd_from_gimbal = self._q_frd_from_mount if self._gimbal is None else self._gimbal.q_frd_from_gimbal
-        multiply(q_ned_from_frd, q_frd_from_gimbal, self._q_ned_from_gimbal)
-        matrix_from_quaternion(self._q_ned_from_gimbal, self._r_ned_from_gimbal)
-        matrix_from_quaternion(q_ned_from_frd, self._r_ned_from_frd)
-        eye_ned_m = np.array(self._home_frame.position_ned_m(truth))
-        eye_ned_m += self._r_ned_from_frd @ np.array(p.position_frd_m)
-
-        sight_ned_m = targets.positions_ned_m - eye_ned_m
-        range_m = np.sqrt(np.einsum("ij,ij->i", sight_ned_m, sight_ned_m))
-        range_m = np.maximum(range_m, 1e-6)
-        pixels = p.model.project(camera_from_gimbal(sight_ned_m @ self._r_ned_from_gimbal))
-        angular_size = 2.0 * np.arctan(0.5 * targets.sizes_m / range_m)
-        visible = (
-            p.model.inside(pixels)
-            & (range_m <= p.max_range_m)
-            & (sight_ned_m[:, 2] >= range_m * math.sin(p.min_depression_rad))
+        vehicle = self._vehicle_ned_m
+        vehicle[0], vehicle[1], vehicle[2] = self._home_frame.position_ned_m(truth)
+        seen = k.look(
+            truth[t.Q_NED_FROM_FRD],
+            self._q_frd_from_mount if self._gimbal is None else self._gimbal.q_frd_from_gimbal,
+            vehicle,
+            targets.positions_ned_m,
+            targets.sizes_m,
+            self._constants,
+            normals,
+            view,
         )
-        probability = p.detection.probability(p.model.focal_px * angular_size, range_m)
-        pixels = pixels + p.pixel_noise_px * normals[:, :2]
-        angular_size = angular_size * np.maximum(0.1, 1.0 + p.size_noise * normals[:, 2])
-        detected = visible & (uniforms < probability) & p.model.inside(pixels)
-        return [
-            self._detection(time_us, pixels[i], float(angular_size[i]), int(targets.tag_ids[i]))
-            for i in np.flatnonzero(detected)
-        ]
+        if not seen:
+            return []
+        visible = np.flatnonzero(~np.isnan(view[:, k.SIZE_PX]))
+        probability = self.parameters.detection.probability(
+            view[visible, k.SIZE_PX], view[visible, k.RANGE_M]
+        )
+        found = []
+        for i in visible[uniforms[visible] < probability].tolist():
+            u_px, v_px, size_rad = view[i, : k.SIZE_RAD + 1].tolist()
+            found.append(self._detection(time_us, u_px, v_px, size_rad, int(targets.tag_ids[i])))
+        return found
 
     def _false_detections(self, time_us: int) -> list[Detection]:
         p = self.parameters
@@ -235,11 +243,21 @@ class Camera:
         count = int(self._clutter.poisson(p.false_detections_per_frame))
         places = self._clutter.random((count, 3))
         least, most = p.false_size_px
-        pixels = places[:, :2] * (p.model.width_px, p.model.height_px)
-        sizes = (least + (most - least) * places[:, 2]) / p.model.focal_px
-        return [self._detection(time_us, pixels[i], float(sizes[i]), NO_TAG) for i in range(count)]
+        return [
+            self._detection(
+                time_us,
+                u * p.model.width_px,
+                v * p.model.height_px,
+                (least + (most - least) * size) / p.model.focal_px,
+                NO_TAG,
+            )
+            for u, v, size in places.tolist()
+        ]
 
-    def _detection(self, time_us: int, pixels: Array, size_rad: float, target_id: int) -> Detection:
-        x, y = self.parameters.model.normalised_from_pixels(pixels).tolist()
-        u_px, v_px = pixels.tolist()
-        return Detection(time_us, u_px, v_px, math.atan(x), math.atan(y), size_rad, target_id)
+    def _detection(
+        self, time_us: int, u_px: float, v_px: float, size_rad: float, target_id: int
+    ) -> Detection:
+        u0_px, v0_px = self.parameters.model.centre_px
+        angle_x_rad = math.atan2(u_px - u0_px, self._focal_px)
+        angle_y_rad = math.atan2(v_px - v0_px, self._focal_px)
+        return Detection(time_us, u_px, v_px, angle_x_rad, angle_y_rad, size_rad, target_id)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.payload.magnetic_map import MagneticMap
+from flightsim.payload.magnetic_map import MagneticMap, bilinear
 from flightsim.payload.main_field import MainField
 from flightsim.payload.signature import Signature
 
@@ -24,7 +24,7 @@ class MagneticField:
         signatures: the targets.
     """
 
-    __slots__ = ("_background", "_field_ned_nt", "published", "signatures")
+    __slots__ = ("_axes", "_background", "_field_ned_nt", "published", "signatures")
 
     def __init__(
         self,
@@ -48,12 +48,29 @@ class MagneticField:
         self.published = published
         self.signatures = tuple(signatures)
         self._background = published.without_holes()
+        row_step_m, column_step_m = published.spacing_m
+        self._axes = (
+            (float(published.north_m[0]), row_step_m, published.north_m.size - 1.0),
+            (float(published.east_m[0]), column_step_m, published.east_m.size - 1.0),
+        )
         main = MainField(published.home, decimal_year)
         self._field_ned_nt: Array = main.total_nt * main.direction_ned
 
     def total_nt(self, north_m: float, east_m: float, height_m: float) -> float:
         """Total field at a place, local NED of the map's home, and a height above it."""
-        return float(self.total_at_nt(np.array(north_m), np.array(east_m), height_m))
+        (south_m, row_step_m, last_row), (west_m, column_step_m, last_column) = self._axes
+        row = min(last_row, max(0.0, (north_m - south_m) / row_step_m))
+        column = min(last_column, max(0.0, (east_m - west_m) / column_step_m))
+        background = self._background
+        total: float = bilinear(background.total_field_nt, row, column)
+        if background.vertical_gradient_nt_m is not None:
+            gradient: float = bilinear(background.vertical_gradient_nt_m, row, column)
+            total += gradient * (height_m - background.height_m)
+        for signature in self.signatures:
+            total += float(
+                signature.anomaly_nt(np.float64(north_m), np.float64(east_m), height_m, self._field_ned_nt)
+            )
+        return total
 
     def total_at_nt(self, north_m: Array, east_m: Array, height_m: float) -> Array:
         """Total field at places of any shape, at one height above home."""

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.home import Home
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
@@ -104,7 +105,13 @@ class MagneticMap:
 
     def total_at_nt(self, north_m: float, east_m: float) -> float:
         """Total field at a place, at the map's height; NaN where there is no data."""
-        return float(self.interpolate(np.array(north_m), np.array(east_m)))
+        return float(
+            bilinear(
+                self.total_field_nt,
+                (north_m - float(self.north_m[0])) / self.spacing_m[0],
+                (east_m - float(self.east_m[0])) / self.spacing_m[1],
+            )
+        )
 
     def interpolate(self, north_m: Array, east_m: Array, height_m: float | None = None) -> Array:
         """Total field at places of any shape; NaN where there is no data.
@@ -120,22 +127,14 @@ class MagneticMap:
         return total + gradient * (height_m - self.height_m)
 
     def _bilinear(self, grid: Array, north_m: Array, east_m: Array) -> Array:
-        rows, columns = grid.shape
-        row_step, column_step = self.spacing_m
-        y = (np.asarray(north_m) - self.north_m[0]) / row_step
-        x = (np.asarray(east_m) - self.east_m[0]) / column_step
-        # A hair of slack at the edges: places come out of divisions.
-        inside = (y >= -1e-9) & (y <= rows - 1 + 1e-9) & (x >= -1e-9) & (x <= columns - 1 + 1e-9)
-        row = np.clip(np.floor(np.where(inside, y, 0.0)), 0, rows - 2).astype(np.intp)
-        column = np.clip(np.floor(np.where(inside, x, 0.0)), 0, columns - 2).astype(np.intp)
-        v, u = y - row, x - column
-        value: Array = (
-            grid[row, column] * (1.0 - v) * (1.0 - u)
-            + grid[row, column + 1] * (1.0 - v) * u
-            + grid[row + 1, column] * v * (1.0 - u)
-            + grid[row + 1, column + 1] * v * u
+        row_step_m, column_step_m = self.spacing_m
+        rows, columns = np.broadcast_arrays(
+            (np.asarray(north_m, dtype=np.float64) - self.north_m[0]) / row_step_m,
+            (np.asarray(east_m, dtype=np.float64) - self.east_m[0]) / column_step_m,
         )
-        return np.where(inside, value, np.nan)
+        out = np.empty(rows.size)
+        _bilinear_many(grid, rows.ravel(), columns.ravel(), out)
+        return out.reshape(rows.shape)
 
     def without_holes(self) -> "MagneticMap":
         """The same map with missing points filled from their nearest neighbours, for a field without end."""
@@ -239,6 +238,27 @@ class MagneticMap:
             return cls(north_m=north_m, east_m=east_m, total_field_nt=total, height_m=height_m, home=home)
         except MagneticMapError as error:
             raise MagneticMapError(f"{path}: {error}") from None
+
+
+@kernel
+def bilinear(grid: Array, row: float, column: float) -> float:
+    """Value at a broken row and column of a grid; NaN outside or beside missing data."""
+    last_row, last_column = grid.shape[0] - 1, grid.shape[1] - 1
+    # A hair of slack at the edges: places come out of divisions.
+    if not (-1e-9 <= row <= last_row + 1e-9 and -1e-9 <= column <= last_column + 1e-9):
+        return math.nan
+    i = max(0, min(last_row - 1, math.floor(row)))
+    j = max(0, min(last_column - 1, math.floor(column)))
+    v, u = row - i, column - j
+    low = grid[i, j] * (1.0 - u) + grid[i, j + 1] * u
+    high = grid[i + 1, j] * (1.0 - u) + grid[i + 1, j + 1] * u
+    return low * (1.0 - v) + high * v
+
+
+@kernel
+def _bilinear_many(grid: Array, rows: Array, columns: Array, out: Array) -> None:
+    for n in range(out.size):
+        out[n] = bilinear(grid, rows[n], columns[n])
 
 
 def _fill(grid: Array) -> Array:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from flightsim.payload.checks import require_finite
 from flightsim.sensors.checks import require_positive
 
 Array = NDArray[np.float64]
+Places: TypeAlias = NDArray[np.float64] | np.float64
 
 _MU0_4PI_NT: Final = 1e-7 * 1e9
 """mu_0 / 4 pi in nT m / A."""
@@ -27,7 +28,7 @@ class Signature(Protocol):
     def east_m(self) -> float:
         """Metres east of home."""
 
-    def anomaly_nt(self, north_m: Array, east_m: Array, height_m: float, field_ned_nt: Array) -> Array:
+    def anomaly_nt(self, north_m: Places, east_m: Places, height_m: float, field_ned_nt: Array) -> Places:
         """What it adds at places of any shape, at a height above home, in an Earth's field (3,)."""
 
 
@@ -58,13 +59,13 @@ class GaussianSignature:
         )
         require_positive(sigma_along_m=self.sigma_along_m, sigma_across_m=self.sigma_across_m)
 
-    def anomaly_nt(self, north_m: Array, east_m: Array, height_m: float, field_ned_nt: Array) -> Array:
+    def anomaly_nt(self, north_m: Places, east_m: Places, height_m: float, field_ned_nt: Array) -> Places:
         """The Gaussian; height and field don't matter."""
-        north, east = np.asarray(north_m) - self.north_m, np.asarray(east_m) - self.east_m
+        north, east = north_m - self.north_m, east_m - self.east_m
         cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
         along = (north * cosine + east * sine) / self.sigma_along_m
         across = (east * cosine - north * sine) / self.sigma_across_m
-        value: Array = self.amplitude_nt * np.exp(-0.5 * (along * along + across * across))
+        value: Places = self.amplitude_nt * np.exp(-0.5 * (along * along + across * across))
         return value
 
 
@@ -94,9 +95,9 @@ class DipoleSignature:
                 f"moment_ned_a_m2 = {self.moment_ned_a_m2!r} is not accepted: 3 finite numbers are"
             )
 
-    def field_ned_nt(self, north_m: Array, east_m: Array, height_m: float) -> Array:
+    def field_ned_nt(self, north_m: Places, east_m: Places, height_m: float) -> Array:
         """Field vectors (..., 3) of the dipole."""
-        north, east = np.asarray(north_m) - self.north_m, np.asarray(east_m) - self.east_m
+        north, east = np.broadcast_arrays(north_m - self.north_m, east_m - self.east_m)
         down = np.full_like(north, self.height_m - height_m)
         offset = np.stack([north, east, down], axis=-1)
         # Nobody measures inside the body: a metre is the least distance.
@@ -106,10 +107,10 @@ class DipoleSignature:
         field: Array = _MU0_4PI_NT * (3.0 * along * offset / distance**5 - moment / distance**3)
         return field
 
-    def anomaly_nt(self, north_m: Array, east_m: Array, height_m: float, field_ned_nt: Array) -> Array:
+    def anomaly_nt(self, north_m: Places, east_m: Places, height_m: float, field_ned_nt: Array) -> Places:
         """Change of the magnitude of the Earth's field."""
-        total = field_ned_nt + self.field_ned_nt(
-            np.asarray(north_m, dtype=np.float64), np.asarray(east_m, dtype=np.float64), height_m
+        total = field_ned_nt + self.field_ned_nt(north_m, east_m, height_m)
+        value: Places = np.sqrt(np.sum(total * total, axis=-1)) - math.sqrt(
+            float(field_ned_nt @ field_ned_nt)
         )
-        value: Array = np.sqrt(np.sum(total * total, axis=-1)) - math.sqrt(float(field_ned_nt @ field_ned_nt))
         return value

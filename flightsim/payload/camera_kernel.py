@@ -1,0 +1,84 @@
+"""What a camera would see of all targets in one frame, compiled."""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
+from flightsim.rotations import rotate, rotate_inverse
+
+Array = NDArray[np.float64]
+
+# constants
+FOCAL_PX: Final = 0
+WIDTH_PX: Final = 1
+HEIGHT_PX: Final = 2
+MAX_RANGE_M: Final = 3
+MIN_SINE: Final = 4  # of the depression
+POSITION_FRD_M: Final = slice(5, 8)
+PIXEL_NOISE: Final = 8
+SIZE_NOISE: Final = 9
+CONSTANTS: Final = 10
+
+# one row for each target
+U_PX: Final = 0  # as measured
+V_PX: Final = 1
+SIZE_RAD: Final = 2  # as measured
+SIZE_PX: Final = 3  # true; NaN: not visible
+RANGE_M: Final = 4
+VIEW: Final = 5
+
+_MIN_RANGE_M: Final = 1e-6
+
+
+@kernel
+def look(
+    q_ned_from_frd: Array,
+    q_frd_from_gimbal: Array,
+    vehicle_ned_m: Array,
+    targets_ned_m: Array,
+    sizes_m: Array,
+    constants: Array,
+    normals: Array,
+    out: Array,
+) -> int:
+    """Rows (n, VIEW) of `out` for targets (n, 3); returns how many are visible.
+
+    Visible is what lies before the camera, in the image as it is and as it is measured, near enough, and far
+    enough below the horizon. `normals` is (n, 3): noise of u, v and size.
+    """
+    arm, eye, sight, body, gimbal = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
+    rotate(q_ned_from_frd, constants[POSITION_FRD_M], arm)
+    for axis in range(3):
+        eye[axis] = vehicle_ned_m[axis] + arm[axis]
+    focal_px, width_px, height_px = constants[FOCAL_PX], constants[WIDTH_PX], constants[HEIGHT_PX]
+    seen = 0
+    for i in range(targets_ned_m.shape[0]):
+        out[i, SIZE_PX] = math.nan
+        for axis in range(3):
+            sight[axis] = targets_ned_m[i, axis] - eye[axis]
+        range_m = max(_MIN_RANGE_M, math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2))
+        out[i, RANGE_M] = range_m
+        if range_m > constants[MAX_RANGE_M] or sight[2] < constants[MIN_SINE] * range_m:
+            continue
+        rotate_inverse(q_ned_from_frd, sight, body)
+        rotate_inverse(q_frd_from_gimbal, body, gimbal)
+        if gimbal[0] <= 0.0:
+            continue
+        u_px = 0.5 * width_px + focal_px * gimbal[1] / gimbal[0]
+        v_px = 0.5 * height_px + focal_px * gimbal[2] / gimbal[0]
+        if not (0.0 <= u_px < width_px and 0.0 <= v_px < height_px):
+            continue
+        u_px += constants[PIXEL_NOISE] * normals[i, 0]
+        v_px += constants[PIXEL_NOISE] * normals[i, 1]
+        if not (0.0 <= u_px < width_px and 0.0 <= v_px < height_px):
+            continue
+        size_rad = 2.0 * math.atan(0.5 * sizes_m[i] / range_m)
+        out[i, U_PX] = u_px
+        out[i, V_PX] = v_px
+        out[i, SIZE_PX] = focal_px * size_rad
+        out[i, SIZE_RAD] = size_rad * max(0.1, 1.0 + constants[SIZE_NOISE] * normals[i, 2])
+        seen += 1
+    return seen
