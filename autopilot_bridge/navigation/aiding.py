@@ -21,6 +21,7 @@ from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.report import Clocks, report
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
+from autopilot_bridge.navigation.standby import Standby
 from autopilot_bridge.navigation.states import (
     CORRECTION_POS,
     TERRAIN_DOWN,
@@ -53,7 +54,6 @@ _GAP_US: Final = 2_000_000  # silence after which a sensor's refusal is counted 
 _CONTRADICTION_MEMORY_US: Final = 10_000_000
 _TOO_MANY_CONTRADICTIONS: Final = 4  # within that time of each other: the estimate is worth nothing
 _GROUND_SILENCE_US: Final = 1_000_000  # no GPS for this long: air data take over
-_HELD_VELOCITY_M_S: Final = 2.0  # 1-sigma of the velocity when the position begins to be held in flight
 
 
 class Aiding:
@@ -66,23 +66,21 @@ class Aiding:
     """
 
     __slots__ = (
-        "_adrift",
         "_baro_known",
         "_clocks",
         "_contradicted_us",
         "_contradictions",
         "_gps_height_known",
         "_health",
-        "_held",
         "_mag_ned",
         "_parameters",
         "_quality",
         "_readings",
         "_rejoining",
         "_report_every",
-        "_rested",
         "_slow_every",
         "_solution",
+        "_standby",
         "_terrain",
         "_tick",
         "air",
@@ -104,6 +102,7 @@ class Aiding:
         self._health = health
         self._quality = GpsQuality(parameters)
         self._terrain = TerrainEstimator(parameters)
+        self._standby = Standby(solution, health)
         self._slow_every = max(1, parameters.covariance_rate_hz // _SLOW_RATE_HZ)
         self._report_every = max(1, parameters.covariance_rate_hz // _REPORT_RATE_HZ)
         self._mag_ned: Array | None = None
@@ -122,9 +121,7 @@ class Aiding:
         self._terrain.restart()
         self._baro_known = False
         self._gps_height_known = False
-        self._rested = False
-        self._held = False
-        self._adrift = False
+        self._standby.restart()
         self._rejoining = False
         self._contradictions = 0
         self._contradicted_us = 0
@@ -210,7 +207,16 @@ class Aiding:
         if self.air is not None:
             self.air.look(time_us)
             self.at_rest = self.at_rest and self.air.stands_still(time_us)
-        has = self._prepare_slow(time_us) if slow else 0
+        has = 0
+        if slow:
+            has = self._standby.prepare(
+                self._parameters,
+                clocks,
+                time_us,
+                at_rest=self.at_rest,
+                winged=self.air is not None,
+                flying=self.air is not None and self.air.flying,
+            )
         gps_row = baro_row = mag_row = 0
         if pending & f.HAS_GPS:
             gps_row = self._prepare_gps(time_us)
@@ -254,7 +260,15 @@ class Aiding:
             accepted |= self._fuse_air(self.air, time_us)
         self._update_terrain(time_us, bool(pending & HAS_RANGE), slow)
         if self._tick % self._report_every == 0:
-            report(health, self._parameters, solution, clocks, time_us, held=self._held, at_rest=self.at_rest)
+            report(
+                health,
+                self._parameters,
+                solution,
+                clocks,
+                time_us,
+                held=self._standby.held,
+                at_rest=self.at_rest,
+            )
             self._quality.silent(time_us)
             health.gps_quality = self._quality.good
             health.rangefinder_in_use = self._terrain.in_use
@@ -270,7 +284,9 @@ class Aiding:
         values, solution, p, obs = reading.values, self._solution, self._parameters, self._solution.obs
         usable = self._quality.judge(values, reading.time_us, time_us)
         row = solution.row_at(reading.time_us, time_us)
-        if not (usable and p.use_gps) or row < 0 or not self._health.yaw_aligned:
+        if not (usable and p.use_gps) or row < 0:
+            return -1
+        if not self._health.yaw_aligned and not self._align_with_course(values):
             return -1
         lat, lon, alt = float(values[GPS_LAT_DEG]), float(values[GPS_LON_DEG]), float(values[GPS_ALT_M])
         if self.frame is None:
@@ -289,7 +305,7 @@ class Aiding:
         solution.set_gps_accuracy(float(values[GPS_EPH_M]), float(values[GPS_EPV_M]))
         clocks = self._clocks
         timeout_us = p.gps_timeout_s * 1e6
-        if self._held or clocks.gps_position_us < 0:
+        if self._standby.held or clocks.gps_position_us < 0:
             self._reset_to_gps(row, time_us)
         elif self.air is not None and time_us - clocks.gps_judged_us > timeout_us:
             self._rejoining = True  # the covariance has grown with the error: the gate can judge it
@@ -304,6 +320,16 @@ class Aiding:
             solution.forget_gps_height_error()
             self._reset_height_to_gps(row, time_us)
         return row
+
+    def _align_with_course(self, values: Array) -> bool:
+        """A wing that has no heading, for want of a magnetometer, flies about where it points; True if so."""
+        north, east, _ = values[GPS_VEL_NED_M_S]
+        if self.air is None or math.hypot(north, east) < self._parameters.airspeed_threshold_m_s:
+            return False
+        rotation = self._solution.core[R : R + 9]
+        self._turn_yaw(math.atan2(east, north) - math.atan2(rotation[3], rotation[0]))
+        self._health.yaw_aligned = True
+        return True
 
     def _contradicted(self, time_us: int) -> None:
         """A sensor that seems good had to be obeyed against the filter's belief."""
@@ -320,7 +346,7 @@ class Aiding:
         change = obs[f.GPS_VEL : f.GPS_VEL + 3] - solution.past_velocity(row)
         solution.move_horizontally(float(step[0]), float(step[1]))
         solution.change_velocity(float(change[0]), float(change[1]), sigma_m_s=UNKNOWN_VELOCITY_M_S)
-        self._held = False
+        self._standby.release()
         clocks.horizontal_aid_us = clocks.gps_position_us = clocks.gps_velocity_us = time_us
         health.position_resets += 1
         health.position_reset_ne_m = (float(step[0]), float(step[1]))
@@ -328,7 +354,7 @@ class Aiding:
         health.velocity_reset_ne_m_s = (float(change[0]), float(change[1]))
 
     def _rejoined(self, jump: Array) -> None:
-        """The first fix after dead reckoning has moved velocity and position (`jump`) by what had built up."""
+        """The first fix after dead reckoning has moved velocity and position by what had built up."""
         health = self._health
         self._rejoining = False
         health.velocity_resets += 1
@@ -339,10 +365,12 @@ class Aiding:
     def _fuse_air(self, air: AirAiding, time_us: int) -> int:
         """Airspeed and sideslip; without GPS they aid the velocity, and so end holding the position."""
         clocks = self._clocks
-        soundness = air.update(time_us, at_rest=self.at_rest, gps_us=clocks.gps_us, drifting=self._held)
+        soundness = air.update(
+            time_us, at_rest=self.at_rest, gps_us=clocks.gps_us, drifting=self._standby.held
+        )
         if air.wind_us == time_us and (clocks.gps_us < 0 or time_us - clocks.gps_us > _GROUND_SILENCE_US):
             clocks.horizontal_aid_us = time_us
-            self._held = self._adrift = False
+            self._standby.release()
         return soundness & f.UNSOUND
 
     def _reset_height_to_gps(self, row: int, time_us: int) -> None:
@@ -437,60 +465,6 @@ class Aiding:
         ):
             self._solution.forget_mag_bias()
             clocks.mag_refused_us = time_us
-
-    def _prepare_slow(self, time_us: int) -> int:
-        """Standing still, and holding the position without horizontal aiding or the height without any."""
-        clocks, p, solution, obs = self._clocks, self._parameters, self._solution, self._solution.obs
-        has = 0
-        if self.at_rest:
-            if self._rested:
-                has |= f.HAS_REST
-            else:
-                f.restart_mean_rate(solution.core)
-                if self._held:
-                    self._forget_velocity()
-        self._rested = self.at_rest
-        lost = clocks.horizontal_aid_us < 0 or time_us - clocks.horizontal_aid_us > p.no_aid_timeout_s * 1e6
-        if lost and not self._held:
-            self._hold()
-        flying = self.air is not None and self.air.flying
-        may_leave = clocks.gps_us >= 0 or self.air is not None  # a launch must not be held back
-        sigma = p.no_aid_noise_m if may_leave and not self.at_rest else p.at_rest_noise_m
-        if self._held and flying:
-            self._adrift = True  # a wing is not where it was
-        elif self._held:
-            if self._adrift:
-                self._hold()
-            obs[f.HOLD_VAR] = sigma * sigma
-            has |= f.HAS_HOLD
-        if time_us - clocks.height_us > p.height_timeout_s * 1e6:
-            if not clocks.height_held:
-                obs[f.HOLD + 2] = solution.core[X_POS + 2]
-            clocks.height_held = True
-            obs[f.HOLD_HEIGHT_VAR] = sigma * sigma
-            has |= f.HAS_HOLD_HEIGHT
-        else:
-            clocks.height_held = False
-        return has
-
-    def _hold(self) -> None:
-        """From now on the position is held where it is, and the velocity taken as about zero; not of a wing
-        in flight, whose attitude that would spoil."""
-        solution, core = self._solution, self._solution.core
-        solution.obs[f.HOLD : f.HOLD + 2] = core[X_POS : X_POS + 2]
-        self._held = True
-        self._adrift = self.air is not None and self.air.flying
-        if not self._adrift:
-            self._forget_velocity()
-
-    def _forget_velocity(self) -> None:
-        """About zero is the best guess of a horizontal velocity that nothing has measured lately."""
-        solution, core = self._solution, self._solution.core
-        if self._clocks.horizontal_aid_us >= 0:
-            north, east = float(core[X_VEL]), float(core[X_VEL + 1])
-            solution.change_velocity(-north, -east, sigma_m_s=_HELD_VELOCITY_M_S)
-            self._health.velocity_resets += 1
-            self._health.velocity_reset_ne_m_s = (-north, -east)
 
     def _update_terrain(self, time_us: int, has_range: bool, slow: bool) -> None:
         terrain, core = self._terrain, self._solution.core

@@ -153,7 +153,7 @@ class AirAiding:
         """
         self._time_us = time_us
         solution, p, pitot = self._solution, self._parameters, self._pitot
-        pitot.update_density()
+        pitot.update_density(believed=self.pitot_believed)
         self._set_wind_walk()
         self._turn.update()
         self._judge_flight(at_rest)

@@ -1,6 +1,6 @@
 """Air data updates of a fixed wing: true airspeed, and no sideslip in coordinated flight.
 
-With the air's velocity past the vehicle `a = v - w` (NED; the wind w is horizontal) and the body's y axis `y`,
+With the vehicle's velocity through the air `a = v - w` (NED; the wind w is horizontal) and the body's y axis,
 
     airspeed  |a|,      error:  a/|a| . (v error - w error)
     sideslip  y . a,    error:  y . (v error - w error) + (y x a) . attitude error
@@ -10,8 +10,8 @@ that lasts for its correlation time T, so samples dt apart carry as little about
 noise of (1 + 2 T / dt) times the variance (same power at low frequencies; Maybeck, "Stochastic Models,
 Estimation, and Control", vol. 1, section 4.11).
 
-While GPS gives the velocity, only the wind is corrected (PX4 does the same): the other states are "considered"
-(Schmidt), their covariance with the wind stays right.
+While GPS gives the velocity, only the wind is corrected (PX4 does the same): the other states are
+"considered" (Schmidt), their covariance with the wind stays right.
 """
 
 import math

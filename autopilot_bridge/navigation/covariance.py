@@ -115,7 +115,8 @@ def _decay(
 
 @kernel
 def predict(p: Array, core: Array, process: Array) -> None:
-    """Carry `p` (22, 22), with wind (24, 24), over the time summed up in `core`, and clear the sums. Stays exactly symmetric."""
+    """Carry `p`, (22, 22) or with wind (24, 24), over the time summed up in `core`, and clear the sums. Stays
+    exactly symmetric."""
     t = core[SUM_TIME]
     if t <= 0.0:
         return

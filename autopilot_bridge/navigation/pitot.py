@@ -89,13 +89,13 @@ class Pitot:
             and time_us - self._changed_us <= _STUCK_US
         )
 
-    def update_density(self) -> None:
-        """Air density from the barometer, and from the tube's own temperature if there is one."""
+    def update_density(self, *, believed: bool) -> None:
+        """Air density from the barometer, and from the sensor's own temperature if it is believed."""
         static_pa = float(self._readings.barometer.values[BARO_PRESSURE_PA])
         if not _PRESSURE_PA[0] <= static_pa <= _PRESSURE_PA[1]:
             return
         sensed_c = float(self._readings.airspeed.values[AIRSPEED_TEMPERATURE_C])
-        if _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
+        if believed and _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
             temperature_k = sensed_c + _KELVIN - self._parameters.airspeed_sensor_heating_k
         else:
             temperature_k = standard_temperature_k(static_pa)
@@ -106,9 +106,9 @@ class Pitot:
 class AirspeedCheck:
     """Decides over time whether the sensor is believed: PX4's airspeed selector (AirspeedValidator).
 
-    The part of the innovation beyond a limit is added up; beyond an integral, or when the sensor is dead, the
-    check fails. Failing for `airspeed_stop_delay_s` takes the sensor out, passing for `airspeed_start_delay_s`
-    brings it back.
+    The part of the innovation beyond a limit is added up; beyond an integral, or when the sensor is dead,
+    the check fails. Failing for `airspeed_stop_delay_s` takes the sensor out, passing for
+    `airspeed_start_delay_s` brings it back.
 
     Attributes:
         passed: the sensor is believed.
@@ -136,7 +136,7 @@ class AirspeedCheck:
         innovation_m_s: float,
         sigma_m_s: float,
     ) -> None:
-        """Judge at `time_us`; `sigma_m_s` is what the innovation may owe to the estimate, NaN innovation: none."""
+        """Judge at `time_us`; `sigma_m_s` is what the innovation (NaN: none) may owe to the estimate."""
         elapsed_s = (time_us - self._updated_us) * 1e-6 if self._updated_us >= 0 else 0.0
         self._updated_us = time_us
         excess = 0.0
@@ -184,8 +184,8 @@ class GustVariance:
     def add(
         self, innovation_m_s: float, noise_variance: float, state_variance: float, interval_s: float
     ) -> None:
-        """Take an accepted innovation. What the state contributes isn't subtracted once it is small: the wind's
-        error is then mostly turbulence of the last minute, with the same sign."""
+        """Take an accepted innovation. What the state contributes isn't subtracted once it is small: the
+        wind's error is then mostly turbulence of the last minute, with the same sign."""
         if state_variance > self._SETTLED:
             return
         said = max(0.0, min(innovation_m_s * innovation_m_s, self._MOST) - noise_variance)

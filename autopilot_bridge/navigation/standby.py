@@ -1,0 +1,107 @@
+"""What is fused when little else is: standing still, and position or height held where they were.
+
+A wing in flight without any aiding is adrift: it is certainly not where it was, and holding it there would
+take its centripetal acceleration for tilt.
+"""
+
+from typing import Final
+
+from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.navigation.report import Clocks
+from autopilot_bridge.navigation.solution import Solution
+from autopilot_bridge.navigation.states import X_POS, X_VEL
+
+_HELD_VELOCITY_M_S: Final = 2.0  # 1-sigma of the velocity when the position begins to be held in flight
+
+
+class Standby:
+    """Prepares these updates of a `Solution`.
+
+    Attributes:
+        held: nothing aids the horizontal position; it is held, or adrift.
+    """
+
+    __slots__ = ("_adrift", "_health", "_rested", "_solution", "held")
+
+    def __init__(self, solution: Solution, health: NavigationHealth) -> None:
+        self._solution = solution
+        self._health = health
+        self.restart()
+
+    def restart(self) -> None:
+        """As at boot."""
+        self.held = False
+        self._adrift = False
+        self._rested = False
+
+    def release(self) -> None:
+        """The position is aided again."""
+        self.held = self._adrift = False
+
+    def prepare(
+        self,
+        parameters: NavigationParameters,
+        clocks: Clocks,
+        time_us: int,
+        *,
+        at_rest: bool,
+        winged: bool,
+        flying: bool,
+    ) -> int:
+        """What of this to fuse at `time_us` (bits of `fusion`), with its variances written into `obs`.
+
+        Args:
+            at_rest: the vehicle stands on the ground.
+            winged, flying: it is a fixed wing, and in flight.
+        """
+        p, solution, obs = parameters, self._solution, self._solution.obs
+        has = 0
+        if at_rest:
+            if self._rested:
+                has |= f.HAS_REST
+            else:
+                f.restart_mean_rate(solution.core)
+                if self.held:
+                    self._forget_velocity(clocks)
+        self._rested = at_rest
+        lost = clocks.horizontal_aid_us < 0 or time_us - clocks.horizontal_aid_us > p.no_aid_timeout_s * 1e6
+        if lost and not self.held:
+            self._hold(clocks, flying=flying)
+        may_leave = clocks.gps_us >= 0 or winged  # a launch must not be held back
+        sigma = p.no_aid_noise_m if may_leave and not at_rest else p.at_rest_noise_m
+        if self.held and flying:
+            self._adrift = True
+        elif self.held:
+            if self._adrift:
+                self._hold(clocks, flying=False)
+            obs[f.HOLD_VAR] = sigma * sigma
+            has |= f.HAS_HOLD
+        if time_us - clocks.height_us > p.height_timeout_s * 1e6:
+            if not clocks.height_held:
+                obs[f.HOLD + 2] = solution.core[X_POS + 2]
+            clocks.height_held = True
+            obs[f.HOLD_HEIGHT_VAR] = sigma * sigma
+            has |= f.HAS_HOLD_HEIGHT
+        else:
+            clocks.height_held = False
+        return has
+
+    def _hold(self, clocks: Clocks, *, flying: bool) -> None:
+        """From now on the position is held where it is, and the velocity taken as about zero."""
+        solution, core = self._solution, self._solution.core
+        solution.obs[f.HOLD : f.HOLD + 2] = core[X_POS : X_POS + 2]
+        self.held = True
+        self._adrift = flying
+        if not flying:
+            self._forget_velocity(clocks)
+
+    def _forget_velocity(self, clocks: Clocks) -> None:
+        """About zero is the best guess of a horizontal velocity that nothing has measured lately."""
+        solution, core = self._solution, self._solution.core
+        if clocks.horizontal_aid_us >= 0:
+            north, east = float(core[X_VEL]), float(core[X_VEL + 1])
+            solution.change_velocity(-north, -east, sigma_m_s=_HELD_VELOCITY_M_S)
+            self._health.velocity_resets += 1
+            self._health.velocity_reset_ne_m_s = (-north, -east)
