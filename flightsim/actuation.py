@@ -1,5 +1,6 @@
 """Actuators of a fixed-wing vehicle: commands by role to JSBSim's properties, and their failures."""
 
+from dataclasses import replace
 from typing import Any, Final
 
 import jsbsim
@@ -13,12 +14,16 @@ _GROUND_ROLES: Final = (Role.FLAPS, Role.STEERING, Role.BRAKE)
 
 _MOVING_THROTTLE: Final = 0.05
 
-# (setter, index of the command, scale, offset, minimum, maximum)
 _Entry = tuple[Any, int, float, float, float, float]
+"""Setter of a property, place of the command, scale, offset, minimum, maximum."""
+_MixedEntry = tuple[Any, tuple[tuple[int, float], ...], float, float, float]
+"""Setter of a property, (place, scale) of each command that it takes, offset, minimum, maximum."""
 
 
 class FixedWingActuators:
     """Writes actuator commands, each to its properties, clipped.
+
+    A property that several roles name takes their sum: elevons, V-tails, brakes that steer.
 
     Attributes:
         roles: those the vehicle has.
@@ -30,6 +35,7 @@ class FixedWingActuators:
         "_effectiveness",
         "_fast",
         "_fdm",
+        "_mixed",
         "_name",
         "_nodes",
         "_slow",
@@ -45,30 +51,27 @@ class FixedWingActuators:
             AirframeError: the model lacks one that the description names.
         """
         if airframe.kind is not AirframeKind.FIXED_WING:
-            raise AirframeError(
-                f"vehicle '{airframe.name}' is a {airframe.kind}, not a {AirframeKind.FIXED_WING}"
-            )
+            raise AirframeError(f"vehicle '{airframe.name}' is a {airframe.kind}, no fixed wing")
         manager = fdm.get_property_manager()
         self._fdm = fdm
         self._name = airframe.name
-        self._channels: dict[Role, ActuatorChannel] = {}
-        self._nodes: dict[Role, tuple[Any, ...]] = {}
-        self._effectiveness: dict[Role, float] = {}
-        self._stuck: dict[Role, float] = {}
+        self._nodes: dict[str, Any] = {}
+        channels: list[ActuatorChannel] = []
         for channel in airframe.channels:
-            if channel.optional:
-                found = [manager.get_node(name) for name in channel.properties]
-                nodes = tuple(node for node in found if node is not None)
-            else:
-                nodes = tuple(
-                    find_property(fdm, name, needed_by=f"{channel.role} of vehicle '{airframe.name}'")
-                    for name in channel.properties
-                )
-            if nodes:
-                self._channels[channel.role] = channel
-                self._nodes[channel.role] = nodes
-                self._effectiveness[channel.role] = 1.0
-        self.roles = tuple(self._channels)
+            found: list[str] = []
+            for name in channel.properties:
+                node = manager.get_node(name)
+                if node is None and not channel.optional:
+                    node = find_property(fdm, name, needed_by=f"{channel.role} of vehicle '{airframe.name}'")
+                if node is not None:
+                    found.append(name)
+                    self._nodes[name] = node
+            if found:
+                channels.append(replace(channel, properties=tuple(found)))
+        self._channels = tuple(channels)
+        self.roles = tuple(dict.fromkeys(channel.role for channel in channels))
+        self._effectiveness = dict.fromkeys(self.roles, 1.0)
+        self._stuck: dict[Role, dict[str, float]] = {}
         self.parked = False
         self._arrange()
 
@@ -76,6 +79,10 @@ class FixedWingActuators:
         """Write flying surfaces and throttle."""
         for set_value, index, scale, offset, low, high in self._fast:
             value = commands[index] * scale + offset
+            set_value(low if value < low else high if value > high else value)
+        for set_value, terms, value, low, high in self._mixed:
+            for index, scale in terms:
+                value += commands[index] * scale
             set_value(low if value < low else high if value > high else value)
 
     def write_slow(self, commands: list[float]) -> None:
@@ -106,11 +113,12 @@ class FixedWingActuators:
         if not 0.0 <= value <= 1.0:
             raise ValueError(f"effectiveness {value} of {role} is not in 0..1")
         self._effectiveness[role] = value
-        name = self._channels[role].effectiveness
-        if name is not None:
-            find_property(self._fdm, name, needed_by=f"{role} of '{self._name}'").set_double_value(value)
-        elif role is Role.THROTTLE:
-            self._run_engines(value > 0.0)
+        names = {channel.effectiveness for channel in self._channels if channel.role is role}
+        for name in names:
+            if name is not None:
+                find_property(self._fdm, name, needed_by=f"{role} of '{self._name}'").set_double_value(value)
+            elif role is Role.THROTTLE:
+                self._run_engines(value > 0.0)
         self._arrange()
 
     def set_stuck(self, role: Role, stuck: bool) -> None:
@@ -118,11 +126,12 @@ class FixedWingActuators:
         self._require(role)
         self._stuck.pop(role, None)
         if stuck:
-            self._stuck[role] = float(self._nodes[role][0].get_double_value())
+            names = (n for channel in self._channels if channel.role is role for n in channel.properties)
+            self._stuck[role] = {name: float(self._nodes[name].get_double_value()) for name in names}
         self._arrange()
 
     def _require(self, role: Role) -> None:
-        if role not in self._channels:
+        if role not in self.roles:
             raise ValueError(
                 f"vehicle '{self._name}' has no actuator '{role}' that can fail; accepted are "
                 f"{', '.join(self.roles)}"
@@ -141,17 +150,31 @@ class FixedWingActuators:
                 node.set_double_value(on if running else off)
 
     def _arrange(self) -> None:
+        """Work out what to write, from the channels and their failures."""
+        by_property: dict[str, list[ActuatorChannel]] = {}
+        for channel in self._channels:
+            for name in channel.properties:
+                by_property.setdefault(name, []).append(channel)
         fast: list[_Entry] = []
         slow: list[_Entry] = []
-        for role, channel in self._channels.items():
-            scale, offset = channel.scale, channel.offset
-            if channel.effectiveness is None:
-                scale *= self._effectiveness[role]
-            if role in self._stuck:
-                scale, offset = 0.0, self._stuck[role]
-            entries = slow if role in _GROUND_ROLES else fast
-            for node in self._nodes[role]:
-                entries.append(
-                    (node.set_double_value, role.command, scale, offset, channel.minimum, channel.maximum)
-                )
-        self._fast, self._slow = tuple(fast), tuple(slow)
+        mixed: list[_MixedEntry] = []
+        for name, channels in by_property.items():
+            set_value = self._nodes[name].set_double_value
+            low = max(channel.minimum for channel in channels)
+            high = min(channel.maximum for channel in channels)
+            terms: list[tuple[int, float]] = []
+            total_offset = 0.0
+            for channel in channels:
+                scale, offset = channel.scale, channel.offset
+                if channel.effectiveness is None:
+                    scale *= self._effectiveness[channel.role]
+                if channel.role in self._stuck:
+                    scale, offset = 0.0, self._stuck[channel.role][name]
+                terms.append((channel.role.command, scale))
+                total_offset += offset
+            if len(terms) > 1:
+                mixed.append((set_value, tuple(terms), total_offset, low, high))
+                continue
+            entries = slow if channels[0].role in _GROUND_ROLES else fast
+            entries.append((set_value, *terms[0], total_offset, low, high))
+        self._fast, self._slow, self._mixed = tuple(fast), tuple(slow), tuple(mixed)

@@ -196,11 +196,14 @@ def _channels(table: Any, path: Path) -> tuple[ActuatorChannel, ...]:
     if not isinstance(table, dict):
         raise AirframeError(f"{path}: [actuators] is {table!r}; expected is a table")
     _only(table, tuple(Role), "roles of [actuators]", path)
-    return tuple(
-        _channel(role, table[role], path) if role in table else _standard(role)
-        for role in Role
-        if table.get(role) is not False
-    )
+    channels: list[ActuatorChannel] = []
+    for role in Role:
+        value = table.get(role, {})
+        if value is False:
+            continue
+        several = isinstance(value, list) and any(isinstance(item, dict) for item in value)
+        channels.extend(_channel(role, item, path) for item in (value if several else [value]))
+    return tuple(channels)
 
 
 def _standard(role: Role) -> ActuatorChannel:
@@ -224,8 +227,8 @@ def _channel(role: Role, value: Any, path: Path) -> ActuatorChannel:
         value = {"properties": value}
     if not isinstance(value, dict):
         raise AirframeError(
-            f"{path}: {where} is {value!r}; expected is a JSBSim property name, a list of them, a table with "
-            f"{', '.join(_CHANNEL_KEYS)}, or false for an aircraft without"
+            f"{path}: {where} is {value!r}; expected is a JSBSim property name, a list of them, a "
+            f"table (or several) with {', '.join(_CHANNEL_KEYS)}, or false for an aircraft without"
         )
     _only(value, _CHANNEL_KEYS, f"keys of {where}", path)
     standard = _standard(role)
