@@ -15,7 +15,7 @@ from flightsim.flight_envelope import FlightEnvelope
 
 _G: Final = 9.80665
 _ROLL_BANDWIDTH_RAD_S: Final = 12.0
-_PITCH_DAMPING: Final = 1.0  # of the short period with the rate loop closed
+_PITCH_DAMPING: Final = 0.8  # of the short period with the rate loop closed
 _YAW_DAMPING: Final = 0.6  # of the Dutch roll
 _SIDE_FORCE_SLOPE_PER_RAD: Final = 0.7  # usual size of the side-force slope, for the sideslip loop alone
 _SIDESLIP_BANDWIDTH_RAD_S: Final = 0.8
@@ -76,11 +76,11 @@ def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> tu
     pitch_gain = envelope.pitch_rate_per_elevator_rad_s
     natural = envelope.short_period_frequency_rad_s
     missing = max(2.0 * (_PITCH_DAMPING - envelope.short_period_damping) * natural, 0.2 * natural)
-    values["rate_pitch_ff"] = 1.0 / pitch_gain
+    values["rate_pitch_ff"] = 0.6 / pitch_gain
     values["rate_pitch_p"] = missing / envelope.pitch_acceleration_per_elevator_rad_s2
     values["rate_pitch_i"] = 1.0 / pitch_gain
     values["rate_pitch_integral_max"] = 0.5
-    pitch_s = max(0.4, 2.0 / natural)
+    pitch_s = max(0.25, 2.5 / natural)
     values["pitch_time_constant_s"] = pitch_s
     pitch_rate = min(math.radians(60.0), 0.6 * pitch_gain)
     values["pitch_rate_max_up_rad_s"] = pitch_rate
@@ -122,14 +122,17 @@ def _energy_gains(envelope: FlightEnvelope, values: dict[str, float | bool], pit
     values["trim_pitch_rad"] = envelope.trim_pitch_rad
     values["lift_angle_rad"] = lift / envelope.lift_slope_per_rad
 
-    values["height_time_constant_s"] = max(1.5, 3.0 * pitch_s)
-    values["airspeed_time_constant_s"] = max(1.5, 3.0 * pitch_s)
+    values["height_time_constant_s"] = max(1.5, 6.0 * pitch_s)
+    values["airspeed_time_constant_s"] = max(1.2, 4.5 * pitch_s)
+    values["energy_rate_time_constant_s"] = max(0.2, 0.8 * pitch_s)
     values["height_rate_ff"] = 1.0
     values["pitch_damping"] = 0.6
-    values["pitch_integral_1_s"] = 0.3
-    values["throttle_damping"] = 0.6
-    values["throttle_integral_1_s"] = 0.3
-    values["speed_weight"] = 1.0 if envelope.powered else 2.0
+    values["pitch_integral_1_s"] = 0.45 / values["height_time_constant_s"]
+    values["throttle_damping"] = 1.0
+    values["throttle_integral_1_s"] = 0.24 / values["airspeed_time_constant_s"]
+    # gusts change airspeed and height both: most of the airspeed is the throttle's
+    values["speed_weight"] = 0.4 if envelope.powered else 2.0
+    values["airspeed_rate_process_noise_m_s2"] = 0.4
     # induced drag grows with the square of the load factor, n^2 - 1 = 2.2 (n - 1) about n = 1.2
     slow = (envelope.best_glide_speed_m_s / envelope.airspeed_trim_m_s) ** 2
     induced_share = 0.5 * _G / envelope.glide_ratio * slow
