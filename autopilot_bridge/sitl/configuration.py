@@ -1,18 +1,23 @@
 """What a SITL world holds: vehicles, place, air and seed. Data only; `Sitl` builds it."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+from flightsim.airframe import AirframeKind, LaunchKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
 
 FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: the moment of boot unless asked otherwise, so that equal flights give equal logs."""
 
-TEAM_SPACING_M: Final = 5.0
+TEAM_SPACING_M: Final[Mapping[AirframeKind, float]] = MappingProxyType(
+    {AirframeKind.MULTICOPTER: 5.0, AirframeKind.FIXED_WING: 25.0}
+)
+"""Room beside each vehicle; between two of different kinds, that of the larger one."""
 MAX_VEHICLES: Final = 250
 
 
@@ -47,10 +52,12 @@ class VehicleSpecification:
 
     Attributes:
         system_id: MAVLink system id, 1..250.
-        model: name of one of our models, or a path.
+        model: name of one of our models or of an aircraft in the `jsbsim` package, or a path.
         flavour: "px4" or "ardupilot".
         offset_ne_m: where it stands, north and east of home.
         parameters: autopilot parameters that differ from the flavour's defaults.
+        launch: how an aircraft gets into the air: "runway", "catapult" or "hand"; None: as its description
+            says.
     """
 
     system_id: int = 1
@@ -58,10 +65,14 @@ class VehicleSpecification:
     flavour: str = "px4"
     offset_ne_m: tuple[float, float] = (0.0, 0.0)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    launch: str | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.system_id <= MAX_VEHICLES:
             raise ValueError(f"system id {self.system_id} is not in 1..{MAX_VEHICLES}")
+        if self.launch is not None and self.launch not in tuple(LaunchKind):
+            accepted = ", ".join(kind.value for kind in LaunchKind)
+            raise ValueError(f"launch {self.launch!r} is unknown; accepted: {accepted}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,22 +111,47 @@ class SitlConfiguration:
 
 
 def team(
-    count: int, *, model: str | Path, flavour: str, parameters: Mapping[str, float]
+    count: int,
+    *,
+    model: str | Path | Sequence[str | Path],
+    flavour: str,
+    parameters: Mapping[str, float],
+    launch: str | None = None,
+    heading_deg: float = 0.0,
 ) -> tuple[VehicleSpecification, ...]:
-    """`count` equal vehicles with system ids 1, 2, ... standing in a row to the east.
+    """`count` vehicles with system ids 1, 2, ... standing in a row to the right of the first.
+
+    Args:
+        count: how many.
+        model: of all of them, or one for each.
+        flavour: of all of them.
+        parameters: that differ from the flavour's defaults.
+        launch: how the aircraft among them get into the air.
+        heading_deg: the way they point; the row is at a right angle to it, so that runways are side by side.
 
     Raises:
-        ValueError: count is not in 1..250.
+        ValueError: count is not in 1..250, or doesn't fit the models.
+        AirframeError: a model that can't be used.
     """
     if not 1 <= count <= MAX_VEHICLES:
         raise ValueError(f"vehicle count {count} is not in 1..{MAX_VEHICLES}")
-    return tuple(
-        VehicleSpecification(
-            system_id=index + 1,
-            model=model,
-            flavour=flavour,
-            offset_ne_m=(0.0, TEAM_SPACING_M * index),
-            parameters=parameters,
+    models = [model] * count if isinstance(model, str | Path) else list(model)
+    if len(models) != count:
+        raise ValueError(f"{len(models)} models for {count} vehicles; accepted: one for all, or {count}")
+    kinds = [load_airframe(each).kind for each in models]
+    right = (-math.sin(math.radians(heading_deg)), math.cos(math.radians(heading_deg)))
+    along_m, vehicles = 0.0, []
+    for index, (each, kind) in enumerate(zip(models, kinds, strict=True)):
+        if index:
+            along_m += max(TEAM_SPACING_M[kind], TEAM_SPACING_M[kinds[index - 1]])
+        vehicles.append(
+            VehicleSpecification(
+                system_id=index + 1,
+                model=each,
+                flavour=flavour,
+                offset_ne_m=(right[0] * along_m + 0.0, right[1] * along_m),
+                parameters=parameters,
+                launch=launch if kind is AirframeKind.FIXED_WING else None,
+            )
         )
-        for index in range(count)
-    )
+    return tuple(vehicles)

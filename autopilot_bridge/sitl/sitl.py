@@ -9,15 +9,20 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from autopilot_bridge.autopilot import Autopilot
-from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flavours import get_flavour
 from autopilot_bridge.links import Link, MemoryLink, memory_pair
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl.failures import FailureInjector
+from autopilot_bridge.sitl.launch_crew import LaunchCrew
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TruthEncoder
 from autopilot_bridge.tlog import TlogWriter
+from flightsim.airframe import Airframe, AirframeKind, LaunchKind
+from flightsim.flight_envelope import FlightEnvelope
+from flightsim.home import Home
+from flightsim.initial_state import InitialState
 from flightsim.sensors import (
     FIX_AT_BOOT,
     RTK_FIX_AFTER_10_S,
@@ -49,11 +54,17 @@ class SitlVehicle:
         self, specification: VehicleSpecification, index: int, configuration: SitlConfiguration, world: World
     ) -> None:
         streams = world.streams
-        flavour = get_flavour(specification.flavour)
         self.specification = specification
-        self.vehicle = world.add_vehicle(specification.model, offset_ne_m=specification.offset_ne_m)
+        launch = None if specification.launch is None else LaunchKind(specification.launch)
+        self.vehicle = world.add_vehicle(
+            specification.model, initial=InitialState(offset_ne_m=specification.offset_ne_m, launch=launch)
+        )
+        airframe = self.vehicle.airframe
+        aircraft = airframe.kind is AirframeKind.FIXED_WING
+        flavour = get_flavour(specification.flavour, airframe.kind)
+        fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
         self.sensors = SensorSuite(
-            SensorSuiteParameters(gps=_gps(specification.flavour)),
+            fitted(gps=_gps(specification.flavour)),
             physics_rate_hz=configuration.physics_rate_hz,
             truth=self.vehicle.truth,
             seeds=lambda name: streams.child("vehicle", index, "sensor", name),
@@ -63,9 +74,18 @@ class SitlVehicle:
             system_id=specification.system_id,
             readings=self.sensors.readings,
             physics_rate_hz=configuration.physics_rate_hz,
-            parameters=specification.parameters,
+            parameters={
+                **flavour.launch_parameters.get(launch or airframe.launch_kind, {}),
+                **specification.parameters,
+            },
+            envelope=_envelope(airframe, configuration.place) if aircraft else None,
             unix_epoch_us=configuration.unix_epoch_us,
-            inject_failure=self._inject_failure,
+            inject_failure=FailureInjector(self.vehicle, self.sensors).inject,
+        )
+        self._crew = (
+            None
+            if self.vehicle.launcher is None
+            else LaunchCrew(self.vehicle, self.autopilot.commander, step_us=world.step_us)
         )
         self.channels: list[LinkChannel] = []
         self.echoes = 0
@@ -73,19 +93,13 @@ class SitlVehicle:
         self._loops = LoopGuard()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
 
-    def _inject_failure(self, unit: int, failure: int, instance: int) -> Result:
-        """MAV_CMD_INJECT_FAILURE on the vehicle's sensors."""
-        try:
-            self.sensors.faults.inject(unit, failure, instance=instance)
-        except ValueError:
-            return Result.UNSUPPORTED
-        return Result.ACCEPTED
-
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
         self.vehicle.step(self.autopilot.actuators)
         self.sensors.step(time_us)
         self.autopilot.step(time_us)
+        if self._crew is not None and self._crew.watch(time_us):
+            self._crew = None
 
     def open(self, link: Link, *, name: str | None = None, role: str = "onboard") -> LinkChannel:
         """Give the autopilot one more link.
@@ -139,6 +153,13 @@ class SitlVehicle:
 def _gps(flavour: str) -> GpsParameters:
     """The receiver, with the start-up that the firmware's own SITL shows."""
     return GpsParameters(fix_timeline=RTK_FIX_AFTER_10_S if flavour == "ardupilot" else FIX_AT_BOOT)
+
+
+def _envelope(airframe: Airframe, home: Home) -> FlightEnvelope:
+    """What an aircraft can do, found by trimming its model."""
+    from flightsim.flight_envelope import flight_envelope  # brings scipy, which a multicopter needs not
+
+    return flight_envelope(airframe, home)
 
 
 class Sitl:

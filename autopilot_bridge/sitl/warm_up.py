@@ -6,36 +6,58 @@ flies a little of everything first. With a warm compile cache it costs a fractio
 """
 
 import math
+from collections.abc import Iterable
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.sitl.configuration import SitlConfiguration
+from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.sitl import Sitl
+from flightsim.airframe import AirframeKind
 
 _BOOT_S: Final = 5.0
 _PHASE_S: Final = 2.5
+_MODELS: Final = {AirframeKind.MULTICOPTER: "iris", AirframeKind.FIXED_WING: "aerosonde"}
 
 
-def compile_flight_code() -> None:
-    """Fly a throwaway vehicle through take-off, an approach, a circle, a descent and all default streams."""
-    sitl = Sitl(SitlConfiguration())
-    vehicle = sitl.vehicles[0]
-    link = sitl.connect(0)
-    commander = vehicle.autopilot.commander
+def compile_flight_code(kinds: Iterable[AirframeKind] = (AirframeKind.MULTICOPTER,)) -> None:
+    """Fly a throwaway vehicle of each kind through take-off, an approach, a circle, a descent and streams."""
+    for kind in sorted(set(kinds)):
+        specification = VehicleSpecification(model=_MODELS[kind])
+        sitl = Sitl(SitlConfiguration(vehicles=(specification,)))
+        link = sitl.connect(0)
+        fly = _fly_aircraft if kind is AirframeKind.FIXED_WING else _fly_multicopter
+        fly(sitl)
+        link.receive()
+        sitl.close()
+
+
+def _fly_multicopter(sitl: Sitl) -> None:
+    commander = sitl.vehicles[0].autopilot.commander
     guidance = commander.guidance
-    _fly(sitl, _BOOT_S)
+    _advance(sitl, _BOOT_S)
     commander.arm()
     guidance.takeoff(down_m=-5.0, yaw_rad=math.nan)
-    _fly(sitl, 3.0 * _PHASE_S)
+    _advance(sitl, 3.0 * _PHASE_S)
     guidance.reposition(north_m=5.0, east_m=5.0, down_m=-5.0)
-    _fly(sitl, _PHASE_S)
+    _advance(sitl, _PHASE_S)
     for mode in (FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND):
         commander.set_mode(mode)
-        _fly(sitl, _PHASE_S)
-    link.receive()
-    sitl.close()
+        _advance(sitl, _PHASE_S)
 
 
-def _fly(sitl: Sitl, seconds: float) -> None:
+def _fly_aircraft(sitl: Sitl) -> None:
+    commander = sitl.vehicles[0].autopilot.commander
+    _advance(sitl, _BOOT_S)
+    commander.set_mode(FlightMode.TAKEOFF)
+    commander.arm()
+    _advance(sitl, 8.0 * _PHASE_S)
+    commander.guidance.reposition(north_m=200.0, east_m=0.0, down_m=-50.0)
+    _advance(sitl, _PHASE_S)
+    for mode in (FlightMode.HOLD, FlightMode.RETURN, FlightMode.LAND):
+        commander.set_mode(mode)
+        _advance(sitl, _PHASE_S)
+
+
+def _advance(sitl: Sitl, seconds: float) -> None:
     for _ in range(round(seconds * 1e6) // sitl.step_us):
         sitl.advance()
