@@ -4,19 +4,25 @@ Everything here comes from the navigation filter, the parameters and the pilot; 
 Positions are local NED metres at the filter's origin.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.control import fixed_wing_setpoint
 from autopilot_bridge.control.setpoint import SETPOINT_SIZE
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.health import NavigationHealth
+
+if TYPE_CHECKING:
+    from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 
 Array = NDArray[np.float64]
 
@@ -130,10 +136,11 @@ class FlightContext:
         dt_s: time since the previous update (the task period).
         nav: navigation state, layout `navigation.layout` (shared with the filter).
         health: what the filter says of its own state; None before the first solution.
-        setpoint: control setpoint, layout `control.setpoint` (shared with the controller); tasks write it.
+        setpoint: control setpoint, layout `control.setpoint` or `control.fixed_wing_setpoint` (shared with
+            the controller); tasks write it.
         home_ned_m: home in the local frame, (3,); NaN while unset.
         home_yaw_rad: heading at home, NaN while unset.
-        parameters: limits and habits of flight.
+        parameters: limits and habits of flight, of the vehicle's kind (`multicopter`, `fixed_wing`).
         landed_state: newest result of the land detector.
         ground_contact: the land detector feels the ground but isn't sure yet.
         maybe_landed: the thrust is low and nothing moves; one step before ON_GROUND.
@@ -170,16 +177,22 @@ class FlightContext:
         *,
         nav: Array | None = None,
         setpoint: Array | None = None,
-        parameters: FlightParameters | None = None,
+        parameters: FlightParameters | FixedWingFlightParameters | None = None,
     ) -> None:
         self.time_us = 0
         self.dt_s = 1.0 / TASK_RATE_HZ
         self.nav: Array = np.full(nav_layout.NAV_SIZE, np.nan) if nav is None else nav
         self.health: NavigationHealth | None = None
-        self.setpoint: Array = np.full(SETPOINT_SIZE, np.nan) if setpoint is None else setpoint
+        self.parameters: FlightParameters | FixedWingFlightParameters = (
+            FlightParameters() if parameters is None else parameters
+        )
+        if setpoint is None:
+            multicopter = isinstance(self.parameters, FlightParameters)
+            size = SETPOINT_SIZE if multicopter else fixed_wing_setpoint.SETPOINT_SIZE
+            setpoint = np.full(size, np.nan)
+        self.setpoint: Array = setpoint
         self.home_ned_m: Array = np.full(3, np.nan)
         self.home_yaw_rad = math.nan
-        self.parameters = FlightParameters() if parameters is None else parameters
         self.landed_state = LandedState.ON_GROUND
         self.ground_contact = True
         self.maybe_landed = True
@@ -189,6 +202,30 @@ class FlightContext:
         self.frame: LocalFrame | None = None
         self.events: list[FlightEvent] = []
         self.hover_thrust = 0.5
+
+    @property
+    def multicopter(self) -> FlightParameters:
+        """The parameters of a multicopter.
+
+        Raises:
+            TypeError: the vehicle is none.
+        """
+        parameters = self.parameters
+        if not isinstance(parameters, FlightParameters):
+            raise TypeError(f"{type(parameters).__name__} is not what a multicopter's task flies by")
+        return parameters
+
+    @property
+    def fixed_wing(self) -> FixedWingFlightParameters:
+        """The parameters of a fixed wing.
+
+        Raises:
+            TypeError: the vehicle is none.
+        """
+        parameters = self.parameters
+        if isinstance(parameters, FlightParameters):
+            raise TypeError(f"{type(parameters).__name__} is not what a fixed wing's task flies by")
+        return parameters
 
     @property
     def on_ground(self) -> bool:

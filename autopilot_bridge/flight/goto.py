@@ -77,10 +77,10 @@ class GotoTask:
             self._motion.change_speed(ctx, kind, speed_m_s)
 
     def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
-        motion.trajectory.set_limits(ctx.parameters, speed_m_s=self._speed_m_s)
+        motion.trajectory.set_limits(ctx.multicopter, speed_m_s=self._speed_m_s)
         motion.begin_leg()
         position, velocity = motion.trajectory.position_ned_m, motion.trajectory.velocity_ned_m_s
-        acc = ctx.parameters.acceleration_m_s2
+        acc = ctx.multicopter.acceleration_m_s2
         stop_ahead = float(np.hypot(velocity[0], velocity[1])) / (2.0 * acc)
         self._place[:] = np.where(np.isfinite(self._wanted), self._wanted, position + velocity * stop_ahead)
 
@@ -98,7 +98,7 @@ class GotoTask:
             return self.update(ctx)
         position = ctx.nav[nav_layout.POS_NED_M]
         wants_up = float(position[2] - self._place[2]) > _WANTS_UP_M
-        if not ramp.update(ctx, wants_up, ctx.parameters.takeoff_speed_m_s):
+        if not ramp.update(ctx, wants_up, ctx.multicopter.takeoff_speed_m_s):
             motion.restart(ctx)
             return TaskStatus.RUNNING
         motion.synchronise(ctx)
@@ -106,7 +106,7 @@ class GotoTask:
         motion.steer(ctx, self._yaw_rad, self._place)
         motion.write(ctx)
         if not self._reached:
-            radius = ctx.parameters.acceptance_radius_m if self._acceptance_m is None else self._acceptance_m
+            radius = ctx.multicopter.acceptance_radius_m if self._acceptance_m is None else self._acceptance_m
             away = math.dist(position, self._place)
             if away < radius and ctx.position_valid and motion.stopped:
                 self._reached = True

@@ -68,7 +68,7 @@ class TakeoffRamp:
                 self._enter(GroundState.SPOOLING)
         elif not wants_up:
             self._enter(GroundState.RESTING)
-        if self.state is GroundState.SPOOLING and self._since_s >= ctx.parameters.spoolup_time_s:
+        if self.state is GroundState.SPOOLING and self._since_s >= ctx.multicopter.spoolup_time_s:
             self._enter(GroundState.RAMPING)
             self._start_down_m = float(ctx.nav[nav_layout.POS_NED_M][2])
         if self.state is not GroundState.RAMPING:
@@ -80,7 +80,7 @@ class TakeoffRamp:
             self._enter(GroundState.FLYING)
             self._left_ground = False
             return True
-        ramp_time_s = ctx.parameters.takeoff_ramp_time_s
+        ramp_time_s = ctx.multicopter.takeoff_ramp_time_s
         part = 1.0 if ramp_time_s <= 0.0 else min(1.0, self._since_s / ramp_time_s)
         clear_setpoint(ctx.setpoint, sp.TRAJECTORY)
         # level until the legs are free: the ground would turn any tilt into a slide

@@ -30,6 +30,7 @@ class GuidedKind(IntEnum):
     ACCELERATION = 3
     TRAJECTORY = 4  # position and velocity together, streamed
     ATTITUDE = 5
+    HEADING = 6  # a fixed wing's: straight on in a direction
 
 
 class GuidedTask:
@@ -118,7 +119,7 @@ class GuidedTask:
     ) -> None:
         """Fly at a velocity until the time-out; NaN components are zero."""
         if self.kind is not GuidedKind.VELOCITY or self._motion is None:
-            self._motion = SmoothMotion(ctx, speed_m_s=ctx.parameters.max_speed_m_s)
+            self._motion = SmoothMotion(ctx, speed_m_s=ctx.multicopter.max_speed_m_s)
         self._velocity[:] = np.nan_to_num(np.array(velocity_ned_m_s, dtype=np.float64), nan=0.0)
         self._acceleration[:] = acceleration_ned_m_s2
         self._set_streamed(GuidedKind.VELOCITY, yaw_rad, yaw_rate_rad_s)
@@ -165,7 +166,7 @@ class GuidedTask:
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
         """Fly an attitude until the time-out; `climb` 0..1 is a climb rate, 0.5 none."""
-        p = ctx.parameters
+        p = ctx.multicopter
         share = 2.0 * (min(1.0, max(0.0, climb)) - 0.5)
         self._climb_m_s = share * (p.climb_speed_m_s if share > 0.0 else p.descend_speed_m_s)
         self._attitude[:] = q_ned_from_frd
@@ -208,7 +209,7 @@ class GuidedTask:
             self._hold.update(ctx)
             return TaskStatus.RUNNING
         self._age_s += ctx.dt_s
-        if self._age_s > ctx.parameters.guided_timeout_s:
+        if self._age_s > ctx.multicopter.guided_timeout_s:
             self.set_hold(ctx)
             self._hold.update(ctx)
         elif kind is GuidedKind.ATTITUDE:
@@ -248,14 +249,14 @@ class GuidedTask:
             trajectory.velocity_ned_m_s[:] = np.nan_to_num(velocity, nan=0.0)
             trajectory.acceleration_ned_m_s2[:] = np.nan_to_num(self._acceleration, nan=0.0)
         if math.isfinite(self._yaw_rate_rad_s):
-            motion.heading.turn(self._yaw_rate_rad_s, ctx.parameters, ctx.dt_s)
+            motion.heading.turn(self._yaw_rate_rad_s, ctx.multicopter, ctx.dt_s)
         else:
             ahead = trajectory.position_ned_m + 4.0 * trajectory.velocity_ned_m_s
             motion.steer(ctx, self._yaw_rad, ahead)
         motion.write(ctx)
 
     def _integrate_acceleration(self, ctx: FlightContext, motion: SmoothMotion) -> None:
-        p = ctx.parameters
+        p = ctx.multicopter
         velocity = motion.trajectory.velocity_ned_m_s + self._acceleration * 0.5
         size = math.hypot(float(velocity[0]), float(velocity[1]))
         if size > p.max_speed_m_s:

@@ -84,7 +84,7 @@ class LandTask:
             height = float(ctx.nav[_NAV_HEIGHT])
             if math.isnan(height):
                 height = ctx.height_above_home_m
-            self._sink(ctx, motion, descent_speed(height, ctx.parameters))
+            self._sink(ctx, motion, descent_speed(height, ctx.multicopter))
         motion.steer(ctx, motion.heading.yaw_rad if math.isnan(self._yaw_rad) else self._yaw_rad)
         motion.write(ctx)
         if self._down:
@@ -106,7 +106,7 @@ class LandTask:
         north, east = 0.0, 0.0
         if target is not None:
             # the last metre to the place is flown on the way down
-            gain = 0.5 * ctx.parameters.trajectory_p_1_s
+            gain = 0.5 * ctx.multicopter.trajectory_p_1_s
             north = gain * float(target[0] - motion.trajectory.position_ned_m[0])
             east = gain * float(target[1] - motion.trajectory.position_ned_m[1])
         motion.trajectory.stretch = 1.0

@@ -77,19 +77,19 @@ class ManualTask:
             return self.update(ctx)
         sticks = ctx.sticks
         throttle = sticks.throttle if sticks.valid else 0.0
-        roll = stick(sticks.roll, ctx.parameters) if sticks.valid else 0.0
-        pitch = stick(sticks.pitch, ctx.parameters) if sticks.valid else 0.0
-        yaw = stick(sticks.yaw, ctx.parameters) if sticks.valid else 0.0
+        roll = stick(sticks.roll, ctx.multicopter) if sticks.valid else 0.0
+        pitch = stick(sticks.pitch, ctx.multicopter) if sticks.valid else 0.0
+        yaw = stick(sticks.yaw, ctx.multicopter) if sticks.valid else 0.0
         if self.kind in (ManualMode.ACRO, ManualMode.STABILIZED):
             self._fly_thrust(ctx, roll, pitch, yaw, throttle if sticks.valid else -1.0)
             return TaskStatus.RUNNING
-        if not ramp.update(ctx, sticks.valid and throttle > _STICK_UP, ctx.parameters.takeoff_speed_m_s):
+        if not ramp.update(ctx, sticks.valid and throttle > _STICK_UP, ctx.multicopter.takeoff_speed_m_s):
             motion.restart(ctx)
             self._yaw_rad = float(ctx.nav[_NAV_YAW])
             self._hold_down_m = math.nan
             return TaskStatus.RUNNING
-        climb = stick(throttle, ctx.parameters)
-        p = ctx.parameters
+        climb = stick(throttle, ctx.multicopter)
+        p = ctx.multicopter
         climb_m_s = climb * (p.manual_climb_speed_m_s if climb > 0.0 else p.manual_descend_speed_m_s)
         if self.kind is ManualMode.POSITION and ctx.velocity_valid:
             self._fly_velocity(ctx, motion, roll, pitch, yaw, climb_m_s)
@@ -99,7 +99,7 @@ class ManualTask:
 
     def _turn(self, ctx: FlightContext, yaw: float) -> float:
         """Advance the heading by the yaw stick; returns the rate. The lead over the vehicle stays small."""
-        rate = yaw * ctx.parameters.manual_yaw_rate_rad_s
+        rate = yaw * ctx.multicopter.manual_yaw_rate_rad_s
         self._yaw_rad += rate * ctx.dt_s
         lead = math.remainder(self._yaw_rad - float(ctx.nav[_NAV_YAW]), 2.0 * math.pi)
         if abs(lead) > 0.5 and rate != 0.0:
@@ -107,7 +107,7 @@ class ManualTask:
         return rate
 
     def _write_tilt(self, ctx: FlightContext, roll: float, pitch: float, yaw: float) -> None:
-        tilt = ctx.parameters.manual_tilt_rad
+        tilt = ctx.multicopter.manual_tilt_rad
         scale = min(1.0, 1.0 / max(1e-9, math.hypot(roll, pitch)))
         rate = self._turn(ctx, yaw)
         clear_setpoint(ctx.setpoint, sp.ATTITUDE)
@@ -117,7 +117,7 @@ class ManualTask:
         ctx.setpoint[sp.YAW_RATE_RAD_S] = rate
 
     def _fly_thrust(self, ctx: FlightContext, roll: float, pitch: float, yaw: float, throttle: float) -> None:
-        p = ctx.parameters
+        p = ctx.multicopter
         if not ctx.armed:
             clear_setpoint(ctx.setpoint, sp.OFF)
             return
@@ -165,7 +165,7 @@ class ManualTask:
         yaw: float,
         climb_m_s: float,
     ) -> None:
-        p = ctx.parameters
+        p = ctx.multicopter
         motion.synchronise(ctx)
         scale = p.manual_speed_m_s * min(1.0, 1.0 / max(1e-9, math.hypot(roll, pitch)))
         heading = float(ctx.nav[_NAV_YAW])

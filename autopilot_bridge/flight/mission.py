@@ -4,16 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from autopilot_bridge.flight.context import (
-    Array,
-    FlightContext,
-    FlightPhase,
-    HomeChangeRequested,
-    MissionFinished,
-    MissionModeRequested,
-    WaypointReached,
-    WaypointStarted,
-)
+from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.corners import Point, passing_speed, turn_in_distance
 from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.hold import HoldTask
@@ -25,9 +16,9 @@ from autopilot_bridge.flight.plan_reading import (
     is_navigation,
     is_passed_through,
     is_waypoint,
-    jump_target,
     target_of,
 )
+from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.return_home import ReturnTask
 from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
@@ -39,7 +30,6 @@ from autopilot_bridge.navigation import layout as nav_layout
 _LOOK_AHEAD_ITEMS: Final = 40
 _LOOK_AHEAD_M: Final = 150.0
 _YAW_REACHED_RAD: Final = math.radians(5.0)
-_MAX_INSTANT_ITEMS: Final = 200  # per update: breaks loops of DO_JUMP without anything to fly in between
 
 
 @dataclass(slots=True)
@@ -57,49 +47,26 @@ class _Leg:
     arrived: bool = False
 
 
-class MissionTask:
-    """Executes the items of a store, from its current one; DONE (and holding) after the last.
+class MissionTask(PlanTask):
+    """A plan flown by a multicopter (`PlanTask`), without needless stops.
 
-    A new plan or another current item, seen in the store, takes effect at the next update. Waypoints
-    without a hold time are passed at the speed their corner, the acceptance radius and the legs behind them
-    allow. DO_ items act at once; those for equipment the vehicle doesn't have are passed over.
-    NAV_RETURN_TO_LAUNCH is flown here and also reported as `MissionModeRequested`.
+    Waypoints without a hold time are passed at the speed their corner, the acceptance radius and the legs
+    behind them allow. NAV_RETURN_TO_LAUNCH is flown here and also reported as `MissionModeRequested`.
 
     Args:
         store: the plan; its `current` is kept up to date.
         first_item: 1 where item 0 is home (ArduPilot).
     """
 
-    __slots__ = (
-        "_finished",
-        "_first_item",
-        "_jumps",
-        "_leg",
-        "_motion",
-        "_ramp",
-        "_seq",
-        "_speed_m_s",
-        "_store",
-        "_sub",
-        "_version",
-        "_wait_left_s",
-        "_yaw_rad",
-    )
+    __slots__ = ("_leg", "_motion", "_ramp", "_speed_m_s", "_yaw_rad")
 
     def __init__(self, store: MissionStore, *, first_item: int = 0) -> None:
-        self._store = store
-        self._first_item = first_item
-        self._version = -1
-        self._seq = -1
-        self._sub: FlightTask | None = None
+        super().__init__(store, first_item=first_item)
         self._leg: _Leg | None = None
         self._motion: SmoothMotion | None = None
         self._ramp: TakeoffRamp | None = None
-        self._jumps: dict[int, int] = {}
         self._speed_m_s: float | None = None
         self._yaw_rad = math.nan
-        self._wait_left_s = 0.0
-        self._finished = False
 
     def activate(self, ctx: FlightContext) -> None:
         ctx.phase = FlightPhase.CRUISE
@@ -107,72 +74,14 @@ class MissionTask:
         self._ramp = TakeoffRamp(ctx)
         self._restart(ctx)
 
-    def _restart(self, ctx: FlightContext) -> None:
-        """(Re-)read the plan and begin its current item."""
-        self._version = self._store.version
-        self._finished = False
-        self._jumps.clear()
-        self._begin(ctx, max(self._store.current, self._first_item), None)
-
-    def _begin(self, ctx: FlightContext, seq: int, came_from: Array | None) -> None:
-        """Make `seq` the current item, running through items that take no time."""
-        items = self._store.items
-        self._sub = None
+    def _forget_leg(self) -> None:
         self._leg = None
-        self._wait_left_s = 0.0
-        for _ in range(_MAX_INSTANT_ITEMS):
-            if seq >= len(items):
-                self._finish(ctx)
-                return
-            item = items[seq]
-            self._seq = self._store.current = seq
-            ctx.events.append(WaypointStarted(seq))
-            if is_navigation(item) or item.command in (Command.CONDITION_DELAY, Command.CONDITION_YAW):
-                if self._begin_timed(ctx, item, came_from):
-                    return
-                seq += 1
-                continue
-            seq = self._act(ctx, item, seq)
-        self._finish(ctx)
 
-    def _finish(self, ctx: FlightContext) -> None:
-        if not self._finished:
-            ctx.events.append(MissionFinished())
-        self._finished = True
-        self._leg = None
-        self._set_sub(ctx, HoldTask())
+    def _hold_task(self) -> FlightTask:
+        return HoldTask()
 
-    def _set_sub(self, ctx: FlightContext, task: FlightTask) -> None:
-        self._sub = task
-        task.activate(ctx)
-
-    def _act(self, ctx: FlightContext, item: MissionItem, seq: int) -> int:
-        """A DO_ item: do it, and give the next sequence number."""
-        if item.command == Command.DO_JUMP:
-            target = jump_target(item, self._store.items)
-            left = self._jumps.get(seq, round(item.param2) if math.isfinite(item.param2) else 0)
-            if target is not None and target >= self._first_item and left != 0:
-                self._jumps[seq] = left - 1 if left > 0 else left
-                return target
-        elif item.command == Command.DO_CHANGE_SPEED:
-            self._change_by_item(ctx, round(item.param1) if math.isfinite(item.param1) else 1, item.param2)
-        elif item.command == Command.DO_SET_HOME:
-            here = item.param1 == 1.0
-            place = ctx.nav[nav_layout.POS_NED_M] if here else target_of(item, ctx)
-            if place is not None:
-                ctx.events.append(HomeChangeRequested(float(place[0]), float(place[1]), float(place[2])))
-        ctx.events.append(WaypointReached(seq, navigation=False))
-        return seq + 1
-
-    def _change_by_item(self, ctx: FlightContext, kind: int, speed_m_s: float) -> None:
-        """DO_CHANGE_SPEED in the plan; -2: back to the parameters' speed."""
-        if kind not in tuple(SpeedKind) or not math.isfinite(speed_m_s):
-            return
-        if speed_m_s > 0.0:
-            self.change_speed(ctx, SpeedKind(kind), speed_m_s)
-        elif speed_m_s == -2.0 and kind <= SpeedKind.GROUND_SPEED:
-            for each in (SpeedKind.GROUND_SPEED, SpeedKind.CLIMB, SpeedKind.DESCENT):
-                self.change_speed(ctx, each, None)
+    def _return_task(self) -> FlightTask:
+        return ReturnTask()
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Fly on at this speed until an item or a command changes it, the present leg included."""
@@ -188,20 +97,12 @@ class MissionTask:
             item = self._store.items[self._seq]
             leg.passing_m_s, leg.turn_in_m = self._corner(ctx, item, leg.start, leg.target, leg.radius_m)
 
-    def _begin_timed(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
-        """Begin an item that takes time; False when there is nothing to do."""
+    def _begin_flown(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
+        """Begin an item that is flown; False when there is nothing to do."""
         command = item.command
-        if command in (Command.CONDITION_DELAY, Command.NAV_DELAY):
-            self._wait_left_s = item.param1 if math.isfinite(item.param1) else 0.0
-            self._set_sub(ctx, HoldTask())
-            return self._wait_left_s > 0.0
         if command == Command.CONDITION_YAW:
             self._yaw_rad = self._condition_yaw(ctx, item)
             self._set_sub(ctx, HoldTask(yaw_rad=self._yaw_rad))
-            return True
-        if command == Command.NAV_RETURN_TO_LAUNCH:
-            ctx.events.append(MissionModeRequested(command))
-            self._set_sub(ctx, ReturnTask())
             return True
         target = target_of(item, ctx)
         if target is None:
@@ -217,7 +118,7 @@ class MissionTask:
         if command == Command.NAV_LOITER_TURNS:
             turns = item.param1 if math.isfinite(item.param1) and item.param1 > 0.0 else 1.0
             radius = item.param3 if math.isfinite(item.param3) else 0.0
-            speed = self._speed_m_s or ctx.parameters.orbit_speed_m_s
+            speed = self._speed_m_s or ctx.multicopter.orbit_speed_m_s
             task = OrbitTask(target, abs(radius) or None, math.copysign(speed, radius), turns=turns)
             self._set_sub(ctx, task)
             return True
@@ -231,7 +132,7 @@ class MissionTask:
         return wrap_pi(angle)
 
     def _item_yaw(self, ctx: FlightContext, item: MissionItem) -> float | None:
-        if not ctx.parameters.use_waypoint_yaw or not math.isfinite(item.param4):
+        if not ctx.multicopter.use_waypoint_yaw or not math.isfinite(item.param4):
             return None
         return math.radians(item.param4)
 
@@ -243,7 +144,7 @@ class MissionTask:
         if motion is None:
             return False
         waypoint = is_waypoint(item)
-        radius = ctx.parameters.acceptance_radius_m
+        radius = ctx.multicopter.acceptance_radius_m
         if waypoint and math.isfinite(item.param2) and item.param2 > 0.0:
             radius = item.param2
         hold_s = 0.0
@@ -257,7 +158,7 @@ class MissionTask:
         if self._sub is not None or came_from is None:
             motion.restart(ctx)
         motion.trajectory.limits[SPEED] = min(
-            self._speed_m_s or ctx.parameters.cruise_speed_m_s, ctx.parameters.max_speed_m_s
+            self._speed_m_s or ctx.multicopter.cruise_speed_m_s, ctx.multicopter.max_speed_m_s
         )
         if came_from is None:
             motion.begin_leg()
@@ -289,60 +190,35 @@ class MissionTask:
                 break
             path.append(_point(place))
             own = later.param2 if math.isfinite(later.param2) else 0.0
-            radii.append(own if own > 0.0 else ctx.parameters.acceptance_radius_m)
+            radii.append(own if own > 0.0 else ctx.multicopter.acceptance_radius_m)
             length_m += math.dist(path[-2], path[-1])
             if not is_passed_through(later) or length_m > _LOOK_AHEAD_M:
                 break
-        speed = min(passing_speed(path, radii, ctx.parameters), ctx.parameters.max_speed_m_s)
+        speed = min(passing_speed(path, radii, ctx.multicopter), ctx.multicopter.max_speed_m_s)
         if speed <= 0.0:
             return 0.0, 0.0
-        speed = min(speed, self._speed_m_s or ctx.parameters.cruise_speed_m_s)
-        return speed, turn_in_distance(path, radii, speed, ctx.parameters)
+        speed = min(speed, self._speed_m_s or ctx.multicopter.cruise_speed_m_s)
+        return speed, turn_in_distance(path, radii, speed, ctx.multicopter)
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         motion, ramp = self._motion, self._ramp
         if motion is None or ramp is None:
             self.activate(ctx)
             return self.update(ctx)
-        if self._store.version != self._version:
-            self._restart(ctx)
-        elif self._store.current != self._seq and not self._finished:
-            self._begin(ctx, max(self._store.current, self._first_item), None)
+        self._follow_store(ctx)
         if self._sub is not None:
             self._fly_sub(ctx, self._sub)
         elif self._leg is not None:
             self._fly_leg(ctx, motion, ramp, self._leg)
         return TaskStatus.DONE if self._finished else TaskStatus.RUNNING
 
-    def _fly_sub(self, ctx: FlightContext, task: FlightTask) -> None:
-        before = len(ctx.events)
-        status = task.update(ctx)
-        # the sub-task's own end is not the mission's
-        ctx.events[before:] = [e for e in ctx.events[before:] if type(e).__name__ != "TaskFinished"]
-        if self._finished:
-            return
-        item = self._store.items[self._seq]
-        if item.command in (Command.CONDITION_DELAY, Command.NAV_DELAY):
-            self._wait_left_s -= ctx.dt_s
-            done = self._wait_left_s <= 0.0
-        elif item.command == Command.CONDITION_YAW:
-            done = abs(wrap_pi(float(ctx.nav[27]) - self._yaw_rad)) < _YAW_REACHED_RAD
-        else:
-            done = status is TaskStatus.DONE
-        if done:
-            self._complete(ctx, item, None)
-
-    def _complete(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> None:
-        """The current item is done: report, and go on."""
-        ctx.events.append(WaypointReached(self._seq, navigation=is_navigation(item)))
-        last = self._seq + 1 >= len(self._store.items)
-        if last or not item.autocontinue:
-            self._finish(ctx)
-        else:
-            self._begin(ctx, self._seq + 1, came_from)
+    def _sub_done(self, ctx: FlightContext, item: MissionItem, status: TaskStatus) -> bool:
+        if item.command == Command.CONDITION_YAW:
+            return abs(wrap_pi(float(ctx.nav[27]) - self._yaw_rad)) < _YAW_REACHED_RAD
+        return super()._sub_done(ctx, item, status)
 
     def _fly_leg(self, ctx: FlightContext, motion: SmoothMotion, ramp: TakeoffRamp, leg: _Leg) -> None:
-        if not ramp.update(ctx, True, ctx.parameters.takeoff_speed_m_s):
+        if not ramp.update(ctx, True, ctx.multicopter.takeoff_speed_m_s):
             motion.restart(ctx)
             return
         motion.synchronise(ctx)
@@ -353,7 +229,7 @@ class MissionTask:
         vehicle = ctx.nav[nav_layout.POS_NED_M]
         point = motion.trajectory.position_ned_m
         away = _flat_distance(vehicle, leg.target)
-        level = abs(float(vehicle[2] - leg.target[2])) < ctx.parameters.acceptance_altitude_m
+        level = abs(float(vehicle[2] - leg.target[2])) < ctx.multicopter.acceptance_altitude_m
         inside = ctx.position_valid and away <= leg.radius_m and level
         if leg.passing_m_s > 0.0 and not leg.arrived:
             ahead = motion.ahead_m(leg.target)

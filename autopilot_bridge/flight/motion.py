@@ -48,7 +48,7 @@ class SmoothMotion:
     )
 
     def __init__(self, ctx: FlightContext, *, speed_m_s: float | None = None) -> None:
-        self.trajectory = TrajectoryGenerator(ctx.parameters, speed_m_s=speed_m_s)
+        self.trajectory = TrajectoryGenerator(ctx.multicopter, speed_m_s=speed_m_s)
         self.heading = YawSteering()
         self._leg_start: Array = np.zeros(3)
         self._position_resets = 0
@@ -107,7 +107,7 @@ class SmoothMotion:
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Another speed on the leg being flown; None: the parameters'. A corner is finished as it is."""
-        p, limits = ctx.parameters, self.trajectory.limits
+        p, limits = ctx.multicopter, self.trajectory.limits
         if kind is SpeedKind.CLIMB:
             limits[SPEED_UP] = p.climb_speed_m_s if speed_m_s is None else speed_m_s
         elif kind is SpeedKind.DESCENT:
@@ -125,7 +125,7 @@ class SmoothMotion:
         self, ctx: FlightContext, end_ned_m: Array, end_speed_m_s: float = 0.0, turn_in_m: float = 0.0
     ) -> None:
         """One tick along the leg to `end_ned_m`, slowed down to the end speed `turn_in_m` before it."""
-        self.trajectory.wait_for(ctx.nav[nav_layout.POS_NED_M], ctx.parameters.trajectory_error_max_m)
+        self.trajectory.wait_for(ctx.nav[nav_layout.POS_NED_M], ctx.multicopter.trajectory_error_max_m)
         self.trajectory.follow_leg(self._leg_start, end_ned_m, end_speed_m_s, ctx.dt_s, turn_in_m=turn_in_m)
 
     def turn_into_leg(self, start_ned_m: Array) -> None:
@@ -171,7 +171,7 @@ class SmoothMotion:
         wanted = yaw_rad
         if math.isnan(wanted):
             wanted = self.heading.yaw_rad
-            behaviour = ctx.parameters.yaw_behaviour
+            behaviour = ctx.multicopter.yaw_behaviour
             if behaviour == YawBehaviour.TOWARDS_TARGET and target_ned_m is not None:
                 north = float(target_ned_m[0] - self.trajectory.position_ned_m[0])
                 east = float(target_ned_m[1] - self.trajectory.position_ned_m[1])
@@ -181,7 +181,7 @@ class SmoothMotion:
                 north, east = (float(v) for v in self.trajectory.velocity_ned_m_s[0:2])
                 if math.hypot(north, east) > _MIN_COURSE_SPEED_M_S:
                     wanted = math.atan2(east, north)
-        self.heading.turn_to(wanted, ctx.parameters, ctx.dt_s, target_rate_rad_s=yaw_rate_rad_s)
+        self.heading.turn_to(wanted, ctx.multicopter, ctx.dt_s, target_rate_rad_s=yaw_rate_rad_s)
 
     def write(self, ctx: FlightContext) -> None:
         """Write the control setpoint, leaving out what the filter doesn't know."""

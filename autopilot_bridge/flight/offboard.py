@@ -116,6 +116,6 @@ class OffboardTask:
             else:
                 ctx.setpoint[:] = self._latest
             return TaskStatus.RUNNING
-        if self._ramp.update(ctx, self._wants_up(ctx), ctx.parameters.takeoff_speed_m_s):
+        if self._ramp.update(ctx, self._wants_up(ctx), ctx.multicopter.takeoff_speed_m_s):
             ctx.setpoint[:] = self._latest
         return TaskStatus.RUNNING

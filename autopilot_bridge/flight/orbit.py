@@ -98,7 +98,7 @@ class OrbitTask(CruiseTask):
         self._finished = False
 
     def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
-        p = ctx.parameters
+        p = ctx.multicopter
         position = motion.trajectory.position_ned_m
         if not (math.isfinite(self.radius_m) and self.radius_m > 0.0):
             self.radius_m = p.orbit_radius_m
@@ -154,9 +154,9 @@ class OrbitTask(CruiseTask):
 
     def _circle(self, ctx: FlightContext, motion: SmoothMotion) -> None:
         trajectory = motion.trajectory
-        trajectory.wait_for(ctx.nav[nav_layout.POS_NED_M], ctx.parameters.trajectory_error_max_m)
+        trajectory.wait_for(ctx.nav[nav_layout.POS_NED_M], ctx.multicopter.trajectory_error_max_m)
         dt = ctx.dt_s * trajectory.stretch
-        acc = _SPEED_UP_SHARE * ctx.parameters.orbit_acceleration_max_m_s2
+        acc = _SPEED_UP_SHARE * ctx.multicopter.orbit_acceleration_max_m_s2
         change = min(acc * dt, max(-acc * dt, self.velocity_m_s - self._speed_m_s))
         self._speed_m_s += change
         along = change / dt if dt > 1e-6 else 0.0
@@ -191,7 +191,7 @@ class OrbitTask(CruiseTask):
         if behaviour is OrbitYaw.FRONT_TANGENT and self.circling:
             return self._phase_rad + math.copysign(0.5 * math.pi, self.velocity_m_s)
         if behaviour is OrbitYaw.RC_CONTROLLED and ctx.sticks.valid:
-            return motion.heading.yaw_rad + ctx.sticks.yaw * ctx.parameters.yaw_rate_max_rad_s
+            return motion.heading.yaw_rad + ctx.sticks.yaw * ctx.multicopter.yaw_rate_max_rad_s
         if behaviour is OrbitYaw.HOLD_INITIAL:
             return self._initial_yaw
         return motion.heading.yaw_rad

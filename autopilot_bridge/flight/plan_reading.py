@@ -1,4 +1,4 @@
-"""What a mission item means for a multicopter: commands, frames, targets."""
+"""What a mission item means: commands, frames, targets."""
 
 import math
 from collections.abc import Sequence
@@ -22,6 +22,7 @@ class Command(IntEnum):
     NAV_RETURN_TO_LAUNCH = 20
     NAV_LAND = 21
     NAV_TAKEOFF = 22
+    NAV_CONTINUE_AND_CHANGE_ALT = 30
     NAV_LOITER_TO_ALT = 31
     NAV_SPLINE_WAYPOINT = 82
     NAV_VTOL_TAKEOFF = 84
@@ -33,6 +34,7 @@ class Command(IntEnum):
     DO_JUMP = 177
     DO_CHANGE_SPEED = 178
     DO_SET_HOME = 179
+    DO_LAND_START = 189
 
 
 _GLOBAL: Final = frozenset({0, 5})  # MAV_FRAME_GLOBAL, _INT: above mean sea level
@@ -94,3 +96,11 @@ def jump_target(item: MissionItem, items: Sequence[MissionItem]) -> int | None:
         return None
     target = round(item.param1)
     return target if 0 <= target < len(items) else None
+
+
+def landing_start(items: Sequence[MissionItem]) -> int | None:
+    """Sequence number of the first DO_LAND_START; None: the plan has no landing sequence."""
+    for seq, item in enumerate(items):
+        if item.command == Command.DO_LAND_START:
+            return seq
+    return None

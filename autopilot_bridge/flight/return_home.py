@@ -64,7 +64,7 @@ class ReturnTask:
         self._wait_s = 0.0
         self._land = None
         self._ramp = TakeoffRamp(ctx)
-        self._motion = SmoothMotion(ctx, speed_m_s=ctx.parameters.return_speed_m_s)
+        self._motion = SmoothMotion(ctx, speed_m_s=ctx.multicopter.return_speed_m_s)
         if not self._can_return(ctx):
             self._start_landing(ctx)
             return
@@ -72,9 +72,9 @@ class ReturnTask:
         velocity = self._motion.trajectory.velocity_ned_m_s
         home = ctx.home_ned_m
         distance = math.hypot(float(home[0] - position[0]), float(home[1] - position[1]))
-        height = return_height(distance, float(home[2] - position[2]), ctx.parameters)
+        height = return_height(distance, float(home[2] - position[2]), ctx.multicopter)
         # the climb ends where braking ends
-        brake_s = float(np.hypot(velocity[0], velocity[1])) / (2.0 * ctx.parameters.acceleration_m_s2)
+        brake_s = float(np.hypot(velocity[0], velocity[1])) / (2.0 * ctx.multicopter.acceleration_m_s2)
         self._target[:] = position + velocity * brake_s
         self._target[2] = float(home[2]) - height
 
@@ -84,7 +84,7 @@ class ReturnTask:
             return
         horizontal = kind in (SpeedKind.AIRSPEED, SpeedKind.GROUND_SPEED)
         if speed_m_s is None and horizontal:
-            speed_m_s = ctx.parameters.return_speed_m_s
+            speed_m_s = ctx.multicopter.return_speed_m_s
         self._motion.change_speed(ctx, kind, speed_m_s)
 
     @staticmethod
@@ -105,11 +105,11 @@ class ReturnTask:
         position = ctx.nav[nav_layout.POS_NED_M]
         away = math.hypot(float(position[0] - self._target[0]), float(position[1] - self._target[1]))
         height_error = abs(float(position[2] - self._target[2]))
-        return away < horizontal_m and height_error < ctx.parameters.acceptance_altitude_m and motion.stopped
+        return away < horizontal_m and height_error < ctx.multicopter.acceptance_altitude_m and motion.stopped
 
     def _advance(self, ctx: FlightContext, motion: SmoothMotion) -> None:
         """Go on to the next phase when this one is done."""
-        p = ctx.parameters
+        p = ctx.multicopter
         home_down = float(ctx.home_ned_m[2])
         low_down = max(float(self._target[2]), home_down - p.return_descend_altitude_m)
         if self.phase is ReturnPhase.CLIMB and self._close(ctx, motion, math.inf):
@@ -141,7 +141,7 @@ class ReturnTask:
         motion.synchronise(ctx)
         self._advance(ctx, motion)
         if self.phase is ReturnPhase.LOITER:
-            wait = ctx.parameters.return_loiter_time_s
+            wait = ctx.multicopter.return_loiter_time_s
             self._wait_s += ctx.dt_s
             if 0.0 <= wait <= self._wait_s:
                 self._start_landing(ctx)

@@ -51,7 +51,7 @@ class TakeoffTask:
         return self._place.copy()
 
     def _set_height(self, ctx: FlightContext) -> None:
-        altitude = ctx.parameters.takeoff_altitude_m if self._altitude_m is None else self._altitude_m
+        altitude = ctx.multicopter.takeoff_altitude_m if self._altitude_m is None else self._altitude_m
         down = float(ctx.nav[nav_layout.POS_NED_M][2])
         home = float(ctx.home_ned_m[2])
         self._place[2] = min(down, (down if math.isnan(home) else home) - altitude)
@@ -69,7 +69,7 @@ class TakeoffTask:
         if motion is None or ramp is None:
             self.activate(ctx)
             return self.update(ctx)
-        climb = ctx.parameters.takeoff_speed_m_s if self._climb_m_s is None else self._climb_m_s
+        climb = ctx.multicopter.takeoff_speed_m_s if self._climb_m_s is None else self._climb_m_s
         if not ramp.update(ctx, True, climb):
             motion.restart(ctx)
             self._place[0:2] = ctx.nav[nav_layout.POS_NED_M][0:2]
@@ -81,7 +81,7 @@ class TakeoffTask:
         motion.write(ctx)
         error = abs(float(ctx.nav[nav_layout.POS_NED_M][2]) - float(self._place[2]))
         slow = abs(float(motion.trajectory.velocity_ned_m_s[2])) < _ARRIVAL_SPEED_M_S
-        if not self._arrived and error < 0.6 * ctx.parameters.acceptance_altitude_m and slow:
+        if not self._arrived and error < 0.6 * ctx.multicopter.acceptance_altitude_m and slow:
             self._arrived = True
             ctx.phase = FlightPhase.CRUISE
             ctx.events.append(TaskFinished("takeoff"))

@@ -1,0 +1,83 @@
+"""What a flight task asks of the control laws: the fixed-wing setpoint as plain numbers, written at once."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.flight.context import FlightContext
+
+_NAN: Final = math.nan
+
+
+class FlightCommand:
+    """One setpoint of level FLY; NaN means not given. Fields as in `control.fixed_wing_setpoint`."""
+
+    __slots__ = (
+        "airspeed_m_s",
+        "brake",
+        "course_rad",
+        "down_m",
+        "flaps",
+        "heading_rad",
+        "height_rate_m_s",
+        "lateral_acceleration_m_s2",
+        "pitch_max_rad",
+        "pitch_min_rad",
+        "pitch_rad",
+        "roll_limit_rad",
+        "roll_rad",
+        "steering_heading_rad",
+        "throttle",
+        "throttle_max",
+        "yaw_stick",
+    )
+
+    def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Nothing given."""
+        self.course_rad = self.heading_rad = self.lateral_acceleration_m_s2 = self.roll_rad = _NAN
+        self.down_m = self.height_rate_m_s = self.airspeed_m_s = self.pitch_rad = self.throttle = _NAN
+        self.steering_heading_rad = self.pitch_min_rad = self.pitch_max_rad = self.throttle_max = _NAN
+        self.roll_limit_rad = self.flaps = self.brake = self.yaw_stick = _NAN
+
+    def clear_lateral(self) -> None:
+        """Nothing given of course, heading, lateral acceleration, roll."""
+        self.course_rad = self.heading_rad = self.lateral_acceleration_m_s2 = self.roll_rad = _NAN
+
+    def write(self, ctx: FlightContext) -> None:
+        """Write the setpoint. Without a height the pitch and throttle of level flight are flown."""
+        if not ctx.altitude_valid:
+            p = ctx.fixed_wing
+            self.down_m = self.height_rate_m_s = _NAN
+            if self.pitch_rad != self.pitch_rad:
+                self.pitch_rad = p.trim_pitch_rad
+            if self.throttle != self.throttle:
+                self.throttle = p.trim_throttle
+        ctx.setpoint[:] = (
+            self.course_rad,
+            self.heading_rad,
+            self.lateral_acceleration_m_s2,
+            self.roll_rad,
+            self.down_m,
+            self.height_rate_m_s,
+            self.airspeed_m_s,
+            self.pitch_rad,
+            self.throttle,
+            _NAN,
+            _NAN,
+            _NAN,
+            _NAN,
+            _NAN,
+            _NAN,
+            self.steering_heading_rad,
+            self.pitch_min_rad,
+            self.pitch_max_rad,
+            self.throttle_max,
+            sp.FLY,
+            self.roll_limit_rad,
+            self.flaps,
+            self.brake,
+            self.yaw_stick,
+        )

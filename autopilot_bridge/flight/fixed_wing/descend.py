@@ -1,0 +1,53 @@
+"""Down without a position: the descent of a failsafe."""
+
+from autopilot_bridge.flight.context import FlightContext, FlightPhase, TouchedDown
+from autopilot_bridge.flight.fixed_wing.base import AircraftTask
+from autopilot_bridge.flight.fixed_wing.position_lost import PositionLost
+from autopilot_bridge.flight.task import TaskStatus
+
+_FLARE_BANK_RAD = 0.0
+
+
+class DescendTask(AircraftTask):
+    """Spiral down at the bank of a lost position; wings level near the ground, throttle idle in the flare.
+
+    DONE on the ground.
+    """
+
+    __slots__ = ("_lost", "_was_in_air")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._lost = PositionLost()
+        self._was_in_air = False
+
+    def _begin(self, ctx: FlightContext) -> None:
+        ctx.phase = FlightPhase.LANDING
+        self._lost.reset()
+
+    def _rest(self, ctx: FlightContext) -> TaskStatus:
+        super()._rest(ctx)
+        if self._was_in_air:
+            self._was_in_air = False
+            ctx.phase = FlightPhase.CRUISE
+            ctx.events.append(TouchedDown())
+        return TaskStatus.DONE
+
+    def _fly(self, ctx: FlightContext) -> TaskStatus:
+        self._was_in_air = True
+        p, state, command = ctx.fixed_wing, self._state, self._command
+        self._lost.fly(ctx, command, p.loiter_radius_m)
+        height = state.height_above_ground_m
+        if height != height:
+            height = ctx.height_above_home_m
+        low_m = max(4.0 * p.flare_height_m, p.flare_time_s * 2.0 * p.position_lost_sink_m_s)
+        command.height_rate_m_s = -p.position_lost_sink_m_s
+        if height < low_m:
+            command.roll_rad = _FLARE_BANK_RAD
+        if height < max(p.flare_height_m, p.flare_time_s * max(0.0, state.vel_down_m_s)):
+            command.height_rate_m_s = -p.flare_sink_m_s
+            command.throttle = p.throttle_idle
+            command.pitch_min_rad = p.flare_pitch_min_rad
+            command.pitch_max_rad = p.flare_pitch_max_rad
+        command.write(ctx)
+        return TaskStatus.RUNNING

@@ -1,0 +1,134 @@
+"""Is the aircraft on the ground? As PX4's `FixedwingLandDetector`: it is when it is slow and nothing happens.
+
+A stationary aircraft in a strong wind has an airspeed, so airspeed counts only while the speed over ground
+isn't known. An aircraft that waits for its launch stands still, and so stays on the ground until it is
+thrown.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState
+from autopilot_bridge.navigation import layout as nav_layout
+
+_IDLE_THROTTLE: Final = 0.1
+_VELOCITY: Final = nav_layout.VEL_NED_M_S.start
+_ACCELERATION: Final = nav_layout.ACC_NED_M_S2.start
+_RATES: Final = nav_layout.RATES_FRD_RAD_S.start
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandDetectorParameters:
+    """Thresholds; PX4's names beside the fields."""
+
+    horizontal_speed_max_m_s: float = 5.0  # LNDFW_VEL_XY_MAX
+    vertical_speed_max_m_s: float = 1.0  # LNDFW_VEL_Z_MAX
+    airspeed_max_m_s: float = 6.0  # LNDFW_AIRSPD_MAX
+    acceleration_max_m_s2: float = 8.0  # LNDFW_XYACC_MAX
+    rotation_max_rad_s: float = 0.5  # LNDFW_ROT_MAX
+    trigger_time_s: float = 2.0  # LNDFW_TRIG_TIME
+    contact_speed_m_s: float = 0.25  # vertical, throttle closed, so long:
+    contact_time_s: float = 0.8
+    filter_time_s: float = 0.5  # of speeds and accelerations
+
+    def __post_init__(self) -> None:
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} = {value} is not positive")
+
+
+class LandDetector:
+    """Judges the landed state at the task rate.
+
+    Args:
+        parameters: thresholds.
+        on_ground: where the aircraft starts.
+
+    Attributes:
+        state: newest judgement.
+    """
+
+    __slots__ = (
+        "_acceleration_m_s2",
+        "_airspeed_m_s",
+        "_contact_s",
+        "_parameters",
+        "_slow_s",
+        "_speed_m_s",
+        "_vertical_m_s",
+        "state",
+    )
+
+    def __init__(self, parameters: LandDetectorParameters | None = None, *, on_ground: bool = True) -> None:
+        self._parameters = LandDetectorParameters() if parameters is None else parameters
+        self._slow_s = self._contact_s = math.inf if on_ground else 0.0
+        self._speed_m_s = self._vertical_m_s = self._airspeed_m_s = self._acceleration_m_s2 = 0.0
+        self.state = LandedState.ON_GROUND if on_ground else LandedState.IN_AIR
+
+    def update(self, ctx: FlightContext, thrust: float) -> LandedState:
+        """Judge, and write `landed_state`, `ground_contact` and `maybe_landed` of the context.
+
+        Args:
+            ctx: newest navigation state and the setpoint flown.
+            thrust: throttle given to the motor, 0..1.
+        """
+        p = self._parameters
+        nav = ctx.nav.tolist()
+        north, east, down = nav[_VELOCITY : _VELOCITY + 3]
+        keep = math.exp(-ctx.dt_s / p.filter_time_s)
+        self._speed_m_s = _filtered(self._speed_m_s, math.hypot(north, east), keep)
+        self._vertical_m_s = _filtered(self._vertical_m_s, abs(down), keep)
+        self._airspeed_m_s = _filtered(self._airspeed_m_s, nav[nav_layout.AIRSPEED_M_S], keep)
+        acceleration = math.hypot(nav[_ACCELERATION], nav[_ACCELERATION + 1])
+        self._acceleration_m_s2 = _filtered(self._acceleration_m_s2, acceleration, keep)
+        if not ctx.armed:
+            # an unforced disarm happens on the ground only; a forced one in the air is gliding or falling
+            moving = self._speed_m_s > p.horizontal_speed_max_m_s or self._vertical_m_s > 2.0
+            if self.state is LandedState.ON_GROUND or not moving:
+                self._slow_s = self._contact_s = math.inf
+                self.state = LandedState.ON_GROUND
+            return self._store(ctx, self.state is LandedState.ON_GROUND)
+        fast = (
+            self._speed_m_s > p.horizontal_speed_max_m_s
+            if ctx.velocity_valid
+            else self._airspeed_m_s > p.airspeed_max_m_s
+        )
+        rates = nav[_RATES : _RATES + 3]
+        turning = math.sqrt(sum(r * r for r in rates)) > p.rotation_max_rad_s
+        vertical = ctx.altitude_valid and self._vertical_m_s > p.vertical_speed_max_m_s
+        shaken = self._acceleration_m_s2 > p.acceleration_max_m_s2
+        slow = not (fast or vertical or shaken)
+        if self.state is LandedState.ON_GROUND:
+            # leaving: at once, but by motion only, not by being carried or turned around
+            slow = not (fast or (vertical and shaken))
+        elif turning:
+            slow = False
+        self._slow_s = self._slow_s + ctx.dt_s if slow else 0.0
+        level = float(ctx.setpoint[sp.LEVEL])
+        closed = level <= sp.IDLE or thrust < _IDLE_THROTTLE
+        touching = closed and abs(down) < p.contact_speed_m_s and ctx.phase is FlightPhase.LANDING
+        self._contact_s = self._contact_s + ctx.dt_s if touching else 0.0
+        if self._slow_s >= p.trigger_time_s:
+            self.state = LandedState.ON_GROUND
+        elif ctx.phase is FlightPhase.TAKEOFF:
+            self.state = LandedState.TAKEOFF
+        elif ctx.phase is FlightPhase.LANDING:
+            self.state = LandedState.LANDING
+        else:
+            self.state = LandedState.IN_AIR
+        return self._store(ctx, self._contact_s >= p.contact_time_s)
+
+    def _store(self, ctx: FlightContext, contact: bool) -> LandedState:
+        landed = self.state is LandedState.ON_GROUND
+        ctx.landed_state = self.state
+        ctx.ground_contact = landed or contact
+        ctx.maybe_landed = landed or self._slow_s >= 0.5 * self._parameters.trigger_time_s
+        return self.state
+
+
+def _filtered(old: float, new: float, keep: float) -> float:
+    """First-order low pass; an unknown value leaves it."""
+    return old if new != new else new + (old - new) * keep

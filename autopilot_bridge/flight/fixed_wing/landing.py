@@ -1,0 +1,276 @@
+"""Landing: circle down to the approach, glide slope, flare, roll out; and the go-around."""
+
+import math
+from enum import IntEnum
+from typing import ClassVar, Final
+
+import numpy as np
+
+from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TouchedDown
+from autopilot_bridge.flight.fixed_wing.approach import Approach, approach_along_leg, approach_into_wind
+from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
+from autopilot_bridge.flight.fixed_wing.circle import Circle, wrap_pi
+from autopilot_bridge.flight.fixed_wing.descend import DescendTask
+from autopilot_bridge.flight.fixed_wing.flare import Flare
+from autopilot_bridge.flight.fixed_wing.line import Line
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
+from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
+
+_ENTRY_HEIGHT_M: Final = 4.0  # the circle is left this close to its height
+_ENTRY_COURSE_RAD: Final = math.radians(20.0)
+_ENTRY_WITHIN: Final = 0.4  # radii around the entry
+_FREE_BANK_M: Final = 15.0  # over the ground the bank is no longer limited for the wing tips
+_LOW_M: Final = 2.0
+_MISSED_M: Final = 40.0  # beyond the place, too high: go around
+_BRAKE_AFTER_S: Final = 1.0
+
+
+class LandPhase(IntEnum):
+    """Where the landing stands."""
+
+    CIRCLE = 0  # down (or up) to the height of the approach
+    APPROACH = 1
+    FLARE = 2
+    ROLL_OUT = 3
+    LANDED = 4
+    GO_AROUND = 5
+    BLIND = 6  # the position is lost: down where it is
+
+
+class LandTask(AircraftTask):
+    """Land at a place. DONE on the ground, with the propeller stopped and a `TouchedDown` event.
+
+    With an approach leg it is flown at once, its slope the glide slope. Without one the aircraft circles down
+    beside the place and lands against the wind. Once the ground is believed, nothing turns again.
+
+    Args:
+        place_ned_m: where to touch down, (3,); NaN components: of the place where the task starts, on the
+            ground of home; None: here.
+        approach_ned_m: where the approach leg begins, (3,); None: no leg is given.
+
+    Attributes:
+        phase: see `LandPhase`.
+        approach: the approach flown; None before `activate`.
+    """
+
+    __slots__ = (
+        "_blind",
+        "_circle",
+        "_flare",
+        "_line",
+        "_path",
+        "_rolled_s",
+        "_start",
+        "_wanted",
+        "approach",
+        "phase",
+    )
+
+    works_on_ground: ClassVar[bool] = True
+
+    def __init__(self, place_ned_m: Array | None = None, approach_ned_m: Array | None = None) -> None:
+        super().__init__()
+        self._wanted: Array = np.full(3, np.nan)
+        if place_ned_m is not None:
+            self._wanted[:] = place_ned_m
+        self._start = None if approach_ned_m is None else np.array(approach_ned_m, dtype=np.float64)
+        self._path = GuidedPath()
+        self._line = Line()
+        self._circle: Circle | None = None
+        self._flare = Flare()
+        self._blind: DescendTask | None = None
+        self._rolled_s = 0.0
+        self.approach: Approach | None = None
+        self.phase = LandPhase.CIRCLE
+
+    def _begin(self, ctx: FlightContext) -> None:
+        state = self._state
+        ctx.phase = FlightPhase.LANDING
+        self._blind = None
+        self._rolled_s = 0.0
+        self._flare.reset()
+        place = self._place(ctx)
+        start = self._start
+        leg = None
+        if start is not None:
+            at = (float(start[0]), float(start[1]), float(start[2]))
+            leg = approach_along_leg(at, place, ctx.fixed_wing)
+        self.approach = approach_into_wind(ctx, state, place) if leg is None else leg
+        self._line.set(self.approach.north_m, self.approach.east_m, self.approach.course_rad)
+        if leg is None:
+            self._enter_circle(ctx)
+        else:
+            self.phase = LandPhase.APPROACH
+
+    def _place(self, ctx: FlightContext) -> tuple[float, float, float]:
+        state = self._state
+        north, east, down = self._wanted.tolist()
+        if down != down:
+            down = float(ctx.home_ned_m[2])
+            if down != down:
+                known = state.height_above_ground_m == state.height_above_ground_m
+                down = state.down_m + state.height_above_ground_m if known else 0.0
+        return state.north_m if north != north else north, state.east_m if east != east else east, down
+
+    def _enter_circle(self, ctx: FlightContext) -> None:
+        approach = self.approach
+        assert approach is not None
+        radius = ctx.fixed_wing.loiter_radius_m
+        north, east = approach.entry_circle(radius)
+        self._circle = Circle(north, east, radius)
+        self._circle.begin(self._state)
+        self.phase = LandPhase.CIRCLE
+
+    def go_around(self, ctx: FlightContext) -> bool:
+        """Break the landing off: climb straight, come back to the approach (MAV_CMD_DO_GO_AROUND).
+
+        False where there is nothing to break off any more (or yet).
+        """
+        if self.phase not in (LandPhase.APPROACH, LandPhase.FLARE):
+            return False
+        self.phase = LandPhase.GO_AROUND
+        return True
+
+    def _land(self, ctx: FlightContext) -> TaskStatus:
+        clear_setpoint(ctx.setpoint, sp.IDLE if ctx.armed else sp.OFF)
+        if self.phase is not LandPhase.LANDED:
+            self.phase = LandPhase.LANDED
+            ctx.phase = FlightPhase.CRUISE
+            ctx.events.append(TouchedDown())
+        return TaskStatus.DONE
+
+    def _rest(self, ctx: FlightContext) -> TaskStatus:
+        return self._land(ctx)
+
+    def _fly(self, ctx: FlightContext) -> TaskStatus:
+        approach, p = self.approach, ctx.fixed_wing
+        if ctx.on_ground or self.phase is LandPhase.LANDED or approach is None:
+            return self._land(ctx)
+        low = self.phase in (LandPhase.FLARE, LandPhase.ROLL_OUT)
+        if not ctx.position_valid and not low:
+            return self._fly_blind(ctx)
+        if self._blind is not None:
+            self._blind = None
+            self._enter_circle(ctx)
+        command = self._command
+        command.flaps = p.flaps_landing
+        command.airspeed_m_s = p.landing_airspeed_m_s
+        match self.phase:
+            case LandPhase.CIRCLE:
+                self._fly_circle(ctx, p, approach)
+            case LandPhase.APPROACH:
+                self._fly_approach(ctx, p, approach)
+            case LandPhase.FLARE:
+                self._fly_flare(ctx, p)
+            case LandPhase.GO_AROUND:
+                self._fly_go_around(ctx, p, approach)
+            case _:
+                self._fly_roll_out(ctx, p)
+        command.write(ctx)
+        return TaskStatus.RUNNING
+
+    def _fly_blind(self, ctx: FlightContext) -> TaskStatus:
+        """Without a position there is no approach: down where it is."""
+        if self._blind is None:
+            self._blind = DescendTask()
+            self._blind.activate(ctx)
+            self.phase = LandPhase.BLIND
+        self._blind.update(ctx)
+        return TaskStatus.RUNNING
+
+    def _fly_circle(self, ctx: FlightContext, p: FixedWingFlightParameters, approach: Approach) -> None:
+        state, command, circle = self._state, self._command, self._circle
+        assert circle is not None
+        guidance = self._path.of(ctx)
+        circle.follow(state, guidance, p.roll_time_constant_s)
+        command.course_rad = guidance.course_rad
+        command.lateral_acceleration_m_s2 = guidance.lateral_acceleration_m_s2
+        command.down_m = approach.entry_down_m
+        at_height = abs(state.down_m - approach.entry_down_m) < _ENTRY_HEIGHT_M
+        command.airspeed_m_s = p.landing_airspeed_m_s if at_height else math.nan
+        past_entry = self._line.along_m(state) + approach.length_m
+        if (
+            circle.circling
+            and at_height
+            and abs(past_entry) < _ENTRY_WITHIN * circle.radius_m
+            and abs(wrap_pi(state.course_rad - approach.course_rad)) < _ENTRY_COURSE_RAD
+        ):
+            self.phase = LandPhase.APPROACH
+
+    def _height(self, p: FixedWingFlightParameters, down_m: float) -> float:
+        """Over the ground, as far as it is known."""
+        measured = self._state.height_above_ground_m
+        if p.rangefinder_landing and measured == measured:
+            return measured
+        return down_m - self._state.down_m
+
+    def _limit_bank(self, p: FixedWingFlightParameters, height_m: float) -> None:
+        share = (height_m - _LOW_M) / (_FREE_BANK_M - _LOW_M)
+        if share < 1.0:
+            share = max(0.0, share)
+            self._command.roll_limit_rad = (
+                p.ground_bank_max_rad + (p.bank_max_rad - p.ground_bank_max_rad) * share
+            )
+
+    def _fly_approach(self, ctx: FlightContext, p: FixedWingFlightParameters, approach: Approach) -> None:
+        state, command = self._state, self._command
+        self._line.follow(state, self._path.of(ctx), command)
+        height = self._height(p, approach.down_m)
+        self._limit_bank(p, height)
+        flare_height = max(p.flare_height_m, p.flare_time_s * state.ground_speed_m_s * approach.slope)
+        shift = approach.flare_shift_m(state.ground_speed_m_s, flare_height, p.flare_sink_m_s)
+        past_aim = self._line.along_m(state) + shift
+        slope_down = approach.down_m + past_aim * approach.slope
+        if slope_down > approach.entry_down_m:
+            command.down_m = slope_down
+            command.height_rate_m_s = -state.ground_speed_m_s * approach.slope
+        else:
+            command.down_m = approach.entry_down_m
+        if height <= max(p.flare_height_m, p.flare_time_s * max(0.0, state.vel_down_m_s)):
+            self.phase = LandPhase.FLARE
+            self._flare.begin(state, height, p)
+        elif past_aim - shift > _MISSED_M:
+            self.phase = LandPhase.GO_AROUND
+
+    def _fly_flare(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
+        state, command, approach = self._state, self._command, self.approach
+        assert approach is not None
+        if ctx.position_valid:
+            self._line.follow(state, self._path.of(ctx), command)
+        else:
+            command.heading_rad = approach.course_rad
+        height = self._height(p, approach.down_m)
+        self._limit_bank(p, height)
+        touched = self._flare.fly(ctx, state, height, p, command)
+        if self._flare.aligning:
+            command.steering_heading_rad = approach.course_rad
+        if touched:
+            self.phase = LandPhase.ROLL_OUT
+            self._rolled_s = 0.0
+
+    def _fly_roll_out(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
+        state, command = self._state, self._command
+        self._rolled_s += ctx.dt_s
+        command.roll_rad = 0.0
+        command.pitch_rad = p.takeoff_roll_pitch_rad
+        command.throttle = 0.0
+        command.steering_heading_rad = self._line.steering_heading(state, ctx.position_valid)
+        if self._rolled_s > _BRAKE_AFTER_S:
+            command.brake = p.brake
+
+    def _fly_go_around(self, ctx: FlightContext, p: FixedWingFlightParameters, approach: Approach) -> None:
+        """Straight up along the runway, then back to where the approach begins."""
+        state, command = self._state, self._command
+        ctx.phase = FlightPhase.CRUISE
+        self._line.follow(state, self._path.of(ctx), command)
+        height = self._height(p, approach.down_m)
+        self._limit_bank(p, height)
+        command.flaps = p.flaps_takeoff
+        command.airspeed_m_s = p.takeoff_airspeed_m_s
+        command.pitch_min_rad = p.takeoff_pitch_min_rad
+        command.height_rate_m_s = max(p.climb_rate_m_s, p.climb_max_m_s)
+        if approach.down_m - state.down_m >= p.landing_abort_climb_m:
+            self._flare.reset()
+            self._enter_circle(ctx)
+            ctx.phase = FlightPhase.LANDING

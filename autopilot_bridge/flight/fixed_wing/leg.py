@@ -1,0 +1,93 @@
+"""A leg to a waypoint: its line, its height profile, and when the waypoint is reached."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.flight.fixed_wing.command import FlightCommand
+from autopilot_bridge.flight.fixed_wing.line import Line
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, TurnInRule
+from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
+from autopilot_bridge.flight.fixed_wing.state import AircraftState
+
+_SAME_PLACE_M: Final = 1.0
+_SLOPE_LONGER_THAN_M: Final = 20.0
+
+Place = tuple[float, float, float]
+
+
+class Leg:
+    """From a place to a waypoint, local NED.
+
+    Args:
+        start: where the line begins.
+        target: the waypoint.
+        ramps: the height goes evenly from the start's to the target's; False: to the target's at once.
+        radius_m: acceptance radius.
+        turn_rad: change of course behind the waypoint, 0..pi; NaN: not known.
+    """
+
+    __slots__ = (
+        "_line",
+        "_ramps",
+        "_start_down_m",
+        "_turn_rad",
+        "course_rad",
+        "length_m",
+        "radius_m",
+        "target",
+    )
+
+    def __init__(self, start: Place, target: Place, *, ramps: bool, radius_m: float, turn_rad: float) -> None:
+        self.target = target
+        self.radius_m = radius_m
+        self._turn_rad = turn_rad
+        self._ramps = ramps
+        self._start_down_m = start[2]
+        self._line = Line()
+        self._set_line(start)
+
+    def _set_line(self, start: Place) -> None:
+        north, east = self.target[0] - start[0], self.target[1] - start[1]
+        self.length_m = math.hypot(north, east)
+        self.course_rad = math.atan2(east, north)
+        self._line.set(start[0], start[1], self.course_rad)
+
+    @property
+    def too_short(self) -> bool:
+        """Start and target are one place: there is no line."""
+        return self.length_m < _SAME_PLACE_M
+
+    def start_again(self, state: AircraftState) -> None:
+        """The waypoint was missed: straight to it from here."""
+        self._ramps = False
+        self._set_line((state.north_m, state.east_m, state.down_m))
+
+    def follow(self, state: AircraftState, guidance: PathGuidance, command: FlightCommand) -> None:
+        """Fill course and height of a command."""
+        self._line.follow(state, guidance, command)
+        command.down_m = self.target[2]
+        climb = self._start_down_m - self.target[2]
+        # the height is there when the turn begins
+        length = self.length_m - self.radius_m
+        if not self._ramps or length < _SLOPE_LONGER_THAN_M or climb == 0.0:
+            return
+        share = self._line.along_m(state) / length
+        if share < 1.0:
+            command.down_m = self._start_down_m - max(0.0, share) * climb
+            command.height_rate_m_s = climb / length * state.ground_speed_m_s
+
+    def away_m(self, state: AircraftState) -> float:
+        """Horizontal distance to the waypoint."""
+        return math.hypot(self.target[0] - state.north_m, self.target[1] - state.east_m)
+
+    def passed(self, state: AircraftState) -> bool:
+        """Beside the waypoint, or beyond it."""
+        return self._line.along_m(state) >= self.length_m
+
+    def turn_in_m(self, guidance: PathGuidance, parameters: FixedWingFlightParameters) -> float:
+        """Distance to the waypoint at which it counts as reached."""
+        if parameters.turn_in is TurnInRule.SWITCH_DISTANCE:
+            return max(self.radius_m, guidance.switch_distance_m)
+        if math.isnan(self._turn_rad):
+            return self.radius_m
+        return self.radius_m * min(1.0, self._turn_rad / (0.5 * math.pi))

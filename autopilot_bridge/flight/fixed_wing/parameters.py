@@ -1,0 +1,245 @@
+"""Limits and habits of fixed-wing flight, in the meaning PX4 (FW_*, NPFG_*, RTL_*) and ArduPlane share."""
+
+import math
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Any, Final, Self
+
+from flightsim.flight_envelope import FlightEnvelope
+
+_SIGNED: Final = frozenset(
+    {
+        "loiter_radius_m",
+        "return_loiter_time_s",
+        "return_loiter_radius_m",
+        "pitch_min_rad",
+        "trim_pitch_rad",
+        "takeoff_roll_pitch_rad",
+        "flare_pitch_min_rad",
+    }
+)
+_MAY_BE_ZERO: Final = frozenset(
+    {
+        "trim_throttle",
+        "throttle_idle",
+        "climb_max_m_s",
+        "takeoff_throttle_ramp_s",
+        "launch_delay_s",
+        "launch_speed_min_m_s",
+        "launch_acceleration_m_s2",
+        "launch_time_s",
+        "landing_abort_climb_m",
+        "brake",
+        "return_climb_min_m",
+        "return_cone_half_angle_rad",
+        "return_min_distance_m",
+        "position_lost_wait_s",
+        "manual_deadzone",
+        "manual_expo",
+    }
+)
+_MAY_BE_INFINITE: Final = frozenset({"acceptance_altitude_m", "position_lost_wait_s"})
+
+
+class LaunchKind(IntEnum):
+    """How the aircraft comes into the air: PX4 RWTO_TKOFF and FW_LAUN_DETCN_ON | TKOFF_THR_MINACC."""
+
+    RUNWAY = 0
+    CATAPULT = 1
+    HAND = 2
+
+
+class TurnInRule(IntEnum):
+    """How far before a waypoint the turn to the next leg begins."""
+
+    SWITCH_DISTANCE = 0  # PX4: the larger of NAV_ACC_RAD and the guidance's switch distance
+    TURN_ANGLE = 1  # ArduPilot: WP_RADIUS, less for turns below 90 degrees
+
+
+class ReturnDestination(IntEnum):
+    """Where a return ends: PX4 RTL_TYPE | ArduPilot RTL_AUTOLAND."""
+
+    HOME = 0  # circle over home; land by `return_loiter_time_s`
+    LANDING_SEQUENCE = 1  # straight to the plan's landing sequence (RTL_TYPE 1 | RTL_AUTOLAND 2)
+    HOME_THEN_LANDING_SEQUENCE = 2  # over home first (RTL_AUTOLAND 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixedWingFlightParameters:
+    """Parameters of every fixed-wing flight task. PX4's and ArduPilot's names stand beside each field.
+
+    Airspeeds are equivalent airspeeds. Heights are above home, or above the ground where they say so.
+
+    Raises:
+        ValueError: a field is not finite, not positive where it must be, or contradicts another.
+    """
+
+    airspeed_min_m_s: float = 18.0  # FW_AIRSPD_MIN | AIRSPEED_MIN
+    airspeed_trim_m_s: float = 25.0  # FW_AIRSPD_TRIM | AIRSPEED_CRUISE
+    airspeed_max_m_s: float = 35.0  # FW_AIRSPD_MAX | AIRSPEED_MAX
+    climb_rate_m_s: float = 3.0  # wanted climbs: FW_T_CLMB_R_SP | FBWB_CLIMB_RATE
+    sink_rate_m_s: float = 2.0  # wanted descents: FW_T_SINK_R_SP | FBWB_CLIMB_RATE
+    climb_max_m_s: float = 5.0  # FW_T_CLMB_MAX | TECS_CLMB_MAX
+    sink_max_m_s: float = 5.0  # FW_T_SINK_MAX | TECS_SINK_MAX
+    bank_max_rad: float = math.radians(45.0)  # FW_R_LIM | ROLL_LIMIT_DEG
+    pitch_max_rad: float = math.radians(25.0)  # FW_P_LIM_MAX | PTCH_LIM_MAX_DEG
+    pitch_min_rad: float = math.radians(-20.0)  # FW_P_LIM_MIN | PTCH_LIM_MIN_DEG
+    trim_pitch_rad: float = math.radians(3.0)  # FW_PSP_OFF | PTCH_TRIM_DEG: flown when the height is lost
+    trim_throttle: float = 0.5  # FW_THR_TRIM | TRIM_THROTTLE
+    throttle_idle: float = 0.0  # FW_THR_IDLE | THR_MIN
+
+    guidance_period_s: float = 10.0  # NPFG_PERIOD | NAVL1_PERIOD
+    guidance_damping: float = 0.7  # NPFG_DAMPING | NAVL1_DAMPING
+    guidance_period_safety: float = 1.5  # NPFG_PERIOD_SF
+    guidance_period_lower_bound: bool = True  # NPFG_LB_PERIOD
+    guidance_period_upper_bound: bool = True  # NPFG_UB_PERIOD
+    roll_time_constant_s: float = 0.5  # NPFG_ROLL_TC | RLL2SRV_TCONST
+    switch_distance_multiplier: float = 0.32  # NPFG_SW_DST_MLT
+
+    acceptance_radius_m: float = 20.0  # NAV_ACC_RAD | WP_RADIUS
+    acceptance_altitude_m: float = 10.0  # NAV_FW_ALT_RAD; ArduPilot: infinite
+    turn_in: TurnInRule = TurnInRule.SWITCH_DISTANCE
+    loiter_exits_aligned: bool = False  # every loiter item ends towards the next waypoint (ArduPilot)
+    loiter_radius_m: float = 80.0  # NAV_LOITER_RAD | WP_LOITER_RAD; negative: counter-clockwise
+
+    launch: LaunchKind = LaunchKind.RUNWAY
+    takeoff_altitude_m: float = 30.0  # MIS_TAKEOFF_ALT | TKOFF_ALT
+    takeoff_straight: bool = False  # ArduPilot climbs straight out, whatever the place of the item
+    takeoff_airspeed_m_s: float = 25.0  # FW_TKO_AIRSPD | TECS' climb speed: AIRSPEED_CRUISE
+    takeoff_pitch_min_rad: float = math.radians(8.0)  # FW_TKO_PITCH_MIN | TKOFF_LVL_PITCH
+    takeoff_clearance_m: float = 15.0  # straight and nearly level wings below: RWTO_ | TKOFF_LVL_ALT
+    takeoff_bank_max_rad: float = math.radians(15.0)  # in the climb-out | LEVEL_ROLL_LIMIT
+    takeoff_throttle_max: float = 1.0  # RWTO_MAX_THR | TKOFF_THR_MAX
+    takeoff_throttle_ramp_s: float = 2.0  # RWTO_RAMP_TIME | TKOFF_THR_SLEW
+    takeoff_roll_pitch_rad: float = 0.0  # RWTO_PSP: on the runway | TKOFF_GND_PITCH
+    rotation_airspeed_m_s: float = 20.0  # RWTO_ROT_AIRSPD | TKOFF_ROTATE_SPD
+    rotation_time_s: float = 1.0  # RWTO_ROT_TIME
+    launch_acceleration_m_s2: float = 15.0  # FW_LAUN_AC_THLD | TKOFF_THR_MINACC
+    launch_time_s: float = 0.05  # FW_LAUN_AC_T: so long
+    launch_speed_min_m_s: float = 0.0  # TKOFF_THR_MINSPD: over ground, too; 0: off
+    launch_delay_s: float = 0.2  # FW_LAUN_MOT_DEL | TKOFF_THR_DELAY: motor off after the launch
+
+    landing_angle_rad: float = math.radians(5.0)  # FW_LND_ANG: glide slope without an approach leg
+    landing_angle_max_rad: float = math.radians(10.0)  # steepest slope flown to meet the place
+    landing_airspeed_m_s: float = 21.0  # FW_LND_AIRSPD | TECS_LAND_ARSPD
+    landing_loiter_altitude_m: float = 40.0  # where a landing without an approach begins its slope
+    flare_height_m: float = 1.5  # above ground, at least: FW_LND_FLALT | LAND_FLARE_ALT
+    flare_time_s: float = 2.0  # before the ground at the present sink: FW_LND_FL_TIME | LAND_FLARE_SEC
+    flare_sink_m_s: float = 0.4  # FW_LND_FL_SINK | TECS_LAND_SINK
+    flare_pitch_min_rad: float = math.radians(1.0)  # FW_LND_FL_PMIN | LAND_PITCH_DEG
+    flare_pitch_max_rad: float = math.radians(12.0)  # FW_LND_FL_PMAX | LAND_PITCH_DEG
+    ground_bank_max_rad: float = math.radians(
+        5.0
+    )  # wing tips free near the ground: FW_WING_* | LEVEL_ROLL_LIMIT
+    rangefinder_landing: bool = True  # FW_LND_USETER | RNGFND_LANDING
+    landing_abort_climb_m: float = 30.0  # go-around: straight up to so much above home | LAND_ABORT_DEG
+    flaps_takeoff: float = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
+    flaps_landing: float = 0.0  # FW_FLAPS_LND_SCL | LAND_FLAP_PERCNT
+    brake: float = 0.5  # in the roll-out
+
+    return_altitude_m: float = 60.0  # RTL_RETURN_ALT | RTL_ALTITUDE
+    return_descend_altitude_m: float = 60.0  # RTL_DESCEND_ALT; ArduPilot: RTL_ALTITUDE
+    return_climbs: bool = True  # PX4 climbs and never descends on the way; ArduPilot flies at the altitude
+    return_climb_min_m: float = 0.0  # RTL_CLIMB_MIN
+    return_loiter_time_s: float = -1.0  # RTL_LAND_DELAY; negative: for ever
+    return_loiter_radius_m: float = 80.0  # RTL_LOITER_RAD | RTL_RADIUS; negative: counter-clockwise
+    return_destination: ReturnDestination = ReturnDestination.HOME
+    return_cone_half_angle_rad: float = 0.0  # RTL_CONE_ANG within RTL_MIN_DIST; 0: off
+    return_min_distance_m: float = 100.0  # RTL_MIN_DIST
+
+    manual_bank_max_rad: float = math.radians(45.0)  # FW_MAN_R_MAX | ROLL_LIMIT_DEG
+    manual_pitch_max_rad: float = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MAX_DEG
+    manual_pitch_down_max_rad: float = math.radians(30.0)  # FW_MAN_P_MAX | PTCH_LIM_MIN_DEG
+    acro_roll_rate_rad_s: float = math.radians(90.0)  # FW_ACRO_X_MAX | ACRO_ROLL_RATE
+    acro_pitch_rate_rad_s: float = math.radians(90.0)  # FW_ACRO_Y_MAX | ACRO_PITCH_RATE
+    acro_yaw_rate_rad_s: float = math.radians(45.0)  # FW_ACRO_Z_MAX | ACRO_YAW_RATE
+    manual_deadzone: float = 0.06
+    manual_expo: float = 0.0
+
+    guided_timeout_s: float = 3.0  # ArduPlane: attitudes in GUIDED
+    position_lost_bank_rad: float = math.radians(15.0)  # FW_GPSF_R
+    position_lost_wait_s: float = 30.0  # FW_GPSF_LT: so long before it descends; ArduPilot: infinite
+    position_lost_sink_m_s: float = 1.5
+
+    @classmethod
+    def for_envelope(cls, envelope: FlightEnvelope, **changes: Any) -> Self:
+        """Parameters for any aircraft, from what it can do; `changes` are fields that shall differ."""
+        e = envelope
+        landing = max(1.2 * e.stall_speed_m_s, e.airspeed_min_m_s)
+        bank = min(e.bank_max_rad, math.radians(45.0))
+        # a circle flown at two thirds of the bank limit's turn rate leaves room for wind
+        radius = e.airspeed_trim_m_s**2 / (9.80665 * math.tan(0.6 * bank))
+        climb = max(0.3, 0.6 * e.climb_max_m_s)
+        climb_pitch = e.trim_pitch_rad + math.atan2(max(0.0, e.climb_max_m_s), e.airspeed_trim_m_s)
+        values: dict[str, Any] = {
+            "airspeed_min_m_s": e.airspeed_min_m_s,
+            "airspeed_trim_m_s": e.airspeed_trim_m_s,
+            "airspeed_max_m_s": e.airspeed_max_m_s,
+            "climb_rate_m_s": min(3.0, climb),
+            "sink_rate_m_s": min(2.5, max(0.8 * e.sink_min_m_s, 0.5)),
+            "climb_max_m_s": max(0.0, e.climb_max_m_s),
+            "sink_max_m_s": e.sink_max_m_s,
+            "bank_max_rad": bank,
+            "pitch_min_rad": e.pitch_min_rad,
+            "pitch_max_rad": e.pitch_max_rad,
+            "trim_pitch_rad": e.trim_pitch_rad,
+            "trim_throttle": e.trim_throttle,
+            "manual_bank_max_rad": bank,
+            "manual_pitch_max_rad": e.pitch_max_rad,
+            "manual_pitch_down_max_rad": -e.pitch_min_rad,
+            "takeoff_pitch_min_rad": min(math.radians(10.0), max(math.radians(2.0), 0.6 * climb_pitch)),
+            "takeoff_airspeed_m_s": e.airspeed_trim_m_s,
+            "rotation_airspeed_m_s": max(1.15 * e.stall_speed_m_s, 0.9 * e.airspeed_min_m_s),
+            "landing_airspeed_m_s": min(landing, e.airspeed_trim_m_s),
+            "loiter_radius_m": max(40.0, radius),
+            "return_loiter_radius_m": max(40.0, radius),
+        }
+        values.update(changes)
+        return cls(**values)
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            name = field.name
+            value = getattr(self, name)
+            if isinstance(value, bool | IntEnum):
+                continue
+            if value == math.inf and name in _MAY_BE_INFINITE:
+                continue
+            if not math.isfinite(value):
+                raise ValueError(f"{name} = {value} is not a finite number")
+            if name in _SIGNED:
+                continue
+            if name in _MAY_BE_ZERO or name.startswith("flaps"):
+                if value < 0.0:
+                    raise ValueError(f"{name} = {value} is negative; zero or more is accepted")
+            elif value <= 0.0:
+                raise ValueError(f"{name} = {value} is not positive")
+        if not self.airspeed_min_m_s <= self.airspeed_trim_m_s <= self.airspeed_max_m_s:
+            raise ValueError(
+                f"airspeed_trim_m_s = {self.airspeed_trim_m_s} is not between airspeed_min_m_s = "
+                f"{self.airspeed_min_m_s} and airspeed_max_m_s = {self.airspeed_max_m_s}"
+            )
+        if not self.pitch_min_rad < self.pitch_max_rad:
+            raise ValueError(
+                f"pitch_min_rad = {self.pitch_min_rad} is not below pitch_max_rad = {self.pitch_max_rad}"
+            )
+        if self.landing_angle_max_rad < self.landing_angle_rad:
+            raise ValueError(
+                f"landing_angle_max_rad = {self.landing_angle_max_rad} is below "
+                f"landing_angle_rad = {self.landing_angle_rad}"
+            )
+        for name in ("trim_throttle", "throttle_idle", "takeoff_throttle_max", "brake", "manual_expo"):
+            value = getattr(self, name)
+            if not 0.0 <= value <= 1.0:
+                raise ValueError(f"{name} = {value} is not in 0..1")
+        for name in ("flaps_takeoff", "flaps_landing"):
+            if getattr(self, name) > 1.0:
+                raise ValueError(f"{name} = {getattr(self, name)} is not in 0..1")
+        if self.manual_deadzone >= 1.0:
+            raise ValueError(f"manual_deadzone = {self.manual_deadzone} is not in 0..1 (1 excluded)")
+        for name in ("bank_max_rad", "takeoff_bank_max_rad", "ground_bank_max_rad", "manual_bank_max_rad"):
+            if getattr(self, name) >= math.radians(85.0):
+                raise ValueError(f"{name} = {getattr(self, name)} is not below 85 degrees")
+        for name in ("loiter_radius_m", "return_loiter_radius_m"):
+            if abs(getattr(self, name)) < 1.0:
+                raise ValueError(f"{name} = {getattr(self, name)} is no circle: at least 1 m either way")

@@ -1,0 +1,180 @@
+"""Return: PX4's fixed-wing Return and ArduPlane's RTL, told apart by parameters only."""
+
+import math
+from enum import IntEnum
+
+import numpy as np
+
+from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.fixed_wing.base import AircraftTask
+from autopilot_bridge.flight.fixed_wing.descend import DescendTask
+from autopilot_bridge.flight.fixed_wing.landing import LandTask
+from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, ReturnDestination
+from autopilot_bridge.flight.plan_reading import landing_start
+from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
+from autopilot_bridge.mission_plan import MissionStore
+
+
+class ReturnPhase(IntEnum):
+    """Where the return stands."""
+
+    CLIMB = 0
+    FLY = 1
+    DESCEND = 2
+    LOITER = 3
+    LAND = 4
+
+
+def return_height(distance_m: float, height_m: float, parameters: FixedWingFlightParameters) -> float:
+    """Height over home to fly home at.
+
+    PX4: never lower than now; otherwise the return altitude, within RTL_MIN_DIST only as high as the cone
+    around home asks for. ArduPilot: the return altitude.
+    """
+    p = parameters
+    wanted = p.return_altitude_m
+    if not p.return_climbs:
+        return wanted
+    if p.return_cone_half_angle_rad > 0.0 and distance_m <= p.return_min_distance_m:
+        floor = min(wanted, p.return_descend_altitude_m)
+        wanted = min(wanted, max(distance_m / math.tan(p.return_cone_half_angle_rad), floor))
+    return max(height_m + p.return_climb_min_m, wanted)
+
+
+class ReturnTask(AircraftTask):
+    """Climb, fly home, circle down, circle there or land; or fly the landing sequence of the plan.
+
+    Without a home it circles where it is; without a position it descends there.
+
+    Args:
+        store: the plan, whose landing sequence the parameters may send the return to; None: there is none.
+        first_item: the first item that is flown, as the mission task has it.
+
+    Attributes:
+        phase: see `ReturnPhase`.
+    """
+
+    __slots__ = ("_first_item", "_home", "_store", "_sub", "_wait_s", "phase")
+
+    def __init__(self, store: MissionStore | None = None, *, first_item: int = 0) -> None:
+        super().__init__()
+        self._store = store
+        self._first_item = first_item
+        self._sub: FlightTask | None = None
+        self._home: Array = np.full(3, np.nan)
+        self._wait_s = 0.0
+        self.phase = ReturnPhase.CLIMB
+
+    @property
+    def sub_task(self) -> FlightTask | None:
+        """What is being flown: a circle, the landing, or the plan."""
+        return self._sub
+
+    @property
+    def works_through_landing(self) -> bool:
+        """The landing has begun: it goes on on the ground."""
+        return self.phase is ReturnPhase.LAND
+
+    def _set_sub(self, ctx: FlightContext, task: FlightTask) -> None:
+        self._sub = task
+        task.activate(ctx)
+
+    def _landing_start(self) -> int | None:
+        return None if self._store is None else landing_start(self._store.items)
+
+    def _begin(self, ctx: FlightContext) -> None:
+        p, state = ctx.fixed_wing, self._state
+        self._wait_s = 0.0
+        self._home[:] = ctx.home_ned_m
+        if not math.isfinite(float(self._home.sum())):
+            self.phase = ReturnPhase.LOITER
+            self._set_sub(ctx, LoiterTask())
+            return
+        to_plan = p.return_destination is ReturnDestination.LANDING_SEQUENCE
+        if to_plan and self._land_by_plan(ctx):
+            return
+        home_down = float(self._home[2])
+        distance = math.hypot(float(self._home[0]) - state.north_m, float(self._home[1]) - state.east_m)
+        height = home_down - state.down_m
+        wanted = return_height(distance, height, p)
+        self._home[2] = home_down - wanted
+        if p.return_climbs and wanted - height > p.acceptance_altitude_m:
+            self.phase = ReturnPhase.CLIMB
+            self._set_sub(ctx, LoiterTask(np.array([math.nan, math.nan, self._home[2]])))
+        else:
+            self._fly_home(ctx)
+
+    def _fly_home(self, ctx: FlightContext) -> None:
+        self.phase = ReturnPhase.FLY
+        self._set_sub(ctx, LoiterTask(self._home, ctx.fixed_wing.return_loiter_radius_m))
+
+    def _land_by_plan(self, ctx: FlightContext) -> bool:
+        """Go on with the landing sequence of the plan, if there is one."""
+        # a plan may send the vehicle home, and a return may fly the plan
+        from autopilot_bridge.flight.fixed_wing.mission import MissionTask
+
+        start = self._landing_start()
+        if start is None or self._store is None:
+            return False
+        self._store.current = start
+        self.phase = ReturnPhase.LAND
+        self._set_sub(ctx, MissionTask(self._store, first_item=self._first_item))
+        return True
+
+    def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
+        """Another airspeed on the way (DO_CHANGE_SPEED)."""
+        if isinstance(self._sub, SpeedTask):
+            self._sub.change_speed(ctx, kind, speed_m_s)
+
+    def go_around(self, ctx: FlightContext) -> bool:
+        """Break a landing off."""
+        from autopilot_bridge.flight.fixed_wing.mission import MissionTask
+
+        return isinstance(self._sub, LandTask | MissionTask) and self._sub.go_around(ctx)
+
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        """Write `ctx.setpoint`; DONE on the ground."""
+        if self._active and self.phase is ReturnPhase.LAND and self._sub is not None and not self._rested:
+            return self._sub.update(ctx)
+        return super().update(ctx)
+
+    def _rest(self, ctx: FlightContext) -> TaskStatus:
+        super()._rest(ctx)
+        return TaskStatus.DONE
+
+    def _fly(self, ctx: FlightContext) -> TaskStatus:
+        sub = self._sub
+        assert sub is not None
+        sub.update(ctx)
+        if isinstance(sub, DescendTask):
+            if ctx.position_valid:
+                self.activate(ctx)
+        elif isinstance(sub, LoiterTask):
+            self._advance(ctx, sub)
+        return TaskStatus.RUNNING
+
+    def _advance(self, ctx: FlightContext, loiter: LoiterTask) -> None:
+        """Go on to the next phase when this one is done."""
+        p = ctx.fixed_wing
+        at_height = abs(self._state.down_m - float(loiter.centre_ned_m[2])) < min(
+            p.acceptance_altitude_m, 10.0
+        )
+        home_down = float(ctx.home_ned_m[2])
+        if self.phase is ReturnPhase.CLIMB and at_height:
+            self._fly_home(ctx)
+        elif self.phase is ReturnPhase.FLY and loiter.circling:
+            then_plan = p.return_destination is ReturnDestination.HOME_THEN_LANDING_SEQUENCE
+            if then_plan and self._land_by_plan(ctx):
+                return
+            self.phase = ReturnPhase.DESCEND
+            if p.return_climbs and math.isfinite(home_down):
+                low_down = max(float(self._home[2]), home_down - p.return_descend_altitude_m)
+                loiter.set_height(low_down)
+        elif self.phase is ReturnPhase.DESCEND and at_height:
+            self.phase = ReturnPhase.LOITER
+        elif self.phase is ReturnPhase.LOITER:
+            self._wait_s += ctx.dt_s
+            if 0.0 <= p.return_loiter_time_s <= self._wait_s and math.isfinite(home_down):
+                self.phase = ReturnPhase.LAND
+                self._set_sub(ctx, LandTask(np.array(ctx.home_ned_m)))

@@ -1,0 +1,76 @@
+"""The aircraft as its flight tasks see it: the navigation state in plain numbers, read once per update."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.navigation import layout as nav_layout
+
+_SLOW_M_S: Final = 1.0  # below this speed over ground the course means nothing: the nose's direction counts
+
+_POS: Final = nav_layout.POS_NED_M.start
+_VEL: Final = nav_layout.VEL_NED_M_S.start
+_EULER: Final = nav_layout.EULER_RAD.start
+_WIND: Final = nav_layout.WIND_NED_M_S.start
+_FORCE: Final = nav_layout.SPECIFIC_FORCE_FRD_M_S2.start
+
+
+class AircraftState:
+    """Navigation state of one update, local NED, as floats.
+
+    Attributes:
+        north_m, east_m, down_m: position.
+        vel_north_m_s, vel_east_m_s, vel_down_m_s: over ground.
+        wind_north_m_s, wind_east_m_s: 0 while not estimated, so that air and ground are one.
+        ground_speed_m_s, course_rad: horizontal velocity; course is the nose's direction when (nearly) still.
+        airspeed_m_s: equivalent airspeed; NaN when not known.
+        true_airspeed_m_s: horizontal speed through the air.
+        roll_rad, pitch_rad, yaw_rad: attitude.
+        forward_force_m_s2: specific force along the body's x axis.
+        height_above_ground_m: of the rangefinder; NaN when not known.
+    """
+
+    __slots__ = (
+        "airspeed_m_s",
+        "course_rad",
+        "down_m",
+        "east_m",
+        "forward_force_m_s2",
+        "ground_speed_m_s",
+        "height_above_ground_m",
+        "north_m",
+        "pitch_rad",
+        "roll_rad",
+        "true_airspeed_m_s",
+        "vel_down_m_s",
+        "vel_east_m_s",
+        "vel_north_m_s",
+        "wind_east_m_s",
+        "wind_north_m_s",
+        "yaw_rad",
+    )
+
+    def __init__(self) -> None:
+        for name in self.__slots__:
+            setattr(self, name, 0.0)
+
+    def read(self, ctx: FlightContext) -> None:
+        """Take over the newest navigation state."""
+        nav = ctx.nav.tolist()
+        self.north_m, self.east_m, self.down_m = nav[_POS : _POS + 3]
+        self.vel_north_m_s, self.vel_east_m_s, self.vel_down_m_s = nav[_VEL : _VEL + 3]
+        self.roll_rad, self.pitch_rad, self.yaw_rad = nav[_EULER : _EULER + 3]
+        self.forward_force_m_s2 = nav[_FORCE]
+        self.airspeed_m_s = nav[nav_layout.AIRSPEED_M_S]
+        self.height_above_ground_m = nav[nav_layout.HEIGHT_ABOVE_GROUND_M]
+        wind_north, wind_east = nav[_WIND], nav[_WIND + 1]
+        if wind_north != wind_north or wind_east != wind_east:
+            wind_north = wind_east = 0.0
+        self.wind_north_m_s, self.wind_east_m_s = wind_north, wind_east
+        self.ground_speed_m_s = math.hypot(self.vel_north_m_s, self.vel_east_m_s)
+        self.true_airspeed_m_s = math.hypot(self.vel_north_m_s - wind_north, self.vel_east_m_s - wind_east)
+        self.course_rad = (
+            math.atan2(self.vel_east_m_s, self.vel_north_m_s)
+            if self.ground_speed_m_s > _SLOW_M_S
+            else self.yaw_rad
+        )
