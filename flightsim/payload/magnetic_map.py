@@ -15,6 +15,9 @@ total_field_nt + vertical_gradient_nt_m * (h - height_m).
 """
 
 import math
+import tokenize
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -28,6 +31,11 @@ from flightsim.kernels import kernel
 Array = NDArray[np.float64]
 
 FORMAT: Final = "flightstack-magnetic-map-1"
+# What zipfile, zlib and numpy's reader of array headers raise for spoiled bytes.
+_UNREADABLE: Final = (
+    *(OSError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError),
+    *(ValueError, TypeError, SyntaxError, tokenize.TokenError),
+)
 _CSV_HEADER: Final = "north_m,east_m,total_field_nt"
 
 
@@ -164,8 +172,13 @@ class MagneticMap:
         }
         if self.vertical_gradient_nt_m is not None:
             contents["vertical_gradient_nt_m"] = self.vertical_gradient_nt_m
-        with path.open("wb") as file:  # an open file: numpy would add .npz to a name without it
-            np.savez_compressed(file, **contents)
+        # Like numpy.savez_compressed, but without the time of day: the same map gives the same bytes.
+        with zipfile.ZipFile(path, "w", compression=zipfile.ZIP_DEFLATED) as archive:
+            for name, value in contents.items():
+                member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+                member.compress_type = zipfile.ZIP_DEFLATED
+                with archive.open(member, "w", force_zip64=True) as file:
+                    np.lib.format.write_array(file, np.asanyarray(value), allow_pickle=False)
 
     @classmethod
     def load(cls, path: Path) -> "MagneticMap":
@@ -175,9 +188,12 @@ class MagneticMap:
             MagneticMapError: no such file, or not such a file.
         """
         try:
-            with np.load(path, allow_pickle=False) as archive:
-                found = {name: archive[name] for name in archive.files}
-        except (OSError, ValueError, EOFError) as error:
+            with zipfile.ZipFile(path) as archive:
+                found = {}
+                for name in archive.namelist():
+                    with archive.open(name) as file:
+                        found[name.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
+        except _UNREADABLE as error:
             raise MagneticMapError(f"{path} is not a magnetic map (.npz): {error}") from None
         needed = (
             *("format", "north_m", "east_m", "total_field_nt", "height_m"),
@@ -216,6 +232,7 @@ class MagneticMap:
         Raises:
             MagneticMapError: no such file, or not such a table.
         """
+        rows_of_text: list[tuple[float, float, float]] = []
         try:
             with path.open(encoding="utf-8") as file:
                 header = file.readline().strip()
@@ -223,13 +240,14 @@ class MagneticMap:
                     raise MagneticMapError(
                         f"{path} begins with {header[:60]!r}; accepted is the header {_CSV_HEADER!r}"
                     )
-                table = np.genfromtxt(file, delimiter=",", dtype=np.float64, ndmin=2)
+                for number, line in enumerate(file, 2):
+                    if line.strip():
+                        rows_of_text.append(_csv_row(line, path, number))
         except (OSError, UnicodeDecodeError) as error:
             raise MagneticMapError(f"{path}: {error}") from None
-        except ValueError as error:
-            raise MagneticMapError(f"{path}: {str(error).splitlines()[0]}") from None
-        if table.size == 0 or table.shape[1] != 3 or not np.all(np.isfinite(table[:, :2])):
-            raise MagneticMapError(f"{path}: accepted are lines of three numbers, with finite places")
+        if not rows_of_text:
+            raise MagneticMapError(f"{path} has a header and no lines")
+        table = np.array(rows_of_text)
         north_m, rows = np.unique(table[:, 0], return_inverse=True)
         east_m, columns = np.unique(table[:, 1], return_inverse=True)
         total = np.full((north_m.size, east_m.size), np.nan)
@@ -238,6 +256,20 @@ class MagneticMap:
             return cls(north_m=north_m, east_m=east_m, total_field_nt=total, height_m=height_m, home=home)
         except MagneticMapError as error:
             raise MagneticMapError(f"{path}: {error}") from None
+
+
+def _csv_row(line: str, path: Path, number: int) -> tuple[float, float, float]:
+    cells = line.split(",")
+    try:
+        north_m, east_m = float(cells[0]), float(cells[1])
+        total_nt = float(cells[2]) if cells[2].strip() else math.nan
+    except (ValueError, IndexError):
+        total_nt = math.inf
+    if len(cells) != 3 or math.isinf(total_nt) or not (math.isfinite(north_m) and math.isfinite(east_m)):
+        raise MagneticMapError(
+            f"{path}, line {number}: {line.strip()[:60]!r}; accepted are three numbers or two and nothing"
+        )
+    return north_m, east_m, total_nt
 
 
 @kernel
