@@ -1,7 +1,8 @@
 """Airspeed and its rate for the fixed-wing control laws: PX4 TECS's steady-state Kalman filter.
 
-Model: a constant rate of change; measured are the equivalent airspeed and, along the body's x axis, the
-acceleration. Of a gust the accelerometer knows nothing, so the filter follows gusts at its own pace.
+Model: a constant rate of change; measured are the equivalent airspeed and, along the flow (PX4: along the
+body's x axis), the acceleration. Of a gust the accelerometer knows nothing, so the filter follows gusts at
+its own pace.
 """
 
 import math
@@ -15,10 +16,32 @@ from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
+_NAV_VEL: Final = 7  # navigation slots, as in navigation.layout
 _NAV_ACC: Final = 13
+_NAV_WIND: Final = 29
 _NAV_EAS: Final = 32
 _NAV_TAS: Final = 33
+_DIRECTION_SPEED_M_S: Final = 5.0  # below it the direction of the flow isn't taken from the velocity
 _RATIO_SPEED_M_S: Final = 3.0  # below it true over equivalent airspeed isn't taken from the two
+
+
+@kernel
+def _acceleration_along_the_flow(nav: Array) -> float:
+    """Acceleration along the velocity through the air, m/s^2; without wind or velocity, along body x.
+
+    The body's x axis is off the flow by the angle of attack, and in a turn or a pull-up it then sees a part
+    of the acceleration across the flow.
+    """
+    north, east = nav[_NAV_VEL] - nav[_NAV_WIND], nav[_NAV_VEL + 1] - nav[_NAV_WIND + 1]
+    down = nav[_NAV_VEL + 2]
+    if math.isfinite(nav[_NAV_WIND + 2]):
+        down -= nav[_NAV_WIND + 2]
+    speed = math.sqrt(north * north + east * east + down * down)
+    if not speed > _DIRECTION_SPEED_M_S:  # true for NaN
+        w, x, y, z = nav[0], nav[1], nav[2], nav[3]
+        north, east, down = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
+        speed = 1.0
+    return (north * nav[_NAV_ACC] + east * nav[_NAV_ACC + 1] + down * nav[_NAV_ACC + 2]) / speed
 
 
 @kernel
@@ -41,12 +64,7 @@ def update_air(nav: Array, p: Array, s: Array, dt: float) -> None:
         s[c.EAS_RATE] = 0.0
         s[c.EAS_KNOWN] = 1.0
         return
-    w, x, y, z = nav[0], nav[1], nav[2], nav[3]
-    forward = (
-        (1.0 - 2.0 * (y * y + z * z)) * nav[_NAV_ACC]
-        + 2.0 * (x * y + w * z) * nav[_NAV_ACC + 1]
-        + 2.0 * (x * z - w * y) * nav[_NAV_ACC + 2]
-    ) / s[c.EAS_TO_TAS]
+    forward = _acceleration_along_the_flow(nav) / s[c.EAS_TO_TAS]
     if not math.isfinite(forward):
         forward = s[c.EAS_RATE]
     # gains of the continuous filter, from its Riccati equation

@@ -35,8 +35,8 @@ _NAV_POS_DOWN: Final = 12
 
 PITCH_LIMIT_RAD: Final = math.radians(80.0)  # of a pitch angle given past the energy control
 _MIN_SPEED_M_S: Final = 3.0  # for divisions
-_UNDERSPEED_START: Final = 0.75  # share of the way from stall to lowest airspeed
-_UNDERSPEED_FULL: Final = 0.25
+_UNDERSPEED_START: Final = 0.9  # share of the way from stall to lowest airspeed
+_UNDERSPEED_FULL: Final = 0.4
 _PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change asked for when pitch alone flies the airspeed
 
 

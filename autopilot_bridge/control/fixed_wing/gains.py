@@ -57,6 +57,10 @@ def gains_for(envelope: FlightEnvelope) -> dict[str, float | bool]:
     }
     roll_s, pitch_s = _rate_gains(envelope, values)
     _energy_gains(envelope, values, pitch_s)
+    values["wheel_time_constant_s"] = 0.3
+    values["wheel_p"] = 1.0
+    values["wheel_i"] = 1.0
+    values["wheel_ff"] = 0.4
     values["roll_slew_rad_s"] = min(math.radians(90.0), 0.6 / roll_s)
     return values
 
