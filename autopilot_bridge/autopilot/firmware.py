@@ -1,7 +1,7 @@
 """What differs between the flavours in the autopilot's messages and services, gathered in one table."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final
 
@@ -24,6 +24,7 @@ from autopilot_bridge.telemetry import ardupilot, px4
 from flightsim.airframe import AirframeKind
 
 _ARDUPILOT_MAX_RATE_HZ: Final = 0.8 * 400.0  # of SCHED_LOOP_RATE
+_ARDUPLANE_MAX_RATE_HZ: Final = 0.8 * 50.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,40 +48,47 @@ class Firmware:
     position_pushed_at_arm: bool
 
 
+_PX4: Final = Firmware(
+    address=px4_address_rule,
+    parameters=PX4_PARAMETER_POLICY,
+    missions=PX4_MISSION_POLICY,
+    intervals=IntervalPolicy(
+        unknown_set=Result.FAILED,
+        unknown_get=Result.ACCEPTED,
+        unknown_request=Result.DENIED,
+        fixed=frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT}),
+        refuse_running=True,
+    ),
+    rates_hz=MappingProxyType({"onboard": px4.ONBOARD_RATES_HZ, "gcs": px4.GCS_RATES_HZ}),
+    answers_ping=True,
+    position_pushed_at_arm=False,
+)
+_ARDUPILOT: Final = Firmware(
+    address=ardupilot_address_rule,
+    parameters=ARDUPILOT_PARAMETER_POLICY,
+    missions=ARDUPILOT_MISSION_POLICY,
+    intervals=IntervalPolicy(
+        unknown_set=Result.DENIED,
+        unknown_get=Result.FAILED,
+        unknown_request=Result.FAILED,
+        not_requestable=ardupilot.NOT_REQUESTABLE,
+        max_rate_hz=_ARDUPILOT_MAX_RATE_HZ,
+        groups=ardupilot.STREAM_GROUPS,
+        unknown_text="No ap_message for mavlink id ({})",
+        too_fast_text="Requested rate for message ID {} too fast. Increase SCHED_LOOP_RATE",
+    ),
+    rates_hz=MappingProxyType({"onboard": ardupilot.START_RATES_HZ, "gcs": ardupilot.START_RATES_HZ}),
+    answers_ping=False,
+    position_pushed_at_arm=True,
+)
+
 FIRMWARES: Final[Mapping[tuple[str, AirframeKind], Firmware]] = MappingProxyType(
     {
-        ("px4", AirframeKind.MULTICOPTER): Firmware(
-            address=px4_address_rule,
-            parameters=PX4_PARAMETER_POLICY,
-            missions=PX4_MISSION_POLICY,
-            intervals=IntervalPolicy(
-                unknown_set=Result.FAILED,
-                unknown_get=Result.ACCEPTED,
-                unknown_request=Result.DENIED,
-                fixed=frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT}),
-                refuse_running=True,
-            ),
-            rates_hz=MappingProxyType({"onboard": px4.ONBOARD_RATES_HZ, "gcs": px4.GCS_RATES_HZ}),
-            answers_ping=True,
-            position_pushed_at_arm=False,
-        ),
-        ("ardupilot", AirframeKind.MULTICOPTER): Firmware(
-            address=ardupilot_address_rule,
-            parameters=ARDUPILOT_PARAMETER_POLICY,
-            missions=ARDUPILOT_MISSION_POLICY,
-            intervals=IntervalPolicy(
-                unknown_set=Result.DENIED,
-                unknown_get=Result.FAILED,
-                unknown_request=Result.FAILED,
-                not_requestable=ardupilot.NOT_REQUESTABLE,
-                max_rate_hz=_ARDUPILOT_MAX_RATE_HZ,
-                groups=ardupilot.STREAM_GROUPS,
-                unknown_text="No ap_message for mavlink id ({})",
-                too_fast_text="Requested rate for message ID {} too fast. Increase SCHED_LOOP_RATE",
-            ),
-            rates_hz=MappingProxyType({"onboard": ardupilot.START_RATES_HZ, "gcs": ardupilot.START_RATES_HZ}),
-            answers_ping=False,
-            position_pushed_at_arm=True,
+        ("px4", AirframeKind.MULTICOPTER): _PX4,
+        ("px4", AirframeKind.FIXED_WING): _PX4,
+        ("ardupilot", AirframeKind.MULTICOPTER): _ARDUPILOT,
+        ("ardupilot", AirframeKind.FIXED_WING): replace(
+            _ARDUPILOT, intervals=replace(_ARDUPILOT.intervals, max_rate_hz=_ARDUPLANE_MAX_RATE_HZ)
         ),
     }
 )

@@ -89,7 +89,7 @@ class FixedWingTasks:
                 self.guided.set_hold(self._context)
                 return self.guided
             case FlightMode.RETURN:
-                return ReturnTask()
+                return ReturnTask(self._missions, first_item=self._policy.mission_first_item)
             case FlightMode.LAND:
                 return LandTask()
             case FlightMode.DESCEND:
@@ -145,11 +145,12 @@ class FixedWingTasks:
         return math.isnan(throttle) or throttle > _LIFTING_THROTTLE
 
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
-        """The circle of a `LoiterTask`, once it is captured."""
-        if not isinstance(task, LoiterTask) or not task.circling:
+        """The circle being flown, once it is captured, whatever task it belongs to."""
+        loiter = _loiter_of(task)
+        if loiter is None or not loiter.circling:
             return None
-        north_m, east_m, down_m = (float(value) for value in task.centre_ned_m)
-        return CircleFlown(task.radius_m, north_m, east_m, down_m)
+        north_m, east_m, down_m = (float(value) for value in loiter.centre_ned_m)
+        return CircleFlown(loiter.radius_m, north_m, east_m, down_m)
 
     def speed_kind(self, kind: int) -> SpeedKind:
         """PX4's aircraft take any speed for an airspeed; ArduPlane knows a ground speed too."""
@@ -166,3 +167,12 @@ class FixedWingTasks:
             return parameters
         low, high = parameters.airspeed_min_m_s, parameters.airspeed_max_m_s
         return replace(parameters, airspeed_trim_m_s=min(high, max(low, wanted)))
+
+
+def _loiter_of(task: FlightTask | None) -> LoiterTask | None:
+    """The circling part of a task."""
+    while isinstance(task, MissionTask | ReturnTask):
+        task = task.sub_task
+    if isinstance(task, GuidedTask):
+        return task.circle
+    return task if isinstance(task, LoiterTask) else None

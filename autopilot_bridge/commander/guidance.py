@@ -93,14 +93,10 @@ class Guidance:
         """Fly home and land."""
         return self._commander.set_mode(FlightMode.RETURN)
 
-    def go_around(self, height_m: float = math.nan) -> Verdict:
-        """Break off a landing and climb.
-
-        Args:
-            height_m: over home, up to which the aircraft climbs; NaN: as its landing says.
-        """
+    def go_around(self) -> Verdict:
+        """Break off a landing, climb and come back to it."""
         task = self._commander.tasks.task
-        if isinstance(task, GoAroundTask) and task.go_around(self._commander.context, height_m):
+        if isinstance(task, GoAroundTask) and task.go_around(self._commander.context):
             return ACCEPTED
         return failed(Reason.WRONG_MODE)
 
@@ -172,12 +168,13 @@ class Guidance:
         Args:
             heading_rad: clockwise from north.
             course: over ground; else through the air.
-            acceleration_m_s2: lateral, of the turn; NaN: the bank limit's.
+            acceleration_m_s2: lateral, of the turn; not positive, or NaN: the bank limit's.
         """
         guided = self._guided_aircraft()
         if guided is None:
             return failed(Reason.WRONG_MODE)
-        guided.set_heading(self._commander.context, heading_rad, course, acceleration_m_s2)
+        acceleration = acceleration_m_s2 if acceleration_m_s2 > 0.0 else math.inf
+        guided.set_heading(self._commander.context, heading_rad, course, acceleration)
         return ACCEPTED
 
     def change_altitude(self, down_m: float, *, rate_m_s: float) -> Verdict:

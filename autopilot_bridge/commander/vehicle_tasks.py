@@ -68,8 +68,8 @@ class CircleFlown(NamedTuple):
 class GoAroundTask(Protocol):
     """A flight task whose landing can be broken off."""
 
-    def go_around(self, ctx: FlightContext, height_m: float) -> bool:
-        """Climb to a height over home (NaN: as the landing says); False when it isn't landing."""
+    def go_around(self, ctx: FlightContext) -> bool:
+        """Climb, and come back to the approach; False when there is nothing to break off."""
         ...
 
 
