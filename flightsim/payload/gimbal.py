@@ -9,7 +9,7 @@ protocol v2 means by them.
 import math
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,9 +114,14 @@ class GimbalParameters:
             )
 
     @classmethod
-    def two_axis(cls) -> "GimbalParameters":
+    def two_axis(cls, **overrides: Any) -> "GimbalParameters":
         """A belly turret: all round, from a little over the horizon to straight down."""
-        return cls(axes=2, pitch_min_rad=-0.5 * math.pi, pitch_max_rad=10.0 * _DEG)
+        numbers: dict[str, Any] = {
+            "axes": 2,
+            "pitch_min_rad": -0.5 * math.pi,
+            "pitch_max_rad": 10.0 * _DEG,
+        }
+        return cls(**(numbers | overrides))
 
 
 class Gimbal:

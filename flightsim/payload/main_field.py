@@ -19,7 +19,7 @@ _REACH_UP_M: Final = 500.0
 class MainField:
     """Total intensity as a quadratic in north and east and linear in height, and direction at home.
 
-    Through WMM values at home and 20 km around: within 1 nT of the model there.
+    Through WMM values at home and 20 km around: within 0.1 nT of the model there.
 
     Attributes:
         total_nt: at home, on the ground.

@@ -72,8 +72,7 @@ def three(**changes: float) -> GimbalParameters:
 
 
 def two(**changes: float) -> GimbalParameters:
-    turret = {"axes": 2, "pitch_min_rad": -0.5 * math.pi, "pitch_max_rad": math.radians(10.0)}
-    return GimbalParameters(**(PERFECT | turret | changes))  # type: ignore[arg-type]
+    return GimbalParameters.two_axis(**(PERFECT | changes))
 
 
 angles = st.floats(-3.1, 3.1)

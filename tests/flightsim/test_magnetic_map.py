@@ -223,7 +223,7 @@ def test_main_field_is_wmm(home: Home) -> None:
         field = 1e5 * magnetic_field_ned_gauss(lat_deg, lon_deg, home.alt_m + height_m, 2026.0)
         expected = np.linalg.norm(field)
         value = main.total_at_nt(np.array(north_m), np.array(east_m), height_m)
-        assert value == pytest.approx(expected, abs=0.5)
+        assert value == pytest.approx(expected, abs=0.1)
     field = 1e5 * magnetic_field_ned_gauss(home.lat_deg, home.lon_deg, home.alt_m, 2026.0)
     np.testing.assert_allclose(main.total_nt * main.direction_ned, field, atol=0.1)
 
