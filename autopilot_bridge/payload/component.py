@@ -1,0 +1,169 @@
+"""What every MAVLink component of the payload does: heartbeat, streams, requests, acknowledgements.
+
+Source: MAVLink heartbeat protocol, command protocol, and "requesting messages" (mavlink.io/en/services).
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import Frame, FrameEncoder, decode
+from autopilot_bridge.mavlink import dialect as mavlink
+
+Builder = Callable[[int], Any]
+"""Makes a message of now; takes vehicle time, microseconds."""
+
+CommandHandler = Callable[[Any, tuple[int, int]], int | None]
+"""Carries out a command: (COMMAND_LONG or COMMAND_INT, sender) -> MAV_RESULT; None: no answer."""
+
+MAX_RATE_HZ: Final = 50.0
+_NEVER_US: Final = 1 << 62
+_SECOND_US: Final = 1_000_000
+
+
+class Component(ABC):
+    """One component of a vehicle's MAVLink system.
+
+    Args:
+        system_id, component_id: of the component.
+        mav_type: MAV_TYPE, for the heartbeat.
+        send: takes packed frames.
+        rates_hz: messages that are streamed from the start, by message id.
+    """
+
+    def __init__(
+        self,
+        *,
+        system_id: int,
+        component_id: int,
+        mav_type: int,
+        send: Callable[[bytes], None],
+        rates_hz: Mapping[int, float],
+    ) -> None:
+        self.system_id = system_id
+        self.component_id = component_id
+        self._mav_type = mav_type
+        self._send = send
+        self._encoder = FrameEncoder(system_id, component_id)
+        self._builders: dict[int, Builder] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat}
+        self._handlers: dict[int, CommandHandler] = {
+            mavlink.MAV_CMD_REQUEST_MESSAGE: self._on_request_message,
+            mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._on_set_interval,
+            mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self._on_get_interval,
+        }
+        self._default_rates_hz = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **rates_hz}
+        self._intervals_us = {m: round(1e6 / rate_hz) for m, rate_hz in self._default_rates_hz.items()}
+        self._due_us = dict.fromkeys(self._intervals_us, _SECOND_US)
+        self._next_us = _SECOND_US
+        self._time_us = 0
+
+    # out
+
+    def step(self, time_us: int) -> None:
+        """Send the streams that are due."""
+        self._time_us = time_us
+        if time_us < self._next_us:
+            return
+        for message_id, due_us in self._due_us.items():
+            if due_us <= time_us:
+                interval_us = self._intervals_us[message_id]
+                self._due_us[message_id] = max(due_us + interval_us, time_us + 1)
+                self.send(self._builders[message_id](time_us))
+        self._next_us = min(self._due_us.values(), default=_NEVER_US)
+
+    def send(self, message: Any) -> None:
+        """Frame a message and send it."""
+        self._send(self._encoder.encode(message))
+
+    @property
+    def time_ms(self) -> int:
+        """Vehicle time as most messages carry it."""
+        return (self._time_us // 1000) & 0xFFFFFFFF
+
+    # in
+
+    def receive(self, frame: Frame) -> None:
+        """Take one frame from somebody else. Contents are untrusted and never raise."""
+        if frame.target_system not in (0, self.system_id):
+            return
+        if frame.target_component not in (0, self.component_id):
+            return
+        message = decode(frame)
+        sender = (frame.system_id, frame.component_id)
+        if frame.message_id in (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT):
+            self._on_command(message, sender)
+        else:
+            self._on_message(message, sender)
+
+    @abstractmethod
+    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
+        """Take a message that is not a command and is meant for this component or for all."""
+
+    def _on_command(self, message: Any, sender: tuple[int, int]) -> None:
+        handler = self._handlers.get(message.command)
+        addressed = message.target_component == self.component_id
+        if handler is None:
+            # a command to everybody is left to those who know it
+            result = mavlink.MAV_RESULT_UNSUPPORTED if addressed else None
+        else:
+            result = handler(message, sender)
+            if result not in (mavlink.MAV_RESULT_ACCEPTED, None) and not addressed:
+                result = None
+        if result is not None:
+            self.send(
+                mavlink.MAVLink_command_ack_message(
+                    message.command, result, 0, 0, target_system=sender[0], target_component=sender[1]
+                )
+            )
+
+    def _on_request_message(self, message: Any, sender: tuple[int, int]) -> int | None:
+        builder = self._builders.get(whole(message.param1, -1))
+        if builder is None:
+            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+        self.send(builder(self._time_us))
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _on_set_interval(self, message: Any, sender: tuple[int, int]) -> int | None:
+        message_id = whole(message.param1, -1)
+        interval_us = message.param2
+        if message_id not in self._builders:
+            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+        if not math.isfinite(interval_us) or interval_us < -1.0:
+            return int(mavlink.MAV_RESULT_DENIED)
+        if interval_us == -1.0:
+            self._intervals_us.pop(message_id, None)
+            self._due_us.pop(message_id, None)
+        else:
+            if interval_us == 0.0:
+                rate_hz = self._default_rates_hz.get(message_id)
+                if rate_hz is None:
+                    return int(mavlink.MAV_RESULT_DENIED)
+                interval_us = 1e6 / rate_hz
+            self._intervals_us[message_id] = max(round(interval_us), round(1e6 / MAX_RATE_HZ))
+            self._due_us[message_id] = self._time_us
+        self._next_us = min(self._due_us.values(), default=_NEVER_US)
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _on_get_interval(self, message: Any, sender: tuple[int, int]) -> int | None:
+        message_id = whole(message.param1, -1)
+        if message_id not in self._builders:
+            return int(mavlink.MAV_RESULT_UNSUPPORTED)
+        interval_us = min(self._intervals_us.get(message_id, -1), 0x7FFFFFFF)
+        self.send(mavlink.MAVLink_message_interval_message(message_id, interval_us))
+        return int(mavlink.MAV_RESULT_ACCEPTED)
+
+    def _heartbeat(self, time_us: int) -> Any:
+        return mavlink.MAVLink_heartbeat_message(
+            self._mav_type, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+        )
+
+
+def whole(value: float, default: int) -> int:
+    """A parameter as a whole number; `default` for what is none or beyond 31 bits."""
+    return round(value) if math.isfinite(value) and abs(value) < 2**31 else default
+
+
+def fixed_text(text: str, length: int) -> bytes:
+    """Text as a fixed field of bytes."""
+    return text.encode("ascii", "replace")[:length].ljust(length, b"\0")

@@ -1,0 +1,40 @@
+"""The survey magnetometer as a MAVLink component: NAMED_VALUE_FLOAT "MAG_NT", total field in nT.
+
+MAVLink has no message for the magnitude of the field; a named value is its standard place for such readings.
+In single precision a field of 50,000 nT is told to 0.004 nT.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.component import Component, fixed_text
+from flightsim.payload import MagneticReading
+
+MAGNETOMETER_COMPONENT: Final = int(mavlink.MAV_COMP_ID_PERIPHERAL)
+TOTAL_FIELD_NAME: Final = "MAG_NT"
+_NAME: Final = fixed_text(TOTAL_FIELD_NAME, 10)
+
+
+class MagnetometerComponent(Component):
+    """Tells every reading as it comes."""
+
+    def __init__(self, *, system_id: int, send: Callable[[bytes], None]) -> None:
+        super().__init__(
+            system_id=system_id,
+            component_id=MAGNETOMETER_COMPONENT,
+            mav_type=mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+            send=send,
+            rates_hz={},
+        )
+
+    def tell(self, reading: MagneticReading) -> None:
+        """Send a reading that was delivered on this step."""
+        self.send(
+            mavlink.MAVLink_named_value_float_message(
+                (reading.time_us // 1000) & 0xFFFFFFFF, _NAME, reading.total_field_nt
+            )
+        )
+
+    def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
+        """Nothing but commands concerns it."""

@@ -1,0 +1,59 @@
+"""The payload components of one vehicle, on one link of their own."""
+
+from collections.abc import Callable
+
+from autopilot_bridge.mavlink import FrameParser
+from autopilot_bridge.payload.camera import CameraComponent
+from autopilot_bridge.payload.component import Component
+from autopilot_bridge.payload.gimbal import GIMBAL_COMPONENT, GimbalComponent
+from autopilot_bridge.payload.magnetometer import MagnetometerComponent
+from flightsim.payload import Payload
+
+
+class PayloadStation:
+    """Steps a payload and lets its components speak.
+
+    Args:
+        payload: the devices.
+        system_id: of the vehicle.
+        send: takes the components' frames.
+
+    Attributes:
+        components: those there are.
+        parser: of what comes in; its counters account for every byte.
+    """
+
+    def __init__(self, payload: Payload, *, system_id: int, send: Callable[[bytes], None]) -> None:
+        self.parser = FrameParser()
+        self.components: list[Component] = []
+        self._payload = payload
+        self._camera: CameraComponent | None = None
+        self._magnetometer: MagnetometerComponent | None = None
+        if payload.camera is not None:
+            device_id = GIMBAL_COMPONENT if payload.gimbal is not None else 0
+            self._camera = CameraComponent(
+                payload.camera, system_id=system_id, send=send, gimbal_device_id=device_id
+            )
+            self.components.append(self._camera)
+        if payload.gimbal is not None:
+            self.components.append(GimbalComponent(payload.gimbal, system_id=system_id, send=send))
+        if payload.magnetometer is not None:
+            self._magnetometer = MagnetometerComponent(system_id=system_id, send=send)
+            self.components.append(self._magnetometer)
+
+    def step(self, time_us: int) -> None:
+        """One physics step: devices, then what they have to say."""
+        payload = self._payload
+        payload.step(time_us)
+        if self._camera is not None and payload.frame is not None:
+            self._camera.tell(payload.frame)
+        if self._magnetometer is not None and payload.reading is not None:
+            self._magnetometer.tell(payload.reading)
+        for component in self.components:
+            component.step(time_us)
+
+    def receive(self, data: bytes) -> None:
+        """Take bytes from the link, in any pieces; damaged ones are dropped and counted."""
+        for frame in self.parser.feed(data):
+            for component in self.components:
+                component.receive(frame)
