@@ -18,6 +18,7 @@ from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 _REACHED_M: Final = 1.5  # below the height the take-off is done
 _CAPTURE_S: Final = 3.0  # of climb before the height: from climb rate to height control
 _CLIMB_SHARE: Final = 0.9  # of the greatest climb rate, so that the throttle isn't asked for the impossible
+_FAST: Final = 1.15  # over the climb's airspeed there is more power than the climb takes
 _LOW_M: Final = 2.0  # over the ground: wing tips
 _LEFT_GROUND_M: Final = 1.0
 
@@ -50,6 +51,7 @@ class TakeoffTask(AircraftTask):
     __slots__ = (
         "_altitude_m",
         "_down_m",
+        "_fast",
         "_launch",
         "_loiter",
         "_path",
@@ -78,11 +80,14 @@ class TakeoffTask(AircraftTask):
         self._down_m = self._start_down_m = 0.0
         self._throttle = 0.0
         self._rotated_s = 0.0
+        self._fast = False
         self.phase = TakeoffPhase.WAIT
 
     @property
     def place_ned_m(self) -> Array:
         """Where the climb ends, (3,); a copy; NaN where that isn't known before."""
+        if self._loiter is not None:
+            return self._loiter.centre_ned_m.copy()
         place = self._place.copy()
         place[2] = self._down_m
         return place
@@ -97,6 +102,7 @@ class TakeoffTask(AircraftTask):
         self._down_m = (state.down_m if math.isnan(home_down) else home_down) - altitude
         self._throttle = 0.0
         self._rotated_s = 0.0
+        self._fast = False
         self._launch.reset()
         self._runway.begin(state, state.yaw_rad)
         if not ctx.on_ground:
@@ -173,7 +179,10 @@ class TakeoffTask(AircraftTask):
             self.phase = TakeoffPhase.CLIMB_OUT
 
     def _climb_out(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
-        """Straight ahead at full power: the pitch holds the airspeed, between limits."""
+        """Straight ahead at full power: the pitch holds the airspeed, between limits.
+
+        Where the aircraft gets too fast at that, or its airspeed isn't known, a climb rate is flown instead.
+        """
         state, command = self._state, self._command
         self._rotated_s += ctx.dt_s
         self._throttle = p.takeoff_throttle_max
@@ -183,17 +192,21 @@ class TakeoffTask(AircraftTask):
         command.pitch_min_rad = (
             p.takeoff_roll_pitch_rad + (p.takeoff_pitch_min_rad - p.takeoff_roll_pitch_rad) * part
         )
-        command.pitch_max_rad = max(
-            command.pitch_min_rad,
-            p.takeoff_roll_pitch_rad + (p.pitch_max_rad - p.takeoff_roll_pitch_rad) * part,
+        # near the ground the tail has no room, and speed matters more than height
+        free = min(1.0, max(0.0, climbed / p.takeoff_clearance_m))
+        command.pitch_max_rad = command.pitch_min_rad + free * max(
+            0.0, p.pitch_max_rad - command.pitch_min_rad
         )
         command.throttle_max = p.takeoff_throttle_max
         remaining = state.down_m - self._down_m
         climb = max(p.climb_rate_m_s, _CLIMB_SHARE * p.climb_max_m_s)
-        if remaining > _CAPTURE_S * climb:
+        self._fast = self._fast or state.airspeed_m_s > _FAST * p.takeoff_airspeed_m_s
+        if remaining <= _CAPTURE_S * climb:
+            command.down_m = self._down_m
+        elif self._fast or state.airspeed_m_s != state.airspeed_m_s:
             command.height_rate_m_s = climb
         else:
-            command.down_m = self._down_m
+            command.throttle = p.takeoff_throttle_max
         low = climbed < _LOW_M
         if ctx.position_valid:
             self._runway.follow(state, self._path.of(ctx), command)
