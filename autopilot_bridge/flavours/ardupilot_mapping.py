@@ -277,9 +277,14 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         NavigationParameters,
         store,
         NAVIGATION,
-        use_gps=integer(store, "EK3_SRC1_POSXY", _SOURCE_GPS) == _SOURCE_GPS,
+        use_gps=gps_is_fused(store),
         **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
     )
+
+
+def gps_is_fused(store: ParameterStore) -> bool:
+    """EK3_SRC1_POSXY names GPS."""
+    return integer(store, "EK3_SRC1_POSXY", _SOURCE_GPS) == _SOURCE_GPS
 
 
 def _exempt(options: int, table: Mapping[int, tuple[FlightMode, ...]]) -> frozenset[FlightMode]:

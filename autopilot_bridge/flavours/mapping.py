@@ -100,6 +100,8 @@ def airframe_overrides(
         low = -math.inf if definition.minimum is None else definition.minimum
         high = math.inf if definition.maximum is None else definition.maximum
         value = clamp(getattr(tuned, entry.field) / entry.factor, low, high)
+        if definition.is_integer:
+            value = round(value)
         if not math.isclose(value, definition.default, rel_tol=1e-5, abs_tol=1e-9):
             overrides[entry.name] = value
     return overrides

@@ -240,9 +240,14 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         store,
         NAVIGATION,
         gps_required_satellites=max(4, min(12, satellites)),
-        use_gps=bool(integer(store, "EKF2_GPS_CTRL", 7) & _GPS_POSITION_OR_VELOCITY),
+        use_gps=gps_is_fused(store),
         **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
     )
+
+
+def gps_is_fused(store: ParameterStore) -> bool:
+    """EKF2_GPS_CTRL asks for position or velocity."""
+    return bool(integer(store, "EKF2_GPS_CTRL", 7) & _GPS_POSITION_OR_VELOCITY)
 
 
 def _exempt(bits: int) -> frozenset[FlightMode]:
