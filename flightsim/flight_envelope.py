@@ -1,8 +1,35 @@
-"""What a fixed-wing aircraft can do, in numbers: what an autopilot's airframe file is made from."""
+"""What a fixed-wing aircraft can do, in numbers: what an autopilot's airframe file is made from.
 
-from dataclasses import dataclass
+Working it out is also the check of an aircraft at load: one that cannot fly its cruise, or whose controls do
+nothing or the opposite, is refused in plain words.
+"""
 
-__all__ = ["FlightEnvelope"]
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from flightsim.airframe import Airframe, AirframeError, FlightLimits, Role, load_airframe
+from flightsim.environment import Environment
+from flightsim.home import Home
+from flightsim.linear_modes import LinearModel, P, Q, R, U, V, W, linearise
+from flightsim.trim_flight import FlightTrim, TrimError, trim_in_tunnel
+from flightsim.wind_tunnel import WindTunnel
+
+__all__ = ["FlightEnvelope", "flight_envelope"]
+
+_G_M_S2: Final = 9.80665
+_SEA_LEVEL_KG_M3: Final = 1.225
+_HEIGHT_M: Final = 100.0
+_STALL_STEP: Final = 0.93
+_STALL_RESOLUTION: Final = 0.01
+# Cruise of an aircraft whose description says nothing, over its stall speed.
+_SLOWEST, _CRUISE, _FASTEST = 1.2, 1.6, 2.2
+_LEAST_ROLL_RATE_RAD_S: Final = 0.05
+_LEAST_ACCELERATION_RAD_S2: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +76,7 @@ class FlightEnvelope:
         spiral_time_constant_s: positive decays, negative grows.
         thrust_per_throttle_n: slope of thrust at the trim throttle.
         lift_slope_per_rad: d(lift coefficient) / d(angle of attack).
-        drag_n: in level flight at the trim airspeed.
+        drag_n: with the throttle closed (idling propeller included), at the trim airspeed.
     """
 
     name: str
@@ -96,3 +123,227 @@ class FlightEnvelope:
     thrust_per_throttle_n: float
     lift_slope_per_rad: float
     drag_n: float
+
+
+def flight_envelope(
+    model: str | Path | Airframe, *, home: Home | None = None, environment: Environment | None = None
+) -> FlightEnvelope:
+    """Work out what an aircraft can do; asked again for the same in this process, remembered.
+
+    Args:
+        model: as for `Vehicle`.
+        home: its altitude makes the density.
+        environment: only its temperature counts.
+
+    Raises:
+        AirframeError: no usable fixed-wing model, or it cannot fly; the message says why.
+    """
+    airframe = model if isinstance(model, Airframe) else load_airframe(model)
+    air = environment or Environment()
+    return _envelope(airframe, home or Home(), air.temperature_offset_k, airframe.xml_path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=32)
+def _envelope(
+    airframe: Airframe, home: Home, temperature_offset_k: float, modified_ns: int
+) -> FlightEnvelope:
+    air = Environment(temperature_offset_k=temperature_offset_k)
+    tunnel = WindTunnel(airframe, home=home, environment=air, height_m=_HEIGHT_M)
+    return _Survey(tunnel).envelope()
+
+
+class _Survey:
+    """The measurements behind one envelope."""
+
+    def __init__(self, tunnel: WindTunnel) -> None:
+        self.tunnel = tunnel
+        self.to_true = tunnel.true_airspeed_m_s(1.0)
+        self.glides: dict[float, FlightTrim] = {}  # by equivalent airspeed
+        self.limits = tunnel.airframe.limits
+
+    def envelope(self) -> FlightEnvelope:
+        tunnel, name = self.tunnel, self.tunnel.airframe.name
+        stall = self.stall_speed()
+        limits = self.limits = _completed(self.limits, stall)
+        slow, cruise, fast = limits.airspeed_min_m_s, limits.airspeed_trim_m_s, limits.airspeed_max_m_s
+        assert slow is not None and cruise is not None and fast is not None
+        if not slow < cruise < fast:
+            raise AirframeError(
+                f"vehicle '{name}': airspeeds {slow:.1f} (min), {cruise:.1f} (trim) and {fast:.1f} (max) m/s "
+                "must rise in this order"
+            )
+        if slow < stall:
+            raise AirframeError(
+                f"vehicle '{name}': airspeed_min_m_s {slow:.1f} is below its stall speed of {stall:.1f} m/s"
+            )
+        level = self.level(cruise, None, must=True)
+        assert level is not None
+        model = linearise(tunnel, level)
+        self.check_controls(model)
+        glide, dive = self.glide(cruise), self.glide(fast)
+        climb = self.full_throttle(cruise, level) if tunnel.powered else glide
+        at_min, at_max = self.level(slow, level), self.level(fast, level)
+        best_speed, best = self.best_glide(stall, cruise)
+        return FlightEnvelope(
+            name=name,
+            mass_kg=tunnel.mass_kg,
+            wing_span_m=tunnel.wing_span_m,
+            wing_area_m2=tunnel.wing_area_m2,
+            chord_m=tunnel.chord_m,
+            density_kg_m3=tunnel.density_kg_m3,
+            stall_speed_m_s=stall,
+            airspeed_min_m_s=slow,
+            airspeed_trim_m_s=cruise,
+            airspeed_max_m_s=fast,
+            powered=tunnel.powered,
+            trim_throttle=level.throttle,
+            trim_throttle_min_speed=_throttle(at_min, tunnel.powered),
+            trim_throttle_max_speed=_throttle(at_max, tunnel.powered),
+            throttle_max=limits.throttle_max if tunnel.powered else 0.0,
+            trim_pitch_rad=level.pitch_rad,
+            trim_angle_of_attack_rad=level.angle_of_attack_rad,
+            trim_elevator=level.elevator,
+            trim_aileron=level.aileron,
+            trim_rudder=level.rudder,
+            climb_max_m_s=climb.climb_m_s,
+            sink_min_m_s=-glide.climb_m_s,
+            sink_max_m_s=-dive.climb_m_s,
+            glide_ratio=1.0 / math.tan(-best.climb_angle_rad),
+            best_glide_speed_m_s=best_speed,
+            bank_max_rad=limits.bank_max_rad,
+            pitch_min_rad=limits.pitch_min_rad,
+            pitch_max_rad=limits.pitch_max_rad,
+            drag_n=tunnel.mass_kg * _G_M_S2 * math.sin(-glide.climb_angle_rad),
+            **self.response(model, level),
+        )
+
+    def level(self, speed_m_s: float, near: FlightTrim | None, *, must: bool = False) -> FlightTrim | None:
+        """Level flight (a glider's glide) at an equivalent airspeed; None where there is none."""
+        try:
+            return trim_in_tunnel(self.tunnel, airspeed_m_s=speed_m_s * self.to_true, near=near)
+        except TrimError as error:
+            if must:
+                raise AirframeError(f"{error} ({speed_m_s:.1f} m/s equivalent, its cruise)") from None
+            return None
+
+    def glide(self, speed_m_s: float, near: FlightTrim | None = None) -> FlightTrim:
+        """Power-off flight at an equivalent airspeed."""
+        if speed_m_s not in self.glides:
+            self.glides[speed_m_s] = trim_in_tunnel(
+                self.tunnel, airspeed_m_s=speed_m_s * self.to_true, throttle=0.0, near=near
+            )
+        return self.glides[speed_m_s]
+
+    def full_throttle(self, speed_m_s: float, near: FlightTrim) -> FlightTrim:
+        try:
+            return trim_in_tunnel(
+                self.tunnel,
+                airspeed_m_s=speed_m_s * self.to_true,
+                throttle=self.limits.throttle_max,
+                near=replace(near, climb_angle_rad=0.1),
+            )
+        except TrimError as error:
+            raise AirframeError(f"{error}, at full throttle") from None
+
+    def stall_speed(self) -> float:
+        """Lowest speed of a steady power-off glide: down from a speed at which it flies, then between."""
+        tunnel = self.tunnel
+        speed = self.limits.airspeed_trim_m_s
+        if speed is None:  # a lift coefficient of 0.5 is within any wing's reach
+            weight_n = tunnel.mass_kg * _G_M_S2
+            speed = math.sqrt(weight_n / (0.5 * _SEA_LEVEL_KG_M3 * tunnel.wing_area_m2 * 0.5))
+        try:
+            flies = self.glide(speed)
+        except TrimError as error:
+            raise AirframeError(f"{error}, power off ({speed:.1f} m/s equivalent)") from None
+        stalled = 0.0
+        while speed - stalled > _STALL_RESOLUTION * speed:
+            trial = speed * _STALL_STEP if stalled == 0.0 else 0.5 * (speed + stalled)
+            try:
+                flies, speed = self.glide(trial, flies), trial
+            except TrimError:
+                stalled = trial
+        return speed
+
+    def best_glide(self, stall: float, cruise: float) -> tuple[float, FlightTrim]:
+        """The flattest of the glides, found by golden section between stall and cruise."""
+        golden = (math.sqrt(5.0) - 1.0) / 2.0
+        low, high = stall * 1.02, max(cruise * 1.3, stall * 1.5)
+        near = self.glide(cruise)
+        for _ in range(6):
+            first, second = high - golden * (high - low), low + golden * (high - low)
+            try:
+                flatter = self.glide(first, near).climb_angle_rad > self.glide(second, near).climb_angle_rad
+            except TrimError:
+                flatter = True
+            low, high = (low, second) if flatter else (first, high)
+        speed, best = max(self.glides.items(), key=lambda item: item[1].climb_angle_rad)
+        if best.climb_angle_rad >= 0.0:
+            raise AirframeError(
+                f"vehicle '{self.tunnel.airframe.name}' does not sink with the throttle closed "
+                f"({best.climb_m_s:.1f} m/s at {speed:.1f} m/s): its description leaves thrust or lift on"
+            )
+        return speed, best
+
+    def check_controls(self, model: LinearModel) -> None:
+        """Every control must do something, and in the right direction."""
+        checks = (
+            (Role.AILERON, model.b[P, 0], "rolls left", "right"),
+            (Role.ELEVATOR, model.b[Q, 1], "pitches the nose down", "up"),
+            (Role.RUDDER, model.b[R, 3], "turns the nose left", "right"),
+            (Role.THROTTLE, model.b[U, 2], "slows it down", "faster"),
+        )
+        name = self.tunnel.airframe.name
+        for role, effect, wrong, right in checks:
+            if role not in self.tunnel.actuators.roles:
+                if role in (Role.AILERON, Role.ELEVATOR):
+                    raise AirframeError(f"vehicle '{name}' has no {role}: [actuators] must name its property")
+                continue
+            if abs(effect) < _LEAST_ACCELERATION_RAD_S2:
+                raise AirframeError(
+                    f"vehicle '{name}': its {role} does nothing at cruise; its property in [actuators] may "
+                    "be the wrong one"
+                )
+            if effect < 0.0:
+                raise AirframeError(
+                    f"vehicle '{name}': positive {role} {wrong}, which should be {right}; turn the sign of "
+                    "its scale in [actuators] round"
+                )
+
+    def response(self, model: LinearModel, level: FlightTrim) -> dict[str, float]:
+        a, b, speed = model.a, model.b, level.airspeed_m_s
+        pitch = -np.linalg.solve(a[np.ix_((W, Q), (W, Q))], b[(W, Q), 1])
+        yaw = -np.linalg.solve(a[np.ix_((V, R), (V, R))], b[(V, R), 3])
+        density = self.tunnel.density_kg_m3
+        pressure_area_n = 0.5 * density * speed**2 * self.tunnel.wing_area_m2
+        return {
+            "roll_rate_per_aileron_rad_s": float(-b[P, 0] / a[P, P]),
+            "roll_time_constant_s": model.roll.time_constant_s,
+            "pitch_acceleration_per_elevator_rad_s2": float(b[Q, 1]),
+            "pitch_rate_per_elevator_rad_s": float(pitch[1]),
+            "load_factor_per_elevator": float(pitch[1]) * speed / _G_M_S2,
+            "short_period_frequency_rad_s": model.short_period.frequency_rad_s,
+            "short_period_damping": model.short_period.damping,
+            "yaw_acceleration_per_rudder_rad_s2": float(b[R, 3]),
+            "yaw_rate_per_rudder_rad_s": float(yaw[1]),
+            "sideslip_per_rudder_rad": float(yaw[0]) / speed,
+            "dutch_roll_frequency_rad_s": model.dutch_roll.frequency_rad_s,
+            "dutch_roll_damping": model.dutch_roll.damping,
+            "spiral_time_constant_s": model.spiral.time_constant_s,
+            "thrust_per_throttle_n": float(b[U, 2]) * self.tunnel.mass_kg,
+            "lift_slope_per_rad": float(-a[W, W]) * self.tunnel.mass_kg * speed / pressure_area_n,
+        }
+
+
+def _completed(limits: FlightLimits, stall_m_s: float) -> FlightLimits:
+    """Limits with the airspeeds that the description leaves open."""
+    cruise = limits.airspeed_trim_m_s or _CRUISE * stall_m_s
+    slow = limits.airspeed_min_m_s or min(_SLOWEST * stall_m_s, 0.9 * cruise)
+    fast = limits.airspeed_max_m_s or max(_FASTEST * stall_m_s, 1.2 * cruise)
+    return replace(limits, airspeed_min_m_s=slow, airspeed_trim_m_s=cruise, airspeed_max_m_s=fast)
+
+
+def _throttle(trim: FlightTrim | None, powered: bool) -> float:
+    if not powered:
+        return 0.0
+    return 1.0 if trim is None else trim.throttle

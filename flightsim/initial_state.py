@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import jsbsim
 
 from flightsim import truth as t
-from flightsim.airframe import Airframe, AirframeError, LaunchKind, LaunchParameters
+from flightsim.airframe import Airframe, AirframeError, AirframeKind, LaunchKind, LaunchParameters
 from flightsim.environment import Environment
 from flightsim.home import Home
 
@@ -28,7 +28,7 @@ class InitialState:
         roll_rad, pitch_rad: attitude (only in the air).
         yaw_rad: heading; None is the home's.
         rates_frd_rad_s: body rates against the Earth (only in the air).
-        rotor_rad_s: speed of every rotor.
+        rotor_rad_s: speed of every rotor; of a fixed-wing vehicle, 0 leaves it as its [start] has it.
         battery_remaining: charge left, 0..1.
         actuators: commands that the actuators have followed already (only in the air); None: at rest.
         launch: how a fixed-wing vehicle gets into the air: "runway", "catapult" or "hand"; None is what its
@@ -82,6 +82,8 @@ def initialise(
     environment: Environment,
     start: InitialState,
     launch: LaunchParameters | None = None,
+    *,
+    prepare: bool = True,
 ) -> None:
     """Put a freshly loaded JSBSim instance into its initial state, with its air and its charge.
 
@@ -91,6 +93,7 @@ def initialise(
         environment: the air.
         start: how it starts.
         launch: it starts on this launcher.
+        prepare: set what the description's [start] says: engines running and the like.
     """
     if launch is not None:
         start = replace(start, height_m=launch.height_m, pitch_rad=launch.pitch_rad, launch=None)
@@ -116,7 +119,7 @@ def initialise(
     for name, value in values:
         fdm.set_property_value(name, value)
     fdm.run_ic()
-    for name, value in airframe.start:
+    for name, value in airframe.start if prepare else ():
         node = fdm.get_property_manager().get_node(name)
         if node is not None:
             node.set_double_value(value)
@@ -126,14 +129,16 @@ def initialise(
             )
     for axis, speed in zip(("north", "east", "down"), environment.wind_ned_m_s, strict=True):
         fdm.set_property_value(f"atmosphere/wind-{axis}-fps", speed / _FT)
-    rotors = [name for index, name in airframe.truth if t.ROTOR_RAD_S.start <= index < t.ROTOR_RAD_S.stop]
+    rotors = [item for item in airframe.truth if t.ROTOR_RAD_S.start <= item[0] < t.ROTOR_RAD_S.stop]
     speeds = start.rotor_rad_s if isinstance(start.rotor_rad_s, tuple) else (start.rotor_rad_s,) * len(rotors)
     if len(speeds) != len(rotors):
         raise ValueError(
             f"{len(speeds)} rotor speeds given; vehicle '{airframe.name}' has {len(rotors)} rotors"
         )
-    for name, speed in zip(rotors, speeds, strict=True):
-        fdm.set_property_value(name, speed)
+    if airframe.kind is AirframeKind.MULTICOPTER or any(speeds):
+        scales = dict(zip(airframe.truth, airframe.truth_scale, strict=False))
+        for (index, name), speed in zip(rotors, speeds, strict=True):
+            fdm.set_property_value(name, speed / scales.get((index, name), 1.0))
     set_battery(fdm, airframe, start.battery_remaining)
 
 
