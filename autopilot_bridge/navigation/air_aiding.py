@@ -29,6 +29,7 @@ _AIRBORNE_M: Final = 3.0  # this far from the height of the last rest, and fast:
 _KNOWN_WIND_M_S: Final = 3.0  # 1-sigma up to which the wind is of use
 _GROUND_AID_US: Final = 1_000_000  # GPS fused within this time: only the wind needs correcting
 _AIR_AID_US: Final = 1_000_000
+_SHORTEST_INTERVAL_S: Final = 0.01
 _LONGEST_INTERVAL_S: Final = 2.0
 _USUAL_TIME_S: Final = 10.0  # average of the airspeed that is assumed when it can't be measured
 _STILL_SPEED_M_S: Final = 1.5  # what stands on the ground and is not being launched
@@ -206,7 +207,7 @@ class AirAiding:
     def _prepare(self, time_us: int, measured_m_s: float, speed_m_s: float, *, assumed: bool) -> None:
         p, air = self._parameters, self._air
         interval_s = (time_us - self._fused_us) * 1e-6 if self._fused_us >= 0 else _LONGEST_INTERVAL_S
-        interval_s = min(interval_s, _LONGEST_INTERVAL_S)
+        interval_s = min(max(interval_s, _SHORTEST_INTERVAL_S), _LONGEST_INTERVAL_S)
         correlation_s = p.turbulence_length_m / max(speed_m_s, p.airspeed_threshold_m_s)
         colour = 1.0 + 2.0 * correlation_s / interval_s
         noise = p.assumed_airspeed_noise_m_s if assumed else p.airspeed_noise_m_s

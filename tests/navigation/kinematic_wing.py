@@ -1,4 +1,4 @@
-"""Flights of a fixed wing that are pure kinematics: truth vectors of catapult launch, climb and turns in wind.
+"""Flights of a fixed wing that are pure kinematics: truth vectors of launch, climb and turns in wind.
 
 Independent of the vehicle model and of the filter: heading, airspeed and climb are prescribed; the air moves
 with a steady wind and with first-order turbulence (the length scales of MIL-F-8785C at 100 m); the vehicle's
@@ -44,6 +44,7 @@ class Wing:
         gust_m_s: 1-sigma of the turbulence, horizontal and vertical.
         gust_m: its correlation lengths.
         trim_sideslip_rad: constant sideslip of the trimmed aircraft.
+        swing_m_s: amplitude of slow changes of the airspeed.
     """
 
     turns: tuple[tuple[float, float, float], ...] = ()
