@@ -30,6 +30,7 @@ _NAV_YAW: Final = 27
 _STEERING_HEADING: Final = 15  # setpoint slot, as in control.fixed_wing_setpoint
 
 _WHEEL_SPEED_SHARE: Final = 0.6  # of the lowest airspeed: below it wheel gains stay as they are (PX4)
+_RATE_LIMIT_RAD_S: Final = 40.0  # no gyro reads more
 _SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
 
 
@@ -58,8 +59,9 @@ def attitude_control(nav: Array, p: Array, s: Array) -> None:
 
 
 @kernel
-def rate_control(nav: Array, p: Array, s: Array, surfaces: Array) -> None:
-    """surfaces (3,) = aileron, elevator, rudder that fly RATE_SETPOINT."""
+def rate_control(nav: Array, p: Array, s: Array, surfaces: Array, rolling: bool) -> None:
+    """surfaces (3,) = aileron, elevator, rudder that fly RATE_SETPOINT; `rolling`: on the runway, integrators
+    wait."""
     dt = s[c.DT]
     scale = 1.0
     if p[c.AIRSPEED_SCALING] != 0.0:
@@ -68,7 +70,8 @@ def rate_control(nav: Array, p: Array, s: Array, surfaces: Array) -> None:
     alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.RATE_D_CUTOFF]))
     for i in range(3):
         g = c.RATE_GAINS + c.RATE_GAINS_PER_AXIS * i
-        rate, wanted = nav[_NAV_RATES + i], s[c.RATE_SETPOINT + i]
+        rate = min(_RATE_LIMIT_RAD_S, max(-_RATE_LIMIT_RAD_S, nav[_NAV_RATES + i]))
+        wanted = s[c.RATE_SETPOINT + i]
         error = wanted - rate
         raw = (rate - s[c.RATE_PREVIOUS + i]) / dt
         s[c.RATE_PREVIOUS + i] = rate
@@ -78,7 +81,7 @@ def rate_control(nav: Array, p: Array, s: Array, surfaces: Array) -> None:
         missing = s[c.UNALLOCATED + i]
         if s[c.GROUND_CONTACT] != 0.0:
             s[c.RATE_INTEGRAL + i] = 0.0  # the wheels hold the vehicle: it would only store a kick
-        elif not ((missing > 0.0 and error > 0.0) or (missing < 0.0 and error < 0.0)):
+        elif not (rolling or (missing > 0.0 and error > 0.0) or (missing < 0.0 and error < 0.0)):
             limit = p[g + 4]
             s[c.RATE_INTEGRAL + i] = min(limit, max(-limit, s[c.RATE_INTEGRAL + i] + p[g + 1] * error * dt))
         surfaces[i] = surface

@@ -16,7 +16,7 @@ from autopilot_bridge.control.fixed_wing.attitude import (
     rate_control,
     wheel_control,
 )
-from autopilot_bridge.control.fixed_wing.energy import energy_control
+from autopilot_bridge.control.fixed_wing.energy import PITCH_LIMIT_RAD, energy_control
 from autopilot_bridge.control.fixed_wing.lateral import lateral_control
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.navigation.layout import NAV_SIZE
@@ -66,6 +66,17 @@ def _rest(nav: Array, s: Array, actuators: Array) -> None:
 
 
 @kernel
+def _sum_of_guidance(s: Array) -> float:
+    """Finite as long as all is that guidance carries on from step to step."""
+    total = s[c.EAS] + s[c.EAS_RATE] + s[c.EAS_TO_TAS] + s[c.ENERGY_RATE]
+    for i in range(c.ROLL_SETPOINT, c.HEIGHT_CONTROLLED):
+        total += s[i]
+    for i in range(c.AIRSPEED_SETPOINT, c.Q_SETPOINT):
+        total += s[i]
+    return total
+
+
+@kernel
 def _guide(nav: Array, sp: Array, p: Array, s: Array, level: float) -> None:
     """The 50 Hz part: airspeed filter, lateral guidance, energy control."""
     dt = s[c.DT] * s[c.DIVISOR]
@@ -85,9 +96,12 @@ def _guide(nav: Array, sp: Array, p: Array, s: Array, level: float) -> None:
     if entering:  # from the attitude flown so far, so that the switch isn't felt
         s[c.FLYING] = 1.0
         s[c.ROLL_SETPOINT] = nav[_NAV_ROLL]
-        s[c.PITCH_SETPOINT] = nav[_NAV_PITCH]
+        s[c.PITCH_SETPOINT] = min(PITCH_LIMIT_RAD, max(-PITCH_LIMIT_RAD, nav[_NAV_PITCH]))
     lateral_control(nav, sp, p, s, dt)
     energy_control(nav, sp, p, s, dt, entering)
+    if not math.isfinite(_sum_of_guidance(s)):  # absurd inputs have overflowed: begin again
+        for i in range(c.FLYING, c.Q_SETPOINT):
+            s[i] = 0.0
 
 
 @kernel
@@ -126,12 +140,13 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) -> None:
             s[c.THROTTLE] = _given(sp[_SP_THROTTLE], 0.0, 1.0)
         else:
             attitude_control(nav, p, s)
-        if math.isfinite(sp[_SP_STEERING]):
+        rolling = math.isfinite(sp[_SP_STEERING])
+        if rolling:
             steering = min(1.0, max(-1.0, wheel_control(nav, sp, p, s) + yaw_stick))
             yaw_stick = steering  # the rudder helps the wheels
         else:
             s[c.WHEEL_INTEGRAL] = 0.0
-        rate_control(nav, p, s, surfaces)
+        rate_control(nav, p, s, surfaces, rolling)
         limit_surfaces(p, s, yaw_stick, surfaces)
     aileron, elevator, rudder = surfaces[0], surfaces[1], surfaces[2]
     actuators[AILERON] = aileron

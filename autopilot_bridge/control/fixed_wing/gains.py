@@ -34,8 +34,6 @@ def gains_for(envelope: FlightEnvelope) -> dict[str, float | bool]:
         "pitch_acceleration_per_elevator_rad_s2",
         "pitch_rate_per_elevator_rad_s",
         "short_period_frequency_rad_s",
-        "yaw_acceleration_per_rudder_rad_s2",
-        "dutch_roll_frequency_rad_s",
     ):
         if not getattr(envelope, name) > 0.0:
             raise ValueError(
@@ -90,12 +88,15 @@ def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> tu
     values["pitch_rate_max_up_rad_s"] = pitch_rate
     values["pitch_rate_max_down_rad_s"] = pitch_rate
 
+    values["rate_yaw_ff"] = 0.0
+    if not envelope.yaw_acceleration_per_rudder_rad_s2 > 0.0:  # no rudder
+        values["rate_yaw_p"] = values["rate_yaw_i"] = 0.0
+        return roll_s, pitch_s
     turn = envelope.dutch_roll_frequency_rad_s
     missing = max(2.0 * (_YAW_DAMPING - envelope.dutch_roll_damping) * turn, 0.5)
     yaw_p = missing / envelope.yaw_acceleration_per_rudder_rad_s2
     values["rate_yaw_p"] = yaw_p
     values["rate_yaw_i"] = 2.0 * yaw_p
-    values["rate_yaw_ff"] = 0.0
     values["rate_yaw_integral_max"] = 0.4
     pressure_pa = 0.5 * 1.225 * envelope.airspeed_trim_m_s**2
     side_m_s2_per_rad = pressure_pa * envelope.wing_area_m2 * _SIDE_FORCE_SLOPE_PER_RAD / envelope.mass_kg

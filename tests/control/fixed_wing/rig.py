@@ -1,4 +1,4 @@
-"""Closed loop for tests of the fixed-wing control laws: a JSBSim aircraft, perfect navigation, the controller.
+"""Closed loop for tests of the fixed-wing control laws: JSBSim aircraft, perfect navigation, controller.
 
 The navigation filter has its own tests; here its place is taken by the truth, so that what is measured is
 the control.

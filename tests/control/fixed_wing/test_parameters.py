@@ -55,11 +55,19 @@ def test_a_glider_flies_its_airspeed_by_pitch() -> None:
     assert parameters.speed_weight == 2.0
 
 
-@pytest.mark.parametrize("field", ["roll_rate_per_aileron_rad_s", "yaw_acceleration_per_rudder_rad_s2"])
+@pytest.mark.parametrize("field", ["roll_rate_per_aileron_rad_s", "pitch_rate_per_elevator_rad_s"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
 def test_a_control_without_effect_is_refused(field: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"aerosonde: {field} = "):
         FixedWingParameters.for_envelope(replace(AEROSONDE, **{field: value}))  # type: ignore[arg-type]
+
+
+def test_without_a_rudder_nothing_is_asked_of_it() -> None:
+    parameters = FixedWingParameters.for_envelope(
+        replace(AEROSONDE, yaw_acceleration_per_rudder_rad_s2=0.0, sideslip_per_rudder_rad=0.0)
+    )
+    assert parameters.rate_yaw_p == parameters.rate_yaw_i == parameters.rate_yaw_ff == 0.0
+    assert parameters.sideslip_gain_rad_s_per_m_s2 == 0.0
 
 
 def test_every_field_is_packed_as_a_number() -> None:
