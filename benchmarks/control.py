@@ -1,4 +1,4 @@
-"""Cost of the control laws: `MulticopterController.step` per physics step and flight tasks per 50 Hz update.
+"""Cost of the control laws: the controllers' `step` per physics step and flight tasks per 50 Hz update.
 
 python benchmarks/control.py
 """
@@ -11,7 +11,9 @@ from collections.abc import Callable
 import numpy as np
 
 from autopilot_bridge.control import MulticopterController
+from autopilot_bridge.control import fixed_wing_setpoint as fixed_wing_sp
 from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.fixed_wing import FixedWingController
 from autopilot_bridge.flight import (
     FlightContext,
     GotoTask,
@@ -25,6 +27,7 @@ from autopilot_bridge.flight import (
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.layout import NAV_SIZE
 
 _ROUNDS = 40
@@ -60,6 +63,20 @@ def flying_context() -> FlightContext:
     return ctx
 
 
+def flying_aircraft() -> FixedWingController:
+    """A controller of an aircraft that follows a course at a height."""
+    nav = np.zeros(NAV_SIZE)
+    nav[0] = 1.0
+    nav[24] = -9.81
+    nav[nav_layout.VEL_NED_M_S] = (15.0, 2.0, 0.0)
+    nav[nav_layout.AIRSPEED_M_S] = nav[nav_layout.AIRSPEED_TRUE_M_S] = 15.0
+    controller = FixedWingController(physics_rate_hz=250.0, nav=nav)
+    controller.setpoint[fixed_wing_sp.LEVEL] = fixed_wing_sp.FLY
+    controller.setpoint[fixed_wing_sp.COURSE_RAD] = 0.2
+    controller.setpoint[fixed_wing_sp.DOWN_M] = -5.0
+    return controller
+
+
 def main() -> None:
     """Print one line per measurement."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
@@ -71,7 +88,10 @@ def main() -> None:
     controller.setpoint[sp.POS_NED_M] = 0.0
     controller.setpoint[sp.YAW_RAD] = 0.0
     controller.setpoint[sp.LEVEL] = sp.TRAJECTORY
-    lines = [("controller.step", mean_us(controller.step, 5 * repeats))]
+    lines = [
+        ("multicopter step", mean_us(controller.step, 5 * repeats)),
+        ("fixed wing step", mean_us(flying_aircraft().step, 5 * repeats)),
+    ]
 
     assert ctx.frame is not None
     lat, lon, _ = ctx.frame.geodetic_from_ned(500.0, 0.0, 0.0)
