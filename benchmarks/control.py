@@ -26,8 +26,8 @@ from autopilot_bridge.flight import (
 )
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
-from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation import layout as nav_layout
+from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.layout import NAV_SIZE
 
 _ROUNDS = 40
