@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.autopilot.firmware import FIRMWARES
+from autopilot_bridge.autopilot.firmware import FIRMWARES, PAYLOAD_ROLE
 from autopilot_bridge.autopilot.status import NavigationJudgement, StatusReport
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.commander import Commander
@@ -181,6 +181,7 @@ class Autopilot:
         self._cache = PayloadCache(self._messages.builders())
         self._tables: dict[str, StreamTable] = {}
         self._table_list: list[StreamTable] = []
+        self._ports: list[StreamTable] = []  # those for clients: SR0_* is the first
         self.intervals = MessageIntervalService(
             firmware.intervals, self._tables, self._cache, self._texts.announce, self._on_demand()
         )
@@ -242,7 +243,7 @@ class Autopilot:
     # the link's side
 
     def add_channel(self, channel: AutopilotChannel, *, role: str) -> None:
-        """Start the default streams of a role ("onboard" or "gcs") on one more channel.
+        """Start the default streams of a role ("onboard", "gcs" or "payload") on one more channel.
 
         Raises:
             ValueError: unknown role, or a channel of that name is there already.
@@ -266,13 +267,16 @@ class Autopilot:
         self.channels.append(channel)
         self._tables[channel.name] = table
         self._table_list = list(self._tables.values())
-        self._apply_stream_rates(len(self._tables) - 1)
+        if role != PAYLOAD_ROLE:
+            self._ports.append(table)
+            self._apply_stream_rates(len(self._ports) - 1)
 
     def remove_channel(self, channel: AutopilotChannel) -> None:
         """Stop everything on a channel."""
         self.channels.remove(channel)
-        del self._tables[channel.name]
+        table = self._tables.pop(channel.name)
         self._table_list = list(self._tables.values())
+        self._ports = [port for port in self._ports if port is not table]
 
     def receive(self, frame: Frame, channel: AutopilotChannel) -> None:
         """Take one frame from a channel. Contents are untrusted and never raise."""
@@ -343,7 +347,7 @@ class Autopilot:
 
     def _apply_stream_rates(self, index: int, changed: str | None = None) -> None:
         """ArduPilot's SRn_* parameters: rates of the stream groups of channel n (one that changed)."""
-        if index >= len(self._table_list):
+        if index >= len(self._ports):
             return
         for group, ending in STREAM_RATE_PARAMETERS.items():
             name = f"SR{index}_{ending}"
@@ -352,7 +356,7 @@ class Autopilot:
             rate_hz = self.parameters.get(name)
             interval_us = round(MICROSECONDS / rate_hz) if rate_hz > 0 else -1
             for message_id in STREAM_GROUPS[group]:
-                self._table_list[index].set_default(message_id, interval_us, self._time_us)
+                self._ports[index].set_default(message_id, interval_us, self._time_us)
 
     def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
         sources = TelemetrySources(

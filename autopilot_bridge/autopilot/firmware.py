@@ -26,6 +26,12 @@ from flightsim.airframe import AirframeKind
 _ARDUPILOT_MAX_RATE_HZ: Final = 0.8 * 400.0  # of SCHED_LOOP_RATE
 _ARDUPLANE_MAX_RATE_HZ: Final = 0.8 * 50.0
 
+PAYLOAD_ROLE: Final = "payload"
+PAYLOAD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
+    {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0}
+)
+"""What devices on the vehicle's own bus are told: whom they hang on, and where it is."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Firmware:
@@ -59,7 +65,9 @@ _PX4: Final = Firmware(
         fixed=frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT}),
         refuse_running=True,
     ),
-    rates_hz=MappingProxyType({"onboard": px4.ONBOARD_RATES_HZ, "gcs": px4.GCS_RATES_HZ}),
+    rates_hz=MappingProxyType(
+        {"onboard": px4.ONBOARD_RATES_HZ, "gcs": px4.GCS_RATES_HZ, PAYLOAD_ROLE: PAYLOAD_RATES_HZ}
+    ),
     answers_ping=True,
     position_pushed_at_arm=False,
 )
@@ -77,7 +85,9 @@ _ARDUPILOT: Final = Firmware(
         unknown_text="No ap_message for mavlink id ({})",
         too_fast_text="Requested rate for message ID {} too fast. Increase SCHED_LOOP_RATE",
     ),
-    rates_hz=MappingProxyType({"onboard": ardupilot.START_RATES_HZ, "gcs": ardupilot.START_RATES_HZ}),
+    rates_hz=MappingProxyType(
+        {"onboard": ardupilot.START_RATES_HZ, "gcs": ardupilot.START_RATES_HZ, PAYLOAD_ROLE: PAYLOAD_RATES_HZ}
+    ),
     answers_ping=False,
     position_pushed_at_arm=True,
 )

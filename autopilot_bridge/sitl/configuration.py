@@ -10,6 +10,7 @@ from typing import Final
 from flightsim.airframe import AirframeKind, LaunchKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
+from flightsim.payload import GroundTargetParameters, MagneticField, PayloadParameters
 
 FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: the moment of boot unless asked otherwise, so that equal flights give equal logs."""
@@ -58,6 +59,7 @@ class VehicleSpecification:
         parameters: autopilot parameters that differ from the flavour's defaults.
         launch: how an aircraft gets into the air: "runway", "catapult" or "hand"; None: as its description
             says.
+        payload: what it carries for its mission; by default nothing.
     """
 
     system_id: int = 1
@@ -66,6 +68,7 @@ class VehicleSpecification:
     offset_ne_m: tuple[float, float] = (0.0, 0.0)
     parameters: Mapping[str, float] = field(default_factory=dict)
     launch: str | None = None
+    payload: PayloadParameters = field(default_factory=PayloadParameters)
 
     def __post_init__(self) -> None:
         if not 1 <= self.system_id <= MAX_VEHICLES:
@@ -86,6 +89,8 @@ class SitlConfiguration:
         seed: root of every random stream.
         physics_rate_hz: steps per second.
         unix_epoch_us: what the vehicles' clocks call the moment of boot.
+        targets: on the ground, for cameras to see.
+        magnetic_field: for survey magnetometers to measure.
     """
 
     vehicles: tuple[VehicleSpecification, ...] = (VehicleSpecification(),)
@@ -94,6 +99,8 @@ class SitlConfiguration:
     seed: int = 0
     physics_rate_hz: int = 250
     unix_epoch_us: int = FIXED_EPOCH_UNIX_US
+    targets: tuple[GroundTargetParameters, ...] = ()
+    magnetic_field: MagneticField | None = None
 
     def __post_init__(self) -> None:
         if not self.vehicles:

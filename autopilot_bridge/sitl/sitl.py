@@ -1,7 +1,7 @@
 """The one visible wiring: world, sensors, autopilots and links, stepped together.
 
 Execution order of a step, for each vehicle in turn: vehicle dynamics, sensors, autopilot (navigation, slow
-loop, control, streams). Then the world's clock moves on and what links have brought is handed to the
+loop, control, streams), payload. Then the world's clock moves on and what links have brought is handed to the
 autopilots.
 """
 
@@ -12,17 +12,18 @@ from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.flavours import get_flavour
 from autopilot_bridge.links import Link, MemoryLink, memory_pair
 from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.payload import PayloadStation
 from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.failures import FailureInjector
 from autopilot_bridge.sitl.launch_crew import LaunchCrew
-from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TruthEncoder
+from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder, TruthEncoder
 from autopilot_bridge.tlog import TlogWriter
 from flightsim.airframe import Airframe, AirframeKind, LaunchKind
-from flightsim.flight_envelope import FlightEnvelope
-from flightsim.home import Home
+from flightsim.flight_envelope import FlightEnvelope, flight_envelope
 from flightsim.initial_state import InitialState
+from flightsim.payload import GroundTargets, Payload, PayloadParameters
 from flightsim.sensors import (
     FIX_AT_BOOT,
     RTK_FIX_AFTER_10_S,
@@ -46,12 +47,18 @@ class SitlVehicle:
         vehicle: the JSBSim vehicle.
         sensors: its sensor suite; `sensors.faults` switches failures.
         autopilot: the emulated autopilot.
+        payload: what it carries, as MAVLink components on a link of their own; None: nothing.
         channels: its open links.
         echoes: frames of its own that came back on a link; they are dropped.
     """
 
     def __init__(
-        self, specification: VehicleSpecification, index: int, configuration: SitlConfiguration, world: World
+        self,
+        specification: VehicleSpecification,
+        index: int,
+        configuration: SitlConfiguration,
+        world: World,
+        targets: GroundTargets,
     ) -> None:
         streams = world.streams
         self.specification = specification
@@ -78,7 +85,7 @@ class SitlVehicle:
                 **flavour.launch_parameters.get(launch or airframe.launch_kind, {}),
                 **specification.parameters,
             },
-            envelope=_envelope(airframe, configuration.place) if aircraft else None,
+            envelope=_envelope(airframe, configuration) if aircraft else None,
             unix_epoch_us=configuration.unix_epoch_us,
             inject_failure=FailureInjector(self.vehicle, self.sensors).inject,
         )
@@ -92,12 +99,36 @@ class SitlVehicle:
         self._router: Router[LinkChannel] = Router()
         self._loops = LoopGuard()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
+        self.payload: PayloadStation | None = None
+        if specification.payload != PayloadParameters():
+            self._fit(
+                Payload(
+                    specification.payload,
+                    truth=self.vehicle.truth,
+                    home=configuration.place,
+                    physics_rate_hz=configuration.physics_rate_hz,
+                    seeds=lambda name: streams.child("vehicle", index, "sensor", name),
+                    targets=targets,
+                    magnetic_field=configuration.magnetic_field,
+                )
+            )
+
+    def _fit(self, payload: Payload) -> None:
+        """Put the payload's components onto a link of their own."""
+        ours, theirs = memory_pair("vehicle", "payload")
+        station = PayloadStation(payload, system_id=self.specification.system_id, send=theirs.send)
+        channel = self.open(ours, role="payload")
+        ours.on_receive = lambda data: self.take(channel, channel.parse(data))
+        theirs.on_receive = station.receive
+        self.payload = station
 
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
         self.vehicle.step(self.autopilot.actuators)
         self.sensors.step(time_us)
         self.autopilot.step(time_us)
+        if self.payload is not None:
+            self.payload.step(time_us)
         if self._crew is not None and self._crew.watch(time_us):
             self._crew = None
 
@@ -106,7 +137,7 @@ class SitlVehicle:
 
         Args:
             name: unique per vehicle; None: made from the link.
-            role: which default streams run on it ("onboard" or "gcs").
+            role: which default streams run on it ("onboard", "gcs" or "payload").
         """
         if name is None:
             name = f"{role}{len(self.channels)} {link.description}"
@@ -131,18 +162,25 @@ class SitlVehicle:
                 self.take(channel, frames)
 
     def take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
-        """Hand frames that came in on a channel to the autopilot and to the channels they are meant for."""
+        """Hand frames that came in on a channel to the autopilot and to the channels they are meant for.
+
+        What is for another component of the vehicle goes there; while it was never heard, to the autopilot, which
+        may answer for it (ArduPilot).
+        """
         own = self.specification.system_id
         several = len(self.channels) > 1
         for frame in frames:
             if frame.system_id == own and frame.component_id == AUTOPILOT_COMPONENT:
                 self.echoes += 1  # its own words, brought back by somebody's bridge
                 continue
-            self.autopilot.receive(frame, channel)
             if not several:
+                self.autopilot.receive(frame, channel)
                 continue
             others = self._router.route(frame, channel)
-            if (frame.target_system, frame.target_component) == (own, AUTOPILOT_COMPONENT):
+            target = (frame.target_system, frame.target_component)
+            if not others or frame.target_system != own or frame.target_component in (0, AUTOPILOT_COMPONENT):
+                self.autopilot.receive(frame, channel)
+            if target == (own, AUTOPILOT_COMPONENT):
                 continue
             if self._loops.comes_round(frame.raw, channel):
                 continue
@@ -155,11 +193,9 @@ def _gps(flavour: str) -> GpsParameters:
     return GpsParameters(fix_timeline=RTK_FIX_AFTER_10_S if flavour == "ardupilot" else FIX_AT_BOOT)
 
 
-def _envelope(airframe: Airframe, home: Home) -> FlightEnvelope:
+def _envelope(airframe: Airframe, configuration: SitlConfiguration) -> FlightEnvelope:
     """What an aircraft can do, found by trimming its model."""
-    from flightsim.flight_envelope import flight_envelope  # brings scipy, which a multicopter needs not
-
-    return flight_envelope(airframe, home)
+    return flight_envelope(airframe, home=configuration.place, environment=configuration.environment)
 
 
 class Sitl:
@@ -167,6 +203,12 @@ class Sitl:
 
     Args:
         configuration: what it holds.
+
+    Attributes:
+        configuration: as given.
+        world: vehicles and air.
+        vehicles: with sensors, autopilots and links.
+        targets: on the ground.
 
     Raises:
         ValueError: a model, flavour or parameter that does not exist or is out of range.
@@ -182,8 +224,12 @@ class Sitl:
                 environment=configuration.environment,
             )
         )
+        streams = self.world.streams
+        self.targets = GroundTargets(
+            configuration.targets, seeds=lambda target: streams.child("target", target)
+        )
         self.vehicles = tuple(
-            SitlVehicle(specification, index, configuration, self.world)
+            SitlVehicle(specification, index, configuration, self.world, self.targets)
             for index, specification in enumerate(configuration.vehicles)
         )
         self._step_us = 1_000_000 // configuration.physics_rate_hz
@@ -193,6 +239,7 @@ class Sitl:
         self._truth_listeners: list[TruthListener] = []
         self._truth_interval_us = 1_000_000 // TRUTH_RATE_HZ
         self._next_truth_us = _NEVER_US
+        self._target_truth = TargetTruthEncoder(self.targets, configuration.place)
 
     @property
     def time_us(self) -> int:
@@ -218,9 +265,13 @@ class Sitl:
         if time_us >= self._next_truth_us:
             self._next_truth_us = time_us + self._truth_interval_us
             for vehicle in self.vehicles:
-                frame = vehicle.truth_encoder.encode(time_us)
-                for listener in self._truth_listeners:
-                    listener(time_us, frame)
+                self._tell_truth(time_us, vehicle.truth_encoder.encode(time_us))
+            for frame in self._target_truth.encode(time_us):
+                self._tell_truth(time_us, frame)
+
+    def _tell_truth(self, time_us: int, frame: bytes) -> None:
+        for listener in self._truth_listeners:
+            listener(time_us, frame)
 
     def poll_every(self, interval_us: int) -> None:
         """Look at real links every so often (vehicle time); memory links need no polling."""

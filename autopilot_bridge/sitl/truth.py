@@ -1,7 +1,8 @@
 """Truth as MAVLink frames, for log and score only: HIL_STATE_QUATERNION, as PX4 sends its ground truth.
 
 The frames carry the vehicle's system id and the component id of the simulator (`SIMULATOR_COMPONENT`), so
-that no reader takes them for the autopilot's word.
+that no reader takes them for the autopilot's word. Ground targets have a system of their own,
+`TARGET_SYSTEM`; the first is component 1.
 """
 
 import math
@@ -14,10 +15,14 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type, whole
+from flightsim.home import Home
 from flightsim.kernels import kernel
+from flightsim.payload import GroundTargets
 from flightsim.truth import TRUTH_SIZE
 
 SIMULATOR_COMPONENT: Final = mavlink.MAV_COMP_ID_USER1
+TARGET_SYSTEM: Final = 251
+MAX_TARGETS: Final = 250
 TRUTH_RATE_HZ: Final = 50
 _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 
@@ -64,3 +69,51 @@ class TruthEncoder:
         """One HIL_STATE_QUATERNION frame of the present truth."""
         _fill(self._truth, time_us, self._record)
         return self._encoder.encode_payload(_MESSAGE_ID, self._record.tobytes())
+
+
+class TargetTruthEncoder:
+    """Packs where the ground targets are.
+
+    Args:
+        targets: of the world.
+        home: origin of their frame.
+    """
+
+    __slots__ = ("_encoders", "_home", "_targets")
+
+    def __init__(self, targets: GroundTargets, home: Home) -> None:
+        if len(targets) > MAX_TARGETS:
+            raise ValueError(f"{len(targets)} ground targets are too many; accepted are up to {MAX_TARGETS}")
+        self._targets = targets
+        self._home = home
+        self._encoders = [FrameEncoder(TARGET_SYSTEM, number + 1) for number in range(len(targets))]
+
+    def encode(self, time_us: int) -> list[bytes]:
+        """A HIL_STATE_QUATERNION frame for each target, as they are at a vehicle time."""
+        self._targets.step(time_us)
+        frames = []
+        for encoder, position, velocity in zip(
+            self._encoders,
+            self._targets.positions_ned_m.tolist(),
+            self._targets.velocities_ned_m_s.tolist(),
+            strict=True,
+        ):
+            lat_deg, lon_deg = self._home.offset(position[0], position[1])
+            message = mavlink.MAVLink_hil_state_quaternion_message(
+                time_us,
+                [1.0, 0.0, 0.0, 0.0],
+                0.0,
+                0.0,
+                0.0,
+                round(lat_deg * 1e7),
+                round(lon_deg * 1e7),
+                round((self._home.alt_m - position[2]) * 1e3),
+                *(round(speed * 100.0) for speed in velocity),
+                0,
+                0,
+                0,
+                0,
+                0,
+            )
+            frames.append(encoder.encode(message))
+        return frames
