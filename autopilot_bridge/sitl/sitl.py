@@ -164,8 +164,8 @@ class SitlVehicle:
     def take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
         """Hand frames that came in on a channel to the autopilot and to the channels they are meant for.
 
-        What is for another component of the vehicle goes there; while it was never heard, to the autopilot, which
-        may answer for it (ArduPilot).
+        What is for another component of the vehicle goes there; while it was never heard, to the autopilot,
+        which may answer for it (ArduPilot).
         """
         own = self.specification.system_id
         several = len(self.channels) > 1
