@@ -131,6 +131,7 @@ class Autopilot:
         self._until_slow = self._divisor
         self._time_us = 0
 
+        self._vehicle = {} if envelope is None else {"envelope": envelope}
         airframe = dict(flavour.airframe)
         if envelope is not None and flavour.airframe_of is not None:
             airframe.update(flavour.airframe_of(envelope))
@@ -139,14 +140,14 @@ class Autopilot:
             flavour.navigation_parameters(self.parameters), readings=readings, physics_rate_hz=physics_rate_hz
         )
         self.controller = flavour.controller(
-            flavour.controller_parameters(self.parameters),
+            flavour.controller_parameters(self.parameters, **self._vehicle),
             physics_rate_hz=physics_rate_hz,
             nav=self.navigation.state,
         )
         self.context = FlightContext(
             nav=self.navigation.state,
             setpoint=self.controller.setpoint,
-            parameters=flavour.flight_parameters(self.parameters),
+            parameters=flavour.flight_parameters(self.parameters, **self._vehicle),
         )
         self.context.health = self.navigation.health
         stores = new_stores()
@@ -338,8 +339,8 @@ class Autopilot:
 
     def _on_parameter(self, name: str, value: float) -> None:
         flavour, store = self.flavour, self.parameters
-        self.controller.set_parameters(flavour.controller_parameters(store))
-        self.commander.guidance.set_parameters(flavour.flight_parameters(store))
+        self.controller.set_parameters(flavour.controller_parameters(store, **self._vehicle))
+        self.commander.guidance.set_parameters(flavour.flight_parameters(store, **self._vehicle))
         self.commander.parameters = flavour.commander_parameters(store)
         self.navigation.set_parameters(flavour.navigation_parameters(store))
         if name.startswith("SR") and name[2:3].isdigit():

@@ -156,7 +156,8 @@ class Flavour:
         land_detector: makes the land detector.
         commander_parameters, flight_parameters, controller_parameters, navigation_parameters: typed
             parameters from the store's current values; called again after a change. They clamp what a ground
-            station may have set beyond reason, and never raise.
+            station may have set beyond reason, and never raise. Those of an aircraft's flight and controller
+            take its `envelope` too.
         text_needs_heartbeat: no STATUSTEXT on a channel before a heartbeat was received there.
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
@@ -184,8 +185,8 @@ class Flavour:
     vehicle_tasks: Callable[[FlightContext, MissionStore, CommanderPolicy], VehicleTasks]
     land_detector: Callable[[], LandDetector]
     commander_parameters: Callable[[ParameterStore], CommanderParameters]
-    flight_parameters: Callable[[ParameterStore], Any]
-    controller_parameters: Callable[[ParameterStore], Any]
+    flight_parameters: Callable[..., Any]
+    controller_parameters: Callable[..., Any]
     navigation_parameters: Callable[[ParameterStore], NavigationParameters]
     text_needs_heartbeat: bool
     heartbeat_on_mode_change: bool

@@ -58,6 +58,7 @@ class Flight:
         flavour: "px4" or "ardupilot".
         parameters: that differ from the flavour's defaults.
         environment: the air.
+        model, launch: the vehicle, and how it gets into the air.
 
     Attributes:
         heartbeats: (time s, custom_mode, base_mode, system_status).
@@ -74,8 +75,12 @@ class Flight:
         seed: int = 1,
         parameters: Mapping[str, float] | None = None,
         environment: Environment | None = None,
+        model: str = "iris",
+        launch: str | None = None,
     ) -> None:
-        specification = VehicleSpecification(flavour=flavour, parameters=parameters or {})
+        specification = VehicleSpecification(
+            flavour=flavour, parameters=parameters or {}, model=model, launch=launch
+        )
         self.sitl = Sitl(
             SitlConfiguration(vehicles=(specification,), seed=seed, environment=environment or Environment())
         )
