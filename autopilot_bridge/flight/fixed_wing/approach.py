@@ -11,7 +11,7 @@ from autopilot_bridge.flight.fixed_wing.state import AircraftState
 _CALM_M_S: Final = 1.0  # less wind doesn't choose the direction
 _RUNWAY_NEAR_HOME_M: Final = 300.0
 _SHALLOW: Final = 0.5  # of the landing angle: a leg shallower than this is flown level until the slope
-_FLARE_SPEED_SHARE: Final = 0.95  # mean speed of the flare over the speed at its begin
+_FLARE_SPEED_SHARE: Final = 0.9  # way of the flare: speed is lost, and the sink is taken back a little late
 _SHORTEST_LEG_M: Final = 30.0
 
 

@@ -1,7 +1,7 @@
 """What all fixed-wing tasks share: reading the state, resting while disarmed or on the ground."""
 
 from abc import ABC, abstractmethod
-from typing import ClassVar
+from typing import ClassVar, Protocol, runtime_checkable
 
 from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
@@ -63,6 +63,15 @@ class AircraftTask(ABC):
     @abstractmethod
     def _fly(self, ctx: FlightContext) -> TaskStatus:
         """Fill `self._command` (which is clear) from `self._state`, and write it."""
+
+
+@runtime_checkable
+class LandingTask(Protocol):
+    """A task that may be landing."""
+
+    def go_around(self, ctx: FlightContext) -> bool:
+        """Break the landing off; False when none is flown."""
+        ...
 
 
 class GuidedPath:

@@ -12,7 +12,10 @@ _TOUCH_M: Final = 0.15
 _STILL_M_S: Final = 0.25
 _STILL_S: Final = 0.6
 _SHORTEST_S: Final = 1.0
+_LONG_S: Final = 6.0  # a flare that lasts this long has reached a ground that lies higher than believed
 _PITCH_BLEND_S: Final = 1.0
+_LEAD_S: Final = 0.6
+_GAIN: Final = 1.0
 
 
 class Flare:
@@ -52,8 +55,13 @@ class Flare:
         """Fill the longitudinal part of a command; True when the ground was touched."""
         p = parameters
         self._time_s += ctx.dt_s
-        share = min(1.0, max(0.0, height_m / self._height_m))
-        command.height_rate_m_s = -(p.flare_sink_m_s + (self._sink_m_s - p.flare_sink_m_s) * share)
+        # ahead of the height by what the pitch needs to follow
+        ahead_m = height_m - _LEAD_S * max(0.0, state.vel_down_m_s)
+        share = min(1.0, max(0.0, ahead_m / self._height_m))
+        sink = p.flare_sink_m_s + (self._sink_m_s - p.flare_sink_m_s) * share
+        # what the loss of speed takes from the response is asked for on top, but never a climb
+        sink -= _GAIN * (state.vel_down_m_s - sink)
+        command.height_rate_m_s = -max(0.0, sink)
         command.throttle = p.throttle_idle
         # the limits of the pitch close in gradually: no jerk of the elevator
         part = min(1.0, self._time_s / _PITCH_BLEND_S)
@@ -62,7 +70,8 @@ class Flare:
         command.pitch_min_rad = low + (p.flare_pitch_min_rad - low) * part
         command.pitch_max_rad = high + (p.flare_pitch_max_rad - high) * part
         self.aligning = height_m < _ALIGN_M
-        still = abs(state.vel_down_m_s) < _STILL_M_S and height_m < 2.0 * _ALIGN_M
+        low = height_m < 2.0 * _ALIGN_M or self._time_s > _LONG_S
+        still = abs(state.vel_down_m_s) < _STILL_M_S and low
         self._still_s = self._still_s + ctx.dt_s if still else 0.0
         measured = state.height_above_ground_m
         touched = p.rangefinder_landing and measured == measured and measured < _TOUCH_M

@@ -20,10 +20,15 @@ from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 _ENTRY_HEIGHT_M: Final = 4.0  # the circle is left this close to its height
 _ENTRY_COURSE_RAD: Final = math.radians(20.0)
 _ENTRY_WITHIN: Final = 0.4  # radii around the entry
+_BEFORE_ENTRY: Final = 1.5  # radii: a leg is taken up from here
+_ALONG_LEG: Final = 0.3  # of its length
+_TOO_HIGH_M: Final = 25.0  # over its entry: circle down first
+_BLIND_M: Final = 30.0  # over the ground: without a position straight on, to the ground
 _FREE_BANK_M: Final = 15.0  # over the ground the bank is no longer limited for the wing tips
 _LOW_M: Final = 2.0
 _MISSED_M: Final = 40.0  # beyond the place, too high: go around
-_BRAKE_AFTER_S: Final = 1.0
+_BRAKE_AFTER_S: Final = 1.5
+_NOSE_DOWN_S: Final = 1.0
 
 
 class LandPhase(IntEnum):
@@ -62,6 +67,7 @@ class LandTask(AircraftTask):
         "_path",
         "_rolled_s",
         "_start",
+        "_touch_pitch_rad",
         "_wanted",
         "approach",
         "phase",
@@ -81,6 +87,7 @@ class LandTask(AircraftTask):
         self._flare = Flare()
         self._blind: DescendTask | None = None
         self._rolled_s = 0.0
+        self._touch_pitch_rad = 0.0
         self.approach: Approach | None = None
         self.phase = LandPhase.CIRCLE
 
@@ -98,10 +105,20 @@ class LandTask(AircraftTask):
             leg = approach_along_leg(at, place, ctx.fixed_wing)
         self.approach = approach_into_wind(ctx, state, place) if leg is None else leg
         self._line.set(self.approach.north_m, self.approach.east_m, self.approach.course_rad)
-        if leg is None:
-            self._enter_circle(ctx)
-        else:
+        if leg is not None and self._on_leg(ctx, leg):
             self.phase = LandPhase.APPROACH
+        else:
+            self._enter_circle(ctx)
+
+    def _on_leg(self, ctx: FlightContext, leg: Approach) -> bool:
+        """The aircraft is where the leg begins, so that it needs no circle to get there."""
+        state, radius = self._state, abs(ctx.fixed_wing.loiter_radius_m)
+        past_entry = self._line.along_m(state) + leg.length_m
+        return (
+            -_BEFORE_ENTRY * radius < past_entry < _ALONG_LEG * leg.length_m
+            and abs(self._line.offset_m(state)) < radius
+            and leg.entry_down_m - state.down_m < _TOO_HIGH_M
+        )
 
     def _place(self, ctx: FlightContext) -> tuple[float, float, float]:
         state = self._state
@@ -147,7 +164,9 @@ class LandTask(AircraftTask):
         approach, p = self.approach, ctx.fixed_wing
         if ctx.on_ground or self.phase is LandPhase.LANDED or approach is None:
             return self._land(ctx)
-        low = self.phase in (LandPhase.FLARE, LandPhase.ROLL_OUT)
+        low = self.phase in (LandPhase.FLARE, LandPhase.ROLL_OUT) or (
+            self.phase is LandPhase.APPROACH and self._height(p, approach.down_m) < _BLIND_M
+        )
         if not ctx.position_valid and not low:
             return self._fly_blind(ctx)
         if self._blind is not None:
@@ -215,22 +234,26 @@ class LandTask(AircraftTask):
 
     def _fly_approach(self, ctx: FlightContext, p: FixedWingFlightParameters, approach: Approach) -> None:
         state, command = self._state, self._command
-        self._line.follow(state, self._path.of(ctx), command)
         height = self._height(p, approach.down_m)
         self._limit_bank(p, height)
-        flare_height = max(p.flare_height_m, p.flare_time_s * state.ground_speed_m_s * approach.slope)
-        shift = approach.flare_shift_m(state.ground_speed_m_s, flare_height, p.flare_sink_m_s)
-        past_aim = self._line.along_m(state) + shift
-        slope_down = approach.down_m + past_aim * approach.slope
-        if slope_down > approach.entry_down_m:
-            command.down_m = slope_down
-            command.height_rate_m_s = -state.ground_speed_m_s * approach.slope
+        sink = state.ground_speed_m_s * approach.slope
+        past_place = -math.inf
+        if ctx.position_valid:
+            self._line.follow(state, self._path.of(ctx), command)
+            past_place = self._line.along_m(state)
+            flare_height = max(p.flare_height_m, p.flare_time_s * sink)
+            shift = approach.flare_shift_m(state.ground_speed_m_s, flare_height, p.flare_sink_m_s)
+            slope_down = approach.down_m + (past_place + shift) * approach.slope
+            command.down_m = max(approach.entry_down_m, slope_down)
+            if slope_down > approach.entry_down_m:
+                command.height_rate_m_s = -sink
         else:
-            command.down_m = approach.entry_down_m
+            command.heading_rad = approach.course_rad
+            command.height_rate_m_s = -sink
         if height <= max(p.flare_height_m, p.flare_time_s * max(0.0, state.vel_down_m_s)):
             self.phase = LandPhase.FLARE
             self._flare.begin(state, height, p)
-        elif past_aim - shift > _MISSED_M:
+        elif past_place > _MISSED_M:
             self.phase = LandPhase.GO_AROUND
 
     def _fly_flare(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
@@ -248,12 +271,17 @@ class LandTask(AircraftTask):
         if touched:
             self.phase = LandPhase.ROLL_OUT
             self._rolled_s = 0.0
+            self._touch_pitch_rad = state.pitch_rad
 
     def _fly_roll_out(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
         state, command = self._state, self._command
         self._rolled_s += ctx.dt_s
         command.roll_rad = 0.0
-        command.pitch_rad = p.takeoff_roll_pitch_rad
+        # the nose comes down gently
+        share = max(0.0, 1.0 - self._rolled_s / _NOSE_DOWN_S)
+        command.pitch_rad = p.takeoff_roll_pitch_rad + share * (
+            self._touch_pitch_rad - p.takeoff_roll_pitch_rad
+        )
         command.throttle = 0.0
         command.steering_heading_rad = self._line.steering_heading(state, ctx.position_valid)
         if self._rolled_s > _BRAKE_AFTER_S:
@@ -269,7 +297,7 @@ class LandTask(AircraftTask):
         command.flaps = p.flaps_takeoff
         command.airspeed_m_s = p.takeoff_airspeed_m_s
         command.pitch_min_rad = p.takeoff_pitch_min_rad
-        command.height_rate_m_s = max(p.climb_rate_m_s, p.climb_max_m_s)
+        command.throttle = p.takeoff_throttle_max
         if approach.down_m - state.down_m >= p.landing_abort_climb_m:
             self._flare.reset()
             self._enter_circle(ctx)

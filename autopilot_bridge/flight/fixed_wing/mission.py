@@ -96,9 +96,7 @@ class MissionTask(PlanTask):
         self._track = None
 
     def _hold_task(self) -> FlightTask:
-        """Around the last place of the plan, or here."""
-        leg = self._leg
-        return LoiterTask(None if leg is None else np.array(leg.target), airspeed_m_s=self._airspeed_m_s)
+        return LoiterTask(airspeed_m_s=self._airspeed_m_s)
 
     def _return_task(self) -> FlightTask:
         return ReturnTask(self._store, first_item=self._first_item)

@@ -6,7 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
-from autopilot_bridge.flight.fixed_wing.base import AircraftTask
+from autopilot_bridge.flight.fixed_wing.base import AircraftTask, LandingTask
 from autopilot_bridge.flight.fixed_wing.descend import DescendTask
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
@@ -71,11 +71,6 @@ class ReturnTask(AircraftTask):
         """What is being flown: a circle, the landing, or the plan."""
         return self._sub
 
-    @property
-    def works_through_landing(self) -> bool:
-        """The landing has begun: it goes on on the ground."""
-        return self.phase is ReturnPhase.LAND
-
     def _set_sub(self, ctx: FlightContext, task: FlightTask) -> None:
         self._sub = task
         task.activate(ctx)
@@ -129,9 +124,7 @@ class ReturnTask(AircraftTask):
 
     def go_around(self, ctx: FlightContext) -> bool:
         """Break a landing off."""
-        from autopilot_bridge.flight.fixed_wing.mission import MissionTask
-
-        return isinstance(self._sub, LandTask | MissionTask) and self._sub.go_around(ctx)
+        return isinstance(self._sub, LandingTask) and self._sub.go_around(ctx)
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         """Write `ctx.setpoint`; DONE on the ground."""

@@ -60,6 +60,7 @@ class TakeoffTask(AircraftTask):
         "_runway",
         "_start_down_m",
         "_throttle",
+        "_way_m",
         "phase",
     )
 
@@ -81,6 +82,7 @@ class TakeoffTask(AircraftTask):
         self._throttle = 0.0
         self._rotated_s = 0.0
         self._fast = False
+        self._way_m = math.nan
         self.phase = TakeoffPhase.WAIT
 
     @property
@@ -107,7 +109,7 @@ class TakeoffTask(AircraftTask):
         self._runway.begin(state, state.yaw_rad)
         if not ctx.on_ground:
             self._down_m = min(self._down_m, state.down_m)
-            self._circle(ctx)
+            self._climb_on(ctx)
         elif p.launch is LaunchKind.RUNWAY:
             self.phase = TakeoffPhase.ROLL
         else:
@@ -126,7 +128,7 @@ class TakeoffTask(AircraftTask):
     def _fly(self, ctx: FlightContext) -> TaskStatus:
         p, command = ctx.fixed_wing, self._command
         if self.phase >= TakeoffPhase.CLIMB:
-            return self._fly_circle(ctx)
+            return self._fly_climb(ctx)
         command.flaps = p.flaps_takeoff
         command.airspeed_m_s = p.takeoff_airspeed_m_s
         if self.phase is TakeoffPhase.WAIT and not self._wait(ctx, p):
@@ -199,14 +201,7 @@ class TakeoffTask(AircraftTask):
         )
         command.throttle_max = p.takeoff_throttle_max
         remaining = state.down_m - self._down_m
-        climb = max(p.climb_rate_m_s, _CLIMB_SHARE * p.climb_max_m_s)
-        self._fast = self._fast or state.airspeed_m_s > _FAST * p.takeoff_airspeed_m_s
-        if remaining <= _CAPTURE_S * climb:
-            command.down_m = self._down_m
-        elif self._fast or state.airspeed_m_s != state.airspeed_m_s:
-            command.height_rate_m_s = climb
-        else:
-            command.throttle = p.takeoff_throttle_max
+        self._climb_to_height(p, remaining)
         low = climbed < _LOW_M
         if ctx.position_valid:
             self._runway.follow(state, self._path.of(ctx), command)
@@ -218,26 +213,57 @@ class TakeoffTask(AircraftTask):
         )
         if low and p.launch is LaunchKind.RUNWAY:
             command.steering_heading_rad = self._runway.heading_rad
-        if remaining <= _REACHED_M or (
-            climbed >= p.takeoff_clearance_m and math.isfinite(float(self._place[0] + self._place[1]))
-        ):
+        has_place = math.isfinite(float(self._place[0] + self._place[1]))
+        if remaining <= _REACHED_M or (climbed >= p.takeoff_clearance_m and has_place):
+            self._climb_on(ctx)
+
+    def _climb_on(self, ctx: FlightContext) -> None:
+        """Clear of the ground: straight to the place if there is one, or circle here."""
+        self.phase = TakeoffPhase.CLIMB
+        state = self._state
+        north, east = float(self._place[0]), float(self._place[1])
+        self._way_m = math.hypot(north - state.north_m, east - state.east_m)
+        if ctx.position_valid and self._way_m > abs(ctx.fixed_wing.loiter_radius_m):  # false for NaN
+            self._runway.begin(state, math.atan2(east - state.east_m, north - state.north_m))
+        else:
             self._circle(ctx)
 
     def _circle(self, ctx: FlightContext) -> None:
-        """Clear of the ground: to the place, circling and climbing on."""
         centre = self._place.copy()
         centre[2] = self._down_m
         self._loiter = LoiterTask(centre)
         self._loiter.activate(ctx)
-        ctx.phase = FlightPhase.TAKEOFF
-        self.phase = TakeoffPhase.CLIMB
+        if self.phase is not TakeoffPhase.REACHED:
+            ctx.phase = FlightPhase.TAKEOFF
 
-    def _fly_circle(self, ctx: FlightContext) -> TaskStatus:
-        loiter = self._loiter
-        assert loiter is not None
-        loiter.update(ctx)
-        if self.phase is TakeoffPhase.CLIMB and self._state.down_m - self._down_m <= _REACHED_M:
+    def _fly_climb(self, ctx: FlightContext) -> TaskStatus:
+        """To the place and around it, climbing."""
+        state, command, loiter = self._state, self._command, self._loiter
+        remaining = state.down_m - self._down_m
+        if loiter is not None:
+            loiter.update(ctx)
+        else:
+            self._climb_to_height(ctx.fixed_wing, remaining)
+            self._runway.follow(state, self._path.of(ctx), command)
+            command.write(ctx)
+            near = self._runway.along_m(state) > self._way_m - abs(ctx.fixed_wing.loiter_radius_m)
+            if near or not ctx.position_valid:
+                self._circle(ctx)
+        if self.phase is TakeoffPhase.CLIMB and remaining <= _REACHED_M:
             self.phase = TakeoffPhase.REACHED
             ctx.phase = FlightPhase.CRUISE
             ctx.events.append(TaskFinished("takeoff"))
         return TaskStatus.DONE if self.phase is TakeoffPhase.REACHED else TaskStatus.RUNNING
+
+    def _climb_to_height(self, p: FixedWingFlightParameters, remaining_m: float) -> None:
+        """Full power, the pitch holds the airspeed; near the height the energy control takes over."""
+        state, command = self._state, self._command
+        command.airspeed_m_s = p.takeoff_airspeed_m_s
+        climb = max(p.climb_rate_m_s, _CLIMB_SHARE * p.climb_max_m_s)
+        self._fast = self._fast or state.airspeed_m_s > _FAST * p.takeoff_airspeed_m_s
+        if remaining_m <= _CAPTURE_S * climb:
+            command.down_m = self._down_m
+        elif self._fast or state.airspeed_m_s != state.airspeed_m_s:
+            command.height_rate_m_s = climb
+        else:
+            command.throttle = p.takeoff_throttle_max

@@ -1,4 +1,4 @@
-"""Closed loop for tests of the fixed-wing flight tasks: JSBSim Aerosonde, perfect navigation, control laws, task.
+"""Closed loop for tests of the flight tasks: JSBSim Aerosonde, perfect navigation, control laws, task.
 
 The navigation filter has its own tests; here its place is taken by the truth.
 """
