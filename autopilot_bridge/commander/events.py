@@ -1,5 +1,6 @@
 """What happened to the vehicle, as typed events. Flavours turn them into the texts a ground station shows."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum, IntEnum, auto
 
@@ -173,14 +174,20 @@ class LandingDetected(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionItemReached(Event):
-    """An item of the mission is done; `index` counts as the stored plan does."""
+    """An item of the mission is done; `index` counts as the stored plan does.
+
+    `distance_m`: from its place, for an item that an aircraft flew past; NaN for others.
+    """
 
     index: int
+    distance_m: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionFinished(Event):
-    """The last item of the mission is done."""
+    """The last item of the mission is done; `landed`: it ended on the ground."""
+
+    landed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,3 +216,46 @@ class AirspeedChanged(Event):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RebootRequested(Event):
     """A client asked for a reboot and it may happen (disarmed)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LaunchDetected(Event):
+    """An aircraft's take-off begins: the launch was felt, or none is waited for.
+
+    `acceleration_m_s2` along the body, `delay_s` until power comes.
+    """
+
+    acceleration_m_s2: float
+    delay_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TakeoffStarted(Event):
+    """An aircraft's take-off has power: over ground so fast, to a height over home on a heading."""
+
+    ground_speed_m_s: float
+    height_m: float
+    heading_deg: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandingApproachStarted(Event):
+    """An aircraft is on its final approach, so high over home."""
+
+    height_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlareStarted(Event):
+    """An aircraft flares: height over the ground, sink rate, ground speed."""
+
+    height_m: float
+    sink_m_s: float
+    ground_speed_m_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LandingAborted(Event):
+    """A landing was broken off; the aircraft climbs to a height over home (NaN: as it was set before)."""
+
+    height_m: float

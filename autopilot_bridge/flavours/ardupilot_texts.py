@@ -16,6 +16,7 @@ _REASONS: Final[Mapping[Reason, str]] = {
     Reason.ACCELEROMETER: "Accels not healthy",
     Reason.BAROMETER: "Barometer not healthy",
     Reason.COMPASS: "Compass not healthy",
+    Reason.AIRSPEED: "Airspeed 1 not healthy",
     Reason.GPS: "GPS 1: Bad fix",
     Reason.ATTITUDE: "AHRS: EKF3 not ready",
     Reason.ALTITUDE: "Need Alt Estimate",
@@ -75,13 +76,8 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
             if reason is DisarmReason.TERMINATION:
                 return (Notice(Severity.EMERGENCY, "Terminating due to GCS request"), stopped)
             return (stopped,)
-        case events.ArmingDenied(mode=mode, reasons=reasons, check_only=check_only):
-            prefix = "PreArm" if check_only else "Arm"
-            return tuple(
-                Notice(Severity.CRITICAL, f"{prefix}: {describe(reason, mode)}")
-                for reason in reasons
-                if not (check_only and reason is Reason.MODE_NOT_ARMABLE)
-            )
+        case events.ArmingDenied():
+            return arming_denied(event, MODE_NAMES)
         case events.ModeDenied(mode=mode, reason=reason, custom_mode=number):
             return (_mode_denied(mode, reason, number),)
         case events.CommandDenied(command=command, reason=reason):
@@ -100,19 +96,34 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
             return (Notice(Severity.WARNING, _FAILSAFES[kind]),)
         case events.FailsafeCleared(kind=kind) if kind in _CLEARED:
             return (_CLEARED[kind],)
-        case events.BatteryWarning(level=level, voltage_v=voltage_v, used_ah=used_ah):
-            word = "low" if level <= BatteryLevel.LOW else "critical"
-            text = f"Battery 1 is {word} {voltage_v:.2f}V used {used_ah * 1000.0:.0f} mAh"
-            return (Notice(Severity.WARNING, text),)
+        case events.BatteryWarning():
+            return battery_warning(event)
         case events.MissionItemReached(index=index):
             return (Notice(Severity.INFO, f"Reached command #{index}"),)
     return ()
 
 
-def describe(reason: Reason, mode: FlightMode) -> str:
-    """One reason in ArduCopter's words."""
+def arming_denied(event: events.ArmingDenied, mode_names: Mapping[FlightMode, str]) -> tuple[Notice, ...]:
+    """A text for each reason, as both of ArduPilot's vehicles say them."""
+    prefix = "PreArm" if event.check_only else "Arm"
+    return tuple(
+        Notice(Severity.CRITICAL, f"{prefix}: {describe(reason, event.mode, mode_names)}")
+        for reason in event.reasons
+        if not (event.check_only and reason is Reason.MODE_NOT_ARMABLE)
+    )
+
+
+def battery_warning(event: events.BatteryWarning) -> tuple[Notice, ...]:
+    """What both vehicles say of a battery."""
+    word = "low" if event.level <= BatteryLevel.LOW else "critical"
+    text = f"Battery 1 is {word} {event.voltage_v:.2f}V used {event.used_ah * 1000.0:.0f} mAh"
+    return (Notice(Severity.WARNING, text),)
+
+
+def describe(reason: Reason, mode: FlightMode, mode_names: Mapping[FlightMode, str] = MODE_NAMES) -> str:
+    """One reason in ArduPilot's words."""
     if reason is Reason.MODE_NOT_ARMABLE:
-        return f"{MODE_NAMES.get(mode, mode.name)} mode not armable"
+        return f"{mode_names.get(mode, mode.name)} mode not armable"
     return _REASONS.get(reason, reason.name.replace("_", " ").capitalize())
 
 

@@ -20,6 +20,7 @@ _REASONS: Final[Mapping[Reason, str]] = {
     Reason.ACCELEROMETER: "Accelerometer data missing or unhealthy",
     Reason.BAROMETER: "Barometer data missing or unhealthy",
     Reason.COMPASS: "Compass data missing or unhealthy",
+    Reason.AIRSPEED: "Airspeed data missing or unhealthy",
     Reason.GPS: "GNSS data fusion stopped or no 3D fix",
     Reason.ATTITUDE: "Attitude estimate invalid",
     Reason.ALTITUDE: "Altitude estimate invalid",
