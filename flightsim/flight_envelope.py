@@ -58,7 +58,7 @@ class FlightEnvelope:
         climb_max_m_s: rate of climb, full throttle, at the trim airspeed (negative for a glider).
         sink_min_m_s: rate of sink, idle, at the trim airspeed.
         sink_max_m_s: rate of sink, idle, at the highest airspeed.
-        glide_ratio: best distance over height, idle.
+        glide_ratio: best distance over height with the throttle closed, no slower than the lowest airspeed.
         best_glide_speed_m_s: equivalent airspeed of it.
         bank_max_rad, pitch_min_rad, pitch_max_rad: limits for the autopilot.
         roll_rate_per_aileron_rad_s: steady roll rate of full aileron.
@@ -183,7 +183,7 @@ class _Survey:
         glide, dive = self.glide(cruise), self.glide(fast)
         climb = self.full_throttle(cruise, level) if tunnel.powered else glide
         at_min, at_max = self.level(slow, level), self.level(fast, level)
-        best_speed, best = self.best_glide(stall, cruise)
+        best_speed, best = self.best_glide(slow, cruise)
         return FlightEnvelope(
             name=name,
             mass_kg=tunnel.mass_kg,
@@ -265,10 +265,10 @@ class _Survey:
                 stalled = trial
         return speed
 
-    def best_glide(self, stall: float, cruise: float) -> tuple[float, FlightTrim]:
-        """The flattest of the glides, found by golden section between stall and cruise."""
+    def best_glide(self, slow: float, cruise: float) -> tuple[float, FlightTrim]:
+        """The flattest of the glides no slower than the lowest airspeed, found by golden section."""
         golden = (math.sqrt(5.0) - 1.0) / 2.0
-        low, high = stall * 1.02, max(cruise * 1.3, stall * 1.5)
+        low, high = slow, cruise * 1.2
         near = self.glide(cruise)
         for _ in range(6):
             first, second = high - golden * (high - low), low + golden * (high - low)
@@ -277,7 +277,9 @@ class _Survey:
             except TrimError:
                 flatter = True
             low, high = (low, second) if flatter else (first, high)
-        speed, best = max(self.glides.items(), key=lambda item: item[1].climb_angle_rad)
+        self.glide(slow, near)
+        allowed = [item for item in self.glides.items() if item[0] >= slow]
+        speed, best = max(allowed, key=lambda item: item[1].climb_angle_rad)
         if best.climb_angle_rad >= 0.0:
             raise AirframeError(
                 f"vehicle '{self.tunnel.airframe.name}' does not sink with the throttle closed "

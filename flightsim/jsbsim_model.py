@@ -18,6 +18,7 @@ LAUNCHER_FORCE: Final = "launcher"
 LAUNCHER_MOMENT: Final = "launcher-moment"
 """Names among a model's external reactions; the force in pounds, the moment in foot-pounds, body axes."""
 
+_NONE: Final = 0.0
 _EULER: Final = 1.0
 _ADAMS_BASHFORTH_2: Final = 3.0
 _ADAMS_BASHFORTH_3: Final = 4.0
@@ -107,8 +108,7 @@ def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsi
     if not loaded:
         raise AirframeError(_refusal(airframe, messages.warnings))
     fdm.set_dt(1.0 / physics_rate_hz)
-    for name, method in _INTEGRATORS:
-        fdm.set_property_value(f"simulation/integrator/{name}", method)
+    hold_motion(fdm, False)
     return fdm, tuple(messages.warnings)
 
 
@@ -135,6 +135,12 @@ def _copy_with_launcher(airframe: Airframe, folder: Path) -> None:
             for axis in "xyz":
                 ElementTree.SubElement(place, axis).text = "0"
     tree.write(copy)
+
+
+def hold_motion(fdm: jsbsim.FGFDMExec, held: bool) -> None:
+    """Hold position, attitude, velocity and rates as they are while all else goes on, or let go."""
+    for name, method in _INTEGRATORS:
+        fdm.set_property_value(f"simulation/integrator/{name}", _NONE if held else method)
 
 
 def find_property(fdm: jsbsim.FGFDMExec, name: str, *, needed_by: str) -> Any:

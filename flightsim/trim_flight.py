@@ -12,7 +12,9 @@ from flightsim import truth as t
 from flightsim.airframe import Airframe, Role
 from flightsim.environment import Environment
 from flightsim.home import Home
+from flightsim.initial_state import InitialState
 from flightsim.interface import AILERON, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
+from flightsim.rotations import quaternion_from_euler, rotate
 from flightsim.trim import TrimError
 from flightsim.wind_tunnel import FlightState, WindTunnel
 
@@ -74,6 +76,23 @@ class FlightTrim:
         values[AILERON], values[ELEVATOR] = self.aileron, self.elevator
         values[THROTTLE], values[RUDDER] = self.throttle, self.rudder
         return tuple(values)
+
+    def initial_state(self, *, height_m: float, yaw_rad: float = 0.0) -> InitialState:
+        """A start in this flight, in still air, the actuators where they should be."""
+        q, vel_ned = np.empty(4), np.empty(3)
+        state = self.state
+        quaternion_from_euler(self.roll_rad, self.pitch_rad, yaw_rad, q)
+        rotate(q, np.array(state.vel_frd_m_s), vel_ned)
+        north, east, down = vel_ned.tolist()
+        return InitialState(
+            height_m=height_m,
+            vel_ned_m_s=(north, east, down),
+            roll_rad=self.roll_rad,
+            pitch_rad=self.pitch_rad,
+            yaw_rad=yaw_rad,
+            rates_frd_rad_s=state.rates_frd_rad_s,
+            actuators=self.actuators,
+        )
 
     @property
     def state(self) -> FlightState:

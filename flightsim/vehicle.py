@@ -21,7 +21,7 @@ from flightsim.environment import CosineGust, Environment, Turbulence
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.jsbsim_model import find_property, load_fdm
+from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
 from flightsim.kernels import kernel
 from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 _FT: Final = 0.3048
 _PA_PER_PSF: Final = 47.88025898033584
 _KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
-_FOLLOW_S: Final = 3.0  # in which actuators and engines follow the commands of a start in the air
+_FOLLOW_S: Final = 10.0  # in which actuators and engines follow the commands of a start in the air
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
 _SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand on a tail wheel
@@ -361,9 +361,11 @@ class Vehicle:
         else:
             self._surfaces.write(commands)
             self._surfaces.write_slow(commands)
+        hold_motion(self._fdm, True)
         for _ in range(round(_FOLLOW_S * self.physics_rate_hz)):
             self._run()
-        initialise(self._fdm, self.airframe, self.home, self.environment, start)
+        hold_motion(self._fdm, False)
+        initialise(self._fdm, self.airframe, self.home, self.environment, start, prepare=False)
 
     def _observe(self) -> None:
         raw = self._raw_view

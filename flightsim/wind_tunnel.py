@@ -20,7 +20,7 @@ from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
 from flightsim.interface import AILERON, ELEVATOR, MAX_ACTUATORS, RUDDER
-from flightsim.jsbsim_model import find_property, load_fdm
+from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
 from flightsim.rotations import quaternion_from_euler, rotate
 
 __all__ = ["FlightState", "Reading", "WindTunnel"]
@@ -132,9 +132,7 @@ class WindTunnel:
             )
         self.airframe = airframe
         self._fdm, _ = load_fdm(airframe, physics_rate_hz)
-        for part in ("rate", "position"):
-            for motion in ("rotational", "translational"):
-                self._fdm.set_property_value(f"simulation/integrator/{part}/{motion}", 0.0)
+        hold_motion(self._fdm, True)
         self._home = home or Home()
         air = environment or Environment()
         self._environment = Environment(temperature_offset_k=air.temperature_offset_k)
@@ -203,6 +201,10 @@ class WindTunnel:
         self.actuators.write(below)
         for _ in range(self._block_steps // 2):
             self._fdm.run()
+
+    def value(self, name: str) -> float:
+        """A JSBSim property of the model, now."""
+        return float(find_property(self._fdm, name, needed_by="the wind tunnel").get_double_value())
 
     def truth_value(self, index: int) -> float:
         """What the model has for a place of the truth vector, now; NaN where it has nothing."""
