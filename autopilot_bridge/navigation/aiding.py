@@ -17,20 +17,19 @@ from autopilot_bridge.navigation.air_aiding import AirAiding
 from autopilot_bridge.navigation.alignment import magnetic_heading_rad, tilt_from_accel
 from autopilot_bridge.navigation.earth import pressure_altitude_m
 from autopilot_bridge.navigation.gps_quality import GpsQuality
+from autopilot_bridge.navigation.heading_check import HeadingCheck
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.report import Clocks, report
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
 from autopilot_bridge.navigation.standby import Standby
 from autopilot_bridge.navigation.states import (
-    CORRECTION_POS,
-    TERRAIN_DOWN,
     X_BARO_OFFSET,
     X_POS,
     X_VEL,
     R,
 )
-from autopilot_bridge.navigation.terrain import TerrainEstimator
+from autopilot_bridge.navigation.terrain import TerrainEstimator, update_terrain
 from flightsim.interface import (
     BARO_PRESSURE_PA,
     GPS_ALT_M,
@@ -40,7 +39,6 @@ from flightsim.interface import (
     GPS_LON_DEG,
     GPS_SPEED_ACCURACY_M_S,
     GPS_VEL_NED_M_S,
-    RANGE_DISTANCE_M,
     SensorReadings,
 )
 from flightsim.magnetics import magnetic_field_ned_gauss
@@ -71,6 +69,7 @@ class Aiding:
         "_contradicted_us",
         "_contradictions",
         "_gps_height_known",
+        "_heading",
         "_health",
         "_mag_ned",
         "_parameters",
@@ -109,6 +108,7 @@ class Aiding:
         if parameters.mag_ned_gauss is not None:
             self._mag_ned = np.array(parameters.mag_ned_gauss)
         self.frame: LocalFrame | None = None
+        self._heading = HeadingCheck()
         self.air: AirAiding | None = None
         if parameters.fixed_wing:
             self.air = AirAiding(parameters, readings=readings, solution=solution, health=health)
@@ -122,6 +122,7 @@ class Aiding:
         self._baro_known = False
         self._gps_height_known = False
         self._standby.restart()
+        self._heading.restart()
         self._rejoining = False
         self._contradictions = 0
         self._contradicted_us = 0
@@ -254,11 +255,14 @@ class Aiding:
             self._mag_refused(time_us)
         if has & f.HAS_GPS:
             self._gps_fused(time_us, accepted)
+            if self.air is not None:
+                self._check_heading(time_us, gps_row, bool(accepted & f.ACCEPTED_GPS_VEL))
             if before is not None:
                 self._rejoined(solution.core[X_VEL : X_POS + 2] - before)
         if self.air is not None and slow:
             accepted |= self._fuse_air(self.air, time_us)
-        self._update_terrain(time_us, bool(pending & HAS_RANGE), slow)
+        ranged = self._readings.rangefinder if pending & HAS_RANGE else None
+        update_terrain(self._terrain, solution, ranged, time_us, slow=slow, at_rest=self.at_rest)
         if self._tick % self._report_every == 0:
             report(
                 health,
@@ -330,6 +334,19 @@ class Aiding:
         self._turn_yaw(math.atan2(east, north) - math.atan2(rotation[3], rotation[0]))
         self._health.yaw_aligned = True
         return True
+
+    def _check_heading(self, time_us: int, row: int, accepted: bool) -> None:
+        """A heading that was wrong on the ground shows in the first seconds of a flight."""
+        obs, rotation = self._solution.obs, self._solution.core[R : R + 9]
+        north, east = float(obs[f.GPS_VEL]), float(obs[f.GPS_VEL + 1])
+        if self.at_rest:
+            self._heading.restart()
+        elif math.hypot(north, east) > self._parameters.airspeed_threshold_m_s:
+            course, yaw = math.atan2(east, north), math.atan2(rotation[3], rotation[0])
+            angle = self._heading.judge(time_us, accepted=accepted, course_rad=course, yaw_rad=yaw)
+            if angle:
+                self._turn_yaw(angle)
+                self._reset_to_gps(row, time_us)
 
     def _contradicted(self, time_us: int) -> None:
         """A sensor that seems good had to be obeyed against the filter's belief."""
@@ -445,7 +462,7 @@ class Aiding:
         reading, solution, health = self._readings.magnetometer, self._solution, self._health
         row = solution.row_at(reading.time_us, time_us)
         norm = math.hypot(*reading.values)
-        if row < 0 or not 0.05 < norm < 2.0:
+        if row < 0 or not 0.05 < norm < 2.0 or self._heading.magnetometer_wrong:
             return -1
         if not health.yaw_aligned:
             rotation = solution.core[R : R + 9]
@@ -465,18 +482,3 @@ class Aiding:
         ):
             self._solution.forget_mag_bias()
             clocks.mag_refused_us = time_us
-
-    def _update_terrain(self, time_us: int, has_range: bool, slow: bool) -> None:
-        terrain, core = self._terrain, self._solution.core
-        if slow:
-            terrain.predict(time_us, math.hypot(core[X_VEL], core[X_VEL + 1]))
-            if self.at_rest:
-                terrain.landed(time_us, float(core[X_POS + 2]))
-        if has_range:
-            reading, solution = self._readings.rangefinder, self._solution
-            row = solution.row_at(reading.time_us, time_us)
-            if row >= 0:
-                cos_tilt = f.body_axis_in_ned(solution.history, row, 2)[2]
-                down = float(solution.history[row, 2] + core[CORRECTION_POS + 2])
-                terrain.fuse(time_us, float(reading.values[RANGE_DISTANCE_M]), cos_tilt, down)
-        core[TERRAIN_DOWN] = terrain.down_m

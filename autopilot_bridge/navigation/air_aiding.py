@@ -26,6 +26,7 @@ from flightsim.interface import SensorReadings
 Array = NDArray[np.float64]
 
 _AIRBORNE_M: Final = 3.0  # this far from the height of the last rest, and fast: in flight
+_LONGEST_ROLL_US: Final = 30_000_000  # so long so fast: not on a runway
 _KNOWN_WIND_M_S: Final = 3.0  # 1-sigma up to which the wind is of use
 _GROUND_AID_US: Final = 1_000_000  # GPS fused within this time: only the wind needs correcting
 _AIR_AID_US: Final = 1_000_000
@@ -50,6 +51,7 @@ class AirAiding:
         "_air",
         "_airspeed_gusts",
         "_check",
+        "_fast_since_us",
         "_fused_us",
         "_health",
         "_parameters",
@@ -101,6 +103,7 @@ class AirAiding:
         self._airspeed_gusts.restart()
         self._sideslip_gusts.restart()
         self._fused_us = -1
+        self._fast_since_us = -1
         self._time_us = 0
         self._quiet_since_us = -1
         self._rest_down_m = math.nan
@@ -196,13 +199,19 @@ class AirAiding:
         if self.pitot_believed:
             speed = max(speed, self._pitot.true_m_s)
         down_m = float(self._solution.core[X_POS + 2])
+        fast = speed > self._parameters.airspeed_threshold_m_s
+        if at_rest or not fast:
+            self._fast_since_us = -1
+        elif self._fast_since_us < 0:
+            self._fast_since_us = self._time_us
         if at_rest or math.isnan(self._rest_down_m):
             self._rest_down_m = down_m
             self.flying = False
         elif self.flying:
             self.flying = speed > 0.5 * self._parameters.airspeed_threshold_m_s
-        elif speed > self._parameters.airspeed_threshold_m_s:
-            self.flying = abs(down_m - self._rest_down_m) > _AIRBORNE_M
+        elif fast:
+            rolled_us = self._time_us - self._fast_since_us
+            self.flying = abs(down_m - self._rest_down_m) > _AIRBORNE_M or rolled_us > _LONGEST_ROLL_US
 
     def _prepare(self, time_us: int, measured_m_s: float, speed_m_s: float, *, assumed: bool) -> None:
         p, air = self._parameters, self._air

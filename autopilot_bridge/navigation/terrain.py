@@ -3,7 +3,11 @@
 import math
 from typing import Final
 
+from autopilot_bridge.navigation.fusion import body_axis_in_ned
 from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.navigation.solution import Solution
+from autopilot_bridge.navigation.states import CORRECTION_POS, TERRAIN_DOWN, X_POS, X_VEL
+from flightsim.interface import RANGE_DISTANCE_M, Reading
 
 _MAX_RANGE_M: Final = 1.0e4
 _RESET_REFUSED_US: Final = 1_000_000  # refused for this long: the ground has another height here
@@ -87,3 +91,27 @@ class TerrainEstimator:
             self._fused_us = time_us
         elif time_us - self._fused_us > _RESET_REFUSED_US:
             self.down_m, self._variance, self._fused_us = measured, noise, time_us
+
+
+def update_terrain(
+    terrain: TerrainEstimator,
+    solution: Solution,
+    ranged: Reading | None,
+    time_us: int,
+    *,
+    slow: bool,
+    at_rest: bool,
+) -> None:
+    """Predict at the slow rate, take a new range if there is one, and write the terrain into `solution`."""
+    core = solution.core
+    if slow:
+        terrain.predict(time_us, math.hypot(core[X_VEL], core[X_VEL + 1]))
+        if at_rest:
+            terrain.landed(time_us, float(core[X_POS + 2]))
+    if ranged is not None:
+        row = solution.row_at(ranged.time_us, time_us)
+        if row >= 0:
+            cos_tilt = body_axis_in_ned(solution.history, row, 2)[2]
+            down = float(solution.history[row, 2] + core[CORRECTION_POS + 2])
+            terrain.fuse(time_us, float(ranged.values[RANGE_DISTANCE_M]), cos_tilt, down)
+    core[TERRAIN_DOWN] = terrain.down_m

@@ -267,6 +267,19 @@ def test_catapult(late_s: float, push_s: float) -> None:
     assert health.airspeed_in_use and health.sideslip_in_use
 
 
+def test_estimate_lost_in_flight() -> None:
+    """The filter aligns anew on a straight leg and finds its way back to airspeed and sideslip."""
+    bench = WingBench(Wing(gust_m_s=(0.3, 0.2)), 120.0).run(50.0)
+    bench.filter._solution.p[3, 3] = math.nan
+    bench.run(51.0)
+    assert bench.filter.health.filter_resets == 1
+    bench.run(120.0)
+    health = bench.filter.health
+    assert health.position_horizontal_absolute and health.sideslip_in_use and health.airspeed_in_use
+    assert bench.tilt_deg < 0.6 and bench.position_error_m < 1.0
+    assert np.hypot(*bench.wind_error()) < 1.5
+
+
 def test_no_sideslip_is_assumed_on_the_ground() -> None:
     """A take-off roll in a crosswind: the nose is held by the wheels, not by the air."""
     truth = fly(
@@ -345,3 +358,27 @@ def test_same_inputs_same_bytes() -> None:
 
 def test_sensors_of_the_bench_are_the_defaults_with_a_tube() -> None:
     assert replace(WING_SENSORS, airspeed=None) == SensorSuiteParameters()
+
+
+@pytest.mark.parametrize("bias", [(0.0, 0.15, 0.0), (0.15, 0.15, 0.0), (0.05, 0.05, 0.0)])
+def test_iron_beside_the_launcher(bias: tuple[float, float, float]) -> None:
+    """A heading 15 to 45 degrees wrong is found right after the launch, and the magnetometer left out."""
+    bench = WingBench(ORBIT, 60.0)
+    bench.suite.faults.inject(SensorUnit.MAG, FaultType.WRONG, bias=bias)
+    bench.run(8.0)
+    assert abs(np.degrees(bench.error()[2])) > 13.0
+    bench.run(12.0)
+    health = bench.filter.health
+    assert health.yaw_resets == 1 and abs(np.degrees(bench.error()[2])) < 6.0
+    bench.run(60.0)
+    assert not health.magnetometer_in_use and health.yaw_resets == 1 and health.filter_resets == 0
+    assert abs(np.degrees(bench.error()[2])) < 2.0 and bench.tilt_deg < 0.6
+    assert bench.position_error_m < 0.6
+
+
+def test_iron_on_board_does_not_turn_a_confirmed_heading() -> None:
+    bench = WingBench(ORBIT, 110.0).run(60.0)
+    bench.suite.faults.inject(SensorUnit.MAG, FaultType.WRONG, bias=(0.15, 0.15, 0.0))
+    bench.run(110.0)
+    assert bench.filter.health.yaw_resets == 0 and not bench.filter.health.magnetometer_in_use
+    assert abs(np.degrees(bench.error()[2])) < 1.5 and bench.tilt_deg < 0.5
