@@ -32,6 +32,7 @@ from missions.run import (
     versions,
     write_summary,
 )
+from missions.scenario import NeedsScenario, Scenario, Setting
 from missions.vehicle.adapter import Mode
 from missions.vehicle.vehicle import Vehicle
 
@@ -137,7 +138,7 @@ def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | N
     made = _missing_folders(request.out or RUNS)
     folder = create_run_folder(request.out, mission.name)
     try:
-        session = (_open_remote if request.connect else _open_embedded)(request)
+        session = _open_remote(request) if request.connect else _open_embedded(mission, request, folder)
     except BaseException:
         if request.out is None:
             made.insert(0, folder)
@@ -217,9 +218,12 @@ class _Session:
     close: Callable[[], None]
 
 
-def _open_embedded(request: RunRequest) -> _Session:
+def _open_embedded(mission: Mission, request: RunRequest, folder: Path) -> _Session:
     from missions.embedded import EmbeddedConfiguration, open_embedded
 
+    scenario = Scenario()
+    if isinstance(mission, NeedsScenario):
+        scenario = mission.scenario(request.options, Setting(seed=request.seed, folder=folder))
     try:
         sitl = open_embedded(
             EmbeddedConfiguration(
@@ -233,6 +237,7 @@ def _open_embedded(request: RunRequest) -> _Session:
                 turbulence=request.turbulence,
                 parameters=request.parameters,
                 home=request.home,
+                scenario=scenario,
             )
         )
     except ValueError as error:

@@ -21,7 +21,16 @@ SANS_IO = (
     *(f"autopilot_bridge.{name}" for name in ("mavlink", "routing", "geodesy", "mission_plan")),
     *(
         f"autopilot_bridge.{name}"
-        for name in ("navigation", "control", "flight", "commander", "flavours", "services", "autopilot")
+        for name in (
+            "navigation",
+            "control",
+            "flight",
+            "commander",
+            "flavours",
+            "services",
+            "autopilot",
+            "payload",
+        )
     ),
 )
 

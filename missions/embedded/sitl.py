@@ -1,7 +1,7 @@
 """An embedded SITL: the world in this process, on virtual time, one memory link per vehicle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from autopilot_bridge.clock import VirtualTimeLoop
@@ -10,6 +10,8 @@ from autopilot_bridge.sitl import Sitl, SitlConfiguration, parse_home, team
 from autopilot_bridge.sitl.configuration import FIXED_EPOCH_UNIX_US
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.environment import Environment
+from missions.embedded.scenario import magnetic_field_of, payload_of, targets_of
+from missions.scenario import Scenario
 
 MAX_FLIGHT_S = 24 * 3600.0
 
@@ -30,6 +32,7 @@ class EmbeddedConfiguration:
         parameters: autopilot parameters that differ from the flavour's defaults.
         home: "lat,lon,alt[,heading]"; None: where the flavour's own SITL stands.
         max_flight_s: vehicle time after which a run that has not ended fails.
+        scenario: targets, payload and magnetic map that the mission asks for.
     """
 
     vehicles: int = 1
@@ -44,6 +47,7 @@ class EmbeddedConfiguration:
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: str | None = None
     max_flight_s: float = MAX_FLIGHT_S
+    scenario: Scenario = field(default_factory=Scenario)
 
     def __post_init__(self) -> None:
         if self.speedup is not None and not 0.0 < self.speedup < float("inf"):
@@ -62,24 +66,31 @@ class EmbeddedSitl:
     log_epoch_unix_us = FIXED_EPOCH_UNIX_US
 
     def __init__(self, configuration: EmbeddedConfiguration) -> None:
-        self.sitl = Sitl(
-            SitlConfiguration(
-                vehicles=team(
-                    configuration.vehicles,
-                    model=configuration.model,
-                    flavour=configuration.flavour,
-                    parameters=configuration.parameters,
-                ),
-                home=None if configuration.home is None else parse_home(configuration.home),
-                environment=Environment.from_wind(
-                    speed_m_s=configuration.wind_speed_m_s,
-                    from_deg=configuration.wind_from_deg,
-                    turbulence=configuration.turbulence,
-                ),
-                seed=configuration.seed,
-                physics_rate_hz=configuration.physics_rate_hz,
-            )
+        scenario = configuration.scenario
+        payload = payload_of(scenario)
+        vehicles = team(
+            configuration.vehicles,
+            model=configuration.model,
+            flavour=configuration.flavour,
+            parameters=configuration.parameters,
         )
+        environment = Environment.from_wind(
+            speed_m_s=configuration.wind_speed_m_s,
+            from_deg=configuration.wind_from_deg,
+            turbulence=configuration.turbulence,
+        )
+        world = SitlConfiguration(
+            vehicles=tuple(replace(vehicle, payload=payload) for vehicle in vehicles),
+            home=None if configuration.home is None else parse_home(configuration.home),
+            environment=environment,
+            seed=configuration.seed,
+            physics_rate_hz=configuration.physics_rate_hz,
+            targets=targets_of(scenario),
+        )
+        magnetic_field = magnetic_field_of(
+            scenario, home=world.place, seed=world.seed, decimal_year=environment.decimal_year
+        )
+        self.sitl = Sitl(replace(world, magnetic_field=magnetic_field))
         self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
         sitl = self.sitl
         self.loop = VirtualTimeLoop(

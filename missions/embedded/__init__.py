@@ -1,0 +1,5 @@
+"""An embedded SITL for missions: the world in this process, on virtual time."""
+
+from missions.embedded.sitl import MAX_FLIGHT_S, EmbeddedConfiguration, EmbeddedSitl, open_embedded
+
+__all__ = ["MAX_FLIGHT_S", "EmbeddedConfiguration", "EmbeddedSitl", "open_embedded"]

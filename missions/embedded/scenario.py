@@ -1,0 +1,125 @@
+"""Building the scenario of a mission into an embedded SITL: ground targets, payload, magnetic field."""
+
+from pathlib import Path
+
+from flightsim.home import Home
+from flightsim.payload import (
+    NO_TAG,
+    CameraParameters,
+    Circle,
+    ConstantVelocity,
+    GaussianSignature,
+    GimbalParameters,
+    GroundTargetParameters,
+    MagneticField,
+    MagneticMap,
+    PayloadParameters,
+    RandomWalk,
+    Static,
+    SurveyMagnetometerParameters,
+    SyntheticMapParameters,
+    synthetic_map,
+)
+from flightsim.payload import TargetMotion as Motion
+from flightsim.random_streams import RandomStreams
+from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
+
+_MAP_SPACING_M = 50.0
+
+
+def payload_of(scenario: Scenario) -> PayloadParameters:
+    """What every vehicle carries."""
+    return PayloadParameters(
+        gimbal=GimbalParameters() if scenario.camera else None,
+        camera=CameraParameters() if scenario.camera else None,
+        magnetometer=SurveyMagnetometerParameters() if scenario.survey is not None else None,
+    )
+
+
+def targets_of(scenario: Scenario) -> tuple[GroundTargetParameters, ...]:
+    """The targets on the ground."""
+    return tuple(
+        GroundTargetParameters(
+            motion=_motion(target), size_m=target.size_m, tag_id=target.tag if target.tag >= 0 else NO_TAG
+        )
+        for target in scenario.targets
+    )
+
+
+def magnetic_field_of(
+    scenario: Scenario, *, home: Home, seed: int, decimal_year: float
+) -> MagneticField | None:
+    """The field that magnetometers measure; a map that is made is published where the scenario says.
+
+    Raises:
+        ValueError: an unusable map, or a target outside it.
+    """
+    survey = scenario.survey
+    if survey is None:
+        return None
+    if survey.map_path is not None:
+        published = MagneticMap.load(survey.map_path)
+    else:
+        published = _made_map(survey, home, seed, decimal_year)
+        if survey.publish_to is not None:
+            published.save(Path(survey.publish_to))
+    signatures = []
+    if survey.target_ne_m is not None:
+        signatures.append(
+            GaussianSignature(
+                north_m=survey.target_ne_m[0],
+                east_m=survey.target_ne_m[1],
+                amplitude_nt=survey.amplitude_nt,
+                sigma_along_m=survey.sigma_along_m,
+                sigma_across_m=survey.sigma_across_m,
+                heading_rad=survey.orientation_rad,
+            )
+        )
+    return MagneticField(published, signatures, decimal_year=decimal_year)
+
+
+def _made_map(survey: SurveyScenario, home: Home, seed: int, decimal_year: float) -> MagneticMap:
+    half_n_m, half_e_m = 0.5 * survey.height_m, 0.5 * survey.width_m
+    return synthetic_map(
+        SyntheticMapParameters(
+            south_m=-half_n_m,
+            north_m=half_n_m,
+            west_m=-half_e_m,
+            east_m=half_e_m,
+            spacing_m=_MAP_SPACING_M,
+            height_m=survey.survey_height_m,
+        ),
+        home=home,
+        seed=RandomStreams(seed).child("magnetic_map"),
+        decimal_year=decimal_year,
+    )
+
+
+def _motion(target: TargetScenario) -> Motion:
+    match target.motion:
+        case TargetMotion.STATIC:
+            return Static(north_m=target.north_m, east_m=target.east_m)
+        case TargetMotion.STRAIGHT:
+            return ConstantVelocity(
+                north_m=target.north_m,
+                east_m=target.east_m,
+                speed_m_s=target.speed_m_s,
+                course_rad=target.course_rad,
+            )
+        case TargetMotion.CIRCLE:
+            return Circle(
+                north_m=target.north_m,
+                east_m=target.east_m,
+                radius_m=target.range_m,
+                speed_m_s=target.speed_m_s,
+            )
+        case TargetMotion.RANDOM_WALK:
+            return RandomWalk(
+                south_m=target.north_m - target.range_m,
+                west_m=target.east_m - target.range_m,
+                north_m=target.north_m + target.range_m,
+                east_m=target.east_m + target.range_m,
+                speed_m_s=target.speed_m_s,
+                start_m=(target.north_m, target.east_m),
+                course_rad=target.course_rad,
+            )

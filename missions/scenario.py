@@ -1,0 +1,128 @@
+"""What a mission asks of the world it is flown in, when that is simulated: targets, payload, magnetic map.
+
+Plain data; `missions.embedded` builds it. On a real vehicle all this is simply there; a
+mission can't tell.
+"""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Final, Protocol, runtime_checkable
+
+from missions.errors import PlanError
+from missions.options import FlightOptions
+
+MAX_DISTANCE_M: Final = 50_000.0
+
+
+class TargetMotion(StrEnum):
+    """How a ground target moves."""
+
+    STATIC = "static"
+    STRAIGHT = "straight"
+    CIRCLE = "circle"
+    RANDOM_WALK = "random-walk"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TargetScenario:
+    """One target on the ground.
+
+    Attributes:
+        north_m, east_m: of home, at the start; the centre of a circle.
+        motion: how it moves.
+        speed_m_s: over ground; not used by a static one.
+        course_rad: where a straight one goes, and a random walk begins.
+        range_m: radius of a circle; half the side of the square a random walk stays in.
+        tag: what a camera reads off it, 0..254; -1: nothing.
+        size_m: its extent.
+
+    Raises:
+        PlanError: a place, speed or range that can't be.
+    """
+
+    north_m: float
+    east_m: float
+    motion: TargetMotion = TargetMotion.STATIC
+    speed_m_s: float = 0.0
+    course_rad: float = 0.0
+    range_m: float = 100.0
+    tag: int = 0
+    size_m: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not math.hypot(self.north_m, self.east_m) <= MAX_DISTANCE_M:
+            raise PlanError(
+                f"target at {self.north_m:g},{self.east_m:g} m is not within {MAX_DISTANCE_M:g} m of home"
+            )
+        moving = self.motion is not TargetMotion.STATIC
+        if not (0.0 < self.speed_m_s <= 60.0 if moving else self.speed_m_s == 0.0):
+            accepted = "more than 0 and up to 60 m/s" if moving else "0 m/s"
+            raise PlanError(f"target speed {self.speed_m_s:g} m/s; a {self.motion} target goes {accepted}")
+        if not (math.isfinite(self.course_rad) and math.isfinite(self.range_m) and self.range_m > 0.0):
+            raise PlanError(f"target course {self.course_rad:g} rad or range {self.range_m:g} m is no number")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurveyScenario:
+    """A magnetic map with a target's signature in it (seed 003: a two-dimensional Gaussian).
+
+    Attributes:
+        map_path: the published map; None: one is made from the seed, `width_m` by `height_m` about home.
+        publish_to: where a map that is made is written, for the mission to read.
+        width_m, height_m: of a map that is made, east and north.
+        survey_height_m: above home, what a map that is made is valid at.
+        target_ne_m: of the signature; None: no target.
+        amplitude_nt: its peak.
+        sigma_along_m, sigma_across_m: its standard deviations.
+        orientation_rad: of its long axis.
+    """
+
+    map_path: Path | None = None
+    publish_to: Path | None = None
+    width_m: float = 2000.0
+    height_m: float = 2000.0
+    survey_height_m: float = 100.0
+    target_ne_m: tuple[float, float] | None = None
+    amplitude_nt: float = 30.0
+    sigma_along_m: float = 80.0
+    sigma_across_m: float = 60.0
+    orientation_rad: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenario:
+    """What there is in the world and on board.
+
+    Attributes:
+        targets: on the ground.
+        camera: every vehicle carries a camera on a gimbal.
+        survey: every vehicle carries a survey magnetometer, over this.
+    """
+
+    targets: tuple[TargetScenario, ...] = ()
+    camera: bool = False
+    survey: SurveyScenario | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """What a scenario may depend on beside the options.
+
+    Attributes:
+        seed: of the world: what a mission leaves to chance is drawn from it.
+        folder: of the run, for files that the scenario publishes.
+    """
+
+    seed: int
+    folder: Path
+
+
+@runtime_checkable
+class NeedsScenario(Protocol):
+    """A mission that needs more in its world than vehicles."""
+
+    def scenario(self, options: FlightOptions, setting: Setting) -> Scenario:
+        """What it asks of an embedded world; not called for vehicles elsewhere."""
+        ...
