@@ -207,7 +207,7 @@ class Aiding:
         slow = self._tick % self._slow_every == 0
         if self.air is not None:
             self.air.look(time_us)
-            self.at_rest = self.at_rest and self.air.stands_still(time_us)
+            self.at_rest = self.at_rest and self.air.stands_still(time_us, gps_us=clocks.gps_us)
         has = 0
         if slow:
             has = self._standby.prepare(

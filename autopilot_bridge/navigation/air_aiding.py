@@ -129,7 +129,7 @@ class AirAiding:
         """Pitot tube and sideslip have been fused lately."""
         return self.wind_us >= 0 and time_us - self.wind_us <= _AIR_AID_US
 
-    def stands_still(self, time_us: int) -> bool:
+    def stands_still(self, time_us: int, *, gps_us: int) -> bool:
         """Speed and accelerometer agree that the vehicle is at rest: a launch is seen here before a land
         detector has made up its mind."""
         core = self._solution.core
@@ -140,7 +140,12 @@ class AirAiding:
         if self._quiet_since_us < 0:
             self._quiet_since_us = time_us
         speed = math.hypot(core[X_VEL], core[X_VEL + 1])
-        return bool(speed < _STILL_SPEED_M_S or time_us - self._quiet_since_us > _QUIET_US)
+        if speed < _STILL_SPEED_M_S:
+            return True
+        if gps_us >= 0 and time_us - gps_us <= _GROUND_AID_US:
+            return False  # the speed is a measured one
+        blown = self.pitot_believed and self._pitot.true_m_s > self._parameters.airspeed_threshold_m_s
+        return not blown and time_us - self._quiet_since_us > _QUIET_US
 
     def look(self, time_us: int) -> None:
         """Take the pitot tube's newest sample if it is a new one."""
