@@ -1,11 +1,10 @@
 """Gains and limits for an aircraft, derived from its flight envelope.
 
-Rate loops: roll is a lag, p = K a / (tau s + 1): the feed-forward is 1/K, the proportional gain quickens
-the lag to `_ROLL_BANDWIDTH_RAD_S`. Pitch and yaw are second order (short period, Dutch roll): the
-proportional gain on the rate adds the damping that is missing, the feed-forward of pitch is the inverse of
-its steady gain. Attitude loops are as slow as the rate loops inside them ask for, height and airspeed loops
-as slow as the attitude loops ask for. Energy rates come from the envelope's climb and sink; the extra drag
-of a turn from its best glide, where induced drag is half of all drag.
+Rate loops: roll is a lag, p = K a / (tau s + 1): the feed-forward is 1/K, the proportional gain makes it some
+times as quick as the roll angle shall be. Pitch and yaw are second order (short period, Dutch roll): the
+proportional gain on the rate adds the damping that is missing. Attitude loops are as slow as the rate loops
+inside them ask for, height and airspeed loops as slow as the attitude loops ask for. Energy rates come from
+the envelope's climb and sink; the extra drag of a turn from the induced drag of a wing of that aspect ratio.
 """
 
 import math
@@ -14,11 +13,14 @@ from typing import Final
 from flightsim.flight_envelope import FlightEnvelope
 
 _G: Final = 9.80665
-_ROLL_BANDWIDTH_RAD_S: Final = 12.0
+_ROLL_BANDWIDTH: Final = 4.0  # of the roll rate, in bandwidths of the roll angle
+_ROLL_RATE_RAD_S: Final = 2.6  # of a wing of 1 m; large aircraft roll with less haste
+_HEADING_P_1_S: Final = 0.8885  # of PX4
 _PITCH_DAMPING: Final = 0.8  # of the short period with the rate loop closed
 _YAW_DAMPING: Final = 0.6  # of the Dutch roll
 _SIDE_FORCE_SLOPE_PER_RAD: Final = 0.7  # usual size of the side-force slope, for the sideslip loop alone
 _SIDESLIP_BANDWIDTH_RAD_S: Final = 0.8
+_OSWALD_FACTOR: Final = 0.85
 _LOAD_FACTOR_MAX: Final = 2.5
 
 
@@ -53,34 +55,37 @@ def gains_for(envelope: FlightEnvelope) -> dict[str, float | bool]:
         "trim_elevator": envelope.trim_elevator,
         "trim_rudder": envelope.trim_rudder,
     }
-    roll_s, pitch_s = _rate_gains(envelope, values)
+    pitch_s = _rate_gains(envelope, values)
     _energy_gains(envelope, values, pitch_s)
     values["wheel_time_constant_s"] = 0.3
     values["wheel_p"] = 1.0
     values["wheel_i"] = 1.0
     values["wheel_ff"] = 0.4
-    values["roll_slew_rad_s"] = min(math.radians(90.0), 0.6 / roll_s)
     return values
 
 
-def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> tuple[float, float]:
-    """Write the gains of attitude and rates; time constants of roll and pitch angle."""
+def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> float:
+    """Write the gains of attitude and rates; the time constant of the pitch angle."""
     roll_gain = envelope.roll_rate_per_aileron_rad_s
-    lag_s = envelope.roll_time_constant_s
+    lag_s = min(0.6, envelope.roll_time_constant_s)
+    roll_s = max(0.35, 2.0 * lag_s)
+    values["roll_time_constant_s"] = roll_s
     values["rate_roll_ff"] = 1.0 / roll_gain
-    values["rate_roll_p"] = max(0.2, lag_s * _ROLL_BANDWIDTH_RAD_S - 1.0) / roll_gain
+    values["rate_roll_p"] = max(0.2, lag_s * _ROLL_BANDWIDTH / roll_s - 1.0) / roll_gain
     values["rate_roll_i"] = 1.0 / roll_gain
     values["rate_roll_integral_max"] = 0.3
-    roll_s = max(0.35, 1.5 * min(lag_s, 0.5))
-    values["roll_time_constant_s"] = roll_s
-    values["roll_rate_max_rad_s"] = min(math.radians(90.0), 0.6 * roll_gain)
+    roll_rate = min(_ROLL_RATE_RAD_S / math.sqrt(envelope.wing_span_m), 0.6 * roll_gain)
+    values["roll_rate_max_rad_s"] = roll_rate
+    values["roll_slew_rad_s"] = min(math.radians(90.0), roll_rate, 0.6 / roll_s)
+    # the bank must be gone when the heading is reached: a slow roller begins to roll out earlier
+    values["heading_p_1_s"] = min(_HEADING_P_1_S, 1.2 * roll_rate / envelope.bank_max_rad)
 
     pitch_gain = envelope.pitch_rate_per_elevator_rad_s
     natural = envelope.short_period_frequency_rad_s
-    missing = max(2.0 * (_PITCH_DAMPING - envelope.short_period_damping) * natural, 0.2 * natural)
+    missing = max(2.0 * (_PITCH_DAMPING - envelope.short_period_damping) * natural, 0.9 * natural)
     values["rate_pitch_ff"] = 0.6 / pitch_gain
     values["rate_pitch_p"] = missing / envelope.pitch_acceleration_per_elevator_rad_s2
-    values["rate_pitch_i"] = 1.0 / pitch_gain
+    values["rate_pitch_i"] = 0.6 / pitch_gain
     values["rate_pitch_integral_max"] = 0.5
     pitch_s = max(0.25, 2.5 / natural)
     values["pitch_time_constant_s"] = pitch_s
@@ -91,7 +96,7 @@ def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> tu
     values["rate_yaw_ff"] = 0.0
     if not envelope.yaw_acceleration_per_rudder_rad_s2 > 0.0:  # no rudder
         values["rate_yaw_p"] = values["rate_yaw_i"] = 0.0
-        return roll_s, pitch_s
+        return pitch_s
     turn = envelope.dutch_roll_frequency_rad_s
     missing = max(2.0 * (_YAW_DAMPING - envelope.dutch_roll_damping) * turn, 0.5)
     yaw_p = missing / envelope.yaw_acceleration_per_rudder_rad_s2
@@ -102,7 +107,7 @@ def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> tu
     side_m_s2_per_rad = pressure_pa * envelope.wing_area_m2 * _SIDE_FORCE_SLOPE_PER_RAD / envelope.mass_kg
     side_per_rudder_m_s2 = side_m_s2_per_rad * max(0.05, abs(envelope.sideslip_per_rudder_rad))
     values["sideslip_gain_rad_s_per_m_s2"] = _SIDESLIP_BANDWIDTH_RAD_S / (2.0 * yaw_p * side_per_rudder_m_s2)
-    return roll_s, pitch_s
+    return pitch_s
 
 
 def _energy_gains(envelope: FlightEnvelope, values: dict[str, float | bool], pitch_s: float) -> None:
@@ -131,14 +136,15 @@ def _energy_gains(envelope: FlightEnvelope, values: dict[str, float | bool], pit
     values["airspeed_time_constant_s"] = max(1.2, 4.5 * pitch_s)
     values["energy_rate_time_constant_s"] = max(0.2, 0.8 * pitch_s)
     values["height_rate_ff"] = 1.0
+    values["height_acceleration_m_s2"] = min(1.5, 0.4 / pitch_s)
     values["pitch_damping"] = 0.6
     values["pitch_integral_1_s"] = 0.45 / values["height_time_constant_s"]
-    values["throttle_damping"] = 1.0
+    values["throttle_damping"] = 0.75 / values["airspeed_time_constant_s"]
     values["throttle_integral_1_s"] = 0.24 / values["airspeed_time_constant_s"]
     # gusts change airspeed and height both: most of the airspeed is the throttle's
     values["speed_weight"] = 0.4 if envelope.powered else 2.0
     values["airspeed_rate_process_noise_m_s2"] = 0.4
     # induced drag grows with the square of the load factor, n^2 - 1 = 2.2 (n - 1) about n = 1.2
-    slow = (envelope.best_glide_speed_m_s / envelope.airspeed_trim_m_s) ** 2
-    induced_share = 0.5 * _G / envelope.glide_ratio * slow
-    values["turn_energy_rate_m2_s3"] = 2.2 * induced_share * envelope.airspeed_trim_m_s
+    aspect_ratio = envelope.wing_span_m**2 / envelope.wing_area_m2
+    induced_m_s2 = _G * lift / (math.pi * _OSWALD_FACTOR * aspect_ratio)
+    values["turn_energy_rate_m2_s3"] = 2.2 * induced_m_s2 * envelope.airspeed_trim_m_s
