@@ -1,6 +1,8 @@
-"""Commands as ArduCopter takes them (reference: ArduPilot 4.6.3, section 3)."""
+"""Commands as every ArduPilot vehicle takes them (reference: ArduPilot 4.6.3, section 3)."""
 
 import math
+from abc import abstractmethod
+from typing import ClassVar
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -8,7 +10,6 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
-from autopilot_bridge.flavours import ardupilot_modes
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_common import (
     AMSL_FRAMES,
@@ -24,11 +25,19 @@ from autopilot_bridge.services.command_common import (
 
 _CUSTOM_MODE_FLAG = 1
 _SERVO_CHANNELS = 32
+_FIRST_FREE_SERVO = 5  # 1 to 4 are motors or surfaces
 _WARNING = mavlink.MAV_SEVERITY_WARNING
 
 
 class ArduPilotCommands(CommandHandlers):
-    """ArduCopter's commands. Everything not in the table is UNSUPPORTED, as in the firmware."""
+    """ArduPilot's commands; a vehicle adds its own. Everything not in the table is UNSUPPORTED, as in the
+    firmware.
+
+    Attributes:
+        reposition_denied: result of a DO_REPOSITION that may not change the mode and is not in GUIDED.
+    """
+
+    reposition_denied: ClassVar[Result]
 
     def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
         super().__init__(commander, hooks)
@@ -36,15 +45,12 @@ class ArduPilotCommands(CommandHandlers):
             **self.table,
             mavlink.MAV_CMD_COMPONENT_ARM_DISARM: self.arm_disarm,
             mavlink.MAV_CMD_DO_SET_MODE: self.set_mode,
-            mavlink.MAV_CMD_NAV_TAKEOFF: self.takeoff,
             mavlink.MAV_CMD_NAV_LOITER_UNLIM: self.loiter,
             mavlink.MAV_CMD_DO_REPOSITION: self.reposition,
             mavlink.MAV_CMD_DO_CHANGE_SPEED: self.change_speed,
-            mavlink.MAV_CMD_CONDITION_YAW: self.turn,
             mavlink.MAV_CMD_MISSION_START: self.start_mission,
             mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: self.set_mission_current,
             mavlink.MAV_CMD_DO_SET_HOME: self.set_home,
-            mavlink.MAV_CMD_DO_PAUSE_CONTINUE: self.pause_continue,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.terminate,
             mavlink.MAV_CMD_DO_SET_SERVO: self.set_servo,
             mavlink.MAV_CMD_DO_GRIPPER: self.fail,
@@ -53,6 +59,10 @@ class ArduPilotCommands(CommandHandlers):
             mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self.calibrate,
             mavlink.MAV_CMD_PREFLIGHT_STORAGE: self.storage,
         }
+
+    @abstractmethod
+    def commanded_mode(self, number: int) -> FlightMode | None:
+        """The mode of a custom_mode number; None where a client can't select it."""
 
     def set_mode_message(self, base_mode: int, custom_mode: int) -> None:
         """SET_MODE: works, never acknowledged."""
@@ -65,7 +75,7 @@ class ArduPilotCommands(CommandHandlers):
     def _set_mode(self, base_mode: int, number: int) -> Result:
         if not base_mode & _CUSTOM_MODE_FLAG:
             return Result.DENIED
-        mode = ardupilot_modes.commanded_mode(number)
+        mode = self.commanded_mode(number)
         if mode is None:
             self.commander.emit(
                 ModeDenied(
@@ -76,25 +86,25 @@ class ArduPilotCommands(CommandHandlers):
                 )
             )
             return Result.FAILED
+        return self.set_flight_mode(mode)
+
+    def set_flight_mode(self, mode: FlightMode) -> Result:
+        """A mode that a client has chosen."""
         return self.commander.set_mode(mode).result
+
+    @staticmethod
+    def is_forced(command: Command) -> bool:
+        """COMPONENT_ARM_DISARM: p2 is the number that goes over the checks."""
+        return command.p2 == FORCE_NUMBER
 
     def arm_disarm(self, command: Command, source: Source) -> Result:
         """COMPONENT_ARM_DISARM: p1 exactly 1 or 0."""
-        forced = command.p2 == FORCE_NUMBER
+        forced = self.is_forced(command)
         if command.p1 == 1.0:
             return self.commander.arm(forced=forced).result
         if command.p1 == 0.0:
             return self.commander.disarm(forced=forced).result
         return Result.UNSUPPORTED
-
-    def takeoff(self, command: Command, source: Source) -> Result:
-        """NAV_TAKEOFF: altitude over home; in GUIDED, armed, on the ground."""
-        if command.is_int and command.frame not in RELATIVE_FRAMES:
-            return Result.DENIED
-        if not (math.isfinite(command.z) and command.z > 0.0):
-            return Result.FAILED
-        down_m = self.down_from(command.z, relative=True)
-        return self.commander.guidance.takeoff(down_m=down_m, yaw_rad=math.nan).result
 
     def loiter(self, command: Command, source: Source) -> Result:
         """NAV_LOITER_UNLIM: mode LOITER."""
@@ -112,30 +122,24 @@ class ArduPilotCommands(CommandHandlers):
             return Result.DENIED
         change = flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE
         if not change and self.commander.mode is not FlightMode.GUIDED:
-            return Result.DENIED
+            return self.reposition_denied
         north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
         verdict = self.commander.guidance.reposition(
-            north_m=north_m, east_m=east_m, down_m=down_m, yaw_rad=math.nan, speed_m_s=command.p1
+            north_m=north_m,
+            east_m=east_m,
+            down_m=down_m,
+            speed_m_s=command.p1,
+            radius_m=self.radius_of(command),
         )
         return Result.ACCEPTED if verdict.accepted else Result.FAILED
 
+    def radius_of(self, command: Command) -> float:
+        """Radius of DO_REPOSITION's circle, positive clockwise; NaN: there is none."""
+        return math.nan
+
+    @abstractmethod
     def change_speed(self, command: Command, source: Source) -> Result:
         """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed."""
-        if not command.p2 > 0.0 or not math.isfinite(command.p2):
-            return Result.FAILED
-        self.commander.guidance.change_speed(command.p2, kind=whole(command.p1, 1) or 0)
-        return Result.ACCEPTED
-
-    def turn(self, command: Command, source: Source) -> Result:
-        """CONDITION_YAW: p1 deg, p2 deg/s, p3 direction, p4 1 = relative."""
-        if not 0.0 <= command.p1 <= 360.0 or command.p4 not in (0.0, 1.0):
-            return Result.FAILED
-        direction = whole(command.p3, 0) or 0
-        yaw_rad = math.radians(command.p1)
-        if command.p4 == 1.0:
-            yaw_rad = self.heading_rad() + (-yaw_rad if direction < 0 else yaw_rad)
-        self.commander.guidance.turn(yaw_rad)
-        return Result.ACCEPTED
 
     def start_mission(self, command: Command, source: Source) -> Result:
         """MISSION_START: whole missions only."""
@@ -166,19 +170,6 @@ class ArduPilotCommands(CommandHandlers):
         placed = self.commander.set_home(command.x, command.y, altitude_m)
         return Result.ACCEPTED if placed else Result.FAILED
 
-    def pause_continue(self, command: Command, source: Source) -> Result:
-        """DO_PAUSE_CONTINUE: 0 holds, 1 goes on; in AUTO and GUIDED."""
-        action = whole(command.p1)
-        if action not in (0, 1):
-            return Result.DENIED
-        guidance = self.commander.guidance
-        done = guidance.pause() if action == 0 else guidance.resume()
-        if done.accepted:
-            return Result.ACCEPTED
-        if action == 0:
-            return self.deny(command, Reason.WRONG_MODE, Result.FAILED)
-        return Result.FAILED
-
     def terminate(self, command: Command, source: Source) -> Result:
         """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors for good."""
         if not command.p1 > 0.5:
@@ -189,7 +180,7 @@ class ArduPilotCommands(CommandHandlers):
     def set_servo(self, command: Command, source: Source) -> Result:
         """DO_SET_SERVO: outputs without a function can be set (and drive nothing here)."""
         channel = whole(command.p1)
-        if channel is None or not 5 <= channel <= _SERVO_CHANNELS:  # 1 to 4 are motors
+        if channel is None or not _FIRST_FREE_SERVO <= channel <= _SERVO_CHANNELS:
             return Result.FAILED
         return Result.ACCEPTED
 

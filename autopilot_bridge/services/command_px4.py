@@ -104,8 +104,17 @@ class Px4Commands(CommandHandlers):
             return Result.DENIED
         north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
         return self.commander.guidance.reposition(
-            north_m=north_m, east_m=east_m, down_m=down_m, yaw_rad=command.p4, speed_m_s=command.p1
+            north_m=north_m,
+            east_m=east_m,
+            down_m=down_m,
+            yaw_rad=command.p4,
+            speed_m_s=command.p1,
+            radius_m=self.radius_of(command),
         ).result
+
+    def radius_of(self, command: Command) -> float:
+        """Radius of DO_REPOSITION's circle, positive clockwise; NaN: there is none."""
+        return math.nan
 
     def orbit(self, command: Command, source: Source) -> Result:
         """DO_ORBIT: p1 radius (negative: counter-clockwise), p2 speed, p3 ORBIT_YAW_BEHAVIOUR, centre."""

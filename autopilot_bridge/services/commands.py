@@ -1,5 +1,6 @@
 """The MAVLink command protocol, autopilot side: COMMAND_LONG, COMMAND_INT, SET_MODE, acknowledgements."""
 
+from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -7,14 +8,24 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.services.channel import AddressRule, MavlinkMessage, Source
-from autopilot_bridge.services.command_ardupilot import ArduPilotCommands
+from autopilot_bridge.services.command_arducopter import ArduCopterCommands
+from autopilot_bridge.services.command_arduplane import ArduPlaneCommands
 from autopilot_bridge.services.command_common import CommandHandlers, CommandHooks, command_from_message
 from autopilot_bridge.services.command_px4 import Px4Commands
+from autopilot_bridge.services.command_px4_plane import Px4PlaneCommands
+from autopilot_bridge.services.vehicle_class import is_aircraft
 
 _COMMANDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT})
 _SET_MODE: Final = mavlink.MAVLINK_MSG_ID_SET_MODE
 _CANCEL: Final = 80  # COMMAND_CANCEL, which not every release of the dialect knows
-_HANDLERS: Final = {"px4": Px4Commands, "ardupilot": ArduPilotCommands}
+_MULTICOPTERS: Final[Mapping[str, type[CommandHandlers]]] = {
+    "px4": Px4Commands,
+    "ardupilot": ArduCopterCommands,
+}
+_AIRCRAFT: Final[Mapping[str, type[CommandHandlers]]] = {
+    "px4": Px4PlaneCommands,
+    "ardupilot": ArduPlaneCommands,
+}
 
 
 class CommandService:
@@ -33,8 +44,9 @@ class CommandService:
     def for_flavour(
         cls, name: str, commander: Commander, hooks: CommandHooks, address: AddressRule
     ) -> "CommandService":
-        """The command service of a flavour, by name."""
-        return cls(_HANDLERS[name](commander, hooks), address)
+        """The command service of a flavour, by name, for the commander's class of vehicle."""
+        handlers = _AIRCRAFT if is_aircraft(commander) else _MULTICOPTERS
+        return cls(handlers[name](commander, hooks), address)
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL or SET_MODE; never raises on contents."""

@@ -1,0 +1,39 @@
+"""Commands as PX4 takes them on a fixed wing (reference: PX4 v1.16.1, sections 4 and 7)."""
+
+import math
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.services.channel import Source
+from autopilot_bridge.services.command_common import RELATIVE_FRAMES, Command, CommandHooks
+from autopilot_bridge.services.command_px4 import Px4Commands
+
+
+class Px4PlaneCommands(Px4Commands):
+    """PX4's commands for an aircraft: those of a multicopter; places are circled.
+
+    DO_ORBIT stays in Hold, which circles (`CommanderPolicy.orbit_mode`).
+    """
+
+    def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
+        super().__init__(commander, hooks)
+        self.table = {**self.table, mavlink.MAV_CMD_DO_GO_AROUND: self.go_around}
+
+    def takeoff(self, command: Command, source: Source) -> Result:
+        """NAV_TAKEOFF: altitude over mean sea level (none: MIS_TAKEOFF_ALT over home), place to circle at."""
+        north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
+        verdict = self.commander.guidance.takeoff(
+            down_m=down_m, yaw_rad=math.nan, north_m=north_m, east_m=east_m
+        )
+        return verdict.result
+
+    def radius_of(self, command: Command) -> float:
+        """DO_REPOSITION: p3 radius, negative counter-clockwise; 0 or NaN: NAV_LOITER_RAD."""
+        return command.p3
+
+    def go_around(self, command: Command, source: Source) -> Result:
+        """DO_GO_AROUND: breaks off a landing."""
+        gone = self.commander.guidance.go_around()
+        return Result.ACCEPTED if gone.accepted else Result.TEMPORARILY_REJECTED
