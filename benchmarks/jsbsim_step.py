@@ -2,23 +2,28 @@
 
     python benchmarks/jsbsim_step.py [--steps 20000] [--turbulence moderate]
 
-Prints microseconds per step (best of five runs) in the air and on the ground, and their ratio.
+Prints microseconds per step (best of five runs) of the quadrotor and the aircraft, in the air and on the
+ground, and their ratio.
 """
 
 import argparse
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flightsim.airframe import load_airframe
+from flightsim.actuation import FixedWingActuators
+from flightsim.airframe import AirframeKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import load_fdm
 from flightsim.trim import trim_hover
+from flightsim.trim_flight import trim_flight
 from flightsim.vehicle import Vehicle
 
 
@@ -42,30 +47,50 @@ def main() -> None:
     parser.add_argument("--turbulence", default="none")
     options = parser.parse_args()
     home, air = Home(), Environment(turbulence=options.turbulence)
-    airframe = load_airframe("iris")
     hover = trim_hover(home=home)
-    actuators = np.zeros(MAX_ACTUATORS)
-    states = {
-        "hover": InitialState(
-            height_m=500.0, roll_rad=hover.roll_rad, pitch_rad=hover.pitch_rad, rotor_rad_s=hover.rotor_rad_s
-        ),
-        "ground": InitialState(),
-    }
-    for name, state in states.items():
-        flying = name == "hover"
-        actuators[: len(hover.actuators)] = hover.actuators if flying else 0.0
-        fdm, _ = load_fdm(airframe, 250)
-        initialise(fdm, airframe, home, air, state)
-        for command, value in zip(airframe.actuators, actuators, strict=False):
-            fdm.set_property_value(command, float(value))
-        alone = microseconds_per_call(fdm.run, options.steps)
-        vehicle = Vehicle(home=home, environment=air, seed_sequence=np.random.SeedSequence(0), initial=state)
+    cruise = trim_flight("aerosonde", airspeed_m_s=25.0, home=home, height_m=500.0)
+    hovering = InitialState(
+        height_m=500.0, roll_rad=hover.roll_rad, pitch_rad=hover.pitch_rad, rotor_rad_s=hover.rotor_rad_s
+    )
+    cases = (
+        ("iris", "hover", hovering, hover.actuators),
+        ("iris", "ground", InitialState(), ()),
+        ("aerosonde", "cruise", cruise.initial_state(height_m=500.0), cruise.actuators),
+        ("aerosonde", "ground", InitialState(), ()),
+    )
+    for model, name, state, commands in cases:
+        actuators = np.zeros(MAX_ACTUATORS)
+        actuators[: len(commands)] = commands
+        alone = jsbsim_alone(model, state, actuators, home, air, options.steps)
+        vehicle = Vehicle(
+            model, home=home, environment=air, seed_sequence=np.random.SeedSequence(0), initial=state
+        )
         vehicle.step(actuators)
-        whole = microseconds_per_call(lambda vehicle=vehicle: vehicle.step(actuators), options.steps)
+        whole = microseconds_per_call(partial(vehicle.step, actuators), options.steps)
         sys.stdout.write(
-            f"{name:>7}: JSBSim alone {alone:5.2f} us, Vehicle.step {whole:5.2f} us, "
+            f"{model:>10} {name:>7}: JSBSim alone {alone:5.2f} us, Vehicle.step {whole:5.2f} us, "
             f"ratio {whole / alone:4.2f}\n"
         )
+
+
+def jsbsim_alone(
+    model: str,
+    state: InitialState,
+    actuators: NDArray[np.float64],
+    home: Home,
+    air: Environment,
+    steps: int,
+) -> float:
+    """Microseconds of a JSBSim step, nothing around it."""
+    airframe = load_airframe(model)
+    fdm, _ = load_fdm(airframe, 250)
+    initialise(fdm, airframe, home, air, state)
+    if airframe.kind is AirframeKind.FIXED_WING:
+        FixedWingActuators(fdm, airframe).write(actuators.tolist())
+    else:
+        for command, value in zip(airframe.actuators, actuators, strict=False):
+            fdm.set_property_value(command, float(value))
+    return microseconds_per_call(fdm.run, steps)
 
 
 if __name__ == "__main__":

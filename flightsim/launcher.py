@@ -146,28 +146,26 @@ class Launcher:
         """Set force and moment for the next physics step."""
         if self.released:
             return
-        acceleration_m_s2 = 0.0 if self.held else self._advance()
-        if self.released:
+        if self._speed_m_s >= self.parameters.speed_m_s and self.distance_m >= self.parameters.length_m:
+            self.released = True
             for set_value in (*self._set_force, *self._set_moment):
                 set_value(0.0)
             return
+        acceleration_m_s2 = 0.0 if self.held else self._acceleration_m_s2()
         motion = [get() for get in self._motion]
         self._push(motion, acceleration_m_s2)
         self._turn(motion)
+        if not self.held:  # the carriage moves on as the vehicle is about to
+            self._speed_m_s += acceleration_m_s2 * self._dt_s
+            self.distance_m += self._speed_m_s * self._dt_s
+            self.time_s += self._dt_s
 
-    def _advance(self) -> float:
-        """Move the carriage by one step; its acceleration, m/s2."""
-        parameters = self.parameters
-        if self._speed_m_s >= parameters.speed_m_s and self.distance_m >= parameters.length_m:
-            self.released = True
+    def _acceleration_m_s2(self) -> float:
+        """Of the carriage, in the coming step."""
+        if self._speed_m_s >= self.parameters.speed_m_s:
             return 0.0
-        self.time_s += self._dt_s
-        acceleration = 0.0
-        if self._speed_m_s < parameters.speed_m_s:
-            acceleration = parameters.acceleration_m_s2 * min(1.0, self.time_s / _RISE_S)
-        self._speed_m_s += acceleration * self._dt_s
-        self.distance_m += self._speed_m_s * self._dt_s
-        return acceleration
+        rise = min(1.0, (self.time_s + self._dt_s) / _RISE_S)
+        return self.parameters.acceleration_m_s2 * rise
 
     def _push(self, motion: list[float], acceleration_m_s2: float) -> None:
         radius_m = motion[12] * _FT
