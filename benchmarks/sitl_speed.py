@@ -1,11 +1,11 @@
 """How fast the whole SITL runs: simulated seconds per wall second, beside JSBSim alone on the same model.
 
-    python benchmarks/sitl_speed.py [--seconds 120]
+    python benchmarks/sitl_speed.py [--model iris] [--model aerosonde] [--autopilot px4] [--seconds 120]
 
-One process, warm (everything compiled and flown before the clock starts). A quadrotor orbits at 250 Hz
-physics under the px4 flavour; its default onboard telemetry goes over a memory link and, with the truth, into
-a log, as `flightstack fly` does it. Then the same for 2, 4 and 8 vehicles in one world, and where the time of
-one vehicle goes.
+One process, warm (everything compiled and flown before the clock starts). A vehicle flies a mission at 250 Hz
+physics; its default onboard telemetry goes over a memory link and, with the truth, into a log, as
+`flightstack fly` does it. Then the same for several vehicles in one world, and where the time of one vehicle
+goes.
 """
 
 import argparse
@@ -20,26 +20,31 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.geodesy import LocalFrame
-from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, team
 from autopilot_bridge.tlog import TlogWriter
+from flightsim.airframe import AirframeKind, load_airframe
 
 PHYSICS_RATE_HZ = 250
+TEAMS = {AirframeKind.MULTICOPTER: (1, 2, 4, 8), AirframeKind.FIXED_WING: (1, 3)}
 
 
 def round_trip(vehicle: SitlVehicle) -> tuple[MissionItem, ...]:
-    """Takeoff, and a square of 60 m flown again and again."""
+    """Takeoff, and a square flown again and again: 60 m a side, or 500 m for an aircraft."""
     home = vehicle.autopilot.commander.home.position
     assert home is not None
     frame = LocalFrame(home)
-    corners = ((0.0, 0.0), (60.0, 0.0), (60.0, 60.0), (0.0, 60.0))
+    wings = vehicle.vehicle.airframe.kind is AirframeKind.FIXED_WING
+    side_m, height_m = (500.0, 60.0) if wings else (60.0, 10.0)
+    corners = ((side_m, 0.0), (side_m, side_m), (0.0, side_m), (0.0, 0.0))
     places = [frame.geodetic_from_ned(north_m, east_m, 0.0) for north_m, east_m in corners]
     waypoints = [
-        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0, param4=math.nan)
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=height_m, param4=math.nan)
         for lat, lon, _ in places
     ]
-    takeoff = MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, x=places[0][0], y=places[0][1], z=10.0)
+    takeoff = MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, x=places[0][0], y=places[0][1], z=height_m)
+    if vehicle.autopilot.commander.policy.mission_first_item:  # item 0 is home
+        waypoints.insert(0, takeoff)
     again = MissionItem(
         command=mavlink.MAV_CMD_DO_JUMP, frame=mavlink.MAV_FRAME_MISSION, param1=1.0, param2=1000.0
     )
@@ -49,22 +54,24 @@ def round_trip(vehicle: SitlVehicle) -> tuple[MissionItem, ...]:
 class Flight:
     """A team in the air with a client on each vehicle, everything logged."""
 
-    def __init__(self, vehicles: int, log: Path) -> None:
+    def __init__(self, vehicles: int, model: str, flavour: str, log: Path) -> None:
         self.sitl = Sitl(
-            SitlConfiguration(vehicles=team(vehicles, model="iris", flavour="px4", parameters={}), seed=1)
+            SitlConfiguration(vehicles=team(vehicles, model=model, flavour=flavour, parameters={}), seed=1)
         )
         self.log = TlogWriter(log)
-        self.encoder = FrameEncoder(255, 190)
         self.links = self.sitl.record(self.log)
 
     def take_off(self) -> None:
         """Store a mission that goes round and round, arm, take off."""
-        self.run(8.0)
-        for vehicle in self.sitl.vehicles:
-            vehicle.autopilot.commander.missions.replace(round_trip(vehicle), plan_id=1)
-        self._command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 4.0, 4.0)
-        self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
-        self.run(20.0)
+        commanders = [vehicle.autopilot.commander for vehicle in self.sitl.vehicles]
+        while not all(commander.armable and commander.home.position for commander in commanders):
+            self.run(1.0)
+        for vehicle, commander in zip(self.sitl.vehicles, commanders, strict=True):
+            commander.missions.replace(round_trip(vehicle), plan_id=1)
+            commander.set_mode(FlightMode.MISSION)
+            commander.arm()
+            commander.guidance.start_mission()
+        self.run(40.0)
         for vehicle in self.sitl.vehicles:
             mode = vehicle.autopilot.commander.mode
             assert mode is FlightMode.MISSION and vehicle.autopilot.commander.airborne, (
@@ -77,13 +84,6 @@ class Flight:
         end_us = sitl.time_us + round(seconds * 1e6)
         while sitl.time_us < end_us:
             sitl.advance()
-
-    def _command(self, command: int, *parameters: float) -> None:
-        values = (*parameters, *(0.0,) * (7 - len(parameters)))
-        for index, link in enumerate(self.links):
-            message = mavlink.MAVLink_command_long_message(index + 1, 1, command, 0, *values)
-            link.send(self.encoder.encode(message))
-        self.run(0.1)
 
     def close(self) -> None:
         """Close links and log."""
@@ -108,9 +108,9 @@ def repeated(step: Callable[[], object], count: int) -> float:
     return timed(loop) / count * 1e6
 
 
-def jsbsim_alone(seconds: float) -> float:
-    """Simulated seconds per wall second of JSBSim's own `run` on our model, hovering."""
-    sitl = Sitl(SitlConfiguration())
+def jsbsim_alone(model: str, seconds: float) -> float:
+    """Simulated seconds per wall second of JSBSim's own `run` on a model."""
+    sitl = Sitl(SitlConfiguration(vehicles=team(1, model=model, flavour="px4", parameters={})))
     run = sitl.vehicles[0].vehicle._fdm.run  # the bare library call
     return 1e6 / PHYSICS_RATE_HZ / repeated(run, round(seconds * PHYSICS_RATE_HZ))
 
@@ -140,38 +140,46 @@ def where_time_goes(flight: Flight, seconds: float) -> dict[str, float]:
     return parts
 
 
+def measure(model: str, flavour: str, seconds: float, folder: Path) -> None:
+    """Print the tables of one model."""
+    out = sys.stdout.write
+    base = jsbsim_alone(model, seconds)
+    out(f"{model}, {flavour}; JSBSim alone, one vehicle, {PHYSICS_RATE_HZ} Hz: {base:.0f} sim s / wall s\n")
+    out("vehicles  sim s / wall s  vehicle s / wall s  of JSBSim alone  messages/s\n")
+    for vehicles in TEAMS[load_airframe(model).kind]:
+        flight = Flight(vehicles, model, flavour, folder / f"{Path(model).stem}{vehicles}.tlog")
+        flight.take_off()
+        before = flight.log.records
+        wall_s = timed(lambda flight=flight: flight.run(seconds))
+        speed = seconds / wall_s
+        rate = (flight.log.records - before) / seconds / vehicles
+        share = speed * vehicles / base
+        out(f"{vehicles:>8} {speed:>15.0f} {speed * vehicles:>19.0f} {share:>16.0%} {rate:>11.0f}\n")
+        if vehicles == 1:
+            one = flight
+            step_us = wall_s / seconds / PHYSICS_RATE_HZ * 1e6
+        else:
+            flight.close()
+    parts = where_time_goes(one, seconds)
+    out(f"one vehicle: {step_us:.1f} us per physics step, of which\n")
+    for name, cost_us in parts.items():
+        out(f"  {name:<28} {cost_us:5.1f} us\n")
+    measured = sum(cost for name, cost in parts.items() if name != "JSBSim")
+    out(f"  {'slow loop, MAVLink, log':<28} {step_us - measured:5.1f} us (the rest)\n\n")
+    one.close()
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    parser.add_argument("--model", action="append", help="may be given several times; iris and aerosonde")
+    parser.add_argument("--autopilot", default="px4", choices=("px4", "ardupilot"))
     parser.add_argument("--seconds", type=float, default=120.0, help="vehicle seconds per measurement")
-    seconds = parser.parse_args().seconds
-    out = sys.stdout.write
+    arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        base = jsbsim_alone(seconds)
-        out(f"JSBSim alone, one quadrotor, {PHYSICS_RATE_HZ} Hz: {base:6.0f} simulated s per wall s\n")
-        out("vehicles  sim s / wall s  vehicle s / wall s  of JSBSim alone  messages/s\n")
-        for vehicles in (1, 2, 4, 8):
-            flight = Flight(vehicles, Path(folder) / f"{vehicles}.tlog")
-            flight.take_off()
-            before = flight.log.records
-            wall_s = timed(lambda flight=flight: flight.run(seconds))
-            speed = seconds / wall_s
-            rate = (flight.log.records - before) / seconds / vehicles
-            share = speed * vehicles / base
-            out(f"{vehicles:>8} {speed:>15.0f} {speed * vehicles:>19.0f} {share:>16.0%} {rate:>11.0f}\n")
-            if vehicles == 1:
-                one = flight
-                step_us = wall_s / seconds / PHYSICS_RATE_HZ * 1e6
-            else:
-                flight.close()
-        parts = where_time_goes(one, seconds)
-        out(f"\none vehicle: {step_us:.1f} us per physics step, of which\n")
-        for name, cost_us in parts.items():
-            out(f"  {name:<28} {cost_us:5.1f} us\n")
-        measured = sum(cost for name, cost in parts.items() if name != "JSBSim")
-        out(f"  {'slow loop, MAVLink, log':<28} {step_us - measured:5.1f} us (the rest)\n")
-        one.close()
+        for model in arguments.model or ("iris", "aerosonde"):
+            measure(model, arguments.autopilot, arguments.seconds, Path(folder))
 
 
 if __name__ == "__main__":
