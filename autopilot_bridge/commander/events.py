@@ -259,3 +259,10 @@ class LandingAborted(Event):
     """A landing was broken off; the aircraft climbs to a height over home (NaN: as it was set before)."""
 
     height_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AltitudeChanged(Event):
+    """A streamed setpoint asked an aircraft for another height over home."""
+
+    height_m: float

@@ -72,6 +72,8 @@ def _flight(event: events.Event) -> tuple[Notice, ...]:
             text = f"Reached waypoint #{index} dist {distance_m:.0f}m"
         case events.MissionFinished(landed=False):
             text = "Mission complete, changing mode to RTL"
+        case events.AltitudeChanged(height_m=height_m):
+            text = f"Change alt to {height_m:.1f}"
         case events.LandingApproachStarted(height_m=height_m):
             text = f"Landing approach start at {height_m:.1f}m"
         case events.FlareStarted(height_m=height_m, sink_m_s=sink, ground_speed_m_s=speed):

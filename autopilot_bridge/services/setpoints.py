@@ -5,8 +5,8 @@ PX4 flies them in OFFBOARD as they come and counts the good ones as a sign of li
 """
 
 import math
-from collections.abc import Mapping
-from typing import Final
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -14,6 +14,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.flight.guided import GuidedTask
 from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.setpoint_arduplane import ArduPlaneSetpoints
 from autopilot_bridge.services.setpoint_frames import (
     ACCELERATION_BITS,
     FORCE_BIT,
@@ -32,6 +33,7 @@ from autopilot_bridge.services.setpoint_frames import (
     velocity_of,
     yaw_of,
 )
+from autopilot_bridge.services.vehicle_class import is_aircraft
 
 _LOCAL: Final = mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
 _GLOBAL: Final = mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
@@ -57,6 +59,16 @@ _ARDUPILOT_OFFSET_FRAMES: Final = frozenset(
 _ARDUPILOT_BODY_FRAMES: Final = frozenset({mavlink.MAV_FRAME_BODY_NED, mavlink.MAV_FRAME_BODY_OFFSET_NED})
 
 
+class SetpointRules(Protocol):
+    """How one firmware takes each kind of setpoint; bad ones are ignored."""
+
+    def on_local(self, message: MavlinkMessage, time_us: int) -> None: ...
+
+    def on_global(self, message: MavlinkMessage, time_us: int) -> None: ...
+
+    def on_attitude(self, message: MavlinkMessage, time_us: int) -> None: ...
+
+
 class SetpointService:
     """Hands setpoints to the commander's stream.
 
@@ -66,7 +78,8 @@ class SetpointService:
     """
 
     def __init__(self, flavour: str, commander: Commander) -> None:
-        self._rules: Px4Setpoints | ArduPilotSetpoints = _RULES[flavour](commander)
+        rules = _AIRCRAFT if is_aircraft(commander) else _MULTICOPTERS
+        self._rules: SetpointRules = rules[flavour](commander)
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take one setpoint; bad ones are ignored, as the flavour does."""
@@ -157,8 +170,8 @@ class Px4Setpoints:
         stream.note(time_us, needs_position=False)
 
 
-class ArduPilotSetpoints:
-    """ArduPilot: position, velocity and acceleration are taken or ignored whole; only GUIDED listens."""
+class ArduCopterSetpoints:
+    """ArduCopter: position, velocity and acceleration are taken or ignored whole; only GUIDED listens."""
 
     def __init__(self, commander: Commander) -> None:
         self.commander = commander
@@ -271,9 +284,13 @@ class ArduPilotSetpoints:
         return commander.guidance.guided()
 
 
-_RULES: Final[Mapping[str, type[Px4Setpoints] | type[ArduPilotSetpoints]]] = {
+_MULTICOPTERS: Final[Mapping[str, Callable[[Commander], SetpointRules]]] = {
     "px4": Px4Setpoints,
-    "ardupilot": ArduPilotSetpoints,
+    "ardupilot": ArduCopterSetpoints,
+}
+_AIRCRAFT: Final[Mapping[str, Callable[[Commander], SetpointRules]]] = {
+    "px4": Px4Setpoints,  # the offboard task of an aircraft has the same setters
+    "ardupilot": ArduPlaneSetpoints,
 }
 
 
