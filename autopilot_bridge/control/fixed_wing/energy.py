@@ -119,6 +119,75 @@ def _wanted_climb(nav: Array, sp: Array, p: Array, s: Array, dt: float, hold: bo
 
 
 @kernel
+def _fly_pitch(sp: Array, p: Array, s: Array, dt: float, speed: float, under: float) -> None:
+    """PITCH_SETPOINT that flies the rate of the energy balance; `speed` is the true airspeed."""
+    lowest = sp[_PITCH_MIN] if math.isfinite(sp[_PITCH_MIN]) else p[c.PITCH_MIN]
+    highest = sp[_PITCH_MAX] if math.isfinite(sp[_PITCH_MAX]) else p[c.PITCH_MAX]
+    # a climb-out's least pitch gives way before the wing stalls
+    lowest = (1.0 - under) * lowest + under * min(lowest, p[c.PITCH_MIN])
+    highest = max(highest, lowest)
+    per_rad = speed * GRAVITY_M_S2
+    wanted = s[c.BALANCE_RATE_SETPOINT] / per_rad
+    missing = wanted - s[c.BALANCE_RATE] / per_rad
+    previous = s[c.PITCH_SETPOINT]
+    step = p[c.PITCH_I] * missing * dt
+    winding = (previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)
+    if s[c.GROUND_CONTACT] == 0.0 and not winding:
+        s[c.PITCH_INTEGRAL] = _clip(s[c.PITCH_INTEGRAL] + step, lowest - highest, highest - lowest)
+    pitch = (
+        _trim_pitch(s[c.AIRSPEED_SETPOINT], p, s)
+        + p[c.PITCH_DAMPING] * missing
+        + p[c.BALANCE_FF] * wanted
+        + s[c.PITCH_INTEGRAL]
+    )
+    change = dt * p[c.VERTICAL_ACCELERATION] / speed
+    s[c.PITCH_SETPOINT] = _clip(_clip(pitch, lowest, highest), previous - change, previous + change)
+
+
+@kernel
+def _fly_throttle(sp: Array, p: Array, s: Array, dt: float, under: float) -> None:
+    """THROTTLE that flies the rate of the total energy."""
+    lowest, highest = p[c.THROTTLE_MIN], p[c.THROTTLE_MAX]
+    if math.isfinite(sp[_THROTTLE_MAX]):
+        highest = _clip(sp[_THROTTLE_MAX], 0.0, highest)
+        lowest = min(lowest, highest)
+    rate_max, rate_min = GRAVITY_M_S2 * p[c.CLIMB_MAX], -GRAVITY_M_S2 * p[c.SINK_MIN]
+    wanted = s[c.ENERGY_RATE_SETPOINT]
+    trim = _clip(_trim_throttle(s[c.AIRSPEED_SETPOINT], p), lowest, highest)
+    if wanted >= 0.0:
+        throttle = trim + wanted / rate_max * (highest - trim)
+    else:
+        throttle = trim + wanted / rate_min * (lowest - trim)
+    missing = (wanted - s[c.ENERGY_RATE]) / (rate_max - rate_min)
+    previous = s[c.THROTTLE]
+    known = s[c.EAS_KNOWN] != 0.0
+    if known and s[c.GROUND_CONTACT] == 0.0:
+        step = p[c.THROTTLE_I] * missing * dt * (1.0 - under)
+        if not ((previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)):
+            s[c.THROTTLE_INTEGRAL] = _clip(s[c.THROTTLE_INTEGRAL] + step, -1.0, 1.0)
+    # without airspeed a positive integral stays: it was needed when there was one (PX4)
+    integral = s[c.THROTTLE_INTEGRAL] if known else max(0.0, s[c.THROTTLE_INTEGRAL])
+    throttle += p[c.THROTTLE_DAMPING] * missing + integral
+    throttle = _clip(under * highest + (1.0 - under) * throttle, lowest, highest)
+    if p[c.THROTTLE_SLEW] > 0.0:
+        change = p[c.THROTTLE_SLEW] * dt
+        throttle = _clip(throttle, previous - change, previous + change)
+    s[c.THROTTLE] = _clip(throttle, lowest, highest)
+
+
+@kernel
+def _wanted_speed_rate(p: Array, s: Array, speed: float, weight: float) -> float:
+    """Rate of change of the true airspeed to fly, m/s^2, within what half of the power can do."""
+    if s[c.EAS_KNOWN] == 0.0:
+        return 0.0
+    faster = 0.5 * GRAVITY_M_S2 * p[c.CLIMB_MAX] / speed
+    slower = -0.5 * GRAVITY_M_S2 * p[c.SINK_MIN] / speed
+    if weight >= 2.0:
+        faster, slower = _PITCH_ONLY_ACCELERATION_M_S2, -_PITCH_ONLY_ACCELERATION_M_S2
+    return _clip((s[c.AIRSPEED_SETPOINT] * s[c.EAS_TO_TAS] - speed) / p[c.AIRSPEED_TC], slower, faster)
+
+
+@kernel
 def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
     """One guidance step: writes PITCH_SETPOINT, THROTTLE and what led to them."""
     pitch_given, throttle_given = math.isfinite(sp[_PITCH]), math.isfinite(sp[_THROTTLE])
@@ -137,14 +206,11 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     under = 0.0 if flare else _underspeed(p, s, load_factor)
     s[c.UNDERSPEED] = under
 
-    # airspeed
     airspeed_min = min(p[c.AIRSPEED_MAX], p[c.AIRSPEED_MIN] * math.sqrt(load_factor))
     airspeed = sp[_AIRSPEED] if math.isfinite(sp[_AIRSPEED]) else p[c.AIRSPEED_TRIM]
     airspeed = max(airspeed, s[c.AIRSPEED_FLOOR])
-    airspeed = _clip(under * airspeed_min + (1.0 - under) * airspeed, airspeed_min, p[c.AIRSPEED_MAX])
-    s[c.AIRSPEED_SETPOINT] = airspeed
-    speed = max(_MIN_SPEED_M_S, s[c.EAS] * s[c.EAS_TO_TAS])
-    energy_max, energy_min = GRAVITY_M_S2 * p[c.CLIMB_MAX], -GRAVITY_M_S2 * p[c.SINK_MIN]
+    airspeed = under * airspeed_min + (1.0 - under) * airspeed
+    s[c.AIRSPEED_SETPOINT] = _clip(airspeed, airspeed_min, p[c.AIRSPEED_MAX])
 
     weight = p[c.SPEED_WEIGHT] if powered else 2.0
     if not known or flare:
@@ -152,91 +218,33 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     elif throttle_given and not climb_given:
         weight = 2.0
     weight = 2.0 * under + (1.0 - under) * weight
-    speed_rate = 0.0
-    if known:
-        faster, slower = 0.5 * energy_max / speed, 0.5 * energy_min / speed
-        if weight >= 2.0:
-            faster, slower = _PITCH_ONLY_ACCELERATION_M_S2, -_PITCH_ONLY_ACCELERATION_M_S2
-        wanted_speed = airspeed * s[c.EAS_TO_TAS]
-        speed_rate = _clip((wanted_speed - speed) / p[c.AIRSPEED_TC], slower, faster)
-    if not powered and not known:
-        wanted_climb = -p[c.SINK_MIN]  # its glide, by the attitude it should have
+
+    speed = max(_MIN_SPEED_M_S, s[c.EAS] * s[c.EAS_TO_TAS])
     potential_rate = GRAVITY_M_S2 * climb
     kinetic_rate = speed * s[c.EAS_RATE] * s[c.EAS_TO_TAS]
-    wanted_potential_rate = GRAVITY_M_S2 * wanted_climb if climb_given or not powered else potential_rate
-    if not math.isfinite(wanted_potential_rate):
-        wanted_potential_rate = potential_rate
-    wanted_kinetic_rate = speed * speed_rate
+    wanted_potential_rate = GRAVITY_M_S2 * wanted_climb if climb_given else potential_rate
+    if not powered and not known:  # its glide, by the attitude it should have
+        wanted_potential_rate = -GRAVITY_M_S2 * p[c.SINK_MIN]
+    wanted_kinetic_rate = speed * _wanted_speed_rate(p, s, speed, weight)
 
-    # pitch
     height_share, speed_share = _clip(2.0 - weight, 0.0, 1.0), _clip(weight, 0.0, 1.0)
-    balance = height_share * potential_rate - speed_share * kinetic_rate
-    wanted_balance = height_share * wanted_potential_rate - speed_share * wanted_kinetic_rate
-    s[c.BALANCE_RATE] = balance
-    s[c.BALANCE_RATE_SETPOINT] = wanted_balance
+    s[c.BALANCE_RATE] = height_share * potential_rate - speed_share * kinetic_rate
+    s[c.BALANCE_RATE_SETPOINT] = height_share * wanted_potential_rate - speed_share * wanted_kinetic_rate
+    share = 1.0 if entering else min(1.0, dt / (dt + p[c.ENERGY_RATE_TC]))
+    s[c.ENERGY_RATE] += share * (potential_rate + kinetic_rate - s[c.ENERGY_RATE])
+    s[c.ENERGY_RATE_SETPOINT] = _clip(
+        wanted_potential_rate + wanted_kinetic_rate + p[c.TURN_ENERGY] * (load_factor - 1.0),
+        -GRAVITY_M_S2 * p[c.SINK_MIN],
+        GRAVITY_M_S2 * p[c.CLIMB_MAX],
+    )
+
     if pitch_given:
         s[c.PITCH_SETPOINT] = _clip(sp[_PITCH], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
     else:
-        lowest = sp[_PITCH_MIN] if math.isfinite(sp[_PITCH_MIN]) else p[c.PITCH_MIN]
-        highest = sp[_PITCH_MAX] if math.isfinite(sp[_PITCH_MAX]) else p[c.PITCH_MAX]
-        # a climb-out's least pitch gives way before the wing stalls
-        lowest = (1.0 - under) * lowest + under * min(lowest, p[c.PITCH_MIN])
-        highest = max(highest, lowest)
-        per_rad = speed * GRAVITY_M_S2
-        missing = (wanted_balance - balance) / per_rad
-        step = p[c.PITCH_I] * missing * dt
-        previous = s[c.PITCH_SETPOINT]
-        if (previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0):
-            step = 0.0
-        if s[c.GROUND_CONTACT] == 0.0:
-            s[c.PITCH_INTEGRAL] = _clip(s[c.PITCH_INTEGRAL] + step, lowest - highest, highest - lowest)
-        pitch = (
-            _trim_pitch(airspeed, p, s)
-            + p[c.PITCH_DAMPING] * missing
-            + p[c.BALANCE_FF] * wanted_balance / per_rad
-            + s[c.PITCH_INTEGRAL]
-        )
-        change = dt * p[c.VERTICAL_ACCELERATION] / speed
-        pitch = _clip(pitch, lowest, highest)
-        s[c.PITCH_SETPOINT] = _clip(pitch, previous - change, previous + change)
-
-    # throttle
-    energy_gain = min(1.0, dt / (dt + p[c.ENERGY_RATE_TC]))
-    if entering:
-        energy_gain = 1.0
-    s[c.ENERGY_RATE] += energy_gain * (potential_rate + kinetic_rate - s[c.ENERGY_RATE])
-    wanted_energy_rate = _clip(
-        wanted_potential_rate + wanted_kinetic_rate + p[c.TURN_ENERGY] * (load_factor - 1.0),
-        energy_min,
-        energy_max,
-    )
-    s[c.ENERGY_RATE_SETPOINT] = wanted_energy_rate
+        _fly_pitch(sp, p, s, dt, speed, under)
     if throttle_given:
         s[c.THROTTLE] = _clip(sp[_THROTTLE], 0.0, 1.0)
-        return
-    if not powered:
-        s[c.THROTTLE] = 0.0
-        return
-    lowest, highest = p[c.THROTTLE_MIN], p[c.THROTTLE_MAX]
-    if math.isfinite(sp[_THROTTLE_MAX]):
-        highest = _clip(sp[_THROTTLE_MAX], 0.0, highest)
-        lowest = min(lowest, highest)
-    trim = _clip(_trim_throttle(airspeed, p), lowest, highest)
-    if wanted_energy_rate >= 0.0:
-        throttle = trim + wanted_energy_rate / energy_max * (highest - trim)
+    elif powered:
+        _fly_throttle(sp, p, s, dt, under)
     else:
-        throttle = trim + wanted_energy_rate / energy_min * (lowest - trim)
-    missing = (wanted_energy_rate - s[c.ENERGY_RATE]) / (energy_max - energy_min)
-    previous = s[c.THROTTLE]
-    if known and s[c.GROUND_CONTACT] == 0.0:
-        step = p[c.THROTTLE_I] * missing * dt * (1.0 - under)
-        if not ((previous >= highest and step > 0.0) or (previous <= lowest and step < 0.0)):
-            s[c.THROTTLE_INTEGRAL] = _clip(s[c.THROTTLE_INTEGRAL] + step, -1.0, 1.0)
-    # without airspeed a positive integral stays: it was needed when there was one (PX4)
-    integral = s[c.THROTTLE_INTEGRAL] if known else max(0.0, s[c.THROTTLE_INTEGRAL])
-    throttle += p[c.THROTTLE_DAMPING] * missing + integral
-    throttle = _clip(under * highest + (1.0 - under) * throttle, lowest, highest)
-    if p[c.THROTTLE_SLEW] > 0.0:
-        change = p[c.THROTTLE_SLEW] * dt
-        throttle = _clip(throttle, previous - change, previous + change)
-    s[c.THROTTLE] = _clip(throttle, lowest, highest)
+        s[c.THROTTLE] = 0.0
