@@ -5,13 +5,14 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.flight.fixed_wing.flare import flare_time
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
 _CALM_M_S: Final = 1.0  # less wind doesn't choose the direction
 _RUNWAY_NEAR_HOME_M: Final = 300.0
 _SHALLOW: Final = 0.5  # of the landing angle: a leg shallower than this is flown level until the slope
-_FLARE_SPEED_SHARE: Final = 0.9  # way of the flare: speed is lost, and the sink is taken back a little late
+_FLARE_SPEED_SHARE: Final = 0.93  # mean speed of the flare over that of the approach
 _SHORTEST_LEG_M: Final = 30.0
 
 
@@ -53,15 +54,11 @@ class Approach:
         )
 
     def flare_shift_m(self, ground_speed_m_s: float, flare_height_m: float, flare_sink_m_s: float) -> float:
-        """How far before the place the slope must aim, since the flare carries farther than the slope.
-
-        From `flare_height_m` the sink falls linearly with the height from the slope's to the flare's, which
-        takes h / (s0 - s1) ln(s0 / s1).
-        """
-        before, after = ground_speed_m_s * self.slope, flare_sink_m_s
-        if before <= after * 1.001:
+        """How far before the place the slope must aim, since the flare carries farther than the slope."""
+        before = ground_speed_m_s * self.slope
+        if before <= flare_sink_m_s * 1.001:
             return 0.0
-        time_s = flare_height_m / (before - after) * math.log(before / after)
+        time_s = flare_time(flare_height_m, flare_height_m, before, flare_sink_m_s)
         return _FLARE_SPEED_SHARE * ground_speed_m_s * time_s - flare_height_m / self.slope
 
 

@@ -1,5 +1,11 @@
-"""The last seconds before the wheels touch: sink taken back, throttle off, nose onto the runway."""
+"""The last seconds before the wheels touch: sink taken back, throttle off, nose onto the runway.
 
+The flare is a path in height over the distance to go: from the slope's sink to that of the touch, falling
+linearly with the height. Height errors are flown out along it, so that turbulence moves the touch little;
+without a position the sink follows the height alone.
+"""
+
+import math
 from typing import Final
 
 from autopilot_bridge.flight.context import FlightContext
@@ -7,6 +13,7 @@ from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
+_SPEED_SHARE: Final = 0.93  # mean speed of what is left of the flare over the present one
 _ALIGN_M: Final = 1.0  # over the ground the crab angle is taken out
 _TOUCH_M: Final = 0.15
 _STILL_M_S: Final = 0.25
@@ -14,18 +21,40 @@ _STILL_S: Final = 0.6
 _SHORTEST_S: Final = 1.0
 _LONG_S: Final = 6.0  # a flare that lasts this long has reached a ground that lies higher than believed
 _PITCH_BLEND_S: Final = 1.0
-_LEAD_S: Final = 0.6
-_GAIN: Final = 1.0
+_LEAD_S: Final = 0.5  # the pitch needs so long to follow
+_HEIGHT_GAIN_1_S: Final = 0.6
+_SINK_GAIN: Final = 1.0  # on the error of the sink, since the loss of speed takes from the response
+_SINK_CORRECTION_M_S: Final = 0.8
+_POWER_BELOW_M: Final = 0.5  # so far under the path the place is out of reach without power
+_FIRMEST_M_S: Final = 0.6  # over the sink of the touch, at the ground; more higher up:
+_FIRMER_1_S: Final = 0.5
+
+
+def flare_time(height_m: float, start_m: float, before_m_s: float, after_m_s: float) -> float:
+    """Time from a height to the ground of a flare that starts at `start_m` with the sink `before_m_s`."""
+    change = before_m_s - after_m_s
+    if change < 1e-3:
+        return height_m / after_m_s
+    sink = after_m_s + change * height_m / start_m
+    return start_m / change * math.log(sink / after_m_s)
+
+
+def flare_height(time_s: float, start_m: float, before_m_s: float, after_m_s: float) -> float:
+    """Height at a time before the touch: the inverse of `flare_time`."""
+    change = before_m_s - after_m_s
+    if change < 1e-3:
+        return after_m_s * time_s
+    return start_m * after_m_s / change * math.expm1(change * time_s / start_m)
 
 
 class Flare:
-    """Sink falls with the height, from that of the slope to that of the touch.
+    """Flies the flare.
 
     Attributes:
         aligning: low enough to point the nose along the runway.
     """
 
-    __slots__ = ("_height_m", "_pitch_rad", "_sink_m_s", "_still_s", "_time_s", "aligning")
+    __slots__ = ("_below_m", "_height_m", "_pitch_rad", "_sink_m_s", "_still_s", "_time_s", "aligning")
 
     def __init__(self) -> None:
         self.reset()
@@ -33,36 +62,57 @@ class Flare:
     def reset(self) -> None:
         """No flare yet."""
         self.aligning = False
-        self._time_s = self._still_s = 0.0
+        self._time_s = self._still_s = self._below_m = 0.0
         self._height_m = 1.0
         self._sink_m_s = self._pitch_rad = 0.0
 
-    def begin(self, state: AircraftState, height_m: float, parameters: FixedWingFlightParameters) -> None:
-        """Flare from here."""
+    def begin(
+        self, state: AircraftState, height_m: float, sink_m_s: float, parameters: FixedWingFlightParameters
+    ) -> None:
+        """Flare from here; `height_m` and `sink_m_s` are those the path was planned with."""
         self.reset()
         self._height_m = max(height_m, 0.1)
-        self._sink_m_s = max(state.vel_down_m_s, parameters.flare_sink_m_s)
+        self._sink_m_s = max(sink_m_s, parameters.flare_sink_m_s)
         self._pitch_rad = state.pitch_rad
+
+    def _sink(self, state: AircraftState, height_m: float, to_go_m: float, after_m_s: float) -> float:
+        """Sink to fly."""
+        start, before = self._height_m, self._sink_m_s
+        ahead = max(0.0, height_m - _LEAD_S * state.vel_down_m_s)
+        if to_go_m == to_go_m:
+            speed = _SPEED_SHARE * max(state.ground_speed_m_s, 1.0)
+            time = max(0.0, to_go_m / speed - _LEAD_S)
+            path = min(flare_height(time, start, before, after_m_s), start)
+            sink = after_m_s + (before - after_m_s) * path / start + _HEIGHT_GAIN_1_S * (ahead - path)
+            self._below_m = path - ahead
+        else:
+            self._below_m = 0.0
+            sink = after_m_s + (before - after_m_s) * min(1.0, ahead / start)
+        return min(after_m_s + _FIRMEST_M_S + _FIRMER_1_S * ahead, max(0.5 * after_m_s, sink))
 
     def fly(
         self,
         ctx: FlightContext,
         state: AircraftState,
         height_m: float,
+        to_go_m: float,
         parameters: FixedWingFlightParameters,
         command: FlightCommand,
     ) -> bool:
-        """Fill the longitudinal part of a command; True when the ground was touched."""
+        """Fill the longitudinal part of a command; True when the ground was touched.
+
+        Args:
+            height_m: over the ground.
+            to_go_m: along the runway to the place of the touch; NaN: not known.
+        """
         p = parameters
         self._time_s += ctx.dt_s
-        # ahead of the height by what the pitch needs to follow
-        ahead_m = height_m - _LEAD_S * max(0.0, state.vel_down_m_s)
-        share = min(1.0, max(0.0, ahead_m / self._height_m))
-        sink = p.flare_sink_m_s + (self._sink_m_s - p.flare_sink_m_s) * share
-        # what the loss of speed takes from the response is asked for on top, but never a climb
-        sink -= _GAIN * (state.vel_down_m_s - sink)
+        sink = self._sink(state, height_m, to_go_m, p.flare_sink_m_s)
+        correction = _SINK_GAIN * (sink - state.vel_down_m_s)
+        sink += min(_SINK_CORRECTION_M_S, max(-_SINK_CORRECTION_M_S, correction))
         command.height_rate_m_s = -max(0.0, sink)
-        command.throttle = p.throttle_idle
+        if self._below_m < _POWER_BELOW_M:
+            command.throttle = p.throttle_idle
         # the limits of the pitch close in gradually: no jerk of the elevator
         part = min(1.0, self._time_s / _PITCH_BLEND_S)
         low = min(self._pitch_rad, p.flare_pitch_min_rad)
@@ -70,8 +120,8 @@ class Flare:
         command.pitch_min_rad = low + (p.flare_pitch_min_rad - low) * part
         command.pitch_max_rad = high + (p.flare_pitch_max_rad - high) * part
         self.aligning = height_m < _ALIGN_M
-        low = height_m < 2.0 * _ALIGN_M or self._time_s > _LONG_S
-        still = abs(state.vel_down_m_s) < _STILL_M_S and low
+        near = height_m < 2.0 * _ALIGN_M or self._time_s > _LONG_S
+        still = abs(state.vel_down_m_s) < _STILL_M_S and near
         self._still_s = self._still_s + ctx.dt_s if still else 0.0
         measured = state.height_above_ground_m
         touched = p.rangefinder_landing and measured == measured and measured < _TOUCH_M

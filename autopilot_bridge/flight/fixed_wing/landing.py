@@ -27,6 +27,11 @@ _BLIND_M: Final = 30.0  # over the ground: without a position straight on, to th
 _FREE_BANK_M: Final = 15.0  # over the ground the bank is no longer limited for the wing tips
 _LOW_M: Final = 2.0
 _MISSED_M: Final = 40.0  # beyond the place, too high: go around
+_SLOPE_GAIN: Final = 0.4
+_DIVE_FREE_M: Final = 25.0  # over the ground the nose may go down as far as anywhere; lower, ever less
+_DIVE_LOW_RAD: Final = math.radians(-1.0)
+_LATEST_FLARE: Final = 0.6  # of the flare's time, before the ground at the present sink
+_STANDING_M_S: Final = 1.5
 _BRAKE_AFTER_S: Final = 1.5
 _NOSE_DOWN_S: Final = 1.0
 
@@ -161,7 +166,7 @@ class LandTask(AircraftTask):
         return self._land(ctx)
 
     def _fly(self, ctx: FlightContext) -> TaskStatus:
-        approach, p = self.approach, ctx.fixed_wing
+        approach, p, state = self.approach, ctx.fixed_wing, self._state
         if ctx.on_ground or self.phase is LandPhase.LANDED or approach is None:
             return self._land(ctx)
         low = self.phase in (LandPhase.FLARE, LandPhase.ROLL_OUT) or (
@@ -187,6 +192,10 @@ class LandTask(AircraftTask):
             case _:
                 self._fly_roll_out(ctx, p)
         command.write(ctx)
+        if self.phase is LandPhase.ROLL_OUT and state.ground_speed_m_s < _STANDING_M_S:
+            # the controls of a standing aircraft would follow every gust
+            clear_setpoint(ctx.setpoint, sp.SURFACES_DIRECT)
+            ctx.setpoint[sp.BRAKE] = p.brake
         return TaskStatus.RUNNING
 
     def _fly_blind(self, ctx: FlightContext) -> TaskStatus:
@@ -236,23 +245,28 @@ class LandTask(AircraftTask):
         state, command = self._state, self._command
         height = self._height(p, approach.down_m)
         self._limit_bank(p, height)
+        share = (height - _LOW_M) / (_DIVE_FREE_M - _LOW_M)
+        if share < 1.0:
+            command.pitch_min_rad = _DIVE_LOW_RAD + (p.pitch_min_rad - _DIVE_LOW_RAD) * max(0.0, share)
         sink = state.ground_speed_m_s * approach.slope
         past_place = -math.inf
+        flare_height = max(p.flare_height_m, p.flare_time_s * sink)
         if ctx.position_valid:
             self._line.follow(state, self._path.of(ctx), command)
             past_place = self._line.along_m(state)
-            flare_height = max(p.flare_height_m, p.flare_time_s * sink)
             shift = approach.flare_shift_m(state.ground_speed_m_s, flare_height, p.flare_sink_m_s)
             slope_down = approach.down_m + (past_place + shift) * approach.slope
             command.down_m = max(approach.entry_down_m, slope_down)
             if slope_down > approach.entry_down_m:
+                # the slope is held more tightly than heights elsewhere (PX4: FW_LND_THRTC_SC)
+                command.down_m += _SLOPE_GAIN * (slope_down - state.down_m)
                 command.height_rate_m_s = -sink
         else:
             command.heading_rad = approach.course_rad
             command.height_rate_m_s = -sink
-        if height <= max(p.flare_height_m, p.flare_time_s * max(0.0, state.vel_down_m_s)):
+        if height <= max(flare_height, _LATEST_FLARE * p.flare_time_s * state.vel_down_m_s):
             self.phase = LandPhase.FLARE
-            self._flare.begin(state, height, p)
+            self._flare.begin(state, flare_height, sink, p)
         elif past_place > _MISSED_M:
             self.phase = LandPhase.GO_AROUND
 
@@ -265,7 +279,8 @@ class LandTask(AircraftTask):
             command.heading_rad = approach.course_rad
         height = self._height(p, approach.down_m)
         self._limit_bank(p, height)
-        touched = self._flare.fly(ctx, state, height, p, command)
+        to_go = -self._line.along_m(state) if ctx.position_valid else math.nan
+        touched = self._flare.fly(ctx, state, height, to_go, p, command)
         if self._flare.aligning:
             command.steering_heading_rad = approach.course_rad
         if touched:

@@ -165,7 +165,7 @@ class FixedWingFlightParameters:
     def for_envelope(cls, envelope: FlightEnvelope, **changes: Any) -> Self:
         """Parameters for any aircraft, from what it can do; `changes` are fields that shall differ."""
         e = envelope
-        landing = max(1.35 * e.stall_speed_m_s, 1.05 * e.airspeed_min_m_s)
+        landing = max(1.35 * e.stall_speed_m_s, 1.2 * e.airspeed_min_m_s)
         bank = min(e.bank_max_rad, math.radians(45.0))
         # a circle flown at two thirds of the bank limit's turn rate leaves room for wind
         radius = e.airspeed_trim_m_s**2 / (9.80665 * math.tan(0.6 * bank))

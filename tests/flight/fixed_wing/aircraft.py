@@ -8,35 +8,24 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingParameters
 from autopilot_bridge.flight.context import FlightContext, ManualInput
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LandDetector
 from autopilot_bridge.flight.task import FlightTask
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import layout as n
-from autopilot_bridge.navigation.health import NavigationHealth
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.rotations import euler_from_quaternion, rotate
 from flightsim.vehicle import InitialState
 from flightsim.world import World, WorldParameters
 from tests.control.fixed_wing.aerosonde import AEROSONDE
+from tests.flight.fixed_wing.kinematic import healthy
 
 Array = NDArray[np.float64]
 
 GRAVITY_M_S2 = 9.80665
 SEA_LEVEL_DENSITY_KG_M3 = 1.225
-
-
-def healthy() -> NavigationHealth:
-    """A filter that knows everything."""
-    health = NavigationHealth()
-    health.uninitialised = False
-    health.attitude = health.velocity_horizontal = health.velocity_vertical = True
-    health.position_horizontal_relative = health.position_horizontal_absolute = True
-    health.position_vertical_absolute = True
-    return health
 
 
 class Aircraft:
@@ -186,6 +175,3 @@ class Aircraft:
             for _ in range(self.slow_steps):
                 self.step()
         return self.time_s - start
-
-
-LEVEL = sp.LEVEL
