@@ -6,14 +6,17 @@ firmware does its own way. Missions, fences and rally points share the protocol,
 
 import math
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
+from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Source
 from autopilot_bridge.services.mission_download import MissionDownloads
 from autopilot_bridge.services.mission_feasibility import mission_problems
+from autopilot_bridge.services.mission_feasibility_aircraft import AircraftRules
 from autopilot_bridge.services.mission_messages import (
     ack_message,
     item_from_message,
@@ -25,6 +28,16 @@ from autopilot_bridge.services.mission_report import MissionProgress, MissionRep
 from autopilot_bridge.services.mission_rules import fence_excludes
 from autopilot_bridge.services.mission_sessions import Sessions, mission_type_of
 from autopilot_bridge.services.mission_upload import MissionUploads
+
+
+class _Judged(NamedTuple):
+    """What a judgement of the stored mission rests on."""
+
+    version: int
+    landed: bool
+    home_alt_m: float | None
+    aircraft: AircraftRules | None
+
 
 HomeOf = Callable[[], GeodeticPosition | None]
 _GUIDED_ITEM = 2  # MISSION_ITEM.current of a guided-mode target
@@ -49,6 +62,7 @@ class MissionService:
             `MissionStore.current` itself when this is None.
         on_plan_changed: called after a plan was replaced or cleared.
         on_guided_item: takes an item as a target for guided mode; False refuses (ArduPilot only).
+        parameters: what an aircraft's missions are judged by; None: the firmware's defaults.
     """
 
     def __init__(
@@ -63,6 +77,7 @@ class MissionService:
         set_current: Callable[[int], bool] | None = None,
         on_plan_changed: Callable[[MissionType], None] | None = None,
         on_guided_item: Callable[[MissionItem], bool] | None = None,
+        parameters: ParameterStore | None = None,
     ) -> None:
         self._policy = policy
         self._stores = dict(stores)
@@ -72,11 +87,12 @@ class MissionService:
         self._set_current = set_current
         self._on_plan_changed = on_plan_changed
         self._on_guided_item = on_guided_item
+        self._parameters = ParameterStore(()) if parameters is None else parameters
         self._sessions = Sessions()
         self._uploads = MissionUploads(policy, self._stores, self._sessions, announce, self._store_plan)
         self._downloads = MissionDownloads(policy, self._stores, self._sessions, announce, self._read_plan)
         self._report = MissionReport(policy, self._stores, broadcast, self._progress)
-        self._judged: tuple[tuple[int, bool, float | None], tuple[str, ...]] | None = None
+        self._judged: tuple[_Judged, tuple[str, ...]] | None = None
         self._last_time_us = 0
 
     @property
@@ -98,9 +114,12 @@ class MissionService:
         if self._policy.home_is_item_0:  # ArduPilot finds out in flight
             return ()
         home = self._home()
-        key = (store.version, landed, None if home is None else home.alt_m)
+        home_alt_m = None if home is None else home.alt_m
+        aircraft = AircraftRules.of(self._parameters) if self._policy.aircraft else None
+        key = _Judged(store.version, landed, home_alt_m, aircraft)
         if self._judged is None or self._judged[0] != key:
-            self._judged = (key, mission_problems(store.items, home_alt_m=key[2], landed=landed))
+            problems = mission_problems(store.items, home_alt_m=home_alt_m, landed=landed, aircraft=aircraft)
+            self._judged = (key, problems)
         return self._judged[1]
 
     def has_mission(self) -> bool:

@@ -1,7 +1,8 @@
-"""PX4's feasibility check: may this stored mission be flown by a multicopter?
+"""PX4's feasibility check: may this stored mission be flown?
 
 An infeasible mission is stored and acknowledged, but mission mode and arming in it are refused. Source: PX4
-1.16 navigator, MissionFeasibility/FeasibilityChecker (the rules that concern rotary wing vehicles).
+1.16 navigator, MissionFeasibility/FeasibilityChecker. What concerns aircraft alone is in
+`mission_feasibility_aircraft`.
 """
 
 from typing import Final
@@ -9,6 +10,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.services.mission_feasibility_aircraft import AircraftRules, aircraft_problems
 from autopilot_bridge.services.mission_messages import GLOBAL_FRAMES, is_geodetic
 
 VTOL_COMMANDS: Final = frozenset(
@@ -36,7 +38,11 @@ _POSITION_COMMANDS: Final = frozenset(
 
 
 def mission_problems(
-    items: tuple[MissionItem, ...], *, home_alt_m: float | None = None, landed: bool = True
+    items: tuple[MissionItem, ...],
+    *,
+    home_alt_m: float | None = None,
+    landed: bool = True,
+    aircraft: AircraftRules | None = None,
 ) -> tuple[str, ...]:
     """Why a mission may not be flown, as PX4 words it; empty when it may. An empty mission has no problems.
 
@@ -44,6 +50,7 @@ def mission_problems(
         items: the stored mission.
         home_alt_m: home altitude above mean sea level, for takeoffs given in AMSL; None: not known.
         landed: the vehicle stands on the ground.
+        aircraft: what a fixed wing asks of a mission; None: the vehicle is none.
     """
     problems: list[str] = []
     placed = False
@@ -61,4 +68,6 @@ def mission_problems(
         if not placed and landed and item.command == mavlink.MAV_CMD_NAV_LAND:
             problems.append("Mission rejected: starts with landing")
         placed = placed or item.command in _POSITION_COMMANDS
+    if aircraft is not None and items:
+        problems += aircraft_problems(items, aircraft, home_alt_m=home_alt_m)
     return tuple(dict.fromkeys(problems))

@@ -1,7 +1,7 @@
 """How PX4 and ArduPilot differ in the mission protocol, as data."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -70,6 +70,7 @@ class MissionPolicy:
         sends_current_on_change: MISSION_CURRENT goes out at once when the current item changes.
         acks_set_current: MISSION_SET_CURRENT is answered with MISSION_CURRENT.
         guided_items: MISSION_ITEM with current = 2 is a guided-mode target (old DroneKit clients).
+        aircraft: the vehicle is a fixed wing, whose missions must be fit for one (PX4).
     """
 
     rules: ItemRules
@@ -94,6 +95,7 @@ class MissionPolicy:
     sends_current_on_change: bool
     acks_set_current: bool
     guided_items: bool
+    aircraft: bool = False
 
 
 PX4_MISSION_POLICY: Final = MissionPolicy(
@@ -169,4 +171,10 @@ ARDUPILOT_MISSION_POLICY: Final = MissionPolicy(
     sends_current_on_change=False,
     acks_set_current=True,
     guided_items=True,
+)
+
+PX4_PLANE_MISSION_POLICY: Final = replace(PX4_MISSION_POLICY, aircraft=True)
+
+ARDUPLANE_MISSION_POLICY: Final = replace(
+    ARDUPILOT_MISSION_POLICY, capacity={**ARDUPILOT_MISSION_POLICY.capacity, MissionType.MISSION: 655}
 )

@@ -36,7 +36,7 @@ class ArduPlaneSetpoints:
         self.commander = commander
 
     def on_local(self, message: MavlinkMessage, time_us: int) -> None:
-        """SET_POSITION_TARGET_LOCAL_NED: a step of the height in MAV_FRAME_LOCAL_OFFSET_NED (7), nothing else.
+        """SET_POSITION_TARGET_LOCAL_NED: in MAV_FRAME_LOCAL_OFFSET_NED (7) a step in height, nothing else.
 
         The mask isn't looked at, as in the firmware.
         """
