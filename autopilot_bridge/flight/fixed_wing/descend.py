@@ -5,8 +5,6 @@ from autopilot_bridge.flight.fixed_wing.base import AircraftTask
 from autopilot_bridge.flight.fixed_wing.position_lost import PositionLost
 from autopilot_bridge.flight.task import TaskStatus
 
-_FLARE_BANK_RAD = 0.0
-
 
 class DescendTask(AircraftTask):
     """Spiral down at the bank of a lost position; wings level near the ground, throttle idle in the flare.
@@ -37,13 +35,13 @@ class DescendTask(AircraftTask):
         self._was_in_air = True
         p, state, command = ctx.fixed_wing, self._state, self._command
         self._lost.fly(ctx, command, p.loiter_radius_m)
-        height = state.height_above_ground_m
+        height = state.height_above_ground_m - p.standing_height_m
         if height != height:
             height = ctx.height_above_home_m
         low_m = max(4.0 * p.flare_height_m, p.flare_time_s * 2.0 * p.position_lost_sink_m_s)
         command.height_rate_m_s = -p.position_lost_sink_m_s
         if height < low_m:
-            command.roll_rad = _FLARE_BANK_RAD
+            command.roll_rad = 0.0
         if height < max(p.flare_height_m, p.flare_time_s * max(0.0, state.vel_down_m_s)):
             command.height_rate_m_s = -p.flare_sink_m_s
             command.throttle = p.throttle_idle

@@ -124,5 +124,5 @@ class Flare:
         still = abs(state.vel_down_m_s) < _STILL_M_S and near
         self._still_s = self._still_s + ctx.dt_s if still else 0.0
         measured = state.height_above_ground_m
-        touched = p.rangefinder_landing and measured == measured and measured < _TOUCH_M
+        touched = p.rangefinder_landing and measured == measured and measured < p.standing_height_m + _TOUCH_M
         return self._time_s > _SHORTEST_S and (touched or self._still_s > _STILL_S or ctx.ground_contact)

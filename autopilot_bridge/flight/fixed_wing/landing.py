@@ -230,7 +230,7 @@ class LandTask(AircraftTask):
         """Over the ground, as far as it is known."""
         measured = self._state.height_above_ground_m
         if p.rangefinder_landing and measured == measured:
-            return measured
+            return measured - p.standing_height_m
         return down_m - self._state.down_m
 
     def _limit_bank(self, p: FixedWingFlightParameters, height_m: float) -> None:

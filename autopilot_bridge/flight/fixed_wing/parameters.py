@@ -29,6 +29,7 @@ _MAY_BE_ZERO: Final = frozenset(
         "launch_acceleration_m_s2",
         "launch_time_s",
         "landing_abort_climb_m",
+        "standing_height_m",
         "brake",
         "return_climb_min_m",
         "return_cone_half_angle_rad",
@@ -132,6 +133,7 @@ class FixedWingFlightParameters:
         5.0
     )  # wing tips free near the ground: FW_WING_* | LEVEL_ROLL_LIMIT
     rangefinder_landing: bool = True  # FW_LND_USETER | RNGFND_LANDING
+    standing_height_m: float = 0.3  # what the rangefinder tells on the ground: EKF2_MIN_RNG | RNGFND1_GNDCLR
     landing_abort_climb_m: float = 30.0  # go-around: straight up to so much above home | LAND_ABORT_DEG
     flaps_takeoff: float = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
     flaps_landing: float = 0.0  # FW_FLAPS_LND_SCL | LAND_FLAP_PERCNT
