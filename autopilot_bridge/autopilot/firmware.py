@@ -12,7 +12,9 @@ from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rul
 from autopilot_bridge.services.message_interval import IntervalPolicy
 from autopilot_bridge.services.mission_policy import (
     ARDUPILOT_MISSION_POLICY,
+    ARDUPLANE_MISSION_POLICY,
     PX4_MISSION_POLICY,
+    PX4_PLANE_MISSION_POLICY,
     MissionPolicy,
 )
 from autopilot_bridge.services.parameters import (
@@ -95,10 +97,12 @@ _ARDUPILOT: Final = Firmware(
 FIRMWARES: Final[Mapping[tuple[str, AirframeKind], Firmware]] = MappingProxyType(
     {
         ("px4", AirframeKind.MULTICOPTER): _PX4,
-        ("px4", AirframeKind.FIXED_WING): _PX4,
+        ("px4", AirframeKind.FIXED_WING): replace(_PX4, missions=PX4_PLANE_MISSION_POLICY),
         ("ardupilot", AirframeKind.MULTICOPTER): _ARDUPILOT,
         ("ardupilot", AirframeKind.FIXED_WING): replace(
-            _ARDUPILOT, intervals=replace(_ARDUPILOT.intervals, max_rate_hz=_ARDUPLANE_MAX_RATE_HZ)
+            _ARDUPILOT,
+            missions=ARDUPLANE_MISSION_POLICY,
+            intervals=replace(_ARDUPILOT.intervals, max_rate_hz=_ARDUPLANE_MAX_RATE_HZ),
         ),
     }
 )

@@ -93,8 +93,9 @@ def arming_reasons(
     reasons.extend(reason for reason in missing if reason not in reasons)
     if by_position and not situation.position and Reason.POSITION not in reasons:
         reasons.append(Reason.POSITION)
-    if mode is FlightMode.MISSION and situation.mission_problem not in (None, *reasons):
-        reasons.append(situation.mission_problem)
+    problem = situation.mission_problem
+    if mode is FlightMode.MISSION and problem is not None and problem not in reasons:
+        reasons.append(problem)
     if situation.battery_level >= BatteryLevel.CRITICAL:
         reasons.append(Reason.BATTERY_FAILSAFE)
     elif situation.battery_level >= BatteryLevel.LOW:

@@ -6,7 +6,6 @@ Requests answer with a `Verdict`; what happens is told in typed events, which fl
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Final
 
 from autopilot_bridge.commander.arming import MODE_REASONS, arming_reasons, shortfalls
@@ -23,11 +22,7 @@ from autopilot_bridge.commander.events import (
     DisarmReason,
     Event,
     FailsafeAction,
-    FailsafeCleared,
-    FailsafeKind,
     HomeSet,
-    MissionFinished,
-    MissionItemReached,
     ModeChanged,
     ModeDenied,
     NavigationReady,
@@ -38,12 +33,14 @@ from autopilot_bridge.commander.geofence import Geofence
 from autopilot_bridge.commander.guidance import Guidance
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.home import Home
+from autopilot_bridge.commander.mode_memory import ModeMemory
 from autopilot_bridge.commander.modes import LANDING_MODES, STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.pilot import THROTTLE_HIGH, PilotInput, stick_travel
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.setpoints import SetpointStream
 from autopilot_bridge.commander.situation import Situation
+from autopilot_bridge.commander.task_events import TaskFollower
 from autopilot_bridge.commander.tasks import TaskRunner
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
@@ -134,7 +131,8 @@ class Commander:
         self._last_prearm_report_us = 0
         self._sticks_at_command = flight.ManualInput()
         self._airspeed_valid = True
-        self._mode_before_radio_loss: FlightMode | None = None
+        self._memory = ModeMemory(active=policy.radio_restores_mode)
+        self._follower = TaskFollower(self)
 
     @property
     def time_us(self) -> int:
@@ -211,10 +209,15 @@ class Commander:
             self.emit(ModeDenied(time_us=self.time_us, mode=mode, reason=reason))
             return Verdict(result=self.policy.mode_denied, reasons=(reason,))
         self.failsafes.override()
-        self._mode_before_radio_loss = None
+        self._memory.forget()
         self._command(mode)
         self._select()
         return ACCEPTED
+
+    def change_mode(self, mode: FlightMode) -> None:
+        """The flight itself goes on in another mode: a task is done, a link is heard again."""
+        self._command(mode)
+        self._enter(mode)
 
     def arm(self, *, forced: bool = False) -> Verdict:
         """Let the motors turn, when every check passes."""
@@ -297,7 +300,7 @@ class Commander:
             self._supervise(time_us)
         self._take_over_by_sticks()
         self.tasks.update()
-        self._follow_task()
+        self._follower.follow()
 
     def _supervise(self, time_us: int) -> None:
         """What needs no haste: sensors, arming checks, home, battery, failsafes and the mode they ask for."""
@@ -305,8 +308,7 @@ class Commander:
             self._booted = True
             self.emit(Booted(time_us=time_us))
             if self.mode is self.policy.initialising_mode:
-                self._command(self.policy.boot_mode)
-                self._enter(self.policy.boot_mode)
+                self.change_mode(self.policy.boot_mode)
         self._health.update(time_us)
         warning = self.battery.update(self.situation.health, self.parameters, time_us)
         if warning is not None:
@@ -320,7 +322,9 @@ class Commander:
         told = self.failsafes.update(self.situation, self.parameters)
         self._events.extend(told)
         self._select()
-        self._restore_mode(told)
+        restored = self._memory.recall(told)
+        if restored is not None and self.armed:
+            self.change_mode(restored)
 
     def _tell_reasons(self, reasons: tuple[Reason, ...], *, check_only: bool) -> None:
         mode = self.commanded_mode
@@ -400,7 +404,7 @@ class Commander:
             action = self.failsafes.action(self.time_us, self.parameters)
         else:
             action = max((action for _, action in self.failsafes.started), default=FailsafeAction.NONE)
-            self._remember_mode()
+            self._memory.note(self.failsafes.started, self.commanded_mode)
             self.failsafes.started.clear()
             if action > FailsafeAction.WARN:
                 # what is up already and left to nobody goes before a weaker newcomer
@@ -488,23 +492,6 @@ class Commander:
             self._airspeed_valid = health.airspeed
             self.emit(AirspeedChanged(time_us=self.time_us, valid=health.airspeed))
 
-    def _remember_mode(self) -> None:
-        """The mode to come back to when a lost radio is soon heard again (ArduPlane)."""
-        for kind, action in self.failsafes.started:
-            if kind is FailsafeKind.MANUAL_LOST and action > FailsafeAction.WARN:
-                self._mode_before_radio_loss = self.commanded_mode
-            elif action > FailsafeAction.WARN:
-                self._mode_before_radio_loss = None
-
-    def _restore_mode(self, told: list[Event]) -> None:
-        """ArduPlane: back to the mode before a short loss of the radio, unless somebody chose another."""
-        for event in told:
-            if isinstance(event, FailsafeCleared) and event.kind is FailsafeKind.MANUAL_LOST:
-                mode, self._mode_before_radio_loss = self._mode_before_radio_loss, None
-                if mode is not None and self.armed and self.policy.radio_restores_mode:
-                    self._command(mode)
-                    self._enter(mode)
-
     def _take_over_by_sticks(self) -> None:
         """PX4 COM_RC_OVERRIDE: moved sticks end automatic flight."""
         parameters = self.parameters
@@ -514,39 +501,3 @@ class Commander:
             return
         if stick_travel(self.context.sticks, self._sticks_at_command) > parameters.stick_override_threshold:
             self.set_mode(FlightMode.POSITION if self.situation.position else FlightMode.ALTITUDE)
-
-    def _follow_task(self) -> None:
-        """Turn what the flight task tells into modes and events."""
-        events = self.context.events
-        if not events:
-            return
-        told = events[:]
-        events.clear()
-        for event in told:
-            if isinstance(event, flight.WaypointReached):
-                last = event.seq + 1 == len(self.missions.items)  # tells clients that the mission is over
-                if event.navigation or last or self.policy.reports_do_items:
-                    self.emit(MissionItemReached(time_us=self.time_us, index=event.seq))
-            elif isinstance(event, flight.MissionFinished):
-                self.emit(MissionFinished(time_us=self.time_us))
-                end = self.policy.mission_end_mode
-                if end is not None and self.airborne and self.mode is FlightMode.MISSION:
-                    self._command(end)
-                    self._enter(end)
-            elif isinstance(event, flight.MissionModeRequested):
-                if self.policy.mission_return_is_mode and self.mode is self.commanded_mode:
-                    self._command(FlightMode.RETURN)
-                    self._enter(FlightMode.RETURN)
-            elif isinstance(event, flight.HomeChangeRequested):
-                frame = self.context.frame
-                if frame is not None:
-                    self.set_home(*frame.geodetic_from_ned(event.north_m, event.east_m, event.down_m))
-            elif (
-                isinstance(event, flight.TaskFinished)
-                and self.mode is self.policy.takeoff_mode
-                and self.mode is self.commanded_mode
-            ):
-                source = partial(self.vehicle.hold_after_takeoff, self.tasks.task)
-                self.tasks.prepare(FlightMode.HOLD, source)
-                self._command(FlightMode.HOLD)
-                self._enter(FlightMode.HOLD)

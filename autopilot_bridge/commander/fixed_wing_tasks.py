@@ -1,12 +1,14 @@
 """The flight tasks of a fixed-wing aircraft."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
+from autopilot_bridge.commander.events import Event
+from autopilot_bridge.commander.fixed_wing_phases import PhaseWatch
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
@@ -28,8 +30,10 @@ from autopilot_bridge.flight.fixed_wing import (
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.hold import IdleTask
 from autopilot_bridge.flight.offboard import OffboardKind
+from autopilot_bridge.flight.plan_reading import is_waypoint, target_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
-from autopilot_bridge.mission_plan import MissionStore
+from autopilot_bridge.mission_plan import MissionItem, MissionStore
+from autopilot_bridge.navigation import layout as nav
 
 _MANUAL: Final = {
     FlightMode.MANUAL: ManualMode.MANUAL,
@@ -60,6 +64,7 @@ class FixedWingTasks:
         self._context = context
         self._missions = missions
         self._policy = policy
+        self._phases = PhaseWatch()
         self.offboard = OffboardTask()
         self.guided = GuidedTask()
 
@@ -144,6 +149,18 @@ class FixedWingTasks:
         throttle = float(setpoint[sp.THROTTLE])
         return math.isnan(throttle) or throttle > _LIFTING_THROTTLE
 
+    def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
+        """Phases of take-off and landing, wherever in a plan or a return they are flown."""
+        return self._phases.update(_flown_by(task), context)
+
+    def distance_to(self, item: MissionItem, context: FlightContext) -> float:
+        """Horizontal, from the place of a waypoint or a circle."""
+        target = target_of(item, context) if is_waypoint(item) else None
+        if target is None:
+            return math.nan
+        north_m, east_m, _ = context.nav[nav.POS_NED_M].tolist()
+        return math.hypot(north_m - float(target[0]), east_m - float(target[1]))
+
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
         """The circle being flown, once it is captured, whatever task it belongs to."""
         loiter = _loiter_of(task)
@@ -169,10 +186,16 @@ class FixedWingTasks:
         return replace(parameters, airspeed_trim_m_s=min(high, max(low, wanted)))
 
 
-def _loiter_of(task: FlightTask | None) -> LoiterTask | None:
-    """The circling part of a task."""
+def _flown_by(task: FlightTask | None) -> FlightTask | None:
+    """The task that flies for a plan or a return, else the task itself."""
     while isinstance(task, MissionTask | ReturnTask):
         task = task.sub_task
+    return task
+
+
+def _loiter_of(task: FlightTask | None) -> LoiterTask | None:
+    """The circling part of a task."""
+    task = _flown_by(task)
     if isinstance(task, GuidedTask):
         return task.circle
     return task if isinstance(task, LoiterTask) else None

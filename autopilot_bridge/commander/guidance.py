@@ -93,10 +93,10 @@ class Guidance:
         """Fly home and land."""
         return self._commander.set_mode(FlightMode.RETURN)
 
-    def go_around(self) -> Verdict:
-        """Break off a landing, climb and come back to it."""
+    def go_around(self, height_m: float = math.nan) -> Verdict:
+        """Break off a landing, climb to a height over home (NaN: the parameter's) and come back to it."""
         task = self._commander.tasks.task
-        if isinstance(task, GoAroundTask) and task.go_around(self._commander.context):
+        if isinstance(task, GoAroundTask) and task.go_around(self._commander.context, height_m):
             return ACCEPTED
         return failed(Reason.WRONG_MODE)
 

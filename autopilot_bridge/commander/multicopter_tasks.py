@@ -1,12 +1,13 @@
 """The flight tasks of a multicopter."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 
+from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
@@ -25,7 +26,7 @@ from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.return_home import ReturnTask
 from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
-from autopilot_bridge.mission_plan import MissionStore
+from autopilot_bridge.mission_plan import MissionItem, MissionStore
 
 _MANUAL: Final = {
     FlightMode.MANUAL: ManualMode.STABILIZED,
@@ -149,6 +150,14 @@ class MulticopterTasks:
     def wants_up(self, context: FlightContext) -> bool:
         """Whatever turns the motors faster than idle lifts."""
         return bool(context.setpoint[sp.LEVEL] > sp.IDLE) or context.phase is FlightPhase.TAKEOFF
+
+    def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
+        """Nothing: a multicopter's phases are modes."""
+        return ()
+
+    def distance_to(self, item: MissionItem, context: FlightContext) -> float:
+        """NaN: a multicopter stops there."""
+        return math.nan
 
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
         """The circle of an `OrbitTask`, once on it."""

@@ -7,16 +7,18 @@ through this protocol; `MulticopterTasks` and `FixedWingTasks` implement it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.context import FlightContext, LandedState
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.mission_plan import MissionItem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,8 +70,11 @@ class CircleFlown(NamedTuple):
 class GoAroundTask(Protocol):
     """A flight task whose landing can be broken off."""
 
-    def go_around(self, ctx: FlightContext) -> bool:
-        """Climb, and come back to the approach; False when there is nothing to break off."""
+    def go_around(self, ctx: FlightContext, height_m: float = math.nan) -> bool:
+        """Climb to a height over home (NaN: the parameter's) and come back to the approach.
+
+        False when there is nothing to break off.
+        """
         ...
 
 
@@ -151,6 +156,14 @@ class VehicleTasks(Protocol):
 
     def wants_up(self, context: FlightContext) -> bool:
         """On the ground, what is flown would lift off: the automatic disarming waits."""
+        ...
+
+    def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
+        """What the active task has come to since the last call, as far as pilots are told."""
+        ...
+
+    def distance_to(self, item: MissionItem, context: FlightContext) -> float:
+        """How far off an item an aircraft passed it, m; NaN where nobody is told."""
         ...
 
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:

@@ -1,5 +1,6 @@
 """What all fixed-wing tasks share: reading the state, resting while disarmed or on the ground."""
 
+import math
 from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol, runtime_checkable
 
@@ -69,7 +70,7 @@ class AircraftTask(ABC):
 class LandingTask(Protocol):
     """A task that may be landing."""
 
-    def go_around(self, ctx: FlightContext) -> bool:
+    def go_around(self, ctx: FlightContext, height_m: float = math.nan) -> bool:
         """Break the landing off; False when none is flown."""
         ...
 

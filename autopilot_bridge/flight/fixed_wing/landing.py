@@ -65,6 +65,7 @@ class LandTask(AircraftTask):
     """
 
     __slots__ = (
+        "_abort_climb_m",
         "_blind",
         "_circle",
         "_flare",
@@ -92,6 +93,7 @@ class LandTask(AircraftTask):
         self._flare = Flare()
         self._blind: DescendTask | None = None
         self._rolled_s = 0.0
+        self._abort_climb_m = math.nan
         self._touch_pitch_rad = 0.0
         self.approach: Approach | None = None
         self.phase = LandPhase.CIRCLE
@@ -144,13 +146,15 @@ class LandTask(AircraftTask):
         self._circle.begin(self._state)
         self.phase = LandPhase.CIRCLE
 
-    def go_around(self, ctx: FlightContext) -> bool:
+    def go_around(self, ctx: FlightContext, height_m: float = math.nan) -> bool:
         """Break the landing off: climb straight, come back to the approach (MAV_CMD_DO_GO_AROUND).
 
-        False where there is nothing to break off any more (or yet).
+        The height to climb to is over home; NaN: the parameter's. False where there is nothing to break off
+        any more (or yet).
         """
         if self.phase not in (LandPhase.APPROACH, LandPhase.FLARE):
             return False
+        self._abort_climb_m = height_m
         self.phase = LandPhase.GO_AROUND
         return True
 
@@ -302,6 +306,10 @@ class LandTask(AircraftTask):
         if self._rolled_s > _BRAKE_AFTER_S:
             command.brake = p.brake
 
+    def abort_climb_m(self, p: FixedWingFlightParameters) -> float:
+        """How high a go-around climbs before it turns."""
+        return self._abort_climb_m if self._abort_climb_m > 0.0 else p.landing_abort_climb_m
+
     def _fly_go_around(self, ctx: FlightContext, p: FixedWingFlightParameters, approach: Approach) -> None:
         """Straight up along the runway, then back to where the approach begins."""
         state, command = self._state, self._command
@@ -313,7 +321,7 @@ class LandTask(AircraftTask):
         command.airspeed_m_s = p.takeoff_airspeed_m_s
         command.pitch_min_rad = p.takeoff_pitch_min_rad
         command.throttle = p.takeoff_throttle_max
-        if approach.down_m - state.down_m >= p.landing_abort_climb_m:
+        if approach.down_m - state.down_m >= self.abort_climb_m(p):
             self._flare.reset()
             self._enter_circle(ctx)
             ctx.phase = FlightPhase.LANDING

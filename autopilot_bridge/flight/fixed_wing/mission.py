@@ -122,9 +122,9 @@ class MissionTask(PlanTask):
         if math.isfinite(item.param3) and item.param3 > 0.0:
             self._throttle = min(1.0, 0.01 * item.param3)
 
-    def go_around(self, ctx: FlightContext) -> bool:
+    def go_around(self, ctx: FlightContext, height_m: float = math.nan) -> bool:
         """Break the landing off and come back to it (MAV_CMD_DO_GO_AROUND); False when none is flown."""
-        return isinstance(self._sub, LandTask) and self._sub.go_around(ctx)
+        return isinstance(self._sub, LandTask) and self._sub.go_around(ctx, height_m)
 
     def _begin_flown(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         command, p = item.command, ctx.fixed_wing

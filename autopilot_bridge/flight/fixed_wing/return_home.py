@@ -122,9 +122,9 @@ class ReturnTask(AircraftTask):
         if isinstance(self._sub, SpeedTask):
             self._sub.change_speed(ctx, kind, speed_m_s)
 
-    def go_around(self, ctx: FlightContext) -> bool:
+    def go_around(self, ctx: FlightContext, height_m: float = math.nan) -> bool:
         """Break a landing off."""
-        return isinstance(self._sub, LandingTask) and self._sub.go_around(ctx)
+        return isinstance(self._sub, LandingTask) and self._sub.go_around(ctx, height_m)
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         """Write `ctx.setpoint`; DONE on the ground."""

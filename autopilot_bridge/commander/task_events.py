@@ -1,0 +1,75 @@
+"""What the flight task tells, turned into modes and events."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from autopilot_bridge.commander.events import MissionFinished, MissionItemReached
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.flight import context as flight
+
+if TYPE_CHECKING:
+    from autopilot_bridge.commander.commander import Commander
+
+
+class TaskFollower:
+    """Follows the active flight task for the commander."""
+
+    __slots__ = ("_commander",)
+
+    def __init__(self, commander: Commander) -> None:
+        self._commander = commander
+
+    def follow(self) -> None:
+        """Take what the task has told since the last call; 50 Hz."""
+        commander = self._commander
+        for phase in commander.vehicle.watch(commander.tasks.task, commander.context):
+            commander.emit(phase)
+        events = commander.context.events
+        if not events:
+            return
+        told = events[:]
+        events.clear()
+        for each in told:
+            self._take(each)
+
+    def _take(self, event: flight.FlightEvent) -> None:
+        commander = self._commander
+        match event:
+            case flight.WaypointReached():
+                self._item_reached(event)
+            case flight.MissionFinished():
+                self._mission_finished()
+            case flight.MissionModeRequested():
+                if commander.policy.mission_return_is_mode and commander.mode is commander.commanded_mode:
+                    commander.change_mode(FlightMode.RETURN)
+            case flight.HomeChangeRequested():
+                frame = commander.context.frame
+                if frame is not None:
+                    commander.set_home(*frame.geodetic_from_ned(event.north_m, event.east_m, event.down_m))
+            case flight.TaskFinished() if (
+                commander.mode is commander.policy.takeoff_mode and commander.mode is commander.commanded_mode
+            ):
+                source = partial(commander.vehicle.hold_after_takeoff, commander.tasks.task)
+                commander.tasks.prepare(FlightMode.HOLD, source)
+                commander.change_mode(FlightMode.HOLD)
+
+    def _item_reached(self, event: flight.WaypointReached) -> None:
+        commander = self._commander
+        items = commander.missions.items
+        last = event.seq + 1 == len(items)  # tells clients that the mission is over
+        if not (event.navigation or last or commander.policy.reports_do_items):
+            return
+        distance_m = float("nan")
+        if event.navigation and event.seq < len(items):
+            distance_m = commander.vehicle.distance_to(items[event.seq], commander.context)
+        reached = MissionItemReached(time_us=commander.time_us, index=event.seq, distance_m=distance_m)
+        commander.emit(reached)
+
+    def _mission_finished(self) -> None:
+        commander = self._commander
+        commander.emit(MissionFinished(time_us=commander.time_us, landed=commander.landed))
+        end = commander.policy.mission_end_mode
+        if end is not None and commander.airborne and commander.mode is FlightMode.MISSION:
+            commander.change_mode(end)
