@@ -36,6 +36,7 @@ class FixedWingActuators:
         "_fast",
         "_fdm",
         "_mixed",
+        "_mixed_slow",
         "_name",
         "_nodes",
         "_slow",
@@ -80,10 +81,8 @@ class FixedWingActuators:
         for set_value, index, scale, offset, low, high in self._fast:
             value = commands[index] * scale + offset
             set_value(low if value < low else high if value > high else value)
-        for set_value, terms, value, low, high in self._mixed:
-            for index, scale in terms:
-                value += commands[index] * scale
-            set_value(low if value < low else high if value > high else value)
+        if self._mixed:
+            _write_sums(self._mixed, commands)
 
     def write_slow(self, commands: list[float]) -> None:
         """Write flaps, steering and brake; may change `commands`."""
@@ -93,6 +92,7 @@ class FixedWingActuators:
         for set_value, index, scale, offset, low, high in self._slow:
             value = commands[index] * scale + offset
             set_value(low if value < low else high if value > high else value)
+        _write_sums(self._mixed_slow, commands)
 
     def effectiveness(self, role: Role) -> float:
         """1 sound, 0 failed."""
@@ -158,6 +158,7 @@ class FixedWingActuators:
         fast: list[_Entry] = []
         slow: list[_Entry] = []
         mixed: list[_MixedEntry] = []
+        mixed_slow: list[_MixedEntry] = []
         for name, channels in by_property.items():
             set_value = self._nodes[name].set_double_value
             low = max(channel.minimum for channel in channels)
@@ -172,9 +173,20 @@ class FixedWingActuators:
                     scale, offset = 0.0, self._stuck[channel.role][name]
                 terms.append((channel.role.command, scale))
                 total_offset += offset
+            slowly = all(channel.role in _GROUND_ROLES for channel in channels)
             if len(terms) > 1:
-                mixed.append((set_value, tuple(terms), total_offset, low, high))
+                group = mixed_slow if slowly else mixed
+                group.append((set_value, tuple(terms), total_offset, low, high))
                 continue
-            entries = slow if channels[0].role in _GROUND_ROLES else fast
+            entries = slow if slowly else fast
             entries.append((set_value, *terms[0], total_offset, low, high))
-        self._fast, self._slow, self._mixed = tuple(fast), tuple(slow), tuple(mixed)
+        self._fast, self._slow = tuple(fast), tuple(slow)
+        self._mixed, self._mixed_slow = tuple(mixed), tuple(mixed_slow)
+
+
+def _write_sums(entries: tuple[_MixedEntry, ...], commands: list[float]) -> None:
+    for set_value, terms, offset, low, high in entries:
+        value = offset
+        for index, scale in terms:
+            value += commands[index] * scale
+        set_value(low if value < low else high if value > high else value)

@@ -119,9 +119,6 @@ def initialise(
     for name, value in values:
         fdm.set_property_value(name, value)
     fdm.run_ic()
-    if prepare and start.height_m is None and airframe.kind is AirframeKind.FIXED_WING:
-        # the friction of JSBSim's wheels starts from uninitialised memory, which only a reset clears
-        fdm.reset_to_initial_conditions(0)
     for name, value in airframe.start if prepare else ():
         node = fdm.get_property_manager().get_node(name)
         if node is not None:

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import jsbsim
 
-from flightsim.airframe import Airframe, AirframeError
+from flightsim.airframe import Airframe, AirframeError, AirframeKind
 
 _LOG: Final = logging.getLogger("flightsim.jsbsim")
 _LOG.addHandler(logging.NullHandler())
@@ -84,11 +84,18 @@ def load_fdm(
     Raises:
         AirframeError: JSBSim refuses the model; the message carries its reasons.
     """
+    tree = _parsed(airframe)
+    outputs = [] if tree is None else tree.getroot().findall("output")
+    if tree is None or not (launcher or outputs):
+        return _load(airframe, airframe.folder, physics_rate_hz)
+    for output in outputs:  # files that some aircraft of the jsbsim package would write beside themselves
+        tree.getroot().remove(output)
     if launcher:
-        with TemporaryDirectory(prefix="flightsim-") as folder:
-            _copy_with_launcher(airframe, Path(folder))
-            return _load(airframe, Path(folder), physics_rate_hz)
-    return _load(airframe, airframe.folder, physics_rate_hz)
+        _add_launcher(tree.getroot())
+    with TemporaryDirectory(prefix="flightsim-") as folder:
+        shutil.copytree(airframe.folder, folder, ignore=_not_xml, dirs_exist_ok=True)
+        tree.write(Path(folder, airframe.xml_path.name))
+        return _load(airframe, Path(folder), physics_rate_hz)
 
 
 def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsim.FGFDMExec, tuple[str, ...]]:
@@ -107,24 +114,32 @@ def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsi
         raise AirframeError(_refusal(airframe, [*messages.warnings, str(error)])) from None
     if not loaded:
         raise AirframeError(_refusal(airframe, messages.warnings))
+    if airframe.kind is AirframeKind.FIXED_WING:
+        # the friction of JSBSim's wheels starts from uninitialised memory, which only a reset clears
+        fdm.set_property_value("ic/h-agl-ft", 1000.0)
+        fdm.run_ic()
+        fdm.reset_to_initial_conditions(0)
     fdm.set_dt(1.0 / physics_rate_hz)
     hold_motion(fdm, False)
     return fdm, tuple(messages.warnings)
 
 
-def _copy_with_launcher(airframe: Airframe, folder: Path) -> None:
-    """Copy the model's XML files, with an external force and moment added to the aircraft's."""
-
-    def not_xml(directory: str, names: list[str]) -> list[str]:
-        return [name for name in names if not name.endswith(".xml") and not Path(directory, name).is_dir()]
-
-    shutil.copytree(airframe.folder, folder, ignore=not_xml, dirs_exist_ok=True)
-    copy = folder / airframe.xml_path.name
+def _parsed(airframe: Airframe) -> "ElementTree.ElementTree[ElementTree.Element] | None":
+    """A fixed-wing model's XML; other models are loaded as they are."""
+    if airframe.kind is not AirframeKind.FIXED_WING:
+        return None
     try:
-        tree = ElementTree.parse(copy)
+        return ElementTree.parse(airframe.xml_path)
     except (OSError, ElementTree.ParseError) as error:
         raise AirframeError(_refusal(airframe, [str(error)])) from None
-    root = tree.getroot()
+
+
+def _not_xml(directory: str, names: list[str]) -> list[str]:
+    return [name for name in names if not name.endswith(".xml") and not Path(directory, name).is_dir()]
+
+
+def _add_launcher(root: ElementTree.Element) -> None:
+    """Add an external force and moment."""
     reactions = root.find("external_reactions")
     if reactions is None:
         reactions = ElementTree.SubElement(root, "external_reactions")
@@ -134,7 +149,6 @@ def _copy_with_launcher(airframe: Airframe, folder: Path) -> None:
             place = ElementTree.SubElement(element, tag, attributes)
             for axis in "xyz":
                 ElementTree.SubElement(place, axis).text = "0"
-    tree.write(copy)
 
 
 def hold_motion(fdm: jsbsim.FGFDMExec, held: bool) -> None:
