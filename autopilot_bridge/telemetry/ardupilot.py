@@ -135,7 +135,7 @@ class ArdupilotMessages(CommonMessages):
         """MEMINFO (152): free memory of the emulated board."""
         return (0, 65535, 131072)
 
-    def nav_controller_output(self) -> Values:
+    def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62)."""
         q_w, q_x, q_y, q_z = self.sources.controller.attitude_setpoint.tolist()
         roll = math.atan2(2.0 * (q_w * q_x + q_y * q_z), 1.0 - 2.0 * (q_x * q_x + q_y * q_y))
@@ -180,14 +180,18 @@ class ArdupilotMessages(CommonMessages):
         """EKF_STATUS_REPORT (193); variances are innovation test ratios, 1 at the gate."""
         health = self.sources.navigation.health
         return (
-            ekf_flags(health, position_ready=self.sources.position_ready()),
+            self.ekf_status_flags(),
             finite(health.velocity_test_ratio),
             finite(health.position_horizontal_test_ratio),
             finite(health.position_vertical_test_ratio),
             finite(health.magnetometer_test_ratio),
             finite(health.height_above_ground_test_ratio),
-            0.0,
+            finite(health.airspeed_test_ratio),
         )
+
+    def ekf_status_flags(self) -> int:
+        """EKF_STATUS_FLAGS."""
+        return ekf_flags(self.sources.navigation.health, position_ready=self.sources.position_ready())
 
     def esc_telemetry(self) -> Values | None:
         """ESC_TELEMETRY_1_TO_4 (11030): voltage of the battery; the ESCs report no speed."""

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.streams import Builder, Values
@@ -32,6 +33,8 @@ class TelemetrySources:
         battery_level: MAV_BATTERY_CHARGE_STATE.
         position_ready: the position may be flown on (the boot timeline is over and the filter has one).
         unix_epoch_us: Unix time of boot, microseconds.
+        task: the flight task being flown, None while there is none (aircraft).
+        missions: the plan a mission task flies (aircraft).
     """
 
     view: TelemetryView
@@ -46,6 +49,8 @@ class TelemetrySources:
     battery_level: Callable[[], int]
     position_ready: Callable[[], bool]
     unix_epoch_us: int
+    task: Callable[[], object] = lambda: None
+    missions: MissionStore | None = None
 
 
 class CommonMessages:
@@ -137,7 +142,17 @@ class CommonMessages:
         pressure_pa, temperature_c = self.view.pressure()
         if not math.isfinite(pressure_pa):
             return None
-        return (self.view.time_ms, pressure_pa * 0.01, 0.0, round(temperature_c * 100.0), 0)
+        return (
+            self.view.time_ms,
+            pressure_pa * 0.01,
+            self.differential_pressure_hpa(),
+            round(temperature_c * 100.0),
+            0,
+        )
+
+    def differential_pressure_hpa(self) -> float:
+        """What the pitot tube measures; 0 without one."""
+        return 0.0
 
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): motor outputs 1000..2000 us."""

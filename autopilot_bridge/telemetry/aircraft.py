@@ -1,0 +1,96 @@
+"""What the messages of both firmwares' aircraft are made from: airspeed, wind and the path being flown."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import FixedWingController
+from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.telemetry.common import TelemetrySources
+from autopilot_bridge.telemetry.flight_path import FlightPath, flight_path
+from flightsim import interface
+from flightsim.rotations import rotate_inverse
+
+
+class Surfaces(NamedTuple):
+    """Actuators of an aircraft: surfaces -1..1, throttle 0..1."""
+
+    aileron: float
+    elevator: float
+    throttle: float
+    rudder: float
+
+
+class AircraftState:
+    """Reads an aircraft's sources."""
+
+    def __init__(self, sources: TelemetrySources) -> None:
+        self._sources = sources
+
+    @property
+    def airspeed_m_s(self) -> float:
+        """Equivalent airspeed; 0 where it isn't known."""
+        airspeed = float(self._sources.navigation.state[nav.AIRSPEED_M_S])
+        return airspeed if math.isfinite(airspeed) else 0.0
+
+    @property
+    def wind_ned_m_s(self) -> tuple[float, float, float] | None:
+        """The estimated wind; None where there is no estimate. A vertical part isn't estimated."""
+        north, east, down = self._sources.navigation.state[nav.WIND_NED_M_S].tolist()
+        if not (math.isfinite(north) and math.isfinite(east)):
+            return None
+        return north, east, down if math.isfinite(down) else 0.0
+
+    @property
+    def air_velocity_frd_m_s(self) -> tuple[float, float, float]:
+        """Velocity through the air along the body's axes, by ground velocity and wind; zero without wind."""
+        wind = self.wind_ned_m_s
+        if wind is None:
+            return 0.0, 0.0, 0.0
+        state = self._sources.navigation.state
+        body = np.zeros(3)
+        rotate_inverse(state[nav.Q_NED_FROM_FRD], state[nav.VEL_NED_M_S] - np.array(wind), body)
+        forward, right, down = body.tolist()
+        return forward, right, down
+
+    @property
+    def path(self) -> FlightPath | None:
+        """What is being flown along."""
+        sources = self._sources
+        if not sources.context.armed:
+            return None
+        return flight_path(sources.task(), sources.context, sources.missions)
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """What the actuators are told."""
+        values = self._sources.controller.actuators.tolist()
+        return Surfaces(
+            values[interface.AILERON],
+            values[interface.ELEVATOR],
+            values[interface.THROTTLE],
+            values[interface.RUDDER],
+        )
+
+    @property
+    def powered(self) -> bool:
+        """The motor may turn: armed, and what is flown is more than resting."""
+        context = self._sources.context
+        return context.armed and bool(context.setpoint[sp.LEVEL] > sp.IDLE)
+
+    @property
+    def controller(self) -> FixedWingController:
+        """The control laws, as an aircraft has them."""
+        controller = self._sources.controller
+        assert isinstance(controller, FixedWingController)
+        return controller
+
+    @property
+    def pitot_pressure_pa(self) -> float | None:
+        """Newest differential pressure; None before the first sample, or without a tube."""
+        reading = self._sources.readings.airspeed
+        if reading.time_us < 0:
+            return None
+        return float(reading.values[interface.AIRSPEED_DIFFERENTIAL_PRESSURE_PA])
