@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
-from missions.options import FlightOptions
+from missions.mission import Mission
+from missions.options import WINGS_SIDE_M, FlightOptions
+from missions.orbit.mission import OrbitMission
 from missions.patterns import (
     Curve,
     Lap,
@@ -24,32 +26,15 @@ from missions.patterns import (
     sector,
 )
 from missions.patterns.lissajous import reduced_ratio
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import FixedWingLimits, Limits
+from missions.planning.turns import smallest_radius_m
 from missions.vehicle.vehicle import Vehicle
-
-
-class Mission(Protocol):
-    """Something that can be flown.
-
-    Attributes:
-        name: for people and file names.
-    """
-
-    name: str
-
-    def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
-        """Refuse, with a PlanError, what can't be flown; before anything is started."""
-        ...
-
-    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
-        """Fly one vehicle, which is ready to arm, from the ground back to the ground."""
-        ...
 
 
 CurveMaker = Callable[[FlightOptions], Curve]
 
 
-class PatternMission:
+class PatternMission(Mission[FlightOptions]):
     """A mission that flies one search pattern.
 
     Args:
@@ -61,15 +46,22 @@ class PatternMission:
         self.name = name
         self._make_curve = make_curve
 
-    def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
-        """Plan for every vehicle of the team; the vehicle's own limits come into it when it is known."""
-        from missions.pattern_flight import plan_pattern
+    def adapted(self, options: FlightOptions, limits: Limits) -> FlightOptions:
+        options = options.for_vehicle(limits)
+        if isinstance(limits, FixedWingLimits) and self.name == "lissajous":
+            # a size that nobody chose is one whose bends the aircraft can fly
+            radius_m = limits.turn_radius_m(options.speed_m_s)
+            factor = radius_m / smallest_radius_m(self.curve(replace(options, periods=1.0, search_time_s=None)))
+            side_m = 100.0 * math.ceil(0.01 * WINGS_SIDE_M * max(1.0, 1.05 * factor))
+            options = options.unless_chosen(width_m=side_m, height_m=side_m)
+        return options
+
+    def check(self, options: FlightOptions, limits: Limits) -> None:
+        from missions.pattern_flight import check_pattern
 
         for name in options.arguments:
             raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
-        for index in range(options.vehicles):
-            own = replace(options, index=index)
-            plan_pattern(self.curve(own), own, limits)
+        check_pattern(self.curve(options), options, limits)
 
     def curve(self, options: FlightOptions) -> Curve:
         """The pattern around its centre, as often as asked."""
@@ -79,6 +71,13 @@ class PatternMission:
         from missions.pattern_flight import fly_pattern
 
         await fly_pattern(vehicle, options, self.curve(options))
+
+    def title(self, options: FlightOptions) -> str:
+        parts = [self.name]
+        if self.name == "lissajous":
+            parts.append(options.pattern if options.ratio is None else "{:g}:{:g}".format(*options.ratio))
+        parts += [f"{options.width_m:g} m x {options.height_m:g} m", f"via {options.via}"]
+        return ", ".join(parts)
 
 
 MAX_LENGTH_M: Final = 100_000.0
@@ -193,18 +192,19 @@ def _expanding_square(options: FlightOptions) -> Curve:
     return _in_passes(make, options, min(options.width_m, options.height_m) ** 2 / options.spacing_m)
 
 
-MISSIONS: Final[Mapping[str, Mission]] = MappingProxyType(
+MISSIONS: Final[Mapping[str, Mission[Any]]] = MappingProxyType(
     {
         "lissajous": PatternMission("lissajous", lissajous_curve),
         "sector": PatternMission("sector", _sector),
         "parallel-sweep": PatternMission("parallel-sweep", _parallel_sweep),
         "expanding-square": PatternMission("expanding-square", _expanding_square),
+        "orbit": OrbitMission(),
     }
 )
 """The missions that can be named on the command line."""
 
 
-class ScriptMission:
+class ScriptMission(Mission[FlightOptions]):
     """A user's own mission: a Python file with `async def fly(vehicle, options)`.
 
     The file may have a class `Mission` instead, made without arguments, with `async def fly(self, vehicle,
@@ -231,7 +231,7 @@ class ScriptMission:
         self._resolved = path.resolve()
         self._check = getattr(holder, "check", None)
 
-    def check(self, options: FlightOptions, limits: VehicleLimits) -> None:
+    def check(self, options: FlightOptions, limits: Limits) -> None:
         if self._check is not None:
             self._check(options)
 
@@ -262,7 +262,7 @@ def _load(path: Path) -> Any:
     return module
 
 
-def find_mission(name: str) -> Mission:
+def find_mission(name: str) -> Mission[Any]:
     """A mission by name, or a user's own by path (anything ending in .py).
 
     Raises:

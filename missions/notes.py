@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition
+from missions.options import MissionOptions
 
 PATTERN = "pattern"
 """Name of the phase that is scored against the commanded path."""
@@ -45,7 +46,9 @@ class FlightNotes:
         phases: finished phases in order.
         commanded: what it was asked to fly.
         progress: 0..1 of the pattern.
-        system_id, autopilot: of the vehicle.
+        system_id, autopilot, kind: of the vehicle.
+        options: as the vehicle flies them.
+        marks: moments and figures that the mission gives a name to, for its own score.
     """
 
     phases: list[Phase] = field(default_factory=list)
@@ -53,6 +56,9 @@ class FlightNotes:
     progress: float = 0.0
     system_id: int = 0
     autopilot: str = ""
+    kind: str = ""
+    options: MissionOptions | None = None
+    marks: dict[str, float] = field(default_factory=dict)
     _open: tuple[str, int] | None = None
 
     @property

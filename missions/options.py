@@ -2,16 +2,17 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Final, Self
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.parameter_files import read_untyped_parameter_file
 from autopilot_bridge.parameters import ParameterError
 from missions.errors import PlanError
+from missions.planning.limits import Limits, MulticopterLimits
 
 MAX_PERIODS: Final = 1000.0
 MAX_SEARCH_TIME_S: Final = 24 * 3600.0
@@ -20,6 +21,8 @@ MAX_SPEED_M_S: Final = 100.0
 MIN_ACCEPTANCE_M: Final = 0.1
 MAX_ACCEPTANCE_M: Final = 1000.0
 MIN_SIDE_M: Final = 1.0
+WINGS_SIDE_M: Final = 1000.0  # of a fixed wing's pattern, unless its turns need more
+_SPACING_RADII: Final = 2.5
 MAX_PHASE_RAD: Final = math.radians(3600.0) + 1e-9
 
 
@@ -30,9 +33,69 @@ class Via(StrEnum):
     SETPOINTS = "setpoints"
 
 
+def check_positive(**options: float | None) -> None:
+    """Refuse options that are given and not more than 0; names are the command line's with _ for -."""
+    for name, value in options.items():
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise PlanError(f"--{name.replace('_', '-')} {value:g} is not possible; ask for more than 0")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlightOptions:
-    """One vehicle's flight, in the units a mission computes with. Missions take what concerns them.
+class MissionOptions:
+    """What every mission has: how many fly, and how high. Each mission has a class of its own made from this.
+
+    Attributes:
+        altitude_m: above home.
+        vehicles, index: size of the team and which of it this is, 0 first.
+        separation_m: between the altitudes of a team.
+        centre: of the mission; None: the vehicle's home.
+        rate_hz: setpoints per vehicle second.
+        arguments: what else the user gave to a mission of theirs, by name.
+        given: names of the fields that were chosen by somebody; None: those that are not at their default. A
+            mission may give the others values that suit the vehicle (`for_vehicle`).
+    """
+
+    altitude_m: float = 10.0
+    vehicles: int = 1
+    index: int = 0
+    separation_m: float = 4.0
+    centre: GeodeticPosition | None = None
+    rate_hz: float = 25.0
+    arguments: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    given: frozenset[str] | None = None
+
+    def __post_init__(self) -> None:
+        check_positive(separation=self.separation_m)
+        if not 2.5 <= self.rate_hz <= 100.0:
+            raise PlanError(f"--rate {self.rate_hz:g} Hz is not in 2.5..100 Hz, what keeps a vehicle guided")
+        if not 1 <= self.vehicles <= 250:
+            raise PlanError(f"--vehicles {self.vehicles} is not in 1..250")
+
+    @property
+    def own_altitude_m(self) -> float:
+        """This vehicle's altitude: a team flies in layers, the first at `altitude_m`."""
+        return self.altitude_m + self.index * self.separation_m
+
+    def chosen(self, name: str) -> bool:
+        """Whether somebody chose a field's value."""
+        if self.given is not None:
+            return name in self.given
+        default = next(f.default for f in fields(self) if f.name == name)
+        return getattr(self, name) != default
+
+    def unless_chosen(self, **values: float | str) -> Self:
+        """The same options, with other values where nobody chose one."""
+        return replace(self, **{name: value for name, value in values.items() if not self.chosen(name)})
+
+    def for_vehicle(self, limits: Limits) -> Self:
+        """The same options as one vehicle flies them: what nobody chose suits its kind."""
+        return self
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightOptions(MissionOptions):
+    """One vehicle's flight of a pattern, in the units a mission computes with. Missions take what concerns
+    them.
 
     Attributes:
         pattern: named Lissajous pattern, "L1".."L4"; not used when `ratio` is given.
@@ -41,18 +104,12 @@ class FlightOptions:
         phase_x_rad, phase_y_rad: its phases; None: the named pattern's, or pi/2 and 0 for a ratio.
         spacing_m: track spacing of sweeps and squares.
         heading_rad: direction of the first leg of the IAMSAR patterns.
-        altitude_m: above home.
-        speed_m_s: ground speed.
+        speed_m_s: ground speed; of a fixed wing: airspeed.
         period_s: time once round in a Lissajous pattern's own time law, in place of the speed.
         periods: times round, or passes.
         search_time_s: end the pattern after this time; it is repeated until then.
         via: uploaded waypoints or streamed setpoints.
         acceptance_m: radius within which a waypoint counts as reached; corners are rounded by as much.
-        rate_hz: setpoints per vehicle second.
-        vehicles, index: size of the team and which of it this is, 0 first.
-        separation_m: between the altitudes of a team.
-        centre: of the pattern; None: the vehicle's home.
-        arguments: what else the user gave to a mission of theirs, by name.
     """
 
     pattern: str = "L3"
@@ -63,33 +120,23 @@ class FlightOptions:
     phase_y_rad: float | None = None
     spacing_m: float = 10.0
     heading_rad: float = 0.0
-    altitude_m: float = 10.0
     speed_m_s: float = 5.0
     period_s: float | None = None
     periods: float = 1.0
     search_time_s: float | None = None
     via: Via = Via.WAYPOINTS
     acceptance_m: float = 2.0
-    rate_hz: float = 25.0
-    vehicles: int = 1
-    index: int = 0
-    separation_m: float = 4.0
-    centre: GeodeticPosition | None = None
-    arguments: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:
-        positive = {
-            "--speed": self.speed_m_s,
-            "--periods": self.periods,
-            "--acceptance": self.acceptance_m,
-            "--spacing": self.spacing_m,
-            "--search-time": self.search_time_s,
-            "--period": self.period_s,
-            "--separation": self.separation_m,
-        }
-        for name, value in positive.items():
-            if value is not None and not (math.isfinite(value) and value > 0.0):
-                raise PlanError(f"{name} {value:g} is not possible; ask for more than 0")
+        super(FlightOptions, self).__post_init__()
+        check_positive(
+            speed=self.speed_m_s,
+            periods=self.periods,
+            acceptance=self.acceptance_m,
+            spacing=self.spacing_m,
+            search_time=self.search_time_s,
+            period=self.period_s,
+        )
         for name, bounded, lowest, highest, unit in (
             ("--periods", self.periods, 0.0, MAX_PERIODS, ""),
             ("--search-time", self.search_time_s, 0.0, MAX_SEARCH_TIME_S, " s"),
@@ -110,17 +157,25 @@ class FlightOptions:
             raise PlanError(
                 f"--heading {math.degrees(self.heading_rad):g} is not a direction; give degrees, such as 90"
             )
-        if not 2.5 <= self.rate_hz <= 100.0:
-            raise PlanError(f"--rate {self.rate_hz:g} Hz is not in 2.5..100 Hz, what keeps a vehicle guided")
-        if not 1 <= self.vehicles <= 250:
-            raise PlanError(f"--vehicles {self.vehicles} is not in 1..250")
         if self.period_s is not None and self.via is not Via.SETPOINTS:
             raise PlanError("--period needs --via setpoints: waypoints are flown at a speed, not at times")
 
-    @property
-    def own_altitude_m(self) -> float:
-        """This vehicle's altitude: a team flies in layers, the first at `altitude_m`."""
-        return self.altitude_m + self.index * self.separation_m
+    def for_vehicle(self, limits: Limits) -> "FlightOptions":
+        """A fixed wing flies larger, higher and faster than a multicopter, unless it was told otherwise."""
+        if isinstance(limits, MulticopterLimits):
+            return self
+        speed_m_s = self.speed_m_s if self.chosen("speed_m_s") else limits.airspeed_trim_m_s
+        radius_m = limits.turn_radius_m(speed_m_s)
+        return self.unless_chosen(
+            pattern="L2",
+            width_m=WINGS_SIDE_M,
+            height_m=WINGS_SIDE_M,
+            speed_m_s=speed_m_s,
+            altitude_m=min(100.0, limits.altitude_max_m),
+            spacing_m=10.0 * math.ceil(0.1 * _SPACING_RADII * radius_m),
+            acceptance_m=min(30.0, max(10.0, speed_m_s)),
+            separation_m=20.0,
+        )
 
 
 def parse_wind(text: str) -> tuple[float, float]:

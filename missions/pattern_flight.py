@@ -16,7 +16,7 @@ from missions.notes import PATTERN, CommandedPath
 from missions.options import FlightOptions, Via
 from missions.patterns.curve import ArcLengthTable, Array, Curve
 from missions.patterns.polyline import Polyline
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import FixedWingLimits, Limits, MulticopterLimits
 from missions.planning.natural import is_lissajous, natural_trajectory
 from missions.planning.trajectory import (
     Trajectory,
@@ -25,6 +25,7 @@ from missions.planning.trajectory import (
     line_trajectory,
     plan_trajectory,
 )
+from missions.pattern_wings import check_wings, fly_pattern_with_wings
 from missions.planning.waypoints import leg_speeds, waypoints_along
 from missions.telemetry import Attitude
 from missions.vehicle.guided import GuidedSession
@@ -38,7 +39,15 @@ _TRANSIT_M_S: Final = 5.0
 _SPEED_STEP_M_S: Final = 0.5
 
 
-def plan_pattern(curve: Curve, options: FlightOptions, limits: VehicleLimits) -> Trajectory:
+def check_pattern(curve: Curve, options: FlightOptions, limits: Limits) -> None:
+    """Refuse, with a PlanError, a pattern that a vehicle with these limits can't fly."""
+    if isinstance(limits, FixedWingLimits):
+        check_wings(curve, options, limits)
+    else:
+        plan_pattern(curve, options, limits)
+
+
+def plan_pattern(curve: Curve, options: FlightOptions, limits: MulticopterLimits) -> Trajectory:
     """The pattern in time, around its own centre.
 
     Raises:
@@ -80,6 +89,9 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
         MissionError: the flight went wrong.
     """
     limits = await vehicle.limits()
+    if isinstance(limits, FixedWingLimits):
+        await fly_pattern_with_wings(vehicle, options, curve, limits)
+        return
     if isinstance(asyncio.get_running_loop(), VirtualTimeLoop):  # time stands still, and flights are equal
         trajectory = plan_pattern(curve, options, limits)
     else:  # heartbeats go on
@@ -110,7 +122,7 @@ def setpoint_at(point: TrajectoryPoint, centre: Vector) -> Setpoint:
 async def _fly_setpoints(
     vehicle: Vehicle,
     options: FlightOptions,
-    limits: VehicleLimits,
+    limits: MulticopterLimits,
     trajectory: Trajectory,
     centre: Vector,
 ) -> None:
@@ -149,7 +161,7 @@ async def _fly_setpoints(
 
 
 async def _fly_line(
-    vehicle: Vehicle, guided: GuidedSession, start: Vector, stop: Vector, limits: VehicleLimits
+    vehicle: Vehicle, guided: GuidedSession, start: Vector, stop: Vector, limits: MulticopterLimits
 ) -> None:
     """Turn the nose along the way, and fly straight from rest to rest."""
     if math.dist(start, stop) < _SAME_PLACE_M:
@@ -160,7 +172,7 @@ async def _fly_line(
 
 
 async def _turn(
-    vehicle: Vehicle, guided: GuidedSession, position: Vector, yaw_rad: float, limits: VehicleLimits
+    vehicle: Vehicle, guided: GuidedSession, position: Vector, yaw_rad: float, limits: MulticopterLimits
 ) -> None:
     """Stay in a place, turn the nose at no more than the yaw rate, and settle for a moment."""
     attitude = vehicle.latest(Attitude)

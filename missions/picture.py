@@ -46,13 +46,14 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
         altitude.sharex(error)
         _draw_error(error, flights)
     for axes in (above, altitude, *rest):
-        _tidy(axes)
+        tidy(axes)
     (rest or [altitude])[0].set_xlabel("vehicle time, s", fontsize=9, color=_INK)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
 
 
-def _tidy(axes: Any) -> None:
+def tidy(axes: Any) -> None:
+    """Quiet axes: thin grid, two spines."""
     axes.tick_params(colors=_INK, labelsize=8)
     axes.grid(True, color=_GRID, linewidth=0.6)
     axes.set_axisbelow(True)

@@ -8,10 +8,9 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Final, Protocol, runtime_checkable
+from typing import Final
 
 from missions.errors import PlanError
-from missions.options import FlightOptions
 
 MAX_DISTANCE_M: Final = 50_000.0
 
@@ -118,11 +117,3 @@ class Setting:
     seed: int
     folder: Path
 
-
-@runtime_checkable
-class NeedsScenario(Protocol):
-    """A mission that needs more in its world than vehicles."""
-
-    def scenario(self, options: FlightOptions, setting: Setting) -> Scenario:
-        """What it asks of an embedded world; not called for vehicles elsewhere."""
-        ...

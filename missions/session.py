@@ -4,25 +4,27 @@ This is the shell around the missions: it opens things, starts the event loop, a
 """
 
 import asyncio
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import AsyncExitStack, suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock, run, unix_time_us
+from autopilot_bridge.clock import Clock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.tlog import TlogWriter
-from missions.connection import GROUND_STATION, Connection
+from missions.connection import Connection
 from missions.errors import MissionError, PlanError
-from missions.library import Mission, PatternMission
+from missions.limits_before_flight import check_request, check_stage, in_wind, vehicle_options
+from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
-from missions.options import FlightOptions
-from missions.planning.limits import DEFAULT_LIMITS, WIDEST_LIMITS, VehicleLimits
+from missions.opening import Stage, open_vehicles, open_world
+from missions.options import MissionOptions
 from missions.records import FlightRecorder, FlightRecords
+from missions.request import RunRequest
 from missions.run import (
-    EPOCH_UNIX_US,
     LOG_NAME,
     PICTURE_NAME,
     RUNS,
@@ -32,54 +34,16 @@ from missions.run import (
     versions,
     write_summary,
 )
-from missions.scenario import NeedsScenario, Scenario, Setting
-from missions.vehicle.adapter import Mode
 from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from autopilot_bridge.links import Link
     from missions.score import FlightScore
 
-_LIMITING_PARAMETERS: Final = ("MPC_XY_VEL_MAX", "MPC_ACC_HOR", "WPNAV_SPEED", "WPNAV_ACCEL")
+__all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
 
 COMPLETED: Final = "completed"
 FAILED: Final = "failed"
 INTERRUPTED: Final = "interrupted"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunRequest:
-    """Everything about a run but the mission itself.
-
-    Attributes:
-        options: what the mission is to do.
-        connect: connection strings, one per vehicle; empty: an embedded SITL.
-        autopilot, model, seed, speedup, wind_speed_m_s, wind_from_deg, turbulence, home: of the embedded
-            SITL.
-        parameters: autopilot parameters to set before the flight.
-        out: run folder; None: the next `runs/<mission>-<n>`.
-        picture: whether to draw `track.png`.
-        identity: MAVLink system and component id of the mission.
-        on_failure: what the vehicle is told when the mission fails or is interrupted.
-        command: the command line, for the summary.
-    """
-
-    options: FlightOptions = field(default_factory=FlightOptions)
-    connect: Sequence[str] = ()
-    autopilot: str = "px4"
-    model: str = "iris"
-    seed: int = 0
-    speedup: float | None = None
-    wind_speed_m_s: float = 0.0
-    wind_from_deg: float = 0.0
-    turbulence: str = "none"
-    home: str | None = None
-    parameters: Mapping[str, float] = field(default_factory=dict)
-    out: Path | None = None
-    picture: bool = True
-    identity: tuple[int, int] = GROUND_STATION
-    on_failure: Mode = Mode.RETURN
-    command: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +83,7 @@ ProgressListener = Callable[[Flight], None]
 """Called each second of vehicle time."""
 
 
-def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
+def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
     """Fly a mission and write its run folder. Blocks until all is done.
 
     A mission that fails or is interrupted (Ctrl-C) leaves its vehicles safe, and still gives a result and a
@@ -129,7 +93,7 @@ def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | N
         PlanError: what was asked for can't be flown; nothing was started.
         BridgeError: a link can't be opened.
     """
-    mission.check(request.options, limits_before_flight(request))
+    check_request(mission, request)
     if request.connect and len(request.connect) != request.options.vehicles:
         raise PlanError(
             f"{len(request.connect)} connections for {request.options.vehicles} vehicles; "
@@ -137,40 +101,49 @@ def fly(mission: Mission, request: RunRequest, on_progress: ProgressListener | N
         )
     made = _missing_folders(request.out or RUNS)
     folder = create_run_folder(request.out, mission.name)
+    stage = None
     try:
-        session = _open_remote(request) if request.connect else _open_embedded(mission, request, folder)
+        stage = open_vehicles(request) if request.connect else open_world(mission, request, folder)
+        check_stage(mission, request, stage)
     except BaseException:
-        if request.out is None:
-            made.insert(0, folder)
-        with suppress(OSError):
-            for empty in made:
-                empty.rmdir()
+        if stage is not None:
+            stage.close()
+            stage.loop.close()
+        _forget(folder, made if request.out is not None else [folder, *made])
         raise
     flight = Flight()
     outcome, reason = COMPLETED, ""
     try:
         with TlogWriter(folder / LOG_NAME) as log:
-            recorder = FlightRecorder(log, epoch_us=session.epoch_us, unix_time_us=unix_time_us)
-            session.on_truth(recorder.record_truth)
+            recorder = FlightRecorder(log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
+            stage.on_truth(recorder.record_truth)
             try:
-                run(_fly(mission, request, session, recorder, flight, on_progress), session.loop)
+                run(_fly(mission, request, stage, recorder, flight, on_progress), stage.loop)
             except KeyboardInterrupt:
                 outcome, reason = INTERRUPTED, "interrupted"
             except (MissionError, PlanError, BridgeError) as error:
                 outcome, reason = FAILED, str(error)
     finally:
-        session.close()
-        session.loop.close()
-    sim_time_s = max(0, session.time_us() - flight.started_us) * 1e-6
+        stage.close()
+        stage.loop.close()
+    sim_time_s = max(0, stage.time_us() - flight.started_us) * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
-    summary = _summary(mission, request, recorder.records, flight, outcome, reason, sim_time_s, wall_s)
-    scores = summary.pop("_scores")
+    debriefing = _debrief(mission, request, recorder.records, flight)
+    summary = _summary(mission, request, debriefing, outcome, reason, sim_time_s, wall_s)
     write_summary(folder, summary)
-    if request.picture and scores:
-        from missions.picture import draw_run
-
-        draw_run(folder / PICTURE_NAME, _title(mission, request, summary), scores)
+    if request.picture and debriefing.flights:
+        mission.draw(folder / PICTURE_NAME, _title(mission, request, summary), debriefing)
     return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
+
+
+def _forget(folder: Path, made: list[Path]) -> None:
+    """Take back a run folder in which nothing was flown, with what the world has published there."""
+    for file in folder.glob("*"):
+        with suppress(OSError):
+            file.unlink()
+    for empty in made:
+        with suppress(OSError):
+            empty.rmdir()
 
 
 def _missing_folders(folder: Path) -> list[Path]:
@@ -181,133 +154,24 @@ def _missing_folders(folder: Path) -> list[Path]:
         return []
 
 
-def limits_before_flight(request: RunRequest) -> VehicleLimits:
-    """What can be refused before a vehicle was heard: by the embedded SITL's parameters, or wide for
-    others.
-    """
-    known = DEFAULT_LIMITS.get(request.autopilot)
-    if request.connect or known is None:
-        return WIDEST_LIMITS
-    given = request.parameters
-    for name in _LIMITING_PARAMETERS:
-        if not given.get(name, 1.0) > 0.0:
-            raise PlanError(f"parameter {name} = {given[name]:g} is not possible; it must be more than 0")
-    if request.autopilot == "px4":
-        return replace(
-            known,
-            speed_m_s=given.get("MPC_XY_VEL_MAX", known.speed_m_s),
-            acceleration_m_s2=given.get("MPC_ACC_HOR", known.acceleration_m_s2),
-        )
-    return replace(
-        known,
-        speed_m_s=0.01 * given.get("WPNAV_SPEED", 100.0 * known.speed_m_s),
-        acceleration_m_s2=0.01 * given.get("WPNAV_ACCEL", 100.0 * known.acceleration_m_s2),
-    )
-
-
-@dataclass(slots=True, kw_only=True)
-class _Session:
-    """What a flight runs on."""
-
-    loop: asyncio.AbstractEventLoop
-    links: list["Link"]
-    clocks: list[Clock]
-    epoch_us: int | None
-    time_us: Callable[[], int]
-    on_truth: Callable[[Callable[[int, bytes], None]], None]
-    close: Callable[[], None]
-
-
-def _open_embedded(mission: Mission, request: RunRequest, folder: Path) -> _Session:
-    from missions.embedded import EmbeddedConfiguration, open_embedded
-
-    scenario = Scenario()
-    if isinstance(mission, NeedsScenario):
-        scenario = mission.scenario(request.options, Setting(seed=request.seed, folder=folder))
-    try:
-        sitl = open_embedded(
-            EmbeddedConfiguration(
-                vehicles=request.options.vehicles,
-                model=request.model,
-                flavour=request.autopilot,
-                seed=request.seed,
-                speedup=request.speedup,
-                wind_speed_m_s=request.wind_speed_m_s,
-                wind_from_deg=request.wind_from_deg,
-                turbulence=request.turbulence,
-                parameters=request.parameters,
-                home=request.home,
-                scenario=scenario,
-            )
-        )
-    except ValueError as error:
-        raise PlanError(str(error)) from error
-    return _Session(
-        loop=sitl.loop,
-        links=list(sitl.links),
-        clocks=[LoopClock() for _ in sitl.links],
-        epoch_us=EPOCH_UNIX_US,
-        time_us=lambda: sitl.time_us,
-        on_truth=sitl.on_truth,
-        close=sitl.close,
-    )
-
-
-def _open_remote(request: RunRequest) -> _Session:
-    from autopilot_bridge.links import ReplayLog, open_link, parse_address
-
-    addresses = [parse_address(text) for text in request.connect]
-    for address in addresses:
-        if isinstance(address, ReplayLog):
-            raise PlanError(f"--connect {address}: a log can't be flown; give the link of a vehicle")
-    links: list[Link] = []
-    try:
-        links.extend(open_link(address) for address in addresses)
-    except BaseException:
-        for link in links:
-            link.close()
-        raise
-    clocks = [TelemetryClock() for _ in links]
-
-    def close() -> None:
-        for link in links:
-            link.close()
-
-    return _Session(
-        loop=asyncio.new_event_loop(),
-        links=links,
-        clocks=list(clocks),
-        epoch_us=None,
-        time_us=lambda: max(clock.time_us for clock in clocks),
-        on_truth=lambda _listener: None,
-        close=close,
-    )
-
-
 async def _fly(
-    mission: Mission,
+    mission: Mission[Any],
     request: RunRequest,
-    session: _Session,
+    stage: Stage,
     recorder: FlightRecorder,
     flight: Flight,
     on_progress: ProgressListener | None,
 ) -> None:
     async with AsyncExitStack() as stack:
-        for link, clock in zip(session.links, session.clocks, strict=True):
+        for link, clock in zip(stage.links, stage.clocks, strict=True):
             connection = Connection(link, clock, recorder, identity=request.identity)
             await stack.enter_async_context(connection)
             flight.vehicles.append(Vehicle(connection))
-        flight.clock = session.clocks[0]
+        flight.clock = stage.clocks[0]
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
             await _all([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])
-            centre = flight.vehicles[0].home if len(flight.vehicles) > 1 else request.options.centre
-            await _all(
-                [
-                    _fly_one(mission, vehicle, replace(request.options, index=k, centre=centre), request)
-                    for k, vehicle in enumerate(flight.vehicles)
-                ]
-            )
+            await _fly_all(mission, flight.vehicles, request)
         finally:
             for vehicle in flight.vehicles:
                 vehicle.notes.end(vehicle.clock.time_us)
@@ -323,6 +187,7 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
         raise MissionError(f"no vehicle was heard{where}: {error}; is it on, and sending there?") from error
     vehicle.notes.system_id = vehicle.system_id
     vehicle.notes.autopilot = vehicle.autopilot
+    vehicle.notes.kind = str(vehicle.kind)
     if request.connect:
         if vehicle is flight.vehicles[0]:
             flight.started_us = vehicle.clock.time_us
@@ -330,10 +195,32 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
     await vehicle.wait_ready()
 
 
-async def _fly_one(mission: Mission, vehicle: Vehicle, options: FlightOptions, request: RunRequest) -> None:
+async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest) -> None:
+    centre = vehicles[0].home if len(vehicles) > 1 else request.options.centre
+    options: list[MissionOptions] = []
+    for index, vehicle in enumerate(vehicles):
+        limits = in_wind(await vehicle.limits(), request.planning_wind_m_s)
+        own = mission.adapted(replace(vehicle_options(request.options, index), centre=centre), limits)
+        options.append(own)
+        vehicle.notes.options = own
+    if not mission.together:
+        await _all(
+            [
+                _fly_one(mission.fly(vehicle, own), vehicle, request)
+                for vehicle, own in zip(vehicles, options, strict=True)
+            ]
+        )
+        return
+    flying = mission.fly_team(vehicles, options)
+    for vehicle in vehicles:
+        flying = _fly_one(flying, vehicle, request)
+    await flying
+
+
+async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request: RunRequest) -> None:
     vehicle.notes.begin("flight", vehicle.clock.time_us)  # until the mission names a phase of its own
     async with vehicle.safe_on_exit(request.on_failure):
-        await mission.fly(vehicle, options)
+        await flying
         if vehicle.armed:
             raise MissionError(
                 f"the mission ended with the vehicle armed; it was told to {request.on_failure}. "
@@ -361,30 +248,38 @@ async def _report(flight: Flight, on_progress: ProgressListener | None) -> None:
         await flight.clock.sleep(1.0)
 
 
+def _debrief(
+    mission: Mission[Any], request: RunRequest, records: FlightRecords, flight: Flight
+) -> Debriefing:
+    from missions.score import score
+
+    notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
+    flights: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
+    options = notes[0].options if notes and notes[0].options is not None else request.options
+    return Debriefing(records=records, flights=flights, options=options)
+
+
 def _summary(
-    mission: Mission,
+    mission: Mission[Any],
     request: RunRequest,
-    records: FlightRecords,
-    flight: Flight,
+    debriefing: Debriefing,
     outcome: str,
     reason: str,
     sim_time_s: float,
     wall_time: float,
 ) -> dict[str, Any]:
-    from missions.score import score
-
-    notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
-    scores: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
-    blocks = [vehicle_summary(n, s) for n, s in scores]
+    blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
+    notes = [n for n, _ in debriefing.flights]
     options = {
-        key: str(value) if key in ("centre", "via") else value
-        for key, value in asdict(replace(request.options, arguments={}, centre=None)).items()
+        key: str(value) if isinstance(value, StrEnum) else value
+        for key, value in asdict(replace(debriefing.options, arguments={}, centre=None, given=None)).items()
         if value is not None
     }
     remote = bool(request.connect)
+    models = dict.fromkeys(request.models)
     summary: dict[str, Any] = {
         "mission": mission.name,
-        "vehicle": "remote" if remote else request.model,
+        "vehicle": "remote" if remote else ",".join(models),
         "autopilot": notes[0].autopilot if notes else request.autopilot,
         "seed": None if remote else request.seed,
         "outcome": outcome,
@@ -393,14 +288,14 @@ def _summary(
         "wall_time_s": round(wall_time, 3),
         "speedup": round(sim_time_s / max(wall_time, 1e-9), 2),
         **team_figures(blocks),
+        **mission.figures(debriefing),
         "vehicles": blocks,
-        "message_counts": records.message_counts,
+        "message_counts": debriefing.records.message_counts,
         "versions": versions(),
         "options": options | {"arguments": dict(request.options.arguments)},
         "parameters": dict(request.parameters),
         "connect": list(request.connect),
         "command": request.command,
-        "_scores": scores,
     }
     if not remote:
         summary["wind"] = {
@@ -411,14 +306,8 @@ def _summary(
     return summary
 
 
-def _title(mission: Mission, request: RunRequest, summary: Mapping[str, Any]) -> str:
-    options = request.options
-    parts = [mission.name]
-    if mission.name == "lissajous":
-        parts.append(options.pattern if options.ratio is None else "{:g}:{:g}".format(*options.ratio))
-    if isinstance(mission, PatternMission):
-        parts += [f"{options.width_m:g} m x {options.height_m:g} m", f"via {options.via}"]
-    parts.append(summary["autopilot"])
+def _title(mission: Mission[Any], request: RunRequest, summary: Mapping[str, Any]) -> str:
+    parts = [mission.title(request.options), summary["autopilot"]]
     rms = summary["path_rms_error_m"]
     figures = f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.0f} s"
     if rms is not None:

@@ -59,6 +59,29 @@ class Attitude:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AirData:
+    """What a pilot's head-up display shows (VFR_HUD; it has no time of its own).
+
+    Attributes:
+        airspeed_m_s: equivalent airspeed.
+        climb_m_s: up.
+        throttle: 0..1.
+    """
+
+    airspeed_m_s: float
+    climb_m_s: float
+    throttle: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pressure:
+    """Static pressure at the vehicle (SCALED_PRESSURE)."""
+
+    time_us: int
+    static_pa: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Battery:
     """Battery (SYS_STATUS). NaN where the vehicle doesn't know."""
 
@@ -124,6 +147,16 @@ def attitude(m: Any) -> Attitude:
     )
 
 
+def air_data(m: Any) -> AirData:
+    """From VFR_HUD."""
+    return AirData(airspeed_m_s=m.airspeed, climb_m_s=m.climb, throttle=0.01 * m.throttle)
+
+
+def pressure(m: Any) -> Pressure:
+    """From SCALED_PRESSURE."""
+    return Pressure(time_us=m.time_boot_ms * 1000, static_pa=100.0 * m.press_abs)
+
+
 def battery(m: Any) -> Battery:
     """From SYS_STATUS."""
     return Battery(
@@ -158,6 +191,8 @@ SOURCES: Final[Mapping[type, tuple[str, Callable[[Any], Any]]]] = MappingProxyTy
         Position: ("GLOBAL_POSITION_INT", position),
         LocalPosition: ("LOCAL_POSITION_NED", local_position),
         Attitude: ("ATTITUDE", attitude),
+        AirData: ("VFR_HUD", air_data),
+        Pressure: ("SCALED_PRESSURE", pressure),
         Battery: ("SYS_STATUS", battery),
         Gps: ("GPS_RAW_INT", gps),
         MissionProgress: ("MISSION_CURRENT", progress),

@@ -1,17 +1,19 @@
 """An embedded SITL: the world in this process, on virtual time, one memory link per vehicle."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.links import Link
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, parse_home, team
-from autopilot_bridge.sitl.configuration import FIXED_EPOCH_UNIX_US
+from autopilot_bridge.sitl.configuration import FIXED_EPOCH_UNIX_US, HOMES
 from autopilot_bridge.sitl.sitl import TruthListener
+from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
 from missions.embedded.scenario import magnetic_field_of, payload_of, targets_of
 from missions.scenario import Scenario
+from missions.kind import VehicleKind
 
 MAX_FLIGHT_S = 24 * 3600.0
 
@@ -22,7 +24,8 @@ class EmbeddedConfiguration:
 
     Attributes:
         vehicles: how many, with system ids 1, 2, ...
-        model: one of our models by name, or a path.
+        model: of all vehicles, or one for each: a name, or a path.
+        launch: how the aircraft among them get into the air; None: as their descriptions say.
         flavour: "px4" or "ardupilot".
         seed: one seed makes one flight.
         physics_rate_hz: steps per second of vehicle time.
@@ -36,7 +39,8 @@ class EmbeddedConfiguration:
     """
 
     vehicles: int = 1
-    model: str | Path = "iris"
+    model: str | Path | Sequence[str | Path] = "iris"
+    launch: str | None = None
     flavour: str = "px4"
     seed: int = 0
     physics_rate_hz: int = 250
@@ -67,12 +71,19 @@ class EmbeddedSitl:
 
     def __init__(self, configuration: EmbeddedConfiguration) -> None:
         scenario = configuration.scenario
+        flavour = configuration.flavour
+        if configuration.home is not None:
+            home = parse_home(configuration.home)
+        else:
+            home = HOMES.get(flavour, HOMES["px4"])
         payload = payload_of(scenario)
         vehicles = team(
             configuration.vehicles,
             model=configuration.model,
-            flavour=configuration.flavour,
+            flavour=flavour,
             parameters=configuration.parameters,
+            launch=configuration.launch,
+            heading_deg=home.heading_deg,
         )
         environment = Environment.from_wind(
             speed_m_s=configuration.wind_speed_m_s,
@@ -81,7 +92,7 @@ class EmbeddedSitl:
         )
         world = SitlConfiguration(
             vehicles=tuple(replace(vehicle, payload=payload) for vehicle in vehicles),
-            home=None if configuration.home is None else parse_home(configuration.home),
+            home=home,
             environment=environment,
             seed=configuration.seed,
             physics_rate_hz=configuration.physics_rate_hz,
@@ -99,6 +110,11 @@ class EmbeddedSitl:
             speedup=configuration.speedup,
             max_time_us=round(configuration.max_flight_s * 1e6),
         )
+
+    def parameters(self, index: int, names: Sequence[str]) -> dict[str, float]:
+        """Parameters of a vehicle's autopilot, as it would tell them; those it doesn't have are left out."""
+        store = self.sitl.vehicles[index].autopilot.parameters
+        return {name: store.get(name) for name in names if name in store}
 
     @property
     def time_us(self) -> int:
@@ -123,3 +139,12 @@ def open_embedded(configuration: EmbeddedConfiguration) -> EmbeddedSitl:
         ValueError: a value that the message names, with what is accepted.
     """
     return EmbeddedSitl(configuration)
+
+
+def model_kind(model: str | Path) -> VehicleKind:
+    """Class of vehicle of a model.
+
+    Raises:
+        ValueError: no such model.
+    """
+    return VehicleKind(load_airframe(model).kind.value)

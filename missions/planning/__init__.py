@@ -1,6 +1,6 @@
 """From a pattern to something a vehicle can fly: a trajectory in time, or waypoints."""
 
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import MulticopterLimits
 from missions.planning.natural import natural_trajectory
 from missions.planning.trajectory import Trajectory, TrajectoryPoint, line_trajectory, plan_trajectory
 from missions.planning.waypoints import leg_speeds, waypoints_along
@@ -8,7 +8,7 @@ from missions.planning.waypoints import leg_speeds, waypoints_along
 __all__ = [
     "Trajectory",
     "TrajectoryPoint",
-    "VehicleLimits",
+    "MulticopterLimits",
     "leg_speeds",
     "line_trajectory",
     "natural_trajectory",

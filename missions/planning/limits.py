@@ -1,31 +1,25 @@
 """What a vehicle can do, as a planner needs it, and refusing what it can't."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from types import MappingProxyType
 from typing import Final
 
 from missions.errors import PlanError
+from missions.kind import VehicleKind
+
+GRAVITY_M_S2: Final = 9.80665
+TURN_MARGIN: Final = 1.2  # of the radius, for gusts and for the time a bank takes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleLimits:
-    """Limits of a multicopter for planning.
+class _Limits:
+    """What every vehicle is bound by.
 
     Attributes:
-        speed_m_s: largest ground speed (PX4 MPC_XY_VEL_MAX 12; ArduCopter WPNAV_SPEED 10).
-        acceleration_m_s2: largest horizontal acceleration (PX4 MPC_ACC_HOR 3; ArduCopter WPNAV_ACCEL 2.5).
-        yaw_rate_rad_s: how fast the nose may turn (PX4 MPC_YAWRAUTO_MAX 60 deg/s).
-        smoothing_s: time over which an acceleration builds up; jerk stays below 2 acceleration / smoothing.
         altitude_min_m, altitude_max_m: above home. 120 m is the ceiling of the open category (EU 2019/947).
         reach_m: farthest from home a pattern may go.
     """
 
-    speed_m_s: float = 12.0
-    acceleration_m_s2: float = 3.0
-    yaw_rate_rad_s: float = math.radians(60.0)
-    smoothing_s: float = 0.8
     altitude_min_m: float = 1.5
     altitude_max_m: float = 120.0
     reach_m: float = 5000.0
@@ -33,10 +27,49 @@ class VehicleLimits:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
+            if not isinstance(value, float) or (value == 0.0 and field.name == "wind_m_s"):
+                continue
             if not (math.isfinite(value) and value > 0.0):
                 raise PlanError(
                     f"vehicle limit {field.name} = {value} is not possible; it must be more than 0"
                 )
+
+    def check_altitude(self, altitude_m: float) -> None:
+        """Refuse an altitude above home outside the limits."""
+        if not self.altitude_min_m <= altitude_m <= self.altitude_max_m:
+            raise PlanError(
+                f"altitude {altitude_m:g} m is not in {self.altitude_min_m:g}..{self.altitude_max_m:g} m "
+                "above home; change --altitude"
+            )
+
+    def check_reach(self, distance_m: float) -> None:
+        """Refuse a pattern that leads too far from home."""
+        if not distance_m <= self.reach_m:
+            raise PlanError(
+                f"the pattern reaches {distance_m:.0f} m from home, more than {self.reach_m:g} m; "
+                "make it smaller"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MulticopterLimits(_Limits):
+    """Limits of a multicopter for planning.
+
+    Attributes:
+        speed_m_s: largest ground speed (PX4 MPC_XY_VEL_MAX 12; ArduCopter WPNAV_SPEED 10).
+        acceleration_m_s2: largest horizontal acceleration (PX4 MPC_ACC_HOR 3; ArduCopter WPNAV_ACCEL 2.5).
+        yaw_rate_rad_s: how fast the nose may turn (PX4 MPC_YAWRAUTO_MAX 60 deg/s).
+        smoothing_s: time over which an acceleration builds up; jerk stays below 2 acceleration / smoothing.
+    """
+
+    speed_m_s: float = 12.0
+    acceleration_m_s2: float = 3.0
+    yaw_rate_rad_s: float = math.radians(60.0)
+    smoothing_s: float = 0.8
+
+    @property
+    def kind(self) -> VehicleKind:
+        return VehicleKind.MULTICOPTER
 
     @property
     def lateral_m_s2(self) -> float:
@@ -58,30 +91,68 @@ class VehicleLimits:
                 "change --speed"
             )
 
-    def check_altitude(self, altitude_m: float) -> None:
-        """Refuse an altitude above home outside the limits."""
-        if not self.altitude_min_m <= altitude_m <= self.altitude_max_m:
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FixedWingLimits(_Limits):
+    """Limits of a fixed wing for planning.
+
+    Attributes:
+        airspeed_min_m_s, airspeed_trim_m_s, airspeed_max_m_s: equivalent airspeed.
+        bank_max_rad: steepest bank of its autopilot.
+        bank_parameter: what that is called there, for messages.
+        wind_m_s: steady wind to plan turns for.
+    """
+
+    altitude_min_m: float = 20.0
+    airspeed_min_m_s: float = 10.0
+    airspeed_trim_m_s: float = 15.0
+    airspeed_max_m_s: float = 20.0
+    bank_max_rad: float = math.radians(50.0)
+    bank_parameter: str = "bank limit"
+    wind_m_s: float = 0.0
+
+    @property
+    def kind(self) -> VehicleKind:
+        return VehicleKind.FIXED_WING
+
+    def check_airspeed(self, airspeed_m_s: float) -> None:
+        """Refuse an airspeed the aircraft can't fly."""
+        if not self.airspeed_min_m_s <= airspeed_m_s <= self.airspeed_max_m_s:
             raise PlanError(
-                f"altitude {altitude_m:g} m is not in {self.altitude_min_m:g}..{self.altitude_max_m:g} m "
-                "above home; change --altitude"
+                f"airspeed {airspeed_m_s:g} m/s is not in "
+                f"{self.airspeed_min_m_s:g}..{self.airspeed_max_m_s:g} m/s, the aircraft's range; "
+                "change the speed"
+            )
+        if airspeed_m_s <= 1.2 * self.wind_m_s:
+            raise PlanError(
+                f"airspeed {airspeed_m_s:g} m/s leaves no way forward in {self.wind_m_s:g} m/s of wind; "
+                "fly faster, or wait for less wind"
             )
 
-    def check_reach(self, distance_m: float) -> None:
-        """Refuse a pattern that leads too far from home."""
-        if not distance_m <= self.reach_m:
-            raise PlanError(
-                f"the pattern reaches {distance_m:.0f} m from home, more than {self.reach_m:g} m; "
-                "make it smaller"
-            )
+    def turn_radius_m(self, airspeed_m_s: float, *, drift_m_s: float = 0.0) -> float:
+        """Tightest circle over ground that can be held all the way round, with margin.
+
+        The wind blows along somewhere on the circle: (V + w)^2 / (g tan(bank)), times 1.2.
+
+        Args:
+            airspeed_m_s: true airspeed.
+            drift_m_s: speed of what the circle is around, against the ground.
+        """
+        fastest = airspeed_m_s + self.wind_m_s + drift_m_s
+        return TURN_MARGIN * fastest**2 / (GRAVITY_M_S2 * math.tan(self.bank_max_rad))
 
 
-WIDEST_LIMITS: Final = VehicleLimits(speed_m_s=20.0, acceleration_m_s2=5.0)
-"""What is refused for any vehicle; a vehicle's own limits are read from it later."""
+Limits = MulticopterLimits | FixedWingLimits
+"""Limits of one vehicle."""
 
-DEFAULT_LIMITS: Final[Mapping[str, VehicleLimits]] = MappingProxyType(
-    {
-        "px4": VehicleLimits(speed_m_s=12.0, acceleration_m_s2=3.0),
-        "ardupilot": VehicleLimits(speed_m_s=10.0, acceleration_m_s2=2.5),
-    }
+WIDEST_LIMITS: Final = MulticopterLimits(speed_m_s=20.0, acceleration_m_s2=5.0)
+"""What is refused for any multicopter; a vehicle's own limits are read from it later."""
+
+WIDEST_FIXED_WING_LIMITS: Final = FixedWingLimits(
+    airspeed_min_m_s=3.0,
+    airspeed_trim_m_s=20.0,
+    airspeed_max_m_s=150.0,
+    bank_max_rad=math.radians(80.0),
+    altitude_max_m=3000.0,
 )
-"""By firmware, with its default parameters: MPC_XY_VEL_MAX and MPC_ACC_HOR; WPNAV_SPEED and WPNAV_ACCEL."""
+"""The same for a fixed wing."""

@@ -8,7 +8,7 @@ import numpy as np
 from missions.errors import PlanError
 from missions.patterns.curve import Array, Curve
 from missions.patterns.lissajous import Lissajous
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import MulticopterLimits
 from missions.planning.profile import STEP_S
 from missions.planning.trajectory import Trajectory
 
@@ -20,7 +20,7 @@ def natural_trajectory(
     *,
     fundamental_period_s: float,
     altitude_m: float,
-    limits: VehicleLimits,
+    limits: MulticopterLimits,
     duration_s: float | None = None,
 ) -> Trajectory:
     """Fly a Lissajous curve (or laps of one) so that x and y are harmonic, with a smooth start and stop.
@@ -86,7 +86,7 @@ def _phase(t: Array, whole_s: float, ramp_s: float, rate: float) -> tuple[Array,
 
 
 def _trajectory(
-    curve: Curve, u: Array, pace: Array, change: Array, altitude_m: float, limits: VehicleLimits
+    curve: Curve, u: Array, pace: Array, change: Array, altitude_m: float, limits: MulticopterLimits
 ) -> Trajectory:
     points = curve.points(u)
     first, second = curve.derivatives(u)

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from missions.patterns.curve import Array
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import MulticopterLimits
 
 STEP_S: Final = 0.02
 _GRID_M: Final = 0.1
@@ -30,7 +30,7 @@ class Profile:
     acceleration_m_s2: Array
 
 
-def speed_profile(arc_m: Array, curvature_per_m: Array, speed_m_s: float, limits: VehicleLimits) -> Profile:
+def speed_profile(arc_m: Array, curvature_per_m: Array, speed_m_s: float, limits: MulticopterLimits) -> Profile:
     """Profile along a path without stops.
 
     Args:

@@ -10,7 +10,7 @@ import numpy as np
 from missions.errors import PlanError
 from missions.patterns.curve import ArcLengthTable, Array, Curve
 from missions.patterns.polyline import Polyline
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import MulticopterLimits
 from missions.planning.profile import STEP_S, Profile, speed_profile
 
 _BISECTIONS: Final = 14
@@ -91,7 +91,7 @@ def plan_trajectory(
     *,
     altitude_m: float,
     speed_m_s: float,
-    limits: VehicleLimits,
+    limits: MulticopterLimits,
     duration_s: float | None = None,
 ) -> Trajectory:
     """Fly a curve from rest to rest at constant altitude, nose along the path.
@@ -125,7 +125,7 @@ def line_trajectory(
     stop_ned_m: tuple[float, float, float],
     *,
     speed_m_s: float,
-    limits: VehicleLimits,
+    limits: MulticopterLimits,
 ) -> Trajectory:
     """Straight from one point to another, from rest to rest; yaw along the way (0 for a climb on the
     spot).
@@ -168,7 +168,7 @@ class _Piece:
     turn_s: float
 
 
-def _plan_pieces(table: ArcLengthTable, end: int, speed_m_s: float, limits: VehicleLimits) -> list[_Piece]:
+def _plan_pieces(table: ArcLengthTable, end: int, speed_m_s: float, limits: MulticopterLimits) -> list[_Piece]:
     bounds = [0, *(k for k in table.stops if k < end), end]
     pieces: list[_Piece] = []
     for first, last in itertools.pairwise(bounds):
@@ -201,7 +201,7 @@ def _duration_s(pieces: list[_Piece]) -> float:
 
 
 def _cut(
-    table: ArcLengthTable, pieces: list[_Piece], speed_m_s: float, limits: VehicleLimits, duration_s: float
+    table: ArcLengthTable, pieces: list[_Piece], speed_m_s: float, limits: MulticopterLimits, duration_s: float
 ) -> list[_Piece]:
     """The longest plan that ends, at rest, within the time."""
     kept: list[_Piece] = []

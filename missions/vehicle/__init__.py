@@ -3,7 +3,9 @@ time.
 """
 
 from missions.vehicle.adapter import Mode
+from missions.vehicle.attitude_setpoint import AttitudeSetpoint
+from missions.kind import VehicleKind
 from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.vehicle import Vehicle
 
-__all__ = ["Mode", "Setpoint", "Vehicle"]
+__all__ = ["AttitudeSetpoint", "Mode", "Setpoint", "Vehicle", "VehicleKind"]

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Protocol
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
+from missions.kind import VehicleKind
 
 if TYPE_CHECKING:
-    from missions.planning.limits import VehicleLimits
+    from missions.planning.limits import Limits
     from missions.vehicle.vehicle import Vehicle
 
 
@@ -39,6 +40,7 @@ class Adapter(Protocol):
 
     Attributes:
         name: "px4" or "ardupilot".
+        kind: class of vehicle.
         modes: HEARTBEAT.custom_mode of each mode.
         stream_rates_hz: telemetry a mission needs.
         bytewise_parameters: integers travel as bit patterns in PARAM_VALUE (PX4), not as numbers.
@@ -46,9 +48,12 @@ class Adapter(Protocol):
         first_mission_item_is_home: item 0 of a mission is home, whatever is uploaded there.
         goto_mode: the mode DO_REPOSITION puts the vehicle into.
         unset: what stands in a command or item parameter that is not set.
+        roll_alone: in the guided mode a roll command may leave pitch and throttle to the autopilot.
+        limiting_parameters: the parameters `limits` reads.
     """
 
     name: str
+    kind: VehicleKind
     modes: Mapping[Mode, int]
     stream_rates_hz: Mapping[str, float]
     bytewise_parameters: bool
@@ -56,6 +61,8 @@ class Adapter(Protocol):
     first_mission_item_is_home: bool
     goto_mode: Mode
     unset: float
+    roll_alone: bool
+    limiting_parameters: Mapping[str, float]
 
     def mode_name(self, custom_mode: int) -> str:
         """The firmware's own name of a mode."""
@@ -85,12 +92,30 @@ class Adapter(Protocol):
         """Fly the uploaded mission, from the ground or in the air."""
         ...
 
-    async def limits(self, vehicle: "Vehicle") -> "VehicleLimits":
-        """What the vehicle's parameters allow."""
+    def limits(self, parameters: Mapping[str, float]) -> "Limits":
+        """What the vehicle's parameters allow a planner.
+
+        Args:
+            parameters: those named in `limiting_parameters`; what is missing has the firmware's default.
+        """
         ...
 
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
         """The radius within which a waypoint counts as reached."""
+        ...
+
+    async def loiter(
+        self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
+    ) -> None:
+        """Command a fixed wing to circle a place."""
+        ...
+
+    async def change_altitude(self, vehicle: "Vehicle", altitude_m: float) -> None:
+        """Command a height above home, the rest of the flight as it is."""
+        ...
+
+    async def change_airspeed(self, vehicle: "Vehicle", airspeed_m_s: float) -> None:
+        """Command an airspeed, the rest of the flight as it is."""
         ...
 
     def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:

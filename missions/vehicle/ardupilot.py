@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Final
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.planning.limits import DEFAULT_LIMITS, VehicleLimits
+from missions.errors import PlanError
+from missions.planning.limits import Limits, MulticopterLimits
 from missions.vehicle.adapter import Mode, ModeCommand, missing_basics
+from missions.kind import VehicleKind
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
@@ -51,6 +53,7 @@ class ArduCopter:
     """ArduPilot copter: sends nothing until asked, numbers home as mission item 0, speaks PARAM_FLOAT."""
 
     name = "ardupilot"
+    kind = VehicleKind.MULTICOPTER
     # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would obey (throttle low:
     # descend)
     modes: Mapping[Mode, int] = MappingProxyType(
@@ -79,6 +82,8 @@ class ArduCopter:
     first_mission_item_is_home = True
     goto_mode = Mode.GUIDED
     unset = 0.0  # NaN is refused
+    roll_alone = False
+    limiting_parameters: Mapping[str, float] = MappingProxyType({"WPNAV_SPEED": 1000.0, "WPNAV_ACCEL": 250.0})
 
     def mode_name(self, custom_mode: int) -> str:
         return _NAMES.get(custom_mode, f"mode {custom_mode}")
@@ -117,16 +122,33 @@ class ArduCopter:
         await vehicle.set_mode(Mode.MISSION)
         await vehicle.command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0)
 
-    async def limits(self, vehicle: "Vehicle") -> VehicleLimits:
-        known = DEFAULT_LIMITS["ardupilot"]
-        return VehicleLimits(
-            speed_m_s=0.01 * await vehicle.parameter_or("WPNAV_SPEED", 100.0 * known.speed_m_s),
-            acceleration_m_s2=0.01
-            * await vehicle.parameter_or("WPNAV_ACCEL", 100.0 * known.acceleration_m_s2),
+    def limits(self, parameters: Mapping[str, float]) -> Limits:
+        values = {**self.limiting_parameters, **parameters}
+        return MulticopterLimits(
+            speed_m_s=0.01 * values["WPNAV_SPEED"], acceleration_m_s2=0.01 * values["WPNAV_ACCEL"]
         )
 
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
         return 0.01 * await vehicle.parameter_or("WPNAV_RADIUS", 100.0 * asked_m)  # param2 is not used
+
+    async def loiter(
+        self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
+    ) -> None:
+        raise PlanError("a multicopter does not circle a place by itself: use goto, or an orbit of your own")
+
+    async def change_altitude(self, vehicle: "Vehicle", altitude_m: float) -> None:
+        position = await vehicle.position()
+        await vehicle.command_int(
+            dialect.MAV_CMD_DO_REPOSITION,
+            dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+            (-1.0, 1.0, 0.0, 0.0),
+            round(position.lat_deg * 1e7),
+            round(position.lon_deg * 1e7),
+            altitude_m,
+        )
+
+    async def change_airspeed(self, vehicle: "Vehicle", airspeed_m_s: float) -> None:
+        raise PlanError("a multicopter has no airspeed to hold: use set_speed")
 
     def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
         return MissionItem(command=dialect.MAV_CMD_NAV_TAKEOFF, x=home.lat_deg, y=home.lon_deg, z=altitude_m)

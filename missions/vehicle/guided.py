@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING, Final
 
 from missions.errors import MissionError, PlanError
 from missions.vehicle.adapter import Mode
+from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 from missions.vehicle.setpoint import Setpoint, Vector
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
-SetpointSource = Callable[[float], Setpoint | None]
-"""Vehicle seconds since the start -> setpoint NED from home, or None at the end."""
+AnySetpoint = Setpoint | AttitudeSetpoint
+SetpointSource = Callable[[float], AnySetpoint | None]
+"""Vehicle seconds since the start -> setpoint NED from home (or an attitude), or None at the end."""
 
 _BEFORE_ENTRY_S: Final = 0.6
 _SLOWEST_HZ: Final = 2.5
@@ -34,7 +36,7 @@ class GuidedSession:
         self._offset = home_offset_ned_m
         self._source: SetpointSource | None = None
         self._start_us = 0
-        self._last: Setpoint | None = None
+        self._last: AnySetpoint | None = None
         self._done = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
         self._entered = False
@@ -125,10 +127,10 @@ class GuidedSession:
             self._source = None
 
 
-def _setpoint_of(source: SetpointSource, time_s: float) -> Setpoint | None:
+def _setpoint_of(source: SetpointSource, time_s: float) -> AnySetpoint | None:
     given: object = source(time_s)
-    if given is None or isinstance(given, Setpoint):
+    if given is None or isinstance(given, AnySetpoint):
         return given
     raise PlanError(
-        f"follow's source gave a {type(given).__name__} ({given!r}); accepted: a Setpoint or None"
+        f"follow's source gave a {type(given).__name__} ({given!r}); accepted: a Setpoint, an AttitudeSetpoint or None"
     )

@@ -5,27 +5,42 @@ The lower half of `Vehicle`: it listens, and sends nothing but what it is given.
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock
+from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, decode, dialect
 from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.errors import VehicleTimeout
 from missions.notes import FlightNotes
-from missions.telemetry import SOURCES, StatusText, StatusTextAssembler
+from missions.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 from missions.vehicle.adapter import Adapter
+from missions.vehicle.arduplane import ArduPlane
 from missions.vehicle.ardupilot import ArduCopter
+from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.vehicle.link_watch import LinkWatch
 from missions.vehicle.px4 import Px4
+from missions.vehicle.px4_plane import Px4Plane
 
 T = TypeVar("T")
 
 _TEXTS_KEPT: Final = 50
-_ADAPTERS: Final[dict[int, Callable[[], Adapter]]] = {
-    dialect.MAV_AUTOPILOT_PX4: Px4,
-    dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: ArduCopter,
+ADAPTERS: Final[Mapping[tuple[str, VehicleKind], Callable[[], Adapter]]] = MappingProxyType(
+    {
+        ("px4", VehicleKind.MULTICOPTER): Px4,
+        ("px4", VehicleKind.FIXED_WING): Px4Plane,
+        ("ardupilot", VehicleKind.MULTICOPTER): ArduCopter,
+        ("ardupilot", VehicleKind.FIXED_WING): ArduPlane,
+    }
+)
+"""By firmware and class of vehicle."""
+
+_FIRMWARES: Final = {
+    dialect.MAV_AUTOPILOT_PX4: "px4",
+    dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot",
 }
 
 
@@ -40,6 +55,7 @@ class VehicleView:
         connection: as given.
         notes: where a mission notes its phases, its progress and what it commands, for the run's summary.
         status_texts: the newest texts from the autopilot, oldest first.
+        first_heard_us: vehicle time of the first heartbeat.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -51,6 +67,7 @@ class VehicleView:
         self._last_ack: Any = None
         self._modes_asked: set[int] = set()  # custom modes asked for since the present `goto` began
         self._heard_us: int | None = None
+        self.first_heard_us = 0
         self._assembler = StatusTextAssembler()
         self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
         connection.listen("STATUSTEXT", self._on_status_text)
@@ -77,6 +94,11 @@ class VehicleView:
         """Firmware: "px4" or "ardupilot"."""
         return self.adapter.name
 
+    @property
+    def kind(self) -> VehicleKind:
+        """Class of vehicle: multicopter or fixed wing."""
+        return self.adapter.kind
+
     @staticmethod
     def _known(value: T | None) -> T:
         if value is None:
@@ -89,12 +111,15 @@ class VehicleView:
         if self._system_id is not None and frame.system_id != self._system_id:
             return
         if self._adapter is None:
-            make = _ADAPTERS.get(decode(frame).autopilot)
-            if make is None:
+            heartbeat = decode(frame)
+            firmware = _FIRMWARES.get(heartbeat.autopilot)
+            kind = KIND_OF_TYPE.get(heartbeat.type)
+            if firmware is None or kind is None:
                 return
-            self._adapter = make()
+            self._adapter = ADAPTERS[firmware, kind]()
             self._system_id = frame.system_id
             self.connection.keep(frame.system_id)
+            self.first_heard_us = self.clock.time_us
         self._heard_us = self.clock.time_us
         self._watch.on_heartbeat()
 
@@ -117,12 +142,35 @@ class VehicleView:
     def latest(self, kind: type[T]) -> T | None:
         """Newest telemetry of a kind, as `latest(Position)`; None before the first.
 
-        Kinds: `Position`, `LocalPosition`, `Attitude`, `Battery`, `Gps`, `MissionProgress`.
+        Kinds: `Position`, `LocalPosition`, `Attitude`, `AirData`, `Pressure`, `Battery`, `Gps`,
+        `MissionProgress`.
         """
         name, convert = SOURCES[kind]
         message = self.message(name)
         value: T | None = None if message is None else convert(message)
         return value
+
+    def home_or_none(self) -> GeodeticPosition | None:
+        """Home as the vehicle reports it, when it has."""
+        message = self.message("HOME_POSITION")
+        return None if message is None else home(message)
+
+    @property
+    def home(self) -> GeodeticPosition:
+        """Home as the vehicle reports it."""
+        place = self.home_or_none()
+        if place is None:
+            raise VehicleTimeout("the vehicle has not told its home position: call wait_ready first")
+        return place
+
+    async def position(self, timeout_s: float = 5.0) -> Position:
+        """Newest global position, waited for when there is none yet."""
+        return await self.wait_until(
+            lambda: self.latest(Position),
+            what="position",
+            on=("GLOBAL_POSITION_INT",),
+            timeout_s=timeout_s,
+        )
 
     async def telemetry(self, kind: type[T]) -> AsyncIterator[T]:
         """Stream of telemetry: `async for position in vehicle.telemetry(Position)`."""

@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Final
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.planning.limits import DEFAULT_LIMITS, VehicleLimits
+from missions.errors import PlanError
+from missions.planning.limits import Limits, MulticopterLimits
 from missions.vehicle.adapter import Mode, ModeCommand, missing_basics
+from missions.kind import VehicleKind
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
 _AUTO: Final = 4
+_HERE: Final = 0x7FFFFFFF
 _SUB_MODES: Final = {Mode.TAKEOFF: 2, Mode.HOLD: 3, Mode.MISSION: 4, Mode.RETURN: 5, Mode.LAND: 6}
 _NAMES: Final = {
     (1, 0): "Manual",
@@ -48,6 +51,7 @@ class Px4:
     """PX4: OFFBOARD needs setpoints before and all the time; mode commands are acknowledged twice."""
 
     name = "px4"
+    kind = VehicleKind.MULTICOPTER
     modes: Mapping[Mode, int] = MappingProxyType({mode: _custom_mode(mode) for mode in Mode})
     stream_rates_hz: Mapping[str, float] = MappingProxyType(
         {
@@ -66,6 +70,8 @@ class Px4:
     first_mission_item_is_home = False
     goto_mode = Mode.HOLD
     unset = math.nan
+    roll_alone = False
+    limiting_parameters: Mapping[str, float] = MappingProxyType({"MPC_XY_VEL_MAX": 12.0, "MPC_ACC_HOR": 3.0})
 
     def mode_name(self, custom_mode: int) -> str:
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24
@@ -103,15 +109,33 @@ class Px4:
         if not vehicle.armed:
             await vehicle.arm()
 
-    async def limits(self, vehicle: "Vehicle") -> VehicleLimits:
-        known = DEFAULT_LIMITS["px4"]
-        return VehicleLimits(
-            speed_m_s=await vehicle.parameter_or("MPC_XY_VEL_MAX", known.speed_m_s),
-            acceleration_m_s2=await vehicle.parameter_or("MPC_ACC_HOR", known.acceleration_m_s2),
+    def limits(self, parameters: Mapping[str, float]) -> Limits:
+        values = {**self.limiting_parameters, **parameters}
+        return MulticopterLimits(
+            speed_m_s=values["MPC_XY_VEL_MAX"], acceleration_m_s2=values["MPC_ACC_HOR"]
         )
 
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
         return asked_m  # a waypoint's param2 counts
+
+    async def loiter(
+        self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
+    ) -> None:
+        raise PlanError("a multicopter does not circle a place by itself: use goto, or an orbit of your own")
+
+    async def change_altitude(self, vehicle: "Vehicle", altitude_m: float) -> None:
+        # a latitude and longitude of INT32_MAX: where it is
+        await vehicle.command_int(
+            dialect.MAV_CMD_DO_REPOSITION,
+            dialect.MAV_FRAME_GLOBAL,
+            (-1.0, 1.0, math.nan, math.nan),
+            _HERE,
+            _HERE,
+            vehicle.home.alt_m + altitude_m,
+        )
+
+    async def change_airspeed(self, vehicle: "Vehicle", airspeed_m_s: float) -> None:
+        raise PlanError("a multicopter has no airspeed to hold: use set_speed")
 
     def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
         return MissionItem(

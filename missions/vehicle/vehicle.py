@@ -12,11 +12,13 @@ from autopilot_bridge.mission_plan import MissionItem
 from missions import telemetry
 from missions.connection import Connection
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
-from missions.planning.limits import VehicleLimits
+from missions.planning.limits import Limits
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
-from missions.vehicle.commands import HEARTBEAT_AGE_US, VehicleCommands
+from missions.vehicle.commands import HEARTBEAT_AGE_US
+from missions.vehicle.fixed_wing import FixedWingFlight
 from missions.vehicle.guided import GuidedSession, SetpointSource
+from missions.kind import VehicleKind
 
 _GROUND: Final = 1
 _ACCEPTED: Final = 0
@@ -24,7 +26,7 @@ _FARTHEST_M: Final = 10_000.0  # from home; beyond, latitude and longitude are m
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
-class Vehicle(VehicleCommands):
+class Vehicle(FixedWingFlight):
     """A vehicle over MAVLink, PX4 or ArduPilot: which one, its heartbeat says.
 
     All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` says what was awaited and
@@ -59,23 +61,25 @@ class Vehicle(VehicleCommands):
             timeout_s=timeout_s,
         )
 
-    @property
-    def home(self) -> GeodeticPosition:
-        """Home as the vehicle reports it."""
-        message = self.message("HOME_POSITION")
-        if message is None:
-            raise VehicleTimeout("the vehicle has not told its home position: call wait_ready first")
-        return telemetry.home(message)
-
-    async def limits(self) -> VehicleLimits:
+    async def limits(self) -> Limits:
         """What the vehicle's parameters allow a planner."""
-        return await self.adapter.limits(self)
+        adapter = self.adapter
+        return adapter.limits(
+            {
+                name: await self.parameter_or(name, default)
+                for name, default in adapter.limiting_parameters.items()
+            }
+        )
 
     # flying
 
     async def arm(self, timeout_s: float = 15.0) -> None:
         """Arm, and see it in a heartbeat; a refusal that may pass is tried again until the deadline."""
         await self.adapter.prepare_arming(self)
+        await self.arm_here(timeout_s)
+
+    async def arm_here(self, timeout_s: float = 15.0) -> None:
+        """As `arm`, in the mode the vehicle is in."""
         end_us = self.clock.time_us + round(timeout_s * 1e6)
         while not self.armed:
             result = await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
@@ -102,9 +106,12 @@ class Vehicle(VehicleCommands):
                 f"takeoff to {altitude_m:g} m is not possible; accepted: a finite altitude above 0 m "
                 "(altitude above home, positive up)"
             )
+        self.note_runway()
         if not self.armed:
             await self.arm()
         await self.adapter.take_off(self, altitude_m)
+        wings = self.kind is VehicleKind.FIXED_WING
+        slack_m, level_m_s = (max(3.0, 0.05 * altitude_m), 2.0) if wings else (max(0.5, 0.05 * altitude_m), 0.4)
 
         def reached() -> bool:
             position = self.latest(telemetry.Position)
@@ -112,8 +119,8 @@ class Vehicle(VehicleCommands):
                 raise MissionError(f"the vehicle disarmed during takeoff; {self.heard()}")
             return (
                 position is not None
-                and position.height_m > altitude_m - max(0.5, 0.05 * altitude_m)
-                and abs(position.vel_ned_m_s[2]) < 0.4
+                and position.height_m > altitude_m - slack_m
+                and abs(position.vel_ned_m_s[2]) < level_m_s
             )
 
         await self.wait_until(
@@ -136,11 +143,15 @@ class Vehicle(VehicleCommands):
     ) -> None:
         """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow.
 
+        For multicopters: an aircraft with wings can't be slow; see `loiter`.
+
         Raises:
             PlanError: the target is more than 10 km from home; nothing was sent.
             MissionError: the vehicle disarmed, or changed to a mode this mission did not ask for (a
                 failsafe, a pilot).
         """
+        if self.kind is VehicleKind.FIXED_WING:
+            raise PlanError("an aircraft with wings can't stop at a point: use loiter")
         self._check_distance(target)
         mode_before = self.custom_mode
         self._modes_asked.clear()

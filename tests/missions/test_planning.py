@@ -20,7 +20,7 @@ from missions.patterns import (
     sector,
 )
 from missions.planning import (
-    VehicleLimits,
+    MulticopterLimits,
     leg_speeds,
     line_trajectory,
     natural_trajectory,
@@ -28,7 +28,7 @@ from missions.planning import (
     waypoints_along,
 )
 
-LIMITS = VehicleLimits()
+LIMITS = MulticopterLimits()
 CURVES = {
     "L1": named_lissajous("L1", width_m=100.0, height_m=100.0),
     "L2": named_lissajous("L2", width_m=100.0, height_m=100.0),
@@ -85,7 +85,7 @@ def test_limits_are_kept_on_any_lissajous_curve(width, height, rx, ry, phase, sp
     curve = Lissajous(
         amplitude_x_m=0.5 * width, amplitude_y_m=0.5 * height, ratio_x=rx, ratio_y=ry, phase_x_rad=phase
     )
-    limits = VehicleLimits(acceleration_m_s2=acceleration)
+    limits = MulticopterLimits(acceleration_m_s2=acceleration)
     trajectory = plan_trajectory(curve, altitude_m=10.0, speed_m_s=speed, limits=limits)
     assert_within(trajectory, limits, speed)
 

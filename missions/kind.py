@@ -1,0 +1,31 @@
+"""What class of vehicle an autopilot flies, as a mission sees it in the heartbeat."""
+
+from collections.abc import Mapping
+from enum import StrEnum
+from types import MappingProxyType
+from typing import Final
+
+from autopilot_bridge.mavlink import dialect
+
+
+class VehicleKind(StrEnum):
+    """Classes of vehicles that a mission treats differently."""
+
+    MULTICOPTER = "multicopter"
+    FIXED_WING = "fixed_wing"
+
+
+KIND_OF_TYPE: Final[Mapping[int, VehicleKind]] = MappingProxyType(
+    {
+        dialect.MAV_TYPE_FIXED_WING: VehicleKind.FIXED_WING,
+        dialect.MAV_TYPE_QUADROTOR: VehicleKind.MULTICOPTER,
+        dialect.MAV_TYPE_COAXIAL: VehicleKind.MULTICOPTER,
+        dialect.MAV_TYPE_HELICOPTER: VehicleKind.MULTICOPTER,
+        dialect.MAV_TYPE_HEXAROTOR: VehicleKind.MULTICOPTER,
+        dialect.MAV_TYPE_OCTOROTOR: VehicleKind.MULTICOPTER,
+        dialect.MAV_TYPE_TRICOPTER: VehicleKind.MULTICOPTER,
+        dialect.MAV_TYPE_DODECAROTOR: VehicleKind.MULTICOPTER,
+        dialect.MAV_TYPE_DECAROTOR: VehicleKind.MULTICOPTER,
+    }
+)
+"""By MAV_TYPE; what is not in it can't be flown."""

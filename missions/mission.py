@@ -1,0 +1,99 @@
+"""What every mission is."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from missions.errors import PlanError
+from missions.options import MissionOptions
+from missions.planning.limits import Limits
+from missions.scenario import Scenario, Setting
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from missions.notes import FlightNotes
+    from missions.records import FlightRecords
+    from missions.score import FlightScore
+    from missions.vehicle.vehicle import Vehicle
+
+AnyOptions = TypeVar("AnyOptions", bound=MissionOptions)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldDefaults:
+    """The embedded world a mission is flown in unless somebody asks for another.
+
+    Attributes:
+        model: vehicle.
+        wind: "SPEED[@FROM]", m/s and degrees.
+        turbulence: "none", "light", "moderate" or "severe".
+    """
+
+    model: str = "iris"
+    wind: str = "0"
+    turbulence: str = "none"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Debriefing:
+    """What there is to say of a flight when it is over.
+
+    Attributes:
+        records: of all vehicles and, embedded, of the truth.
+        flights: notes and scores, one per vehicle.
+        options: of the first vehicle.
+    """
+
+    records: "FlightRecords"
+    flights: "Sequence[tuple[FlightNotes, FlightScore]]"
+    options: MissionOptions
+
+
+class Mission(Generic[AnyOptions]):
+    """Something that can be flown. Subclasses say what they do differently.
+
+    Attributes:
+        name: for people and file names.
+        world_defaults: the world it is flown in.
+        together: the vehicles of a team are flown by one `fly_team`, not each by a `fly`.
+    """
+
+    name: str = "mission"
+    world_defaults = WorldDefaults()
+    together = False
+
+    def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:
+        """The options as one vehicle flies them: what nobody chose suits it."""
+        return options.for_vehicle(limits)
+
+    def check(self, options: AnyOptions, limits: Limits) -> None:
+        """Refuse, with a PlanError, what one vehicle can't fly; before anything is started, and again when its
+        own limits are known.
+        """
+
+    def scenario(self, options: AnyOptions, setting: Setting) -> Scenario:
+        """What an embedded world must hold beside the vehicles; not asked for vehicles elsewhere."""
+        return Scenario()
+
+    async def fly(self, vehicle: "Vehicle", options: AnyOptions) -> None:
+        """Fly one vehicle, which is ready to arm, from the ground back to the ground."""
+        raise PlanError(f"mission {self.name} flies no single vehicle")
+
+    async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[AnyOptions]) -> None:
+        """Fly all vehicles of a team, each ready to arm; called instead of `fly` when `together`."""
+        raise PlanError(f"mission {self.name} flies no team")
+
+    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
+        """What `summary.json` has beside the figures of every flight."""
+        return {}
+
+    def title(self, options: AnyOptions) -> str:
+        """First words of the picture's title."""
+        return self.name
+
+    def draw(self, path: "Path", title: str, debriefing: Debriefing) -> None:
+        """Draw `track.png`."""
+        from missions.picture import draw_run
+
+        draw_run(path, title, list(debriefing.flights))

@@ -1,0 +1,119 @@
+"""Opening what a flight runs on: an embedded world, or links to vehicles elsewhere."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
+from missions.errors import PlanError
+from missions.mission import Mission
+from missions.request import RunRequest
+from missions.run import EPOCH_UNIX_US
+from missions.scenario import Setting
+
+if TYPE_CHECKING:
+    from autopilot_bridge.links import Link
+
+
+@dataclass(slots=True, kw_only=True)
+class Stage:
+    """What a flight runs on.
+
+    Attributes:
+        loop: event loop, on vehicle time when embedded.
+        links, clocks: one per vehicle.
+        epoch_us: Unix time of vehicle time 0; None: the calendar's.
+        time_us: vehicle time.
+        on_truth: have frames of truth delivered.
+        parameters: those of one vehicle (index, names), without asking it; None: it must be asked.
+        close: when all is done.
+    """
+
+    loop: asyncio.AbstractEventLoop
+    links: list["Link"]
+    clocks: list[Clock]
+    epoch_us: int | None
+    time_us: Callable[[], int]
+    on_truth: Callable[[Callable[[int, bytes], None]], None]
+    parameters: Callable[[int, Sequence[str]], dict[str, float]] | None
+    close: Callable[[], None]
+
+
+def open_world(mission: Mission[Any], request: RunRequest, folder: Path) -> Stage:
+    """An embedded SITL with what the mission needs in it.
+
+    Raises:
+        PlanError: a value that the message names, with what is accepted.
+    """
+    from missions.embedded import EmbeddedConfiguration, open_embedded
+
+    scenario = mission.scenario(request.options, Setting(seed=request.seed, folder=folder))
+    try:
+        sitl = open_embedded(
+            EmbeddedConfiguration(
+                vehicles=request.options.vehicles,
+                model=request.models,
+                launch=request.launch,
+                flavour=request.autopilot,
+                seed=request.seed,
+                speedup=request.speedup,
+                wind_speed_m_s=request.wind_speed_m_s,
+                wind_from_deg=request.wind_from_deg,
+                turbulence=request.turbulence,
+                parameters=request.parameters,
+                home=request.home,
+                scenario=scenario,
+            )
+        )
+    except ValueError as error:
+        raise PlanError(str(error)) from error
+    return Stage(
+        loop=sitl.loop,
+        links=list(sitl.links),
+        clocks=[LoopClock() for _ in sitl.links],
+        epoch_us=EPOCH_UNIX_US,
+        time_us=lambda: sitl.time_us,
+        on_truth=sitl.on_truth,
+        parameters=sitl.parameters,
+        close=sitl.close,
+    )
+
+
+def open_vehicles(request: RunRequest) -> Stage:
+    """Links to vehicles elsewhere.
+
+    Raises:
+        PlanError: an address that is no vehicle's.
+        BridgeError: a link can't be opened.
+    """
+    from autopilot_bridge.links import ReplayLog, open_link, parse_address
+
+    addresses = [parse_address(text) for text in request.connect]
+    for address in addresses:
+        if isinstance(address, ReplayLog):
+            raise PlanError(f"--connect {address}: a log can't be flown; give the link of a vehicle")
+    links: list[Link] = []
+    try:
+        links.extend(open_link(address) for address in addresses)
+    except BaseException:
+        for link in links:
+            link.close()
+        raise
+    clocks = [TelemetryClock() for _ in links]
+
+    def close() -> None:
+        for link in links:
+            link.close()
+
+    return Stage(
+        loop=asyncio.new_event_loop(),
+        links=links,
+        clocks=list(clocks),
+        epoch_us=None,
+        time_us=lambda: max(clock.time_us for clock in clocks),
+        on_truth=lambda _listener: None,
+        parameters=None,
+        close=close,
+    )

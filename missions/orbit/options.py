@@ -1,0 +1,152 @@
+"""What a person can choose about an orbit."""
+
+import math
+from dataclasses import dataclass
+
+from missions.errors import PlanError
+from missions.options import MissionOptions, check_positive
+from missions.planning.limits import FixedWingLimits, Limits
+from missions.scenario import TargetMotion
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrbitOptions(MissionOptions):
+    """A circle around a target on the ground.
+
+    Attributes:
+        altitude_m: above home, and so above the target's ground when that is level.
+        radius_m: horizontal.
+        direction: +1 clockwise seen from above, -1 counter-clockwise.
+        duration_s: on the circle.
+        airspeed_m_s: equivalent; None: the aircraft's own.
+        target_ne_m: where the target is believed to be when the vehicle is first heard, from home.
+        target_speed_m_s, target_heading_rad: how it is believed to move, straight on.
+        target_motion: how it moves in an embedded world; None: straight on with a speed, else not.
+        target_ground_m: of the ground it is on, above home.
+        entry_bearing_rad: from the target to where GPS is lost.
+        entry_distance_m: between the two.
+        entry_heading_rad: of the nose there; None: towards the target.
+        gps_fault: GPS is switched off for the orbit (MAV_CMD_INJECT_FAILURE).
+        lost_limit_s: the mission ends when the target was not seen for so long.
+    """
+
+    altitude_m: float = 100.0
+    separation_m: float = 20.0
+    radius_m: float = 150.0
+    direction: int = 1
+    duration_s: float = 600.0
+    airspeed_m_s: float | None = None
+    target_ne_m: tuple[float, float] = (500.0, 300.0)
+    target_speed_m_s: float = 0.0
+    target_heading_rad: float = 0.0
+    target_motion: TargetMotion | None = None
+    target_ground_m: float = 0.0
+    entry_bearing_rad: float = math.pi
+    entry_distance_m: float = 400.0
+    entry_heading_rad: float | None = None
+    gps_fault: bool = True
+    lost_limit_s: float = 30.0
+
+    def __post_init__(self) -> None:
+        super(OrbitOptions, self).__post_init__()
+        check_positive(
+            radius=self.radius_m,
+            duration=self.duration_s,
+            airspeed=self.airspeed_m_s,
+            entry_distance=self.entry_distance_m,
+        )
+        if self.direction not in (-1, 1):
+            raise PlanError(f"--direction {self.direction} is not cw or ccw")
+        if not 0.0 <= self.target_speed_m_s <= 15.0:
+            raise PlanError(f"--target-speed {self.target_speed_m_s:g} m/s is not in 0..15 m/s")
+        if not 1.0 <= self.duration_s <= 6 * 3600.0:
+            raise PlanError(f"--duration {self.duration_s:g} s is not in 1..21600 s")
+        if not all(math.isfinite(value) for value in self.target_ne_m):
+            raise PlanError("--target is not a place; give NORTH,EAST in metres from home")
+        if self.target_motion not in (None, TargetMotion.STATIC) and self.target_speed_m_s == 0.0:
+            raise PlanError(f"--target-motion {self.target_motion} needs a --target-speed of more than 0")
+        if self.target_motion is TargetMotion.STATIC and self.target_speed_m_s > 0.0:
+            raise PlanError("--target-motion static leaves no --target-speed; choose one")
+
+    @property
+    def motion(self) -> TargetMotion:
+        """How the target moves in an embedded world."""
+        if self.target_motion is not None:
+            return self.target_motion
+        return TargetMotion.STRAIGHT if self.target_speed_m_s > 0.0 else TargetMotion.STATIC
+
+    @property
+    def height_over_target_m(self) -> float:
+        """Of this vehicle."""
+        return self.own_altitude_m - self.target_ground_m
+
+    @property
+    def entry_course_rad(self) -> float:
+        """Heading where GPS is lost."""
+        if self.entry_heading_rad is not None:
+            return self.entry_heading_rad
+        return math.remainder(self.entry_bearing_rad + math.pi, math.tau)
+
+    def airspeed(self, limits: FixedWingLimits) -> float:
+        """Equivalent airspeed of the orbit."""
+        return limits.airspeed_trim_m_s if self.airspeed_m_s is None else self.airspeed_m_s
+
+    def check(self, limits: Limits) -> None:
+        """Refuse an orbit that the aircraft can't hold, or from which the target can't be seen.
+
+        Raises:
+            PlanError: says why, and what to change.
+        """
+        if not isinstance(limits, FixedWingLimits):
+            raise PlanError("orbit is flown by aircraft with wings; choose --model aerosonde, or another one")
+        airspeed_m_s = self.airspeed(limits)
+        limits.check_airspeed(airspeed_m_s)
+        limits.check_altitude(self.own_altitude_m)
+        limits.check_reach(math.hypot(*self.target_ne_m) + self.entry_distance_m)
+        true_m_s = airspeed_m_s * _TRUE_OVER_EQUIVALENT
+        least_m = limits.turn_radius_m(true_m_s, drift_m_s=self.target_speed_m_s)
+        if self.radius_m < least_m:
+            raise PlanError(
+                f"an orbit of radius {self.radius_m:g} m can't be held: at {airspeed_m_s:g} m/s of airspeed, in "
+                f"{limits.wind_m_s:g} m/s of wind and around a target that moves at {self.target_speed_m_s:g} m/s, "
+                f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter}) make a circle of "
+                f"{least_m:.0f} m or more; ask for --radius {10.0 * math.ceil(0.1 * least_m):g}, or a lower --airspeed"
+            )
+        if self.height_over_target_m <= 0.0:
+            raise PlanError(
+                f"the target's ground, {self.target_ground_m:g} m above home, is not below the aircraft at "
+                f"{self.own_altitude_m:g} m; change --altitude"
+            )
+        depression = math.atan2(self.height_over_target_m, self.radius_m)
+        if depression < LEAST_DEPRESSION_RAD:
+            raise PlanError(
+                f"from {self.height_over_target_m:g} m above it, at {self.radius_m:g} m, the target would be seen "
+                f"only {math.degrees(depression):.1f} degrees below the horizon, too flat to tell its distance; "
+                f"{math.degrees(LEAST_DEPRESSION_RAD):g} are needed: ask for a higher --altitude or a smaller --radius"
+            )
+
+    def check_camera(self, limits: FixedWingLimits, pitch_min_rad: float, pitch_max_rad: float) -> None:
+        """Refuse an orbit on which the target would be outside what the gimbal can look at.
+
+        On the circle the target is abeam: the bank lifts the horizon on its side, so that against the body it is
+        (depression - bank) down.
+        """
+        true_m_s = self.airspeed(limits) * _TRUE_OVER_EQUIVALENT
+        depression = math.atan2(self.height_over_target_m, self.radius_m)
+        slower = max(5.0, true_m_s - limits.wind_m_s - self.target_speed_m_s)
+        faster = true_m_s + limits.wind_m_s + self.target_speed_m_s
+        for speed in (slower, faster):
+            bank = math.atan(speed**2 / (_GRAVITY_M_S2 * self.radius_m))
+            elevation = bank - depression
+            if not pitch_min_rad + _MARGIN_RAD <= elevation <= pitch_max_rad - _MARGIN_RAD:
+                raise PlanError(
+                    f"on the orbit the target would be {math.degrees(elevation):.0f} degrees above the wing's plane, "
+                    f"outside what the camera's gimbal reaches ({math.degrees(pitch_min_rad):.0f} to "
+                    f"{math.degrees(pitch_max_rad):.0f} degrees); change --radius or --altitude"
+                )
+
+
+LEAST_DEPRESSION_RAD = math.radians(8.0)
+_MARGIN_RAD = math.radians(3.0)
+_TRUE_OVER_EQUIVALENT = 1.03  # at 600 m above the sea
+_GRAVITY_M_S2 = 9.80665

@@ -1,0 +1,114 @@
+"""The picture of an orbit: over ground, around the target, and distance and height against time."""
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from missions.mission import Debriefing
+from missions.orbit.options import OrbitOptions
+from missions.orbit.score import OrbitTruth, orbit_truth
+from missions.picture import draw_run, tidy
+
+_INK: Final = "#1f2937"
+_GREY: Final = "#9aa3af"
+_BLUE: Final = "#1769aa"
+_RED: Final = "#c2410c"
+_SHADE: Final = "#f3f4f6"
+_GPS_LOST: Final = "#fee2e2"
+
+
+def draw_orbit(path: Path, title: str, debriefing: Debriefing) -> None:
+    """Draw `track.png`. Without truth (a vehicle elsewhere) the picture of any flight is drawn.
+
+    Args:
+        path: the file; it must not exist.
+    """
+    notes, _ = debriefing.flights[0]
+    options = debriefing.options
+    truth = orbit_truth(debriefing.records, notes.system_id)
+    if truth is None or not isinstance(options, OrbitOptions) or not notes.phases:
+        draw_run(path, title, list(debriefing.flights))
+        return
+    flown = truth.during(notes.phases[0].start_us, notes.phases[-1].end_us)
+    figure = Figure(figsize=(12.0, 11.0), dpi=120, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(3, 2, height_ratios=(3.0, 1.0, 1.0))
+    ground, around = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
+    distance = figure.add_subplot(grid[1, :])
+    height = figure.add_subplot(grid[2, :], sharex=distance)
+    figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
+    phase = notes.phase("orbit")
+    lost_s, back_s = notes.marks.get("gps_lost_at_s"), notes.marks.get("gps_back_at_s")
+    orbit = None if phase is None else flown.during(phase.start_us, phase.end_us)
+    entry = None
+    if lost_s is not None:
+        end_us = flown.time_s[-1] * 1e6 if phase is None else phase.end_us
+        entry = flown.during(round(lost_s * 1e6), round(end_us))
+    _draw_ground(ground, flown, orbit)
+    _draw_around(around, entry if entry is not None else orbit, orbit, options)
+    for axes in (distance, height):
+        if lost_s is not None:
+            axes.axvspan(lost_s, back_s or flown.time_s[-1], color=_GPS_LOST, zorder=0, linewidth=0)
+    thin = max(1, len(flown.time_s) // 8000)
+    times = flown.time_s[::thin]
+    distance.plot(times, flown.radius_m[::thin], color=_BLUE, linewidth=1.0)
+    distance.axhline(options.radius_m, color=_GREY, linewidth=3.0, alpha=0.6)
+    distance.set_ylim(0.0, max(3.0 * options.radius_m, 1.2 * options.entry_distance_m))
+    distance.set_ylabel("distance to\ntarget, m", fontsize=9, color=_INK)
+    distance.tick_params(labelbottom=False)
+    if orbit is not None and len(orbit.time_s):
+        error = 100.0 * (float(orbit.radius_m.mean()) / options.radius_m - 1.0)
+        distance.set_title(
+            f"mean {orbit.radius_m.mean():.1f} m ({error:+.1f} %), standard deviation {orbit.radius_m.std():.1f} m; "
+            "GPS off where red",
+            fontsize=9,
+            color=_INK,
+        )
+    height.plot(times, -flown.aircraft_ned_m[::thin, 2], color=_BLUE, linewidth=1.0)
+    height.axhline(options.own_altitude_m, color=_GREY, linewidth=3.0, alpha=0.6)
+    height.set_ylim(bottom=0.0)
+    height.set_ylabel("height, m", fontsize=9, color=_INK)
+    height.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
+    for axes in (ground, around, distance, height):
+        tidy(axes)
+    with path.open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def _draw_ground(axes: Any, flown: OrbitTruth, orbit: OrbitTruth | None) -> None:
+    track, target = flown.aircraft_ned_m, flown.target_ned_m
+    thin = max(1, len(track) // 8000)
+    axes.plot(track[::thin, 1], track[::thin, 0], color=_GREY, linewidth=0.9, label="aircraft")
+    if orbit is not None and len(orbit.time_s):
+        axes.plot(
+            orbit.aircraft_ned_m[::thin, 1], orbit.aircraft_ned_m[::thin, 0], color=_BLUE, linewidth=0.9,
+            label="its orbit",
+        )  # fmt: skip
+    axes.plot(target[::thin, 1], target[::thin, 0], color=_RED, linewidth=2.0, label="target")
+    axes.plot(target[-1, 1], target[-1, 0], "o", color=_RED, markersize=6)
+    axes.plot(track[0, 1], track[0, 0], "o", color="#15803d", markersize=8, markeredgecolor="white", label="start")
+    axes.plot(track[-1, 1], track[-1, 0], "s", color="#b91c1c", markersize=6, markeredgecolor="white", label="end")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_title("over ground", fontsize=10, color=_INK)
+    axes.set_xlabel("east, m", fontsize=9, color=_INK)
+    axes.set_ylabel("north, m", fontsize=9, color=_INK)
+    axes.legend(fontsize=8, frameon=False)
+
+
+def _draw_around(axes: Any, entry: OrbitTruth | None, orbit: OrbitTruth | None, options: OrbitOptions) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, 361)
+    axes.plot(
+        options.radius_m * np.sin(angle), options.radius_m * np.cos(angle), color=_GREY, linewidth=5.0, alpha=0.6
+    )
+    for part, colour, width in ((entry, _GREY, 1.0), (orbit, _BLUE, 0.8)):
+        if part is not None and len(part.time_s):
+            offset = part.aircraft_ned_m - part.target_ned_m
+            axes.plot(offset[:, 1], offset[:, 0], color=colour, linewidth=width)
+    axes.plot(0.0, 0.0, "o", color=_RED, markersize=7)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_title("around the target", fontsize=10, color=_INK)
+    axes.set_xlabel("east of target, m", fontsize=9, color=_INK)
+    axes.set_ylabel("north of target, m", fontsize=9, color=_INK)

@@ -1,0 +1,140 @@
+"""How well the orbit was held: figures from the truth in the records."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from missions.mission import Debriefing
+from missions.notes import FlightNotes
+from missions.orbit.options import OrbitOptions
+from missions.records import FlightRecords
+
+Array = NDArray[np.float64]
+
+TARGET_SYSTEM: Final = 251
+"""MAVLink system of the simulated targets' truth; the first is component 1."""
+
+_TRUTH: Final = "HIL_STATE_QUATERNION"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OrbitTruth:
+    """Aircraft and target in truth, at the aircraft's times.
+
+    Attributes:
+        time_s: (n,) vehicle time.
+        aircraft_ned_m, target_ned_m: (n, 3) from where the aircraft stood at first.
+        radius_m: (n,) horizontal distance.
+    """
+
+    time_s: Array
+    aircraft_ned_m: Array
+    target_ned_m: Array
+    radius_m: Array
+
+    def during(self, start_us: int, end_us: int) -> "OrbitTruth":
+        """The part between two times."""
+        kept = (self.time_s >= start_us * 1e-6) & (self.time_s <= end_us * 1e-6)
+        return OrbitTruth(
+            time_s=self.time_s[kept],
+            aircraft_ned_m=self.aircraft_ned_m[kept],
+            target_ned_m=self.target_ned_m[kept],
+            radius_m=self.radius_m[kept],
+        )
+
+
+def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
+    """From the truth frames of a vehicle and of the first target; None without them."""
+    own = records.table(_TRUTH, system_id)
+    target = records.table(_TRUTH, TARGET_SYSTEM, 1)
+    if len(own) < 2 or len(target) < 2:
+        return None
+    origin = GeodeticPosition(
+        lat_deg=own["lat"][0] * 1e-7, lon_deg=own["lon"][0] * 1e-7, alt_m=own["alt"][0] * 1e-3
+    )
+    time_s = own["time_usec"] * 1e-6
+    aircraft, theirs = _ned(own, origin), _ned(target, origin)
+    at = np.column_stack([np.interp(time_s, target["time_usec"] * 1e-6, axis) for axis in theirs.T])
+    offset = at - aircraft
+    return OrbitTruth(
+        time_s=time_s,
+        aircraft_ned_m=aircraft,
+        target_ned_m=at,
+        radius_m=np.hypot(offset[:, 0], offset[:, 1]),
+    )
+
+
+def _ned(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
+    """Positions of a table; flat within some kilometres to a few centimetres."""
+    frame = LocalFrame(origin)
+    north, _, _ = frame.ned_from_geodetic(origin.lat_deg + 0.01, origin.lon_deg, origin.alt_m)
+    _, east, _ = frame.ned_from_geodetic(origin.lat_deg, origin.lon_deg + 0.01, origin.alt_m)
+    return np.column_stack(
+        (
+            (table["lat"] * 1e-7 - origin.lat_deg) * (north * 100.0),
+            (table["lon"] * 1e-7 - origin.lon_deg) * (east * 100.0),
+            origin.alt_m - table["alt"] * 1e-3,
+        )
+    )
+
+
+def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
+    """The figures of the first vehicle's orbit; those that were not measured are None.
+
+    radius_mean_error_percent: of the mean distance to the target over the orbit.
+    radius_std_m: standard deviation of that distance.
+    radius_max_error_m: largest difference from the radius asked for.
+    altitude_error_m: largest difference of the true height above the start from the altitude asked for.
+    orbit_s: how long.
+    """
+    if not debriefing.flights or not isinstance(debriefing.options, OrbitOptions):
+        return {}
+    notes, options = debriefing.flights[0][0], debriefing.options
+    marks = notes.marks
+    figures: dict[str, Any] = {
+        "radius_m": options.radius_m,
+        "radius_mean_error_percent": None,
+        "radius_std_m": None,
+        "radius_max_error_m": None,
+        "altitude_error_m": None,
+        "altitude_rms_error_m": None,
+        "gps_lost_at_s": _rounded(marks.get("gps_lost_at_s")),
+        "gps_back_at_s": _rounded(marks.get("gps_back_at_s")),
+        "orbit_captured_after_s": _rounded(marks.get("orbit_captured_after_s")),
+        "orbit_s": None,
+        "radius_estimate_mean_m": _rounded(marks.get("radius_estimate_mean_m")),
+        "detections_used": None if "detections_used" not in marks else int(marks["detections_used"]),
+        "target_losses": None if "target_losses" not in marks else int(marks["target_losses"]),
+    }
+    truth = orbit_truth(debriefing.records, notes.system_id)
+    window = _window(notes)
+    if truth is None or window is None:
+        return figures
+    orbit = truth.during(*window)
+    if not len(orbit.time_s):
+        return figures
+    error = orbit.radius_m - options.radius_m
+    height = -orbit.aircraft_ned_m[:, 2] - options.altitude_m
+    figures |= {
+        "radius_mean_error_percent": _rounded(100.0 * float(error.mean()) / options.radius_m),
+        "radius_std_m": _rounded(float(orbit.radius_m.std())),
+        "radius_max_error_m": _rounded(float(np.abs(error).max())),
+        "altitude_error_m": _rounded(float(np.abs(height).max())),
+        "altitude_rms_error_m": _rounded(math.sqrt(float(np.mean(height**2)))),
+        "orbit_s": _rounded(float(orbit.time_s[-1] - orbit.time_s[0])),
+    }
+    return figures
+
+
+def _window(notes: FlightNotes) -> tuple[int, int] | None:
+    phase = notes.phase("orbit")
+    return None if phase is None else (phase.start_us, phase.end_us)
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else round(value, 3)

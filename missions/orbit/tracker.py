@@ -1,0 +1,184 @@
+"""From what the aircraft's components say to where the target is, without I/O.
+
+Attitudes, airspeeds, heights, gimbal attitudes and detections go in as they come; the relative target, and
+where the gimbal has to look, come out.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+from missions.orbit.attitude import AttitudeSource
+from missions.orbit.line_of_sight import LineOfSight, line_of_sight_of_gimbal, pointing_angles
+from missions.orbit.relative_target import RelativeState, RelativeTarget, RelativeTargetParameters
+from missions.orbit.rotation import between, yaw_of
+from missions.vehicle.payload import Detection, GimbalAttitude
+
+_GIMBALS_KEPT: Final = 128
+_GIMBAL_STALE_US: Final = 200_000
+_OLD_IMAGE_US: Final = 900_000
+_LEAST_HEIGHT_M: Final = 2.0
+
+
+class TargetStatus(StrEnum):
+    """What is known of the target."""
+
+    EXPECTED = "expected"  # never seen: only what somebody else said of it
+    SEEN = "seen"
+    LOST = "lost"  # was seen; for a while now it was not
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackerParameters:
+    """Attributes:
+    target: the filter's.
+    lost_after_s: without an accepted detection the target counts as lost.
+    """
+
+    target: RelativeTargetParameters = RelativeTargetParameters()
+    lost_after_s: float = 3.0
+
+    def __post_init__(self) -> None:
+        if not self.lost_after_s > 0.0:
+            raise ValueError(f"lost_after_s = {self.lost_after_s} is not possible; it must be more than 0")
+
+
+class TargetTracker:
+    """Follows one target by line of sight.
+
+    Args:
+        attitude: of the aircraft.
+        parameters: noise and times.
+
+    Attributes:
+        target: the filter.
+        losses: how often the target was lost.
+    """
+
+    def __init__(self, attitude: AttitudeSource, parameters: TrackerParameters | None = None) -> None:
+        self.parameters = parameters or TrackerParameters()
+        self.target = RelativeTarget(self.parameters.target)
+        self.losses = 0
+        self._attitude = attitude
+        self._gimbals: deque[GimbalAttitude] = deque(maxlen=_GIMBALS_KEPT)
+        self._images: dict[int, list[Detection]] = {}
+        self._height_m = math.nan
+        self._seen_us: int | None = None
+        self._lost = False
+
+    # what comes in
+
+    def start(
+        self,
+        time_us: int,
+        *,
+        offset_ne_m: tuple[float, float],
+        offset_std_m: float,
+        drift_ne_m_s: tuple[float, float],
+        drift_std_m_s: float,
+    ) -> None:
+        """Begin with what somebody else says of the target (equation 33)."""
+        self._seen_us = None
+        self._lost = False
+        self.target.start(
+            time_us,
+            offset_ne_m=offset_ne_m,
+            offset_std_m=offset_std_m,
+            drift_ne_m_s=drift_ne_m_s,
+            drift_std_m_s=drift_std_m_s,
+        )
+
+    def height(self, height_m: float) -> None:
+        """Height of the aircraft over the target's ground."""
+        self._height_m = height_m
+
+    def gimbal(self, attitude: GimbalAttitude) -> None:
+        """Where the gimbal looks; in time order."""
+        if not self._gimbals or attitude.time_us > self._gimbals[-1].time_us:
+            self._gimbals.append(attitude)
+
+    def detect(self, detection: Detection) -> None:
+        """One object of one image; it is looked at with the next `step`."""
+        self._images.setdefault(detection.time_us, []).append(detection)
+
+    # what comes out
+
+    def step(self, time_us: int, airspeed_true_m_s: float, climb_m_s: float = 0.0) -> None:
+        """Go on to a time; then look at the images that have come.
+
+        Args:
+            time_us: now.
+            airspeed_true_m_s: along the nose.
+            climb_m_s: of which so much goes upwards.
+        """
+        q = self._attitude.at(time_us)
+        if q is None:
+            return
+        heading = yaw_of(q)
+        level = math.sqrt(max(0.0, airspeed_true_m_s**2 - climb_m_s**2))
+        self.target.move(time_us, (level * math.cos(heading), level * math.sin(heading)))
+        for image_us in sorted(self._images):
+            self._look(image_us, self._images.pop(image_us), time_us)
+        if self._seen_us is not None:
+            lost = time_us - self._seen_us > self.parameters.lost_after_s * 1e6
+            self.losses += lost and not self._lost
+            self._lost = lost
+
+    def _look(self, image_us: int, detections: list[Detection], now_us: int) -> None:
+        if not now_us - _OLD_IMAGE_US < image_us <= now_us or not self._height_m > _LEAST_HEIGHT_M:
+            return
+        gimbal, q = self._gimbal_at(image_us), self._attitude.at(image_us)
+        if gimbal is None or q is None:
+            return
+        lines = [line_of_sight_of_gimbal(d.image_x, d.image_y, gimbal, q) for d in detections]
+
+        def distance(line: LineOfSight) -> float:
+            return self.target.distance_squared(image_us, line, self._height_m)
+
+        if self.target.see(image_us, min(lines, key=distance), self._height_m):
+            self._seen_us = image_us
+
+    def _gimbal_at(self, time_us: int) -> GimbalAttitude | None:
+        later: GimbalAttitude | None = None
+        for sample in reversed(self._gimbals):
+            if sample.time_us <= time_us:
+                if later is None or later.from_north != sample.from_north:
+                    return sample if time_us - sample.time_us <= _GIMBAL_STALE_US else None
+                share = (time_us - sample.time_us) / (later.time_us - sample.time_us)
+                return GimbalAttitude(
+                    time_us=time_us,
+                    q=between(sample.q, later.q, share),
+                    from_north=sample.from_north,
+                )
+            later = sample
+        return None
+
+    @property
+    def status(self) -> TargetStatus:
+        """What is known of the target."""
+        if self._seen_us is None:
+            return TargetStatus.EXPECTED
+        return TargetStatus.LOST if self._lost else TargetStatus.SEEN
+
+    def unseen_s(self, time_us: int) -> float:
+        """How long it was not seen; infinite if it never was."""
+        return math.inf if self._seen_us is None else (time_us - self._seen_us) * 1e-6
+
+    def state(self, time_us: int) -> RelativeState:
+        """The target against the aircraft, from now on."""
+        return self.target.state(time_us)
+
+    def pointing(self, time_us: int, ahead_s: float) -> tuple[float, float] | None:
+        """(azimuth, elevation), rad against the body, of a gimbal that is to look at the target.
+
+        Args:
+            time_us: now.
+            ahead_s: how far the way of the target is foreseen, for the time a gimbal takes.
+        """
+        q = self._attitude.at(time_us)
+        if q is None or not self.target.known or not math.isfinite(self._height_m):
+            return None
+        north_m, east_m = self.target.state(time_us + round(ahead_s * 1e6)).offset_ne_m
+        return pointing_angles((north_m, east_m, max(_LEAST_HEIGHT_M, self._height_m)), q)

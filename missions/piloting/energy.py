@@ -1,0 +1,147 @@
+"""Altitude and airspeed by pitch and throttle, for autopilots that want both with a commanded roll (PX4).
+
+Total energy control (Lambregts, AIAA 83-2239): throttle makes the sum of the rates of potential and kinetic
+energy, pitch their difference. Rates are written as climb rates: V dV/dt / g is the climb that an acceleration
+is worth. It runs at the far end of a telemetry link, so it is slow: the time constants are those of PX4's own
+TECS or longer.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+GRAVITY_M_S2: Final = 9.80665
+_ACCELERATION_FILTER_S: Final = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyParameters:
+    """Trims, limits, gains.
+
+    Attributes:
+        throttle_trim, throttle_min, throttle_max: 0..1; the first holds level flight.
+        pitch_trim_rad: of the body in level flight.
+        pitch_min_rad, pitch_max_rad: of the command.
+        climb_full_throttle_m_s: at `throttle_max`.
+        sink_idle_m_s: at `throttle_min`, positive.
+        climb_max_m_s, sink_max_m_s: that are asked for.
+        height_time_constant_s, airspeed_time_constant_s: of the approach to what is commanded.
+        angle_of_attack_rad: of the wing's zero-lift line in level flight: what a bank must add grows with it.
+        bank_climb_m_s: climb rate that the drag of one more load factor costs.
+        balance_gain, balance_integral_per_s: on the error of the energy balance.
+        total_gain, total_integral_per_s: on the error of the total rate.
+    """
+
+    throttle_trim: float = 0.5
+    throttle_min: float = 0.0
+    throttle_max: float = 1.0
+    pitch_trim_rad: float = 0.0
+    pitch_min_rad: float = math.radians(-15.0)
+    pitch_max_rad: float = math.radians(20.0)
+    climb_full_throttle_m_s: float = 5.0
+    sink_idle_m_s: float = 2.0
+    climb_max_m_s: float = 2.5
+    sink_max_m_s: float = 2.0
+    height_time_constant_s: float = 5.0
+    airspeed_time_constant_s: float = 5.0
+    angle_of_attack_rad: float = 0.09
+    bank_climb_m_s: float = 1.0
+    balance_gain: float = 0.4
+    balance_integral_per_s: float = 0.15
+    total_gain: float = 0.4
+    total_integral_per_s: float = 0.15
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.throttle_min < self.throttle_trim < self.throttle_max <= 1.0:
+            raise ValueError(
+                f"throttles {self.throttle_min:g}, {self.throttle_trim:g}, {self.throttle_max:g} (least, trim, "
+                "most) are not in order within 0..1"
+            )
+        if not self.pitch_min_rad < self.pitch_trim_rad < self.pitch_max_rad:
+            raise ValueError(
+                f"pitch {self.pitch_min_rad:g}, {self.pitch_trim_rad:g}, {self.pitch_max_rad:g} rad (least, trim, "
+                "most) are not in order"
+            )
+        for name in (
+            "climb_full_throttle_m_s",
+            "sink_idle_m_s",
+            "climb_max_m_s",
+            "sink_max_m_s",
+            "height_time_constant_s",
+            "airspeed_time_constant_s",
+        ):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} = {getattr(self, name)} is not possible; it must be more than 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyState:
+    """What is measured.
+
+    Attributes:
+        height_m: over the same ground as the height asked for.
+        climb_m_s: up.
+        airspeed_m_s: of the same kind as the airspeed asked for.
+        roll_rad: bank angle.
+    """
+
+    height_m: float
+    climb_m_s: float
+    airspeed_m_s: float
+    roll_rad: float
+
+
+class EnergyController:
+    """The loop. Call it at an even rate of some 10 Hz or more.
+
+    Args:
+        parameters: trims, limits, gains.
+    """
+
+    def __init__(self, parameters: EnergyParameters) -> None:
+        self.parameters = parameters
+        self._balance = 0.0  # integrals, m/s of climb
+        self._total = 0.0
+        self._airspeed_m_s = math.nan
+        self._acceleration_m_s2 = 0.0
+
+    def step(
+        self, dt_s: float, state: EnergyState, *, height_m: float, airspeed_m_s: float
+    ) -> tuple[float, float]:
+        """(pitch rad, throttle 0..1) for the height and the airspeed asked for."""
+        p = self.parameters
+        speed = max(3.0, state.airspeed_m_s)
+        self._differentiate(dt_s, state.airspeed_m_s)
+        climb_d = (height_m - state.height_m) / p.height_time_constant_s
+        climb_d = max(-p.sink_max_m_s, min(p.climb_max_m_s, climb_d))
+        gain = (airspeed_m_s - speed) / p.airspeed_time_constant_s
+        gain_d = max(-1.0, min(1.0, gain)) * speed / GRAVITY_M_S2
+        gain_now = self._acceleration_m_s2 * speed / GRAVITY_M_S2
+        load = 1.0 / max(0.5, math.cos(state.roll_rad))
+
+        total_error = climb_d + gain_d - state.climb_m_s - gain_now
+        drag = p.bank_climb_m_s * (load - 1.0)
+        asked = climb_d + gain_d + drag + p.total_gain * total_error + self._total
+        span = p.throttle_max - p.throttle_trim if asked > 0.0 else p.throttle_trim - p.throttle_min
+        rate = p.climb_full_throttle_m_s if asked > 0.0 else p.sink_idle_m_s
+        raw = p.throttle_trim + asked * span / rate
+        throttle = max(p.throttle_min, min(p.throttle_max, raw))
+        if raw == throttle or (raw - throttle) * total_error < 0.0:
+            self._total += p.total_integral_per_s * total_error * dt_s
+
+        balance_error = (climb_d - gain_d) - (state.climb_m_s - gain_now)
+        slope = (climb_d - gain_d + p.balance_gain * balance_error + self._balance) / speed
+        raw = p.pitch_trim_rad + p.angle_of_attack_rad * (load - 1.0) + slope
+        pitch = max(p.pitch_min_rad, min(p.pitch_max_rad, raw))
+        if raw == pitch or (raw - pitch) * balance_error < 0.0:
+            self._balance += p.balance_integral_per_s * balance_error * dt_s
+        return pitch, throttle
+
+    def _differentiate(self, dt_s: float, airspeed_m_s: float) -> None:
+        """Acceleration along the path: difference of the airspeed, low-passed."""
+        if math.isnan(self._airspeed_m_s):
+            self._airspeed_m_s = airspeed_m_s
+        share = dt_s / (_ACCELERATION_FILTER_S + dt_s)
+        step = share * (airspeed_m_s - self._airspeed_m_s)
+        self._airspeed_m_s += step
+        self._acceleration_m_s2 = step / dt_s if dt_s > 0.0 else 0.0

@@ -1,0 +1,58 @@
+"""Height from static pressure: what is left of the height when GPS is gone."""
+
+import math
+from typing import Final
+
+_SEA_LEVEL_K: Final = 288.15  # ISO 2533 standard atmosphere
+_SEA_LEVEL_PA: Final = 101_325.0
+_LAPSE_K_M: Final = 0.0065
+_EXPONENT: Final = 9.80665 / (287.05287 * _LAPSE_K_M)
+_FILTER_S: Final = 0.3
+
+
+def pressure_altitude_m(static_pa: float) -> float:
+    """Altitude in the standard atmosphere with this pressure."""
+    return _SEA_LEVEL_K / _LAPSE_K_M * (1.0 - (static_pa / _SEA_LEVEL_PA) ** (1.0 / _EXPONENT))
+
+
+def air_density_ratio(static_pa: float) -> float:
+    """Density of the standard atmosphere where it has this pressure, over that at sea level."""
+    return float((static_pa / _SEA_LEVEL_PA) ** (1.0 - 1.0 / _EXPONENT))
+
+
+class PressureHeight:
+    """Height over the place where the pressure was taken first, from pressure and climb rate.
+
+    The difference of two pressure altitudes; a day warmer than the standard atmosphere by 10 K makes it 3.5 %
+    too small. Between the samples, and against their noise, the climb rate carries it on.
+
+    Args:
+        ground_pa: pressure on the ground.
+    """
+
+    def __init__(self, ground_pa: float) -> None:
+        if not 10_000.0 < ground_pa < 120_000.0:
+            raise ValueError(f"a ground pressure of {ground_pa:g} Pa is not on this Earth: 10000..120000 Pa")
+        self.ground_pa = ground_pa
+        self._ground_m = pressure_altitude_m(ground_pa)
+        self._height_m = math.nan
+        self._time_us = 0
+
+    @property
+    def height_m(self) -> float:
+        """NaN before the first sample."""
+        return self._height_m
+
+    def add(self, time_us: int, static_pa: float, climb_m_s: float) -> float:
+        """Take a sample; gives the height."""
+        if not 10_000.0 < static_pa < 120_000.0:
+            return self._height_m
+        measured = pressure_altitude_m(static_pa) - self._ground_m
+        dt = (time_us - self._time_us) * 1e-6
+        if math.isnan(self._height_m) or not 0.0 < dt < 5.0:
+            self._height_m = measured
+        else:
+            ahead = self._height_m + climb_m_s * dt
+            self._height_m = ahead + dt / (_FILTER_S + dt) * (measured - ahead)
+        self._time_us = time_us
+        return self._height_m

@@ -1,0 +1,66 @@
+"""What a run is asked for."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from missions.connection import GROUND_STATION
+from missions.options import FlightOptions, MissionOptions
+from missions.vehicle.adapter import Mode
+
+ELSEWHERE_WIND_M_S: Final = 5.0
+"""Wind to plan turns for where nobody knows it: a fresh day."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRequest:
+    """Everything about a run but the mission itself.
+
+    Attributes:
+        options: what the mission is to do.
+        connect: connection strings, one per vehicle; empty: an embedded SITL.
+        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, turbulence, home: of the embedded SITL.
+        model: its vehicle: of all of a team, or one for each.
+        launch: how its aircraft get into the air: "runway", "catapult", "hand"; None: as described with them.
+        expected_wind_m_s: to plan turns for; None: the embedded SITL's, or 5 m/s for vehicles elsewhere.
+        parameters: autopilot parameters to set before the flight.
+        out: run folder; None: the next `runs/<mission>-<n>`.
+        picture: whether to draw `track.png`.
+        identity: MAVLink system and component id of the mission.
+        on_failure: what the vehicle is told when the mission fails or is interrupted.
+        command: the command line, for the summary.
+    """
+
+    options: MissionOptions = field(default_factory=FlightOptions)
+    connect: Sequence[str] = ()
+    autopilot: str = "px4"
+    model: str | Sequence[str] = "iris"
+    launch: str | None = None
+    seed: int = 0
+    speedup: float | None = None
+    wind_speed_m_s: float = 0.0
+    wind_from_deg: float = 0.0
+    turbulence: str = "none"
+    expected_wind_m_s: float | None = None
+    home: str | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    out: Path | None = None
+    picture: bool = True
+    identity: tuple[int, int] = GROUND_STATION
+    on_failure: Mode = Mode.RETURN
+    command: str = ""
+
+    @property
+    def models(self) -> list[str]:
+        """The model of each vehicle of the team."""
+        if isinstance(self.model, str):
+            return [self.model] * self.options.vehicles
+        return list(self.model)
+
+    @property
+    def planning_wind_m_s(self) -> float:
+        """Wind that turns are planned for."""
+        if self.expected_wind_m_s is not None:
+            return self.expected_wind_m_s
+        return ELSEWHERE_WIND_M_S if self.connect else self.wind_speed_m_s

@@ -1,0 +1,169 @@
+"""An aircraft flown by bank angle from a mission; the rest is held by whoever can.
+
+ArduPilot's plane takes the roll alone and holds altitude and airspeed itself. PX4 takes roll, pitch and thrust
+together, so that a total-energy loop of the mission makes the last two, from pressure, airspeed and climb rate:
+no position is needed for either.
+"""
+
+import math
+from typing import TYPE_CHECKING, Final
+
+from missions import telemetry
+from missions.errors import MissionError
+from missions.piloting.energy import EnergyController, EnergyParameters, EnergyState
+from missions.piloting.pressure_height import PressureHeight, air_density_ratio
+from missions.vehicle.attitude_setpoint import AttitudeSetpoint
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+_RATES_HZ: Final = {"ATTITUDE": 40.0, "VFR_HUD": 20.0, "SCALED_PRESSURE": 20.0}
+_STEP_S: Final = 0.02
+
+
+class AttitudePilot:
+    """Height, airspeed and air data of one aircraft, and its attitude commands.
+
+    Made on the ground: the pressure there is where heights are counted from.
+
+    Args:
+        vehicle: a fixed wing.
+        ground_pa: static pressure on the ground.
+    """
+
+    def __init__(self, vehicle: "Vehicle", ground_pa: float) -> None:
+        self._vehicle = vehicle
+        self._pressure = PressureHeight(ground_pa)
+        self._energy: EnergyController | None = None
+        self._altitude_m = math.nan
+        self._airspeed_m_s = math.nan
+        self._last_us = -1
+        self._stop = vehicle.connection.listen("SCALED_PRESSURE", lambda _frame: self._on_pressure())
+
+    @classmethod
+    async def on_ground(cls, vehicle: "Vehicle") -> "AttitudePilot":
+        """Ask for the streams it needs, and take the pressure on the ground.
+
+        Raises:
+            MissionError: the vehicle tells no pressure, or is in the air.
+        """
+        for name, rate_hz in _RATES_HZ.items():
+            await vehicle.set_message_rate(name, rate_hz)
+        position = await vehicle.position()
+        if vehicle.armed and position.height_m > 5.0:
+            raise MissionError("the pressure on the ground must be taken before takeoff")
+        total, count = 0.0, 0
+        with vehicle.messages("SCALED_PRESSURE") as stream:
+            async with vehicle.deadline(10.0, "static pressure (SCALED_PRESSURE)"):
+                while count < 20:
+                    message = await anext(stream)
+                    total, count = total + 100.0 * message.press_abs, count + 1
+        return cls(vehicle, total / count)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._stop()
+
+    def _on_pressure(self) -> None:
+        pressure = self._vehicle.latest(telemetry.Pressure)
+        air = self._vehicle.latest(telemetry.AirData)
+        if pressure is not None and air is not None:
+            self._pressure.add(pressure.time_us, pressure.static_pa, air.climb_m_s)
+
+    @property
+    def height_m(self) -> float:
+        """Pressure height over the ground it was taken on; NaN before the first sample."""
+        return self._pressure.height_m
+
+    @property
+    def airspeed_true_m_s(self) -> float:
+        """True airspeed; NaN when it is not told."""
+        pressure = self._vehicle.latest(telemetry.Pressure)
+        air = self._vehicle.latest(telemetry.AirData)
+        if pressure is None or air is None:
+            return math.nan
+        return air.airspeed_m_s / math.sqrt(air_density_ratio(pressure.static_pa))
+
+    @property
+    def climb_m_s(self) -> float:
+        """Climb rate by the autopilot; 0 when it is not told."""
+        air = self._vehicle.latest(telemetry.AirData)
+        return 0.0 if air is None else air.climb_m_s
+
+    async def prepare(self, altitude_m: float, airspeed_m_s: float | None) -> None:
+        """Read what the loop needs to know of the aircraft; say what shall be held.
+
+        Args:
+            altitude_m: above the ground it started from.
+            airspeed_m_s: equivalent; None: the autopilot's own.
+        """
+        vehicle = self._vehicle
+        limits = await vehicle.limits()
+        trim_m_s = getattr(limits, "airspeed_trim_m_s", math.nan)
+        self._altitude_m = altitude_m
+        self._airspeed_m_s = trim_m_s if airspeed_m_s is None else airspeed_m_s
+        if not vehicle.adapter.roll_alone:
+            self._energy = EnergyController(await _energy_parameters(vehicle))
+
+    async def begin(self) -> None:
+        """Give altitude and airspeed to an autopilot that holds them itself. It is in its guided mode."""
+        vehicle = self._vehicle
+        if vehicle.adapter.roll_alone:
+            await vehicle.change_altitude(self._altitude_m)
+            await vehicle.change_airspeed(self._airspeed_m_s)
+
+    def hold(self, *, altitude_m: float | None = None, airspeed_m_s: float | None = None) -> None:
+        """Other values for the loop of the mission (PX4)."""
+        self._altitude_m = self._altitude_m if altitude_m is None else altitude_m
+        self._airspeed_m_s = self._airspeed_m_s if airspeed_m_s is None else airspeed_m_s
+
+    def setpoint(self, time_us: int, roll_rad: float) -> AttitudeSetpoint:
+        """The attitude command for a roll."""
+        if self._energy is None:
+            return AttitudeSetpoint(roll_rad=roll_rad)
+        air = self._vehicle.latest(telemetry.AirData)
+        attitude = self._vehicle.latest(telemetry.Attitude)
+        height_m = self.height_m
+        if air is None or attitude is None or not math.isfinite(height_m):
+            raise MissionError(
+                "the vehicle tells no airspeed, attitude or pressure (VFR_HUD, ATTITUDE, SCALED_PRESSURE), so "
+                f"altitude can't be held; {self._vehicle.heard()}"
+            )
+        dt_s = _STEP_S if self._last_us < 0 else min(0.2, max(0.0, (time_us - self._last_us) * 1e-6))
+        self._last_us = time_us
+        pitch_rad, throttle = self._energy.step(
+            dt_s,
+            EnergyState(
+                height_m=height_m,
+                climb_m_s=air.climb_m_s,
+                airspeed_m_s=air.airspeed_m_s,
+                roll_rad=attitude.roll_rad,
+            ),
+            height_m=self._altitude_m,
+            airspeed_m_s=self._airspeed_m_s,
+        )
+        return AttitudeSetpoint(
+            roll_rad=roll_rad, pitch_rad=pitch_rad, thrust=throttle, yaw_rad=attitude.yaw_rad
+        )
+
+
+async def _energy_parameters(vehicle: "Vehicle") -> EnergyParameters:
+    """From PX4's parameters of this aircraft."""
+    get = vehicle.parameter_or
+    least, most = await get("FW_THR_MIN", 0.0), await get("FW_THR_MAX", 1.0)
+    trim = min(max(await get("FW_THR_TRIM", 0.5), least + 0.02), most - 0.02)
+    pitch_trim = math.radians(await get("FW_PSP_OFF", 0.0))
+    lowest = math.radians(await get("FW_P_LIM_MIN", -20.0))
+    highest = math.radians(await get("FW_P_LIM_MAX", 20.0))
+    return EnergyParameters(
+        throttle_trim=trim,
+        throttle_min=max(0.0, least),
+        throttle_max=min(1.0, most),
+        pitch_trim_rad=min(max(pitch_trim, lowest + 0.02), highest - 0.02),
+        pitch_min_rad=lowest,
+        pitch_max_rad=highest,
+        climb_full_throttle_m_s=max(0.5, await get("FW_T_CLMB_MAX", 5.0)),
+        sink_idle_m_s=max(0.5, await get("FW_T_SINK_MIN", 2.0)),
+        climb_max_m_s=max(0.3, 0.6 * await get("FW_T_CLMB_MAX", 5.0)),
+        sink_max_m_s=max(0.3, await get("FW_T_SINK_MIN", 2.0)),
+    )

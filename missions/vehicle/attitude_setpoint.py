@@ -1,0 +1,76 @@
+"""Streamed attitude commands: SET_ATTITUDE_TARGET with its type mask."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import dialect
+from missions.errors import PlanError
+from missions.vehicle.setpoint import Vector
+
+_IGNORE_RATES: Final = 0x07
+_IGNORE_PITCH_AND_YAW_RATE: Final = 0x06
+_IGNORE_THRUST: Final = 0x40
+_IGNORE_ATTITUDE: Final = 0x80
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttitudeSetpoint:
+    """How the aircraft shall lie now, and how hard its motor works.
+
+    Attributes:
+        roll_rad: bank angle, right wing down positive.
+        pitch_rad: nose above the horizon; None: left to the autopilot's altitude control (ArduPilot's plane).
+        thrust: 0..1; None: left to the autopilot's speed control (ArduPilot).
+        yaw_rad: heading; a fixed wing turns by its bank and takes no notice of it.
+    """
+
+    roll_rad: float
+    pitch_rad: float | None = None
+    thrust: float | None = None
+    yaw_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in (("roll", self.roll_rad), ("pitch", self.pitch_rad), ("yaw", self.yaw_rad)):
+            if value is not None and not math.isfinite(value):
+                raise PlanError(f"an attitude with a {name} of {value} can't be flown; give an angle")
+        if self.thrust is not None and not 0.0 <= self.thrust <= 1.0:
+            raise PlanError(f"a thrust of {self.thrust} is not in 0..1")
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is left to the autopilot."""
+        return self.pitch_rad is not None and self.thrust is not None
+
+    @property
+    def type_mask(self) -> int:
+        """ATTITUDE_TARGET_TYPEMASK: what to ignore.
+
+        Roll alone travels as ArduPilot's plane takes it: attitude ignored as a whole, the bit of the roll
+        rate clear (0xC6).
+        """
+        thrust = _IGNORE_THRUST if self.thrust is None else 0
+        if self.pitch_rad is None:
+            return _IGNORE_ATTITUDE | _IGNORE_PITCH_AND_YAW_RATE | thrust
+        return _IGNORE_RATES | thrust
+
+    def message(self, time_us: int, system_id: int, offset_ned_m: Vector = (0.0, 0.0, 0.0)) -> Any:
+        """The message. An attitude has no place, so the offset of the local frame changes nothing."""
+        halves = (0.5 * self.roll_rad, 0.5 * (self.pitch_rad or 0.0), 0.5 * self.yaw_rad)
+        (cr, cp, cy), (sr, sp, sy) = (tuple(map(f, halves)) for f in (math.cos, math.sin))
+        return dialect.MAVLink_set_attitude_target_message(
+            time_us // 1000 & 0xFFFFFFFF,
+            system_id,
+            1,
+            self.type_mask,
+            [
+                cr * cp * cy + sr * sp * sy,
+                sr * cp * cy - cr * sp * sy,
+                cr * sp * cy + sr * cp * sy,
+                cr * cp * sy - sr * sp * cy,
+            ],
+            0.0,
+            0.0,
+            0.0,
+            0.0 if self.thrust is None else self.thrust,
+        )

@@ -1,0 +1,259 @@
+"""What a mission may ask of an aircraft with wings beside what it asks of any vehicle."""
+
+import math
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions import telemetry
+from missions.errors import MissionError, PlanError
+from missions.vehicle.adapter import Mode
+from missions.vehicle.commands import VehicleCommands
+from missions.kind import VehicleKind
+from missions.vehicle.payload import Payload
+
+if TYPE_CHECKING:
+    from missions.vehicle.attitude_pilot import AttitudePilot
+    from missions.vehicle.heading_flight import HeadingFlight
+
+_GLIDE_SLOPE_RAD: Final = math.radians(3.5)  # PX4 refuses more than FW_LND_ANG, 5 deg
+_APPROACH_HEIGHT_M: Final = 40.0
+_TAIL_WIND_M_S: Final = 1.0
+_FARTHEST_M: Final = 10_000.0
+_GROUND_FRAME: Final = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Approach:
+    """How an aircraft comes down: a circle to lose height on, and a straight line from it to the ground.
+
+    Attributes:
+        place: where to touch the ground.
+        heading_rad: direction of the landing, clockwise from north.
+        height_m: above home, at the end of the circle.
+        circle_radius_m: of the circle, clockwise positive.
+    """
+
+    place: GeodeticPosition
+    heading_rad: float
+    height_m: float = _APPROACH_HEIGHT_M
+    circle_radius_m: float = 100.0
+
+    def __post_init__(self) -> None:
+        if not self.height_m >= 10.0:
+            raise PlanError(f"an approach from {self.height_m:g} m is too low; ask for 10 m or more")
+        if not abs(self.circle_radius_m) >= 20.0:
+            raise PlanError(f"an approach circle of {self.circle_radius_m:g} m is too tight; ask for 20 m or more")
+
+    @property
+    def length_m(self) -> float:
+        """Of the straight part, over ground."""
+        return self.height_m / math.tan(_GLIDE_SLOPE_RAD)
+
+    def items(self) -> list[MissionItem]:
+        """The circle, left along the line of the landing, and the landing."""
+        frame = LocalFrame(self.place)
+        north, east = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        # the circle touches the line where the descent begins; its centre lies abeam
+        back, side = -self.length_m, self.circle_radius_m
+        lat, lon, _ = frame.geodetic_from_ned(back * north - side * east, back * east + side * north, 0.0)
+        return [
+            MissionItem(
+                command=dialect.MAV_CMD_NAV_LOITER_TO_ALT,
+                frame=_GROUND_FRAME,
+                param1=1.0,  # leave it in the direction of the next item only
+                param2=self.circle_radius_m,
+                param4=1.0,  # the line to the next item begins where the circle is left
+                x=lat,
+                y=lon,
+                z=self.height_m,
+            ),
+            MissionItem(
+                command=dialect.MAV_CMD_NAV_LAND,
+                frame=_GROUND_FRAME,
+                x=self.place.lat_deg,
+                y=self.place.lon_deg,
+                z=0.0,
+            ),
+        ]
+
+
+class FixedWingFlight(VehicleCommands):
+    """The part of a vehicle that is for wings only; a multicopter answers with a PlanError."""
+
+    runway_heading_rad: float | None = None
+    """Heading on the ground before the last takeoff: along the runway."""
+
+    pilot: "AttitudePilot | None" = None
+    """What flies it by attitude; see `prepare_piloting`."""
+
+    _payload: Payload | None = None
+
+    @property
+    def payload(self) -> Payload:
+        """Camera, gimbal and survey magnetometer of this vehicle (of a multicopter too)."""
+        if self._payload is None:
+            self._payload = Payload(self)
+        return self._payload
+
+    def note_runway(self) -> None:
+        """Remember which way the aircraft stands on the ground; it will land that way, or the opposite."""
+        attitude = self.latest(telemetry.Attitude)
+        if attitude is not None and not self.armed:
+            self.runway_heading_rad = attitude.yaw_rad
+
+    async def prepare_piloting(self) -> "AttitudePilot":
+        """On the ground: get ready to be flown by headings or rolls; heights count from here."""
+        from missions.vehicle.attitude_pilot import AttitudePilot
+
+        self._require_wings("prepare_piloting")
+        if self.pilot is not None:
+            self.pilot.close()
+        self.pilot = await AttitudePilot.on_ground(self)
+        return self.pilot
+
+    def _require_wings(self, what: str) -> None:
+        if self.kind is not VehicleKind.FIXED_WING:
+            raise PlanError(f"{what} is for aircraft with wings; this is a {self.kind}")
+
+    # circles and changes
+
+    async def loiter(
+        self,
+        place: GeodeticPosition | None = None,
+        *,
+        radius_m: float | None = None,
+        clockwise: bool = True,
+        wait: bool = True,
+        timeout_s: float | None = None,
+    ) -> None:
+        """Go to a place and circle it.
+
+        Args:
+            place: centre, and altitude above mean sea level; None: where it is now.
+            radius_m: None: the autopilot's own.
+            clockwise: seen from above.
+            wait: until it circles there, near its altitude.
+
+        Raises:
+            PlanError: not a fixed wing, or too far away; nothing was sent.
+        """
+        self._require_wings("loiter")
+        if radius_m is not None and not (math.isfinite(radius_m) and radius_m > 0.0):
+            raise PlanError(f"a circle of radius {radius_m:g} m can't be flown; ask for more than 0 m")
+        here = await self.position()
+        if place is None:
+            place = GeodeticPosition(lat_deg=here.lat_deg, lon_deg=here.lon_deg, alt_m=here.alt_m)
+        frame = LocalFrame(place)
+        away_m = math.hypot(*frame.ned_from_geodetic(here.lat_deg, here.lon_deg, here.alt_m)[:2])
+        if not away_m <= _FARTHEST_M:
+            raise PlanError(
+                f"the place {place} is {away_m * 1e-3:.1f} km away; accepted: at most {_FARTHEST_M * 1e-3:g} km"
+            )
+        await self.adapter.loiter(self, place, radius_m, clockwise)
+        if not wait:
+            return
+        near_m = 1.5 * (radius_m or 120.0) + 20.0
+
+        def there() -> bool:
+            if not self.armed:
+                raise MissionError(f"the vehicle disarmed on its way; {self.heard()}")
+            p = self.latest(telemetry.Position)
+            if p is None:
+                return False
+            north, east, down = frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
+            return math.hypot(north, east) < near_m and abs(down) < 10.0
+
+        await self.wait_until(
+            there,
+            what="arrival at the circle",
+            on=("GLOBAL_POSITION_INT",),
+            timeout_s=timeout_s or 120.0 + 0.2 * away_m,
+        )
+
+    async def change_altitude(self, altitude_m: float) -> None:
+        """Go on at another height above home."""
+        await self.adapter.change_altitude(self, altitude_m)
+
+    async def change_airspeed(self, airspeed_m_s: float) -> None:
+        """Go on at another airspeed."""
+        self._require_wings("change_airspeed")
+        await self.adapter.change_airspeed(self, airspeed_m_s)
+
+    # headings and rolls
+
+    @asynccontextmanager
+    async def heading_flight(
+        self, *, altitude_m: float, airspeed_m_s: float | None = None
+    ) -> AsyncIterator["HeadingFlight"]:
+        """Fly headings: `async with vehicle.heading_flight(altitude_m=100) as flight: await flight.turn_to(1.57)`.
+
+        Altitude and airspeed are held; `prepare_piloting` was called on the ground. ArduPilot's plane gets commands (GUIDED_CHANGE_HEADING), PX4 a stream
+        of attitudes that hold the heading. At the end the vehicle holds.
+
+        Args:
+            altitude_m: above home.
+            airspeed_m_s: None: the autopilot's own.
+        """
+        from missions.vehicle.heading_flight import open_heading_flight
+
+        self._require_wings("heading_flight")
+        async with open_heading_flight(self, altitude_m, airspeed_m_s) as flight:
+            yield flight
+
+    # coming down
+
+    def landing_heading_rad(self) -> float:
+        """Direction to land in: that of the takeoff, or the opposite when the wind has turned.
+
+        Raises:
+            MissionError: neither runway nor heading is known.
+        """
+        heading = self.runway_heading_rad
+        if heading is None:
+            attitude = self.latest(telemetry.Attitude)
+            if attitude is None:
+                raise MissionError(f"no direction to land in is known; {self.heard()}")
+            heading = attitude.yaw_rad
+        wind = self.wind_ne_m_s()
+        if wind is not None and wind[0] * math.cos(heading) + wind[1] * math.sin(heading) > _TAIL_WIND_M_S:
+            heading += math.pi
+        return math.remainder(heading, math.tau)
+
+    def wind_ne_m_s(self) -> tuple[float, float] | None:
+        """The autopilot's estimate of the wind, where the air moves to (WIND_COV or WIND); None: not told."""
+        m = self.message("WIND_COV")
+        if m is not None and math.isfinite(m.wind_x) and math.isfinite(m.wind_y):
+            return float(m.wind_x), float(m.wind_y)
+        m = self.message("WIND")
+        if m is not None and math.isfinite(m.speed) and math.isfinite(m.direction):
+            source = math.radians(m.direction)
+            return -m.speed * math.cos(source), -m.speed * math.sin(source)
+        return None
+
+    async def land_along(
+        self, approach: Approach | None = None, *, wait: bool = True, timeout_s: float = 900.0
+    ) -> None:
+        """Land by an approach: it is uploaded in place of the vehicle's mission, and flown.
+
+        Args:
+            approach: None: at home, along the runway.
+            wait: until the vehicle is disarmed.
+        """
+        from missions.vehicle import mission_transfer
+
+        self._require_wings("land_along")
+        if approach is None:
+            approach = Approach(place=self.home, heading_rad=self.landing_heading_rad())
+        items = approach.items()
+        if self.adapter.first_mission_item_is_home:
+            items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=approach.place.lat_deg,
+                                 y=approach.place.lon_deg, z=approach.place.alt_m), *items]  # fmt: skip
+        await mission_transfer.upload(self, items)
+        await self.set_mode(Mode.MISSION)
+        if wait:
+            await self.wait_disarmed(timeout_s)

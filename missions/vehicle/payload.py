@@ -1,0 +1,266 @@
+"""What hangs on a vehicle beside the autopilot: camera, gimbal, survey magnetometer.
+
+Each is a MAVLink component of the vehicle's system with ids of its own (docs/fixed_wing.md). What they say is
+taken as it comes; nothing is sent but what is asked for.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+from autopilot_bridge.mavlink import decode, dialect
+from missions.errors import VehicleTimeout
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+CAMERA_COMPONENT: Final = 100
+GIMBAL_COMPONENT: Final = 154
+SURVEY_MAGNETOMETER_COMPONENT: Final = 158
+TOTAL_FIELD_NAME: Final = "MAG_NT"
+
+_IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
+_IN_EARTH_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
+_YAW_LOCK: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_LOCK
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Detection:
+    """One object in one image (LANDING_TARGET of the camera).
+
+    Attributes:
+        time_us: when the image was taken, vehicle time.
+        target: which object the camera's tracker believes it to be (`target_num`).
+        image_x, image_y: normalized image coordinates: x to the right, y down, unit focal length.
+    """
+
+    time_us: int
+    target: int
+    image_x: float
+    image_y: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GimbalAttitude:
+    """Where the gimbal looks (GIMBAL_DEVICE_ATTITUDE_STATUS).
+
+    Attributes:
+        time_us: vehicle time.
+        q: Hamilton quaternion (w x y z) that takes gimbal vectors (x along the line of sight, y right,
+            z down) to the reference frame.
+        from_north: the reference frame is NED; otherwise it is the vehicle's level frame, x along its heading.
+    """
+
+    time_us: int
+    q: tuple[float, float, float, float]
+    from_north: bool
+
+
+def detection(m: Any) -> Detection | None:
+    """From LANDING_TARGET; None when its angles are no angles of an image."""
+    if not (abs(m.angle_x) < 0.5 * math.pi and abs(m.angle_y) < 0.5 * math.pi):
+        return None
+    return Detection(
+        time_us=int(m.time_usec),
+        target=int(m.target_num),
+        image_x=math.tan(m.angle_x),
+        image_y=math.tan(m.angle_y),
+    )
+
+
+def gimbal_attitude(m: Any) -> GimbalAttitude | None:
+    """From GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is none.
+
+    Roll and pitch are those against the horizon. Yaw is from north or from the vehicle's heading, as the flags
+    say; in gimbals older than those flags YAW_LOCK stands for north.
+    """
+    w, x, y, z = (float(value) for value in m.q)
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    if not 0.5 < norm < 2.0:
+        return None
+    flags = int(m.flags)
+    return GimbalAttitude(
+        time_us=int(m.time_boot_ms) * 1000,
+        q=(w / norm, x / norm, y / norm, z / norm),
+        from_north=bool(flags & _IN_EARTH_FRAME)
+        or (not flags & _IN_VEHICLE_FRAME and bool(flags & _YAW_LOCK)),
+    )
+
+
+class Payload:
+    """The payload components of one vehicle.
+
+    Args:
+        vehicle: whose.
+    """
+
+    def __init__(self, vehicle: "Vehicle") -> None:
+        self._vehicle = vehicle
+
+    # listening
+
+    def on_detection(self, listener: Callable[[Detection], None]) -> Callable[[], None]:
+        """Call `listener` with each detection; returns what ends it."""
+        return self._listen("LANDING_TARGET", CAMERA_COMPONENT, detection, listener)
+
+    def on_gimbal_attitude(self, listener: Callable[[GimbalAttitude], None]) -> Callable[[], None]:
+        """Call `listener` with each attitude of the gimbal; returns what ends it."""
+        return self._listen("GIMBAL_DEVICE_ATTITUDE_STATUS", GIMBAL_COMPONENT, gimbal_attitude, listener)
+
+    def on_total_field(self, listener: Callable[[int, float], None]) -> Callable[[], None]:
+        """Call `listener` with (vehicle time us, total magnetic field nT) of each sample of the survey
+        magnetometer; returns what ends it.
+        """
+
+        def sample(m: Any) -> tuple[int, float] | None:
+            if str(m.name).rstrip("\0") != TOTAL_FIELD_NAME or not math.isfinite(m.value):
+                return None
+            return int(m.time_boot_ms) * 1000, float(m.value)
+
+        return self._listen(
+            "NAMED_VALUE_FLOAT", SURVEY_MAGNETOMETER_COMPONENT, sample, lambda s: listener(*s)
+        )
+
+    def _listen(
+        self,
+        name: str,
+        component_id: int,
+        convert: Callable[[Any], Any],
+        listener: Callable[[Any], None],
+    ) -> Callable[[], None]:
+        system_id = self._vehicle.system_id
+
+        def look(frame: Any) -> None:
+            if frame.system_id == system_id and frame.component_id == component_id:
+                value = convert(decode(frame))
+                if value is not None:
+                    listener(value)
+
+        return self._vehicle.connection.listen(name, look)
+
+    async def require(self, *components: int, timeout_s: float = 5.0) -> None:
+        """Wait until each of these components was heard.
+
+        Raises:
+            VehicleTimeout: one was not; names it.
+        """
+        vehicle = self._vehicle
+        names = {
+            CAMERA_COMPONENT: "camera",
+            GIMBAL_COMPONENT: "gimbal",
+            SURVEY_MAGNETOMETER_COMPONENT: "survey magnetometer",
+        }
+
+        def missing() -> list[str]:
+            return [
+                f"{names.get(c, 'component')} ({c})"
+                for c in components
+                if vehicle.connection.latest("HEARTBEAT", vehicle.system_id, c) is None
+            ]
+
+        try:
+            await vehicle.wait_until(
+                lambda: not missing(), what="payload", on=("HEARTBEAT",), timeout_s=timeout_s
+            )
+        except VehicleTimeout:
+            raise VehicleTimeout(
+                f"the vehicle has no {', no '.join(missing())}: no heartbeat of it within {timeout_s:g} s"
+            ) from None
+
+    # gimbal
+
+    def gimbal_range_rad(self) -> tuple[float, float, float, float] | None:
+        """(lowest pitch, highest pitch, leftmost yaw, rightmost yaw) against the vehicle, by the gimbal
+        manager's information; None before it was told (`request_gimbal_information`).
+        """
+        vehicle = self._vehicle
+        m = vehicle.connection.latest("GIMBAL_MANAGER_INFORMATION", vehicle.system_id, GIMBAL_COMPONENT)
+        return None if m is None else (m.pitch_min, m.pitch_max, m.yaw_min, m.yaw_max)
+
+    async def request_gimbal_information(self, timeout_s: float = 3.0) -> tuple[float, float, float, float]:
+        """Ask the gimbal manager for its range, and wait for it.
+
+        Raises:
+            VehicleTimeout: it does not say.
+        """
+        vehicle = self._vehicle
+        self._command(
+            dialect.MAV_CMD_REQUEST_MESSAGE, float(dialect.MAVLINK_MSG_ID_GIMBAL_MANAGER_INFORMATION)
+        )
+        return await vehicle.wait_until(
+            self.gimbal_range_rad,
+            what="range of the gimbal",
+            on=("GIMBAL_MANAGER_INFORMATION",),
+            timeout_s=timeout_s,
+        )
+
+    def take_gimbal_control(self) -> None:
+        """Become the primary control of the gimbal."""
+        connection = self._vehicle.connection
+        self._command(
+            dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+            float(connection.system_id),
+            float(connection.component_id),
+            -1.0,
+            -1.0,
+        )
+
+    def set_gimbal_rate(self, rate_hz: float) -> None:
+        """Have the gimbal report its attitude at a rate."""
+        self._command(
+            dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
+            float(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS),
+            1e6 / rate_hz,
+        )
+
+    def point_gimbal(
+        self,
+        *,
+        pitch_rad: float,
+        yaw_rad: float,
+        pitch_rate_rad_s: float = math.nan,
+        yaw_rate_rad_s: float = math.nan,
+    ) -> None:
+        """Point the gimbal, angles against the vehicle's body (pitch up and yaw right positive)."""
+        self._set_pitchyaw(pitch_rad, yaw_rad, pitch_rate_rad_s, yaw_rate_rad_s)
+
+    def turn_gimbal(self, *, pitch_rate_rad_s: float, yaw_rate_rad_s: float) -> None:
+        """Turn the gimbal at rates, wherever it looks."""
+        self._set_pitchyaw(math.nan, math.nan, pitch_rate_rad_s, yaw_rate_rad_s)
+
+    def point_gimbal_at(self, lat_deg: float, lon_deg: float, alt_m: float) -> None:
+        """Have the gimbal look at a place by itself (region of interest)."""
+        vehicle = self._vehicle
+        vehicle.send(
+            dialect.MAVLink_command_int_message(
+                vehicle.system_id,
+                GIMBAL_COMPONENT,
+                dialect.MAV_FRAME_GLOBAL,
+                dialect.MAV_CMD_DO_SET_ROI_LOCATION,
+                0,
+                0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                round(lat_deg * 1e7),
+                round(lon_deg * 1e7),
+                alt_m,
+            )
+        )
+
+    def _set_pitchyaw(self, pitch: float, yaw: float, pitch_rate: float, yaw_rate: float) -> None:
+        vehicle = self._vehicle
+        vehicle.send(
+            dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
+                vehicle.system_id, GIMBAL_COMPONENT, _IN_VEHICLE_FRAME, 0, pitch, yaw, pitch_rate, yaw_rate
+            )
+        )
+
+    def _command(self, command: int, *params: float) -> None:
+        vehicle = self._vehicle
+        values = (*params, *(0.0,) * (7 - len(params)))
+        vehicle.send(
+            dialect.MAVLink_command_long_message(vehicle.system_id, GIMBAL_COMPONENT, command, 0, *values)
+        )

@@ -1,0 +1,63 @@
+"""PX4's fixed wing as a mission meets it (v1.16 behaviour)."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions.planning.limits import FixedWingLimits, Limits
+from missions.kind import VehicleKind
+from missions.vehicle.px4 import Px4
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+
+class Px4Plane(Px4):
+    """PX4 with wings: OFFBOARD takes roll, pitch and thrust together; circles come with DO_REPOSITION."""
+
+    kind = VehicleKind.FIXED_WING
+    stream_rates_hz: Mapping[str, float] = MappingProxyType({**Px4.stream_rates_hz, "VFR_HUD": 10.0})
+    limiting_parameters: Mapping[str, float] = MappingProxyType(
+        {"FW_AIRSPD_MIN": 10.0, "FW_AIRSPD_TRIM": 15.0, "FW_AIRSPD_MAX": 20.0, "FW_R_LIM": 50.0}
+    )
+
+    def limits(self, parameters: Mapping[str, float]) -> Limits:
+        values = {**self.limiting_parameters, **parameters}
+        return FixedWingLimits(
+            airspeed_min_m_s=values["FW_AIRSPD_MIN"],
+            airspeed_trim_m_s=values["FW_AIRSPD_TRIM"],
+            airspeed_max_m_s=values["FW_AIRSPD_MAX"],
+            bank_max_rad=math.radians(values["FW_R_LIM"]),
+            bank_parameter="FW_R_LIM",
+        )
+
+    async def loiter(
+        self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
+    ) -> None:
+        await vehicle.command_int(
+            dialect.MAV_CMD_DO_REPOSITION,
+            dialect.MAV_FRAME_GLOBAL,
+            (-1.0, 1.0, math.nan if radius_m is None else radius_m, 0.0 if clockwise else 1.0),
+            round(place.lat_deg * 1e7),
+            round(place.lon_deg * 1e7),
+            place.alt_m,
+        )
+
+    async def change_airspeed(self, vehicle: "Vehicle", airspeed_m_s: float) -> None:
+        await vehicle.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 0.0, airspeed_m_s, -1.0)
+
+    async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
+        return max(asked_m, await vehicle.parameter_or("NAV_ACC_RAD", 10.0))
+
+    def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
+        return MissionItem(
+            command=dialect.MAV_CMD_NAV_TAKEOFF,
+            param4=math.nan,
+            x=home.lat_deg,
+            y=home.lon_deg,
+            z=altitude_m,
+        )
