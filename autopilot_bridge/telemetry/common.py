@@ -3,11 +3,10 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mission_plan import MissionStore
@@ -26,6 +25,7 @@ class TelemetrySources:
     """Where the messages take their contents from.
 
     Attributes:
+        controller: `MulticopterController` or `FixedWingController`.
         heartbeat: field values of HEARTBEAT in definition order.
         sys_status: (present, enabled, health) sensor bits of SYS_STATUS.
         mission_current: packed payload of MISSION_CURRENT.
@@ -40,7 +40,7 @@ class TelemetrySources:
     view: TelemetryView
     context: FlightContext
     navigation: NavigationFilter
-    controller: MulticopterController
+    controller: Any
     readings: SensorReadings
     heartbeat: Callable[[], Values]
     sys_status: Callable[[], tuple[int, int, int]]
