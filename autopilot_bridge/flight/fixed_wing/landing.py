@@ -31,6 +31,7 @@ _SLOPE_GAIN: Final = 0.4
 _DIVE_FREE_M: Final = 25.0  # over the ground the nose may go down as far as anywhere; lower, ever less
 _DIVE_LOW_RAD: Final = math.radians(-1.0)
 _LATEST_FLARE: Final = 0.6  # of the flare's time, before the ground at the present sink
+_TOUCH_EARLY_S: Final = 0.5  # the wheels touch so long before the path of the flare ends: the sink lags
 _STANDING_M_S: Final = 1.5
 _BRAKE_AFTER_S: Final = 1.5
 _NOSE_DOWN_S: Final = 1.0
@@ -257,7 +258,7 @@ class LandTask(AircraftTask):
         flare_height = max(p.flare_height_m, p.flare_time_s * sink)
         if ctx.position_valid:
             self._line.follow(state, self._path.of(ctx), command)
-            past_place = self._line.along_m(state)
+            past_place = self._line.along_m(state) - _TOUCH_EARLY_S * state.ground_speed_m_s
             shift = approach.flare_shift_m(state.ground_speed_m_s, flare_height, p.flare_sink_m_s)
             slope_down = approach.down_m + (past_place + shift) * approach.slope
             command.down_m = max(approach.entry_down_m, slope_down)
@@ -283,7 +284,9 @@ class LandTask(AircraftTask):
             command.heading_rad = approach.course_rad
         height = self._height(p, approach.down_m)
         self._limit_bank(p, height)
-        to_go = -self._line.along_m(state) if ctx.position_valid else math.nan
+        to_go = math.nan
+        if ctx.position_valid:
+            to_go = _TOUCH_EARLY_S * state.ground_speed_m_s - self._line.along_m(state)
         touched = self._flare.fly(ctx, state, height, to_go, p, command)
         if self._flare.aligning:
             command.steering_heading_rad = approach.course_rad

@@ -9,6 +9,8 @@ from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParamet
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
+_GRAVITY_M_S2: Final = 9.80665
+_TURN_BANK_RAD: Final = math.radians(30.0)  # of the turn towards a waypoint beside the aircraft
 _SAME_PLACE_M: Final = 1.0
 _SLOPE_LONGER_THAN_M: Final = 20.0
 
@@ -27,6 +29,7 @@ class Leg:
     """
 
     __slots__ = (
+        "_direct",
         "_line",
         "_ramps",
         "_start_down_m",
@@ -42,6 +45,7 @@ class Leg:
         self.radius_m = radius_m
         self._turn_rad = turn_rad
         self._ramps = ramps
+        self._direct = not ramps
         self._start_down_m = start[2]
         self._line = Line()
         self._set_line(start)
@@ -60,12 +64,18 @@ class Leg:
     def start_again(self, state: AircraftState) -> None:
         """The waypoint was missed: straight to it from here."""
         self._ramps = False
+        self._direct = True
         self._set_line((state.north_m, state.east_m, state.down_m))
 
     def follow(self, state: AircraftState, guidance: PathGuidance, command: FlightCommand) -> None:
         """Fill course and height of a command."""
-        self._line.follow(state, guidance, command)
         command.down_m = self.target[2]
+        if self._direct and self._inside_turn(state):
+            # turning towards it would circle around it for ever: away from it first
+            command.course_rad = state.course_rad
+            self._set_line((state.north_m, state.east_m, state.down_m))
+            return
+        self._line.follow(state, guidance, command)
         climb = self._start_down_m - self.target[2]
         # the height is there when the turn begins
         length = self.length_m - self.radius_m
@@ -75,6 +85,17 @@ class Leg:
         if share < 1.0:
             command.down_m = self._start_down_m - max(0.0, share) * climb
             command.height_rate_m_s = climb / length * state.ground_speed_m_s
+
+    def _inside_turn(self, state: AircraftState) -> bool:
+        """The waypoint is so near and so far aside that no turn from here leads over it."""
+        north, east = self.target[0] - state.north_m, self.target[1] - state.east_m
+        speed = state.ground_speed_m_s
+        turn_m = speed * speed / (_GRAVITY_M_S2 * math.tan(_TURN_BANK_RAD))
+        if north * north + east * east > 4.0 * turn_m * turn_m or speed < 1.0:
+            return False
+        right = (state.vel_north_m_s * east - state.vel_east_m_s * north) / speed
+        ahead = (state.vel_north_m_s * north + state.vel_east_m_s * east) / speed
+        return math.hypot(ahead, abs(right) - turn_m) < turn_m - 0.5 * self.radius_m
 
     def away_m(self, state: AircraftState) -> float:
         """Horizontal distance to the waypoint."""

@@ -1,11 +1,14 @@
 """Limits and habits of fixed-wing flight, in the meaning PX4 (FW_*, NPFG_*, RTL_*) and ArduPlane share."""
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
-from flightsim.flight_envelope import FlightEnvelope
+if TYPE_CHECKING:  # its module brings scipy
+    from flightsim.flight_envelope import FlightEnvelope
 
 _SIGNED: Final = frozenset(
     {
