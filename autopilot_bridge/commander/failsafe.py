@@ -147,7 +147,7 @@ class FailsafeMonitor:
             FailsafeKind.GCS_LOST,
             links_matter
             and 0.0 < parameters.gcs_loss_s < situation.gcs_age_s < math.inf
-            and situation.mode not in parameters.gcs_loss_exempt,
+            and not self._exempt(FailsafeKind.GCS_LOST, situation.mode, parameters.gcs_loss_exempt),
             parameters.gcs_loss_action,
         )
         yield (
@@ -155,7 +155,7 @@ class FailsafeMonitor:
             links_matter
             and situation.sticks_at_arming
             and 0.0 < parameters.manual_loss_s < situation.sticks_age_s
-            and (situation.mode not in parameters.manual_loss_exempt or self._chose_mode),
+            and not self._exempt(FailsafeKind.MANUAL_LOST, situation.mode, parameters.manual_loss_exempt),
             parameters.manual_loss_action,
         )
         yield (
@@ -163,7 +163,9 @@ class FailsafeMonitor:
             links_matter
             and situation.sticks_at_arming
             and 0.0 < parameters.manual_long_loss_s < situation.sticks_age_s
-            and situation.mode not in parameters.manual_long_loss_exempt,
+            and not self._exempt(
+                FailsafeKind.MANUAL_LOST_LONG, situation.mode, parameters.manual_long_loss_exempt
+            ),
             parameters.manual_long_loss_action,
         )
         level = situation.battery_level
@@ -197,10 +199,11 @@ class FailsafeMonitor:
         )
         yield FailsafeKind.GEOFENCE, situation.outside_fence, parameters.fence_action
 
-    @property
-    def _chose_mode(self) -> bool:
-        """The lost radio's failsafe has changed the mode (ArduPlane): the new mode doesn't end it."""
-        return self._policy.radio_restores_mode and FailsafeKind.MANUAL_LOST in self._active
+    def _exempt(self, kind: FailsafeKind, mode: FlightMode, exempt: frozenset[FlightMode]) -> bool:
+        """The mode flies on without that link."""
+        if self._policy.failsafe_lasts and kind in self._active:
+            return False
+        return mode in exempt
 
     def _position_lost(self, situation: Situation, parameters: CommanderParameters) -> bool:
         """Without a position for too long in a mode that needs one."""

@@ -53,6 +53,8 @@ class CommanderPolicy:
         takeoff_by_command: NAV_TAKEOFF as a command takes off (not on ArduPlane).
         orbit_mode: mode in which a commanded circle is flown; an aircraft holds by circling.
         failsafe_disarms_landed: a failsafe that acts on the ground stops the motors (ArduCopter).
+        failsafe_lasts: the failsafe of a lost link lasts until the link is back, although the mode it has
+            chosen is one that would have been left alone (ArduPlane).
         landing_ignores_links: a lost link doesn't end a landing (ArduPlane).
         radio_restores_mode: the mode comes back when a radio does before the second stage of its failsafe
             (ArduPlane).
@@ -98,6 +100,7 @@ class CommanderPolicy:
     takeoff_by_command: bool = True
     orbit_mode: FlightMode = FlightMode.ORBIT
     failsafe_disarms_landed: bool = False
+    failsafe_lasts: bool = False
     landing_ignores_links: bool = False
     radio_restores_mode: bool = False
     ground_speed_apart: bool = False

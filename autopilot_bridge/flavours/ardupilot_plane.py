@@ -83,6 +83,7 @@ POLICY: Final = CommanderPolicy(
     boot_status=SystemStatus.CALIBRATING,
     takeoff_by_command=False,
     orbit_mode=FlightMode.HOLD,
+    failsafe_lasts=True,
     landing_ignores_links=True,
     radio_restores_mode=True,
     ground_speed_apart=True,

@@ -41,11 +41,12 @@ _ARDUPLANE_MODES: Final[Mapping[str, tuple[float, float]]] = {
     "initialising": (16, 0),
 }
 _GLOBAL_RELATIVE_INT: Final = 6
+_FRAME_MISSION: Final = 2
 _METRES_PER_DEG: Final = math.radians(6_371_000.0)
 
 
 class Item:
-    """One plan item at a place given in metres from home."""
+    """One plan item at a place given in metres from home; without a place it has MAV_FRAME_MISSION."""
 
     def __init__(
         self,
@@ -175,7 +176,7 @@ class AircraftFlight(Flight):
                 SYSTEM_ID,
                 1,
                 seq,
-                _GLOBAL_RELATIVE_INT,
+                _FRAME_MISSION if item.north_m is None else _GLOBAL_RELATIVE_INT,
                 item.command,
                 0,
                 1,
@@ -219,7 +220,7 @@ class AircraftFlight(Flight):
     def get_ready(self) -> None:
         """From boot to ready to arm; asks for the streams the pilot looks at."""
         self.fly(2.5)
-        for message_id, rate_hz in ((1, 2), (245, 5), (33, 10), (32, 10), (30, 10), (74, 10)):
+        for message_id, rate_hz in ((1, 2), (245, 5), (33, 10), (32, 10), (30, 10), (74, 10), (42, 5)):
             self.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz)
 
         def ready() -> bool:

@@ -218,7 +218,7 @@ def test_px4_offboard_attitude() -> None:
 def test_arduplane_guided_attitude() -> None:
     flight = AircraftFlight("ardupilot", environment=WIND)
     flight.take_off(80.0)
-    flight.repeat(10.0, lambda _: flight.attitude_setpoint(-25.0, 0.0, 0.0, 0xC6 & ~0x80 | 0x40))
+    flight.repeat(10.0, lambda _: flight.attitude_setpoint(-25.0, 0.0, 0.0, 0xC6))
     flight.fly(4.0)
     rolls, heights = [], []
 

@@ -97,7 +97,7 @@ def test_px4_offboard_attitudes_go_on_without_gps() -> None:
 
 def test_arduplane_guided_attitudes_go_on_without_gps() -> None:
     flight = circling("ardupilot", 100.0)
-    flight.repeat(20.0, lambda _: flight.attitude_setpoint(22.0, 0.0, 0.0, 0x46))
+    flight.repeat(20.0, lambda _: flight.attitude_setpoint(22.0, 0.0, 0.0, 0xC6))
     flight.fly(2.0)
     flight.inject(GPS, OFF)
     rolls, heights = [], []
@@ -165,8 +165,9 @@ def test_geofence(flavour: str) -> None:
     )
     flight = circling(flavour, 60.0, **fence)
     assert flight.reposition(900.0, 0.0, 60.0) == 0
-    flight.fly(45.0)
-    assert flight.mode == "return" and status(flight) == CRITICAL
+    flight.fly_until(lambda: flight.mode == "return", 45.0, "return")
+    flight.fly(1.2)
+    assert status(flight) == CRITICAL
     flight.fly(60.0)
     assert flight.distance_m(0.0, 0.0) < 250.0
 
