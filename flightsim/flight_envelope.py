@@ -5,7 +5,7 @@ nothing or the opposite, is refused in plain words.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Final
@@ -14,6 +14,7 @@ import numpy as np
 
 from flightsim.airframe import Airframe, AirframeError, FlightLimits, Role, load_airframe
 from flightsim.environment import Environment
+from flightsim.flight_figures import FlightEnvelope
 from flightsim.home import Home
 from flightsim.linear_modes import LinearModel, P, Q, R, U, V, W, linearise
 from flightsim.trim_flight import FlightTrim, TrimError, trim_in_tunnel
@@ -30,99 +31,6 @@ _STALL_RESOLUTION: Final = 0.01
 _SLOWEST, _CRUISE, _FASTEST = 1.2, 1.6, 2.2
 _LEAST_ROLL_RATE_RAD_S: Final = 0.05
 _LEAST_ACCELERATION_RAD_S2: Final = 0.02
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FlightEnvelope:
-    """Performance and control response of a fixed-wing aircraft.
-
-    Speeds are equivalent airspeeds (sea level density), rates of climb and sink are at home's altitude with
-    the atmosphere's density there. Actuator levels are those of `flightsim.interface`: surfaces -1..1,
-    positive rolls right, pitches the nose up, turns the nose right; throttle 0..1. Control response is that
-    of level flight at the trim airspeed; a moment grows with the square of airspeed, a steady rate and the
-    inverse of a time constant in proportion to it.
-
-    Attributes:
-        name: the vehicle.
-        mass_kg, wing_span_m, wing_area_m2, chord_m: of the model.
-        density_kg_m3: of the air for which all this holds.
-        stall_speed_m_s: lowest speed of steady 1 g flight, power off.
-        airspeed_min_m_s, airspeed_trim_m_s, airspeed_max_m_s: limits and cruise for the autopilot.
-        powered: False for a glider; its throttle does nothing.
-        trim_throttle: in level flight at the trim airspeed (0 for a glider).
-        trim_throttle_min_speed, trim_throttle_max_speed: at the lowest and highest airspeed, limited to 1.
-        throttle_max: highest useful throttle.
-        trim_pitch_rad: pitch in level flight at the trim airspeed (for a glider: in its glide).
-        trim_angle_of_attack_rad: angle of attack there.
-        trim_elevator, trim_aileron, trim_rudder: surfaces there, -1..1.
-        climb_max_m_s: rate of climb, full throttle, at the trim airspeed (negative for a glider).
-        sink_min_m_s: rate of sink, idle, at the trim airspeed.
-        sink_max_m_s: rate of sink, idle, at the highest airspeed.
-        glide_ratio: best distance over height with the throttle closed, no slower than the lowest airspeed.
-        best_glide_speed_m_s: equivalent airspeed of it.
-        bank_max_rad, pitch_min_rad, pitch_max_rad: limits for the autopilot.
-        roll_rate_per_aileron_rad_s: steady roll rate of full aileron.
-        roll_time_constant_s: of the roll rate.
-        pitch_acceleration_per_elevator_rad_s2: at once, of full elevator.
-        pitch_rate_per_elevator_rad_s: steady (short period) pitch rate of full elevator.
-        load_factor_per_elevator: steady increase of the load factor (g) of full elevator.
-        short_period_frequency_rad_s, short_period_damping: of the pair of roots (geometric mean and mean
-            over it when they are real).
-        yaw_acceleration_per_rudder_rad_s2: at once, of full rudder.
-        yaw_rate_per_rudder_rad_s: steady yaw rate of full rudder, wings held level.
-        sideslip_per_rudder_rad: steady sideslip of full rudder, wings held level (negative: right rudder
-            makes wind from the left).
-        dutch_roll_frequency_rad_s, dutch_roll_damping: of that pair of roots.
-        spiral_time_constant_s: positive decays, negative grows.
-        thrust_per_throttle_n: slope of thrust at the trim throttle.
-        lift_slope_per_rad: d(lift coefficient) / d(angle of attack).
-        drag_n: with the throttle closed (idling propeller included), at the trim airspeed.
-    """
-
-    name: str
-    mass_kg: float
-    wing_span_m: float
-    wing_area_m2: float
-    chord_m: float
-    density_kg_m3: float
-    stall_speed_m_s: float
-    airspeed_min_m_s: float
-    airspeed_trim_m_s: float
-    airspeed_max_m_s: float
-    powered: bool
-    trim_throttle: float
-    trim_throttle_min_speed: float
-    trim_throttle_max_speed: float
-    throttle_max: float
-    trim_pitch_rad: float
-    trim_angle_of_attack_rad: float
-    trim_elevator: float
-    trim_aileron: float
-    trim_rudder: float
-    climb_max_m_s: float
-    sink_min_m_s: float
-    sink_max_m_s: float
-    glide_ratio: float
-    best_glide_speed_m_s: float
-    bank_max_rad: float
-    pitch_min_rad: float
-    pitch_max_rad: float
-    roll_rate_per_aileron_rad_s: float
-    roll_time_constant_s: float
-    pitch_acceleration_per_elevator_rad_s2: float
-    pitch_rate_per_elevator_rad_s: float
-    load_factor_per_elevator: float
-    short_period_frequency_rad_s: float
-    short_period_damping: float
-    yaw_acceleration_per_rudder_rad_s2: float
-    yaw_rate_per_rudder_rad_s: float
-    sideslip_per_rudder_rad: float
-    dutch_roll_frequency_rad_s: float
-    dutch_roll_damping: float
-    spiral_time_constant_s: float
-    thrust_per_throttle_n: float
-    lift_slope_per_rad: float
-    drag_n: float
 
 
 def flight_envelope(
@@ -164,9 +72,8 @@ class _Survey:
     def envelope(self) -> FlightEnvelope:
         tunnel, name = self.tunnel, self.tunnel.airframe.name
         stall = self.stall_speed()
-        limits = self.limits = _completed(self.limits, stall)
-        slow, cruise, fast = limits.airspeed_min_m_s, limits.airspeed_trim_m_s, limits.airspeed_max_m_s
-        assert slow is not None and cruise is not None and fast is not None
+        limits = self.limits
+        slow, cruise, fast = _airspeeds_m_s(limits, stall)
         if not slow < cruise < fast:
             raise AirframeError(
                 f"vehicle '{name}': airspeeds {slow:.1f} (min), {cruise:.1f} (trim) and {fast:.1f} (max) m/s "
@@ -176,13 +83,11 @@ class _Survey:
             raise AirframeError(
                 f"vehicle '{name}': airspeed_min_m_s {slow:.1f} is below its stall speed of {stall:.1f} m/s"
             )
-        level = self.level(cruise, None, must=True)
-        assert level is not None
+        level = self.cruise(cruise)
         model = linearise(tunnel, level)
         self.check_controls(model)
         glide, dive = self.glide(cruise), self.glide(fast)
         climb = self.full_throttle(cruise, level) if tunnel.powered else glide
-        at_min, at_max = self.level(slow, level), self.level(fast, level)
         best_speed, best = self.best_glide(slow, cruise)
         return FlightEnvelope(
             name=name,
@@ -197,8 +102,8 @@ class _Survey:
             airspeed_max_m_s=fast,
             powered=tunnel.powered,
             trim_throttle=level.throttle,
-            trim_throttle_min_speed=_throttle(at_min, tunnel.powered),
-            trim_throttle_max_speed=_throttle(at_max, tunnel.powered),
+            trim_throttle_min_speed=self.level_throttle(slow, level),
+            trim_throttle_max_speed=self.level_throttle(fast, level),
             throttle_max=limits.throttle_max if tunnel.powered else 0.0,
             trim_pitch_rad=level.pitch_rad,
             trim_angle_of_attack_rad=level.angle_of_attack_rad,
@@ -217,14 +122,25 @@ class _Survey:
             **self.response(model, level),
         )
 
-    def level(self, speed_m_s: float, near: FlightTrim | None, *, must: bool = False) -> FlightTrim | None:
-        """Level flight (a glider's glide) at an equivalent airspeed; None where there is none."""
+    def level(self, speed_m_s: float, near: FlightTrim | None = None) -> FlightTrim:
+        """Level flight (a glider's glide) at an equivalent airspeed."""
+        return trim_in_tunnel(self.tunnel, airspeed_m_s=speed_m_s * self.to_true, near=near)
+
+    def cruise(self, speed_m_s: float) -> FlightTrim:
+        """Level flight that it must be able to hold."""
         try:
-            return trim_in_tunnel(self.tunnel, airspeed_m_s=speed_m_s * self.to_true, near=near)
+            return self.level(speed_m_s)
         except TrimError as error:
-            if must:
-                raise AirframeError(f"{error} ({speed_m_s:.1f} m/s equivalent, its cruise)") from None
-            return None
+            raise AirframeError(f"{error} ({speed_m_s:.1f} m/s equivalent, its cruise)") from None
+
+    def level_throttle(self, speed_m_s: float, near: FlightTrim) -> float:
+        """Throttle of level flight; all of it where that is not enough."""
+        if not self.tunnel.powered:
+            return 0.0
+        try:
+            return self.level(speed_m_s, near).throttle
+        except TrimError:
+            return 1.0
 
     def glide(self, speed_m_s: float, near: FlightTrim | None = None) -> FlightTrim:
         """Power-off flight at an equivalent airspeed."""
@@ -337,15 +253,9 @@ class _Survey:
         }
 
 
-def _completed(limits: FlightLimits, stall_m_s: float) -> FlightLimits:
-    """Limits with the airspeeds that the description leaves open."""
+def _airspeeds_m_s(limits: FlightLimits, stall_m_s: float) -> tuple[float, float, float]:
+    """Lowest, cruise and highest equivalent airspeed, with those that the description leaves open."""
     cruise = limits.airspeed_trim_m_s or _CRUISE * stall_m_s
     slow = limits.airspeed_min_m_s or min(_SLOWEST * stall_m_s, 0.9 * cruise)
     fast = limits.airspeed_max_m_s or max(_FASTEST * stall_m_s, 1.2 * cruise)
-    return replace(limits, airspeed_min_m_s=slow, airspeed_trim_m_s=cruise, airspeed_max_m_s=fast)
-
-
-def _throttle(trim: FlightTrim | None, powered: bool) -> float:
-    if not powered:
-        return 0.0
-    return 1.0 if trim is None else trim.throttle
+    return slow, cruise, fast

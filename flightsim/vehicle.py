@@ -22,10 +22,17 @@ from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
-from flightsim.kernels import kernel
 from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
-from flightsim.rotations import quaternion_from_euler
+from flightsim.truth_reading import (
+    ACCEL_SCALE,
+    LOAD_FACTOR_SCALE,
+    LOAD_FACTORS,
+    MOTION_SIZE,
+    STATE,
+    STATE_SIZE,
+    write_truth,
+)
 from flightsim.turbulence import DrydenTurbulence
 
 __all__ = ["InitialState", "Vehicle", "VehicleDivergedError"]
@@ -33,54 +40,10 @@ __all__ = ["InitialState", "Vehicle", "VehicleDivergedError"]
 Array = NDArray[np.float64]
 
 _FT: Final = 0.3048
-_PA_PER_PSF: Final = 47.88025898033584
-_KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
 _FOLLOW_S: Final = 10.0  # in which actuators and engines follow the commands of a start in the air
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
 _SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand on a tail wheel
-
-# What is read from JSBSim every step, in this order; `_write_truth` converts it.
-_STATE: Final = (
-    "position/lat-geod-rad",
-    "position/long-gc-rad",
-    "position/geod-alt-ft",
-    "velocities/v-north-fps",
-    "velocities/v-east-fps",
-    "velocities/v-down-fps",
-    "attitude/phi-rad",
-    "attitude/theta-rad",
-    "attitude/psi-rad",
-    "velocities/pi-rad_sec",
-    "velocities/qi-rad_sec",
-    "velocities/ri-rad_sec",
-    "accelerations/a-pilot-x-ft_sec2",
-    "accelerations/a-pilot-y-ft_sec2",
-    "accelerations/a-pilot-z-ft_sec2",
-    "atmosphere/P-psf",
-    "atmosphere/T-R",
-    "atmosphere/rho-slugs_ft3",
-    "atmosphere/total-wind-north-fps",
-    "atmosphere/total-wind-east-fps",
-    "atmosphere/total-wind-down-fps",
-    "position/h-agl-ft",
-    "velocities/vt-fps",
-    "forces/fbx-gear-lbs",
-    "forces/fby-gear-lbs",
-    "forces/fbz-gear-lbs",
-    "aero/alpha-rad",
-    "aero/beta-rad",
-    "aero/qbar-psf",
-)
-_STATE_SIZE: Final = len(_STATE)
-# a-pilot is at the eye point, which our multicopter has at its centre of gravity; other models have not.
-_LOAD_FACTORS: Final = {
-    f"accelerations/a-pilot-{axis}-ft_sec2": f"accelerations/N{axis}" for axis in ("x", "y", "z")
-}
-_ACCEL_SCALE: Final = np.array([_FT, _FT, _FT])
-_LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * 9.80665
-# Motion is read every step; the rest and the model's own properties may be slower.
-_MOTION_SIZE: Final = _STATE.index("atmosphere/P-psf")
 
 
 class VehicleDivergedError(ArithmeticError):
@@ -173,7 +136,7 @@ class Vehicle:
         self._truth_scale = np.array(
             self.airframe.truth_scale or np.ones(len(self.airframe.truth)), dtype=float
         )
-        self._raw = np.zeros(_STATE_SIZE + len(self.airframe.truth))
+        self._raw = np.zeros(STATE_SIZE + len(self.airframe.truth))
         self._raw_view = self._raw.data  # its elements are set faster than the array's
         self._slow_steps = max(1, physics_rate_hz // (slow_rate_hz or physics_rate_hz))
         self._slow_phase = 1 % self._slow_steps  # the first step, then at the slow rate, as sensors measure
@@ -205,13 +168,13 @@ class Vehicle:
         self._run = fdm.run
         self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
         name = self.airframe.name
-        state = [_LOAD_FACTORS.get(prop, prop) for prop in _STATE] if fixed_wing else _STATE
+        state = [LOAD_FACTORS.get(prop, prop) for prop in STATE] if fixed_wing else STATE
         properties = (*state, *(prop for _, prop in self.airframe.truth))
         getters = tuple(
             (i, find_property(fdm, prop, needed_by="the truth vector").get_double_value)
             for i, prop in enumerate(properties)
         )
-        self._getters_motion, self._getters_slow = getters[:_MOTION_SIZE], getters[_MOTION_SIZE:]
+        self._getters_motion, self._getters_slow = getters[:MOTION_SIZE], getters[MOTION_SIZE:]
         self._set_actuators = tuple(
             find_property(fdm, prop, needed_by=f"vehicle '{name}'").set_double_value
             for prop in self.airframe.actuators
@@ -374,8 +337,8 @@ class Vehicle:
         if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
             for i, get in self._getters_slow:
                 raw[i] = get()
-        accel_scale = _ACCEL_SCALE if self._surfaces is None else _LOAD_FACTOR_SCALE
-        if not _write_truth(self._raw, accel_scale, self._truth_extra, self._truth_scale, self.truth):
+        accel_scale = ACCEL_SCALE if self._surfaces is None else LOAD_FACTOR_SCALE
+        if not write_truth(self._raw, accel_scale, self._truth_extra, self._truth_scale, self.truth):
             raise VehicleDivergedError(
                 f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
                 f"({self._steps / self.physics_rate_hz:.3f} s): its state is not finite"
@@ -425,35 +388,3 @@ def _launch_parameters(airframe: Airframe, start: InitialState) -> LaunchParamet
         return None
     kind = LaunchKind(start.launch or airframe.launch_kind)
     return None if kind is LaunchKind.RUNWAY else airframe.launch(kind)
-
-
-@kernel
-def _write_truth(
-    raw: Array, accel_scale: Array, extra: NDArray[np.int64], scale: Array, truth: Array
-) -> bool:
-    """Convert JSBSim's values (order of `_STATE`, then the model's own) to truth; False if not finite."""
-    truth[0] = raw[0]
-    truth[1] = raw[1]
-    for i in range(2, 6):
-        truth[i] = raw[i] * _FT
-    quaternion_from_euler(raw[6], raw[7], raw[8], truth[6:10])
-    for i in range(3):
-        truth[10 + i] = raw[9 + i]
-        truth[13 + i] = raw[12 + i] * accel_scale[i]
-        truth[19 + i] = raw[18 + i] * _FT
-    truth[16] = raw[15] * _PA_PER_PSF
-    truth[17] = raw[16] / 1.8
-    truth[18] = raw[17] * _KG_M3_PER_SLUG_FT3
-    truth[25] = raw[21] * _FT
-    truth[26] = raw[22] * _FT
-    truth[40] = raw[26]
-    truth[41] = raw[27]
-    truth[42] = raw[28] * _PA_PER_PSF
-    truth[31] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
-    total = 0.0
-    for i in range(_STATE_SIZE):
-        total += raw[i]
-    for i in range(extra.shape[0]):
-        truth[extra[i]] = raw[_STATE_SIZE + i] * scale[i]
-        total += raw[_STATE_SIZE + i]
-    return math.isfinite(total)

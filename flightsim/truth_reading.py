@@ -1,0 +1,88 @@
+"""What is read from JSBSim for the truth vector, and its conversion."""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
+from flightsim.rotations import quaternion_from_euler
+
+Array = NDArray[np.float64]
+
+_FT: Final = 0.3048
+_PA_PER_PSF: Final = 47.88025898033584
+_KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
+
+# What is read from JSBSim every step, in this order; `write_truth` converts it.
+STATE: Final = (
+    "position/lat-geod-rad",
+    "position/long-gc-rad",
+    "position/geod-alt-ft",
+    "velocities/v-north-fps",
+    "velocities/v-east-fps",
+    "velocities/v-down-fps",
+    "attitude/phi-rad",
+    "attitude/theta-rad",
+    "attitude/psi-rad",
+    "velocities/pi-rad_sec",
+    "velocities/qi-rad_sec",
+    "velocities/ri-rad_sec",
+    "accelerations/a-pilot-x-ft_sec2",
+    "accelerations/a-pilot-y-ft_sec2",
+    "accelerations/a-pilot-z-ft_sec2",
+    "atmosphere/P-psf",
+    "atmosphere/T-R",
+    "atmosphere/rho-slugs_ft3",
+    "atmosphere/total-wind-north-fps",
+    "atmosphere/total-wind-east-fps",
+    "atmosphere/total-wind-down-fps",
+    "position/h-agl-ft",
+    "velocities/vt-fps",
+    "forces/fbx-gear-lbs",
+    "forces/fby-gear-lbs",
+    "forces/fbz-gear-lbs",
+    "aero/alpha-rad",
+    "aero/beta-rad",
+    "aero/qbar-psf",
+)
+STATE_SIZE: Final = len(STATE)
+# a-pilot is at the eye point, which our multicopter has at its centre of gravity; other models have not.
+LOAD_FACTORS: Final = {
+    f"accelerations/a-pilot-{axis}-ft_sec2": f"accelerations/N{axis}" for axis in ("x", "y", "z")
+}
+ACCEL_SCALE: Final = np.array([_FT, _FT, _FT])
+LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * 9.80665
+# Motion is read every step; the rest and the model's own properties may be slower.
+MOTION_SIZE: Final = STATE.index("atmosphere/P-psf")
+
+
+@kernel
+def write_truth(raw: Array, accel_scale: Array, extra: NDArray[np.int64], scale: Array, truth: Array) -> bool:
+    """Convert JSBSim's values (order of `STATE`, then the model's own) to truth; False if not finite."""
+    truth[0] = raw[0]
+    truth[1] = raw[1]
+    for i in range(2, 6):
+        truth[i] = raw[i] * _FT
+    quaternion_from_euler(raw[6], raw[7], raw[8], truth[6:10])
+    for i in range(3):
+        truth[10 + i] = raw[9 + i]
+        truth[13 + i] = raw[12 + i] * accel_scale[i]
+        truth[19 + i] = raw[18 + i] * _FT
+    truth[16] = raw[15] * _PA_PER_PSF
+    truth[17] = raw[16] / 1.8
+    truth[18] = raw[17] * _KG_M3_PER_SLUG_FT3
+    truth[25] = raw[21] * _FT
+    truth[26] = raw[22] * _FT
+    truth[40] = raw[26]
+    truth[41] = raw[27]
+    truth[42] = raw[28] * _PA_PER_PSF
+    truth[31] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
+    total = 0.0
+    for i in range(STATE_SIZE):
+        total += raw[i]
+    for i in range(extra.shape[0]):
+        truth[extra[i]] = raw[STATE_SIZE + i] * scale[i]
+        total += raw[STATE_SIZE + i]
+    return math.isfinite(total)
