@@ -17,6 +17,7 @@ from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.parameters import ParameterStore
 from flightsim import interface
+from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 
 PERIOD_US = 20_000
@@ -41,6 +42,9 @@ class FollowerLandDetector:
 
     def update(self, ctx: FlightContext, thrust: float) -> LandedState:
         height_m = -float(ctx.nav[nav.POS_NED_M][2])
+        if ctx.setpoint.size != sp.SETPOINT_SIZE:
+            ctx.landed_state = LandedState.ON_GROUND if height_m <= 0.02 else LandedState.IN_AIR
+            return ctx.landed_state
         resting = height_m <= 0.02 and not (
             ctx.armed and ctx.setpoint[sp.LEVEL] > sp.IDLE and ctx.setpoint[5] < 0.0
         )
@@ -59,8 +63,15 @@ class FollowerLandDetector:
 class Rig:
     """One commander of a flavour; `run` advances it, `events` collects what happened."""
 
-    def __init__(self, flavour: str = "px4", *, start_s: float = READY_S, **parameters: float) -> None:
-        self.flavour = get_flavour(flavour)
+    def __init__(
+        self,
+        flavour: str = "px4",
+        *,
+        kind: AirframeKind = AirframeKind.MULTICOPTER,
+        start_s: float = READY_S,
+        **parameters: float,
+    ) -> None:
+        self.flavour = get_flavour(flavour, kind)
         self.store = ParameterStore(self.flavour.parameter_definitions(), parameters)
         self.readings = SensorReadings()
         self.judgement = Judgement()
@@ -86,7 +97,7 @@ class Rig:
             policy=self.flavour.policy,
             parameters=self.flavour.commander_parameters(self.store),
             vehicle=self.flavour.vehicle_tasks(self.context, self.missions, self.flavour.policy),
-            health=HealthMonitor(self.readings, self.judgement),
+            health=HealthMonitor(self.readings, self.judgement, airspeed=self.flavour.has_airspeed),
             land_detector=self.detector,
             thrust=lambda: 0.3,
             missions=self.missions,
@@ -165,6 +176,7 @@ class Rig:
         if not self.sensors_on:
             return
         readings, jitter = self.readings, 1e-6 * (self.time_us // PERIOD_US % 7)
+        readings.airspeed.values[:] = (1.0 + jitter, 15.0)
         imu = readings.imu.values
         imu[interface.IMU_GYRO_FRD_RAD_S] = jitter
         imu[interface.IMU_ACCEL_FRD_M_S2] = (jitter, 0.0, -9.81)
@@ -183,6 +195,7 @@ class Rig:
             readings.magnetometer,
             readings.gps,
             readings.battery,
+            readings.airspeed,
         ):
             reading.time_us = self.time_us
         if self.spoil is not None:
@@ -193,6 +206,8 @@ class Rig:
         ctx, dt_s = self.context, PERIOD_US * 1e-6
         position, velocity = ctx.nav[nav.POS_NED_M], ctx.nav[nav.VEL_NED_M_S]
         velocity[:] = 0.0
+        if self.flavour.kind is AirframeKind.FIXED_WING:
+            return  # the test moves it
         if not ctx.armed or ctx.setpoint[sp.LEVEL] <= sp.IDLE:
             return
         wanted, speed = ctx.setpoint[sp.POS_NED_M], ctx.setpoint[sp.VEL_NED_M_S]
