@@ -9,9 +9,9 @@ from typing import Any, Final
 import jsbsim
 
 from flightsim import truth as t
+from flightsim.airframe_channels import read_channels, standard_channel
 from flightsim.airframe_types import (
     DEFAULT_LAUNCHES,
-    ActuatorChannel,
     Airframe,
     AirframeError,
     AirframeKind,
@@ -20,24 +20,11 @@ from flightsim.airframe_types import (
     LaunchParameters,
     Role,
 )
+from flightsim.toml_tables import listed, names_of, number, only, table_of, text
 
 _MODELS_DIR: Final = Path(__file__).parent / "models"
 _DESCRIPTION: Final = "vehicle.toml"
 
-# JSBSim's standard pilot's commands: its elevator is positive nose down, its rudder positive nose left.
-_STANDARD: Final = (
-    ActuatorChannel(role=Role.AILERON, properties=("fcs/aileron-cmd-norm",)),
-    ActuatorChannel(role=Role.ELEVATOR, properties=("fcs/elevator-cmd-norm",), scale=-1.0),
-    ActuatorChannel(role=Role.THROTTLE, properties=tuple(f"fcs/throttle-cmd-norm[{i}]" for i in range(8))),
-    ActuatorChannel(role=Role.RUDDER, properties=("fcs/rudder-cmd-norm",), scale=-1.0),
-    ActuatorChannel(role=Role.FLAPS, properties=("fcs/flap-cmd-norm",)),
-    ActuatorChannel(role=Role.STEERING, properties=("fcs/steer-cmd-norm",)),
-    ActuatorChannel(
-        role=Role.BRAKE,
-        properties=tuple(f"fcs/{side}-brake-cmd-norm" for side in ("left", "right", "center")),
-    ),
-)
-_RANGE: Final = {role: (0.0, 1.0) for role in (Role.THROTTLE, Role.FLAPS, Role.BRAKE)}
 # What makes an aircraft ready to fly: engines running on a rich mixture, gear down.
 _READY: Final = (
     ("gear/gear-cmd-norm", 1.0),
@@ -56,7 +43,6 @@ _GENERATOR: Final = (
 )
 _VEHICLE_KEYS: Final = ("name", "kind", "jsbsim", "cg_height_at_rest_m")
 _TABLES: Final = ("vehicle", "actuators", "start", "truth", "limits", "launch")
-_CHANNEL_KEYS: Final = ("property", "properties", "scale", "offset", "minimum", "maximum", "effectiveness")
 _HOW_TO: Final = (
     'a description is a few lines of TOML: [vehicle] with name, kind = "fixed_wing" and jsbsim = the name '
     "of an aircraft of the jsbsim package or of an .xml file beside it; see docs/vehicles.md"
@@ -96,9 +82,9 @@ def load_airframe(model: str | Path) -> Airframe:
         path = path / _DESCRIPTION
     if not path.is_file():
         raise AirframeError(
-            f"vehicle model '{model}' is unknown; accepted are {_list(known_models())}, the path of a folder "
-            f"with a {_DESCRIPTION}, of a description (.toml) or of a JSBSim aircraft (.xml), and aircraft "
-            f"of the jsbsim package ({_list(package_aircraft())}); {_HOW_TO}"
+            f"vehicle model '{model}' is unknown; accepted are {listed(known_models())}, the path of a "
+            f"folder with a {_DESCRIPTION}, of a description (.toml) or of a JSBSim aircraft (.xml), and "
+            f"aircraft of the jsbsim package ({listed(package_aircraft())}); {_HOW_TO}"
         )
     return _bare(path) if path.suffix == ".xml" else _read(path)
 
@@ -115,7 +101,7 @@ def _bare(xml: Path) -> Airframe:
         folder=xml.parent.resolve(),
         jsbsim=xml.stem,
         cg_height_at_rest_m=None,
-        channels=tuple(_standard(role) for role in Role),
+        channels=tuple(standard_channel(role) for role in Role),
         constants=_GENERATOR,
         start=_READY,
         start_optional=True,
@@ -131,24 +117,24 @@ def _read(path: Path) -> Airframe:
     if unknown := [name for name in data if name not in _TABLES]:
         accepted = ", ".join(f"[{name}]" for name in _TABLES)
         raise AirframeError(f"{path}: '{unknown[0]}' is unknown; tables are {accepted}")
-    vehicle = _table(data, "vehicle", path)
-    _only(vehicle, _VEHICLE_KEYS, "keys of [vehicle]", path)
-    kind_name = _text(vehicle, "kind", path)
+    vehicle = table_of(data, "vehicle", path)
+    only(vehicle, _VEHICLE_KEYS, "keys of [vehicle]", path)
+    kind_name = text(vehicle, "kind", path)
     try:
         kind = AirframeKind(kind_name)
     except ValueError:
         accepted = ", ".join(member.value for member in AirframeKind)
         raise AirframeError(f"{path}: kind '{kind_name}' is unknown; accepted are {accepted}") from None
     fixed_wing = kind is AirframeKind.FIXED_WING
-    xml = _jsbsim_file(_text(vehicle, "jsbsim", path), path)
+    xml = _jsbsim_file(text(vehicle, "jsbsim", path), path)
     height_m = None
     if not fixed_wing or "cg_height_at_rest_m" in vehicle:
-        height_m = _number(vehicle, "cg_height_at_rest_m", path)
+        height_m = number(vehicle, "cg_height_at_rest_m", path)
     truth, scale, constants = _truth(
-        data.get("truth", {}) if fixed_wing else _table(data, "truth", path), path
+        data.get("truth", {}) if fixed_wing else table_of(data, "truth", path), path
     )
     common: dict[str, Any] = {
-        "name": _text(vehicle, "name", path),
+        "name": text(vehicle, "name", path),
         "kind": kind,
         "folder": xml.parent.resolve(),
         "jsbsim": xml.stem,
@@ -157,19 +143,19 @@ def _read(path: Path) -> Airframe:
         "truth_scale": scale,
     }
     if not fixed_wing:
-        actuators = _table(data, "actuators", path)
+        actuators = table_of(data, "actuators", path)
         return Airframe(
             **common,
-            actuators=_names(actuators, "properties", path),
-            effectiveness=_names(actuators, "effectiveness", path) if "effectiveness" in actuators else (),
+            actuators=names_of(actuators, "properties", path),
+            effectiveness=names_of(actuators, "effectiveness", path) if "effectiveness" in actuators else (),
             constants=constants,
         )
     known = {index for index, _ in (*truth, *constants)}
     kind_of_launch, launches = _launch(data.get("launch", {}), path)
-    own_start = _table(data, "start", path) if "start" in data else None
+    own_start = table_of(data, "start", path) if "start" in data else None
     return Airframe(
         **common,
-        channels=_channels(data.get("actuators", {}), path),
+        channels=read_channels(data.get("actuators", {}), path),
         constants=(*constants, *(item for item in _GENERATOR if item[0] not in known)),
         start=_READY if own_start is None else _start(own_start, path),
         start_optional=own_start is None,
@@ -192,72 +178,8 @@ def _jsbsim_file(name: str, path: Path) -> Path:
     )
 
 
-def _channels(table: Any, path: Path) -> tuple[ActuatorChannel, ...]:
-    if not isinstance(table, dict):
-        raise AirframeError(f"{path}: [actuators] is {table!r}; expected is a table")
-    _only(table, tuple(Role), "roles of [actuators]", path)
-    channels: list[ActuatorChannel] = []
-    for role in Role:
-        value = table.get(role, {})
-        if value is False:
-            continue
-        several = isinstance(value, list) and any(isinstance(item, dict) for item in value)
-        channels.extend(_channel(role, item, path) for item in (value if several else [value]))
-    return tuple(channels)
-
-
-def _standard(role: Role) -> ActuatorChannel:
-    channel = next(channel for channel in _STANDARD if channel.role is role)
-    low, high = _RANGE.get(role, (-1.0, 1.0))
-    return ActuatorChannel(
-        role=role,
-        properties=channel.properties,
-        scale=channel.scale,
-        minimum=low,
-        maximum=high,
-        optional=True,
-    )
-
-
-def _channel(role: Role, value: Any, path: Path) -> ActuatorChannel:
-    where = f"[actuators] {role}"
-    if isinstance(value, str):
-        value = {"property": value}
-    elif isinstance(value, list):
-        value = {"properties": value}
-    if not isinstance(value, dict):
-        raise AirframeError(
-            f"{path}: {where} is {value!r}; expected is a JSBSim property name, a list of them, a "
-            f"table (or several) with {', '.join(_CHANNEL_KEYS)}, or false for an aircraft without"
-        )
-    _only(value, _CHANNEL_KEYS, f"keys of {where}", path)
-    standard = _standard(role)
-    names = standard.properties
-    if "property" in value:
-        names = (_text(value, "property", path),)
-    elif "properties" in value:
-        names = _names(value, "properties", path)
-    given = "property" in value or "properties" in value
-    channel = ActuatorChannel(
-        role=role,
-        properties=names,
-        scale=_number(value, "scale", path, standard.scale if names == standard.properties else 1.0),
-        offset=_number(value, "offset", path, 0.0),
-        minimum=_number(value, "minimum", path, -math.inf if given else standard.minimum),
-        maximum=_number(value, "maximum", path, math.inf if given else standard.maximum),
-        effectiveness=_text(value, "effectiveness", path) if "effectiveness" in value else None,
-        optional=not given,
-    )
-    if channel.scale == 0.0 or not channel.minimum < channel.maximum:
-        raise AirframeError(
-            f"{path}: {where} has scale {channel.scale}, minimum {channel.minimum} and maximum "
-            f"{channel.maximum}; accepted are a scale other than 0 and a minimum below the maximum"
-        )
-    return channel
-
-
 def _start(table: dict[str, Any], path: Path) -> tuple[tuple[str, float], ...]:
-    return tuple((name, _number(table, name, path)) for name in table)
+    return tuple((name, number(table, name, path)) for name in table)
 
 
 def _limits(table: Any, path: Path) -> FlightLimits:
@@ -268,10 +190,10 @@ def _launch(table: Any, path: Path) -> tuple[LaunchKind, tuple[LaunchParameters,
     """The usual kind, and how catapult and hand do it: [launch] kind, [launch.catapult], [launch.hand]."""
     if not isinstance(table, dict):
         raise AirframeError(f"{path}: [launch] is {table!r}; expected is a table")
-    _only(table, ("kind", *(launch.kind for launch in DEFAULT_LAUNCHES)), "keys of [launch]", path)
-    text = _text(table, "kind", path) if "kind" in table else LaunchKind.RUNWAY.value
-    if text not in tuple(LaunchKind):
-        raise AirframeError(f"{path}: launch kind '{text}' is unknown; accepted are {_list(LaunchKind)}")
+    only(table, ("kind", *(launch.kind for launch in DEFAULT_LAUNCHES)), "keys of [launch]", path)
+    kind = text(table, "kind", path) if "kind" in table else LaunchKind.RUNWAY.value
+    if kind not in tuple(LaunchKind):
+        raise AirframeError(f"{path}: launch kind '{kind}' is unknown; accepted are {listed(LaunchKind)}")
     launches = tuple(
         replace(
             launch,
@@ -279,7 +201,7 @@ def _launch(table: Any, path: Path) -> tuple[LaunchKind, tuple[LaunchParameters,
         )
         for launch in DEFAULT_LAUNCHES
     )
-    return LaunchKind(text), launches
+    return LaunchKind(kind), launches
 
 
 def _converted(table: Any, name: str, target: Any, path: Path, *left_out: str) -> dict[str, Any]:
@@ -288,12 +210,12 @@ def _converted(table: Any, name: str, target: Any, path: Path, *left_out: str) -
         raise AirframeError(f"{path}: [{name}] is {table!r}; expected is a table")
     names = tuple(field.name for field in fields(target) if field.name not in left_out)
     accepted = tuple(key.removesuffix("_rad") + "_deg" if key.endswith("_rad") else key for key in names)
-    _only(table, accepted, f"keys of [{name}]", path)
+    only(table, accepted, f"keys of [{name}]", path)
     values: dict[str, Any] = {}
     for key, fieldname in zip(accepted, names, strict=True):
         if key in table:
-            number = _number(table, key, path)
-            values[fieldname] = math.radians(number) if key != fieldname else number
+            value = number(table, key, path)
+            values[fieldname] = math.radians(value) if key != fieldname else value
     return values
 
 
@@ -323,8 +245,8 @@ def _truth(
                 continue
             scale = 1.0
             if isinstance(entry, dict):
-                _only(entry, ("property", "scale"), f"keys of {key}", path)
-                scale = _number(entry, "scale", path, 1.0)
+                only(entry, ("property", "scale"), f"keys of {key}", path)
+                scale = number(entry, "scale", path, 1.0)
                 entry = entry.get("property")
             if not isinstance(entry, str):
                 raise AirframeError(
@@ -334,41 +256,3 @@ def _truth(
             found.append((index, entry))
             scales.append(scale)
     return tuple(found), tuple(scales), tuple(constants)
-
-
-def _list(names: Any) -> str:
-    return ", ".join(str(name) for name in names)
-
-
-def _only(table: dict[str, Any], accepted: Any, what: str, path: Path) -> None:
-    for key in table:
-        if key not in tuple(str(name) for name in accepted):
-            raise AirframeError(f"{path}: '{key}' is unknown; {what} are {_list(accepted)}")
-
-
-def _table(data: dict[str, Any], name: str, path: Path) -> dict[str, Any]:
-    table = data.get(name)
-    if not isinstance(table, dict):
-        raise AirframeError(f"{path} has no table [{name}]")
-    return table
-
-
-def _text(table: dict[str, Any], key: str, path: Path) -> str:
-    value = table.get(key)
-    if not isinstance(value, str):
-        raise AirframeError(f"{path}: {key} is {value!r}; expected is a text")
-    return value.removesuffix(".xml") if key == "jsbsim" else value
-
-
-def _number(table: dict[str, Any], key: str, path: Path, default: float | None = None) -> float:
-    value = table.get(key, default)
-    if not isinstance(value, int | float) or isinstance(value, bool) or math.isnan(value):
-        raise AirframeError(f"{path}: {key} is {value!r}; expected is a number")
-    return float(value)
-
-
-def _names(table: dict[str, Any], key: str, path: Path) -> tuple[str, ...]:
-    names = table.get(key)
-    if not isinstance(names, list) or not names or not all(isinstance(name, str) for name in names):
-        raise AirframeError(f"{path}: {key} is {names!r}; expected is a list of JSBSim property names")
-    return tuple(names)
