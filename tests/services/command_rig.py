@@ -58,6 +58,11 @@ class ServiceRig(Rig):
 
     def __init__(self, flavour: str = "px4", **arguments: Any) -> None:
         super().__init__(flavour, **arguments)
+        self.connect()
+
+    def connect(self) -> None:
+        """Services around the commander."""
+        flavour = self.flavour.name
         self.channel = Channel()
         self.channels = [self.channel]
         self.source = Source(self.channel, 255, 190)
@@ -71,6 +76,7 @@ class ServiceRig(Rig):
             set_current_item=self._set_current,
             mission_item_count=lambda: len(self.missions.items),
             inject_failure=self._inject,
+            fence_item_count=lambda: len(self.fence.items),
         )
         self.commands = CommandService.for_flavour(
             flavour, self.commander, hooks, self.flavour.command_address(1)

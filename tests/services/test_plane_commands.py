@@ -1,0 +1,305 @@
+"""Commands of aircraft: the plane's column of the reference tables, and where they send the aircraft."""
+
+import math
+
+import pytest
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.mission_plan import MissionItem
+from tests.services.command_rig import NAN
+from tests.services.plane_rig import PlaneRig
+
+ARM, MODE, TAKEOFF, LAND, RTL = 400, 176, 22, 21, 20
+CHANGE_SPEED, CHANGE_ALTITUDE, CHANGE_HEADING = 43000, 43001, 43002
+LAND_START, GO_AROUND = 189, 191
+
+
+def rig_of(flavour: str, state: str) -> PlaneRig:
+    """ready: on the ground, disarmed, in GUIDED (ArduPlane) or Hold (PX4); flying: in the air there."""
+    rig = PlaneRig(flavour)
+    if state == "flying":
+        rig.fly()
+    elif flavour == "ardupilot":
+        rig.commander.set_mode(FlightMode.GUIDED)
+    rig.channel.sent.clear()
+    return rig
+
+
+ARDUPLANE_TABLE = [
+    # command, parameters, state, acknowledgements
+    (31999, (), "ready", [3]),
+    (MODE, (1, 10), "ready", [0]),
+    (MODE, (1, 16), "ready", [4]),
+    (MODE, (1, 17), "ready", [4]),
+    (MODE, (1, 26), "ready", [4]),
+    (MODE, (1, 99), "ready", [4]),
+    (MODE, (0, 5), "ready", [2]),
+    (ARM, (1,), "ready", [0]),
+    (ARM, (2,), "ready", [3]),
+    (ARM, (0,), "flying", [4]),
+    (ARM, (0, 21196), "flying", [0]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, 50), "ready", [4]),
+    (TAKEOFF, (0, 0, 0, 0, 0, 0, 50), "flying", [4]),
+    (LAND, (), "flying", [3]),
+    (RTL, (), "flying", [0]),
+    (17, (), "flying", [0]),
+    (16, (), "flying", [3]),
+    (177, (), "flying", [3]),
+    (34, (), "flying", [3]),
+    (192, (-1, 1, 0, 0, 47.4, 8.5, 100), "flying", [3]),
+    (178, (0, 25, -1), "flying", [0]),
+    (178, (0, -2, 0), "flying", [0]),
+    (178, (0, 3, 0), "flying", [4]),  # below AIRSPEED_MIN
+    (178, (0, NAN, 0), "flying", [4]),
+    (115, (90, 30, 1, 0), "flying", [3]),
+    (193, (0,), "flying", [3]),
+    (300, (0, 0), "ready", [0]),
+    (300, (1, 0), "ready", [2]),
+    (179, (1,), "ready", [0]),
+    (CHANGE_SPEED, (0, 25, 0), "flying", [0]),
+    (CHANGE_SPEED, (1, 25, 0), "flying", [2]),  # airspeeds only
+    (CHANGE_SPEED, (0, 3, 0), "flying", [2]),
+    (CHANGE_SPEED, (0, NAN, 0), "flying", [2]),
+    (CHANGE_ALTITUDE, (0, 0, 0, 0, 0, 0, 120), "flying", [0]),
+    (CHANGE_ALTITUDE, (0, 0, 0, 0, 0, 0, 0), "flying", [2]),
+    (CHANGE_ALTITUDE, (0, 0, 0, 0, 0, 0, -1), "flying", [2]),
+    (CHANGE_ALTITUDE, (0, 0, 0, 0, 0, 0, NAN), "flying", [2]),
+    (CHANGE_HEADING, (1, 90, 5), "flying", [0]),
+    (CHANGE_HEADING, (0, 90, NAN), "flying", [0]),
+    (CHANGE_HEADING, (1, 360, 5), "flying", [2]),
+    (CHANGE_HEADING, (1, -1, 5), "flying", [2]),
+    (CHANGE_HEADING, (7, 90, 5), "flying", [2]),
+    (LAND_START, (), "flying", [4]),
+    (GO_AROUND, (), "flying", [4]),
+    (218, (4, 2), "flying", [0]),
+    (218, (4, 7), "flying", [2]),
+    (218, (9999, 2), "flying", [4]),
+    (185, (0,), "ready", [4]),
+    (185, (1,), "ready", [4]),
+    (183, (9, 1500), "ready", [0]),
+    (183, (3, 1500), "ready", [4]),
+    (183, (99, 1500), "ready", [4]),
+    (211, (), "ready", [4]),
+    (207, (1,), "ready", [4]),
+    (241, (), "ready", [3]),
+    (245, (99,), "ready", [2]),
+    (401, (), "ready", [0]),
+    (410, (), "ready", [0]),
+    (520, (1,), "ready", [0]),
+    (224, (77,), "ready", [2]),
+    (224, (0,), "ready", [0]),
+]
+
+PX4_PLANE_TABLE = [
+    (ARM, (1,), "ready", [0]),
+    (ARM, (0,), "flying", [1]),
+    (MODE, (1, 3, 2), "ready", [0, 1]),  # slow position flight is a multicopter's
+    (MODE, (1, 4, 9), "ready", [0, 1]),  # no precision landing on an aircraft
+    (MODE, (1, 4, 5), "flying", [0, 0]),
+    (TAKEOFF, (0, 0, 0, NAN, NAN, NAN, NAN), "ready", [0]),
+    (LAND, (), "flying", [0]),
+    (192, (-1, 1, 0, NAN, NAN, NAN, NAN), "flying", [0]),
+    (192, (-1, 0, 0, NAN, NAN, NAN, NAN), "flying", [3]),
+    (34, (100, 2, 0, NAN, NAN, NAN, NAN), "flying", [0]),
+    (178, (0, 20, -1), "flying", [0]),
+    (LAND_START, (), "flying", [6]),
+    (GO_AROUND, (), "flying", [1]),
+    (300, (0, 0), "ready", [2]),
+    (115, (90, 30, 0, 0), "flying", [3]),
+    (CHANGE_HEADING, (1, 90, 5), "flying", [3]),
+]
+
+
+@pytest.mark.parametrize(("command", "parameters", "state", "acks"), ARDUPLANE_TABLE)
+def test_arduplane_results(
+    command: int, parameters: tuple[float, ...], state: str, acks: list[int]
+) -> None:
+    rig = rig_of("ardupilot", state)
+    rig.plan(rig.waypoint(500.0, 0.0, 100.0))
+    assert rig.long(command, *parameters) == acks
+
+
+@pytest.mark.parametrize(("command", "parameters", "state", "acks"), PX4_PLANE_TABLE)
+def test_px4_plane_results(
+    command: int, parameters: tuple[float, ...], state: str, acks: list[int]
+) -> None:
+    assert rig_of("px4", state).long(command, *parameters) == acks
+
+
+@pytest.mark.parametrize("command", [CHANGE_SPEED, CHANGE_ALTITUDE, CHANGE_HEADING])
+def test_guided_changes_fail_in_other_modes(command: int) -> None:
+    rig = rig_of("ardupilot", "flying")
+    rig.commander.set_mode(FlightMode.HOLD)
+    assert rig.long(command, 0, 25, 0, 0, 0, 0, 100) == [4]
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [(16, "Flight mode change failed"), (24, "Flight mode change failed"), (17, "Q_ENABLE 0")]
+    + [(26, "No such mode 26"), (99, "No such mode 99")],
+)
+def test_arduplane_says_why_a_mode_is_refused(number: int, text: str) -> None:
+    rig = rig_of("ardupilot", "ready")
+    assert rig.long(MODE, 1, number) == [4]
+    assert rig.channel.texts() == [text]
+
+
+@pytest.mark.parametrize(
+    ("radius_m", "yaw", "flown_m"),
+    [
+        (80.0, NAN, 80.0),
+        (80.0, 0.0, 80.0),
+        (80.0, 1.0, -80.0),
+        (-80.0, 0.0, 125.0),  # WP_LOITER_RAD of the aircraft, clockwise
+        (0.0, 1.0, -125.0),
+        (NAN, NAN, 125.0),
+    ],
+)
+def test_arduplane_reposition_takes_radius_and_direction(radius_m: float, yaw: float, flown_m: float) -> None:
+    rig = rig_of("ardupilot", "flying")
+    assert rig.int(192, -1, 1, radius_m, yaw, *rig.place(400.0, 300.0), 120.0, frame=6) == [0]
+    rig.tick()
+    circle = rig.commander.tasks.task.circle
+    assert circle.radius_m == pytest.approx(flown_m)
+    assert rig.centre() == pytest.approx((400.0, 300.0, -120.0), abs=0.05)
+
+
+def test_arduplane_reposition_changes_the_mode_only_when_told() -> None:
+    rig = rig_of("ardupilot", "flying")
+    rig.commander.set_mode(FlightMode.HOLD)
+    place = rig.place(400.0, 0.0)
+    assert rig.int(192, -1, 0, 0, 0, *place, 120.0, frame=6) == [4]
+    assert rig.int(192, -1, 1, 0, 0, *place, 120.0, frame=1) == [2]
+    assert rig.channel.texts() == ["Unknown mavlink coordinate frame 1"]
+    assert rig.int(192, -1, 1, 0, 0, *place, 120.0, frame=6) == [0]
+    assert rig.commander.mode is FlightMode.GUIDED
+
+
+@pytest.mark.parametrize(("radius_m", "flown_m"), [(90.0, 90.0), (-90.0, -90.0), (NAN, None), (0.0, None)])
+def test_px4_reposition_circles_with_the_radius_of_param3(radius_m: float, flown_m: float | None) -> None:
+    rig = rig_of("px4", "flying")
+    assert rig.int(192, -1, 1, radius_m, math.radians(90.0), *rig.place(0.0, 500.0), 150.0, frame=6) == [0]
+    rig.tick()
+    task = rig.commander.tasks.task
+    assert task.radius_m == pytest.approx(flown_m or rig.context.fixed_wing.loiter_radius_m)
+    assert task.centre_ned_m == pytest.approx((0.0, 500.0, -150.0), abs=0.05)
+
+
+@pytest.mark.parametrize("radius_m", [150.0, -150.0])
+def test_px4_orbit_stays_in_hold(radius_m: float) -> None:
+    rig = rig_of("px4", "flying")
+    assert rig.int(34, radius_m, NAN, 0, NAN, *rig.place(300.0, 0.0), 110.0, frame=6) == [0]
+    rig.tick()
+    assert rig.commander.mode is FlightMode.HOLD
+    assert rig.commander.tasks.task.radius_m == radius_m
+
+
+def test_px4_takeoff_goes_to_the_place_given() -> None:
+    rig = rig_of("px4", "ready")
+    lat, lon = rig.place(400.0, 100.0)
+    assert rig.long(TAKEOFF, 0, 0, 0, NAN, lat * 1e-7, lon * 1e-7, 489.0 + 60.0) == [0]
+    assert rig.long(ARM, 1) == [0]
+    place = rig.commander.tasks.task.place_ned_m
+    assert place == pytest.approx((400.0, 100.0, -60.0), abs=0.5)
+
+
+def test_arduplane_change_speed_is_told() -> None:
+    rig = rig_of("ardupilot", "flying")
+    assert rig.long(178, 0, 30, 0) == [0]
+    assert rig.channel.texts() == ["Set airspeed 30 m/s"]
+    assert rig.context.fixed_wing.airspeed_trim_m_s == 30.0
+    assert rig.long(178, 1, 12, 0) == [0]
+    assert rig.store.get("MIN_GROUNDSPEED") == 12.0
+    assert rig.long(178, 9, 0, 60) == [0]
+    assert rig.store.get("TRIM_THROTTLE") == 60
+    rig.commander.set_mode(FlightMode.HOLD)
+    assert rig.long(178, 0, 30, 0) == [4]
+
+
+def test_arduplane_heading_altitude_and_airspeed_are_flown() -> None:
+    rig = rig_of("ardupilot", "flying")
+    assert rig.long(CHANGE_HEADING, 1, 90, 3.0) == [0]
+    rig.tick()
+    setpoint = rig.context.setpoint
+    assert setpoint[sp.HEADING_RAD] == pytest.approx(math.pi / 2.0)
+    assert math.isnan(setpoint[sp.COURSE_RAD])
+    assert rig.long(CHANGE_HEADING, 0, 270, 3.0) == [0]
+    assert rig.int(CHANGE_ALTITUDE, 0, 0, 0, 0, 0, 0, 489.0 + 140.0, frame=0) == [0]
+    assert rig.long(CHANGE_SPEED, 0, 30, 0) == [0]
+    rig.tick()
+    assert math.cos(setpoint[sp.COURSE_RAD] - 1.5 * math.pi) == pytest.approx(1.0)
+    assert setpoint[sp.DOWN_M] == pytest.approx(-140.0, abs=0.01)
+    assert setpoint[sp.AIRSPEED_M_S] == pytest.approx(30.0)
+    assert rig.int(CHANGE_ALTITUDE, 0, 0, 0, 0, 0, 0, 50.0, frame=1) == [2]
+
+
+def landing_plan(rig: PlaneRig) -> tuple[MissionItem, ...]:
+    return (
+        rig.waypoint(500.0, 0.0, 100.0),
+        MissionItem(command=LAND_START, frame=6),
+        rig.waypoint(-500.0, 0.0, 40.0),
+        rig.waypoint(0.0, 0.0, 0.0, command=LAND),
+    )
+
+
+def test_land_start_blocks_arming_while_autoland_is_off() -> None:
+    rig = rig_of("ardupilot", "ready")
+    rig.plan(*landing_plan(rig))
+    assert rig.long(ARM, 1) == [4]
+    assert rig.channel.texts() == ["Arm: DO_LAND_START set and RTL_AUTOLAND disabled"]
+    rig.store.set("RTL_AUTOLAND", 2)
+    assert rig.long(ARM, 1) == [0]
+
+
+def test_after_a_landing_the_mission_must_be_left_before_arming_again() -> None:
+    rig = rig_of("ardupilot", "ready")
+    rig.store.set("RTL_AUTOLAND", 2)
+    rig.plan(*landing_plan(rig))
+    rig.commander.set_mode(FlightMode.MISSION)
+    rig.missions.current = 4
+    assert rig.long(ARM, 1) == [4]
+    assert rig.channel.texts() == ["Arm: In landing sequence"]
+    assert rig.long(MODE, 1, 5) == [0]
+    assert rig.channel.texts() == ["In landing sequence: mission reset"]
+    assert rig.missions.current == 0
+    assert rig.long(ARM, 1) == [0]
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_land_start_goes_to_the_landing_sequence(flavour: str) -> None:
+    rig = rig_of(flavour, "flying")
+    rig.plan(*landing_plan(rig))
+    assert rig.long(LAND_START) == [0]
+    assert rig.commander.mode is FlightMode.MISSION
+    first = rig.flavour.policy.mission_first_item
+    assert rig.missions.current == first + 2  # the waypoint behind DO_LAND_START
+
+
+def test_auto_without_a_mission_gives_up() -> None:
+    rig = rig_of("ardupilot", "ready")
+    assert rig.long(300, 0, 0) == [0]
+    assert rig.channel.texts() == ["Mission complete, changing mode to RTL"]
+    assert rig.commander.mode is FlightMode.RETURN
+
+
+def test_a_fence_can_be_switched_on_when_there_is_one() -> None:
+    rig = rig_of("ardupilot", "ready")
+    assert rig.long(207, 1) == [4]
+    rig.fence.replace((MissionItem(command=5001, frame=0, param1=3.0),) * 3, 1)
+    assert rig.long(207, 1) == [0]
+    assert rig.store.get("FENCE_ENABLE") == 1
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_landing_can_be_broken_off(flavour: str) -> None:
+    rig = rig_of(flavour, "flying")
+    # on the approach: at its entry, along it
+    rig.plan(rig.waypoint(-900.0, 0.0, 60.0), rig.waypoint(0.0, 0.0, 0.0, command=LAND))
+    rig.context.nav[10:13] = (-880.0, 0.0, -60.0)
+    rig.missions.current = len(rig.missions.items) - 1
+    assert rig.commander.set_mode(FlightMode.MISSION).accepted
+    rig.run(0.1)
+    assert rig.long(GO_AROUND) == [0]
+    rig.tick()
+    assert rig.long(GO_AROUND) != [0]  # broken off already
