@@ -112,18 +112,14 @@ PX4_PLANE_TABLE = [
 
 
 @pytest.mark.parametrize(("command", "parameters", "state", "acks"), ARDUPLANE_TABLE)
-def test_arduplane_results(
-    command: int, parameters: tuple[float, ...], state: str, acks: list[int]
-) -> None:
+def test_arduplane_results(command: int, parameters: tuple[float, ...], state: str, acks: list[int]) -> None:
     rig = rig_of("ardupilot", state)
     rig.plan(rig.waypoint(500.0, 0.0, 100.0))
     assert rig.long(command, *parameters) == acks
 
 
 @pytest.mark.parametrize(("command", "parameters", "state", "acks"), PX4_PLANE_TABLE)
-def test_px4_plane_results(
-    command: int, parameters: tuple[float, ...], state: str, acks: list[int]
-) -> None:
+def test_px4_plane_results(command: int, parameters: tuple[float, ...], state: str, acks: list[int]) -> None:
     assert rig_of("px4", state).long(command, *parameters) == acks
 
 
