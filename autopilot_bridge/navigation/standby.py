@@ -4,6 +4,7 @@ A wing in flight without any aiding is adrift: it is certainly not where it was,
 take its centripetal acceleration for tilt.
 """
 
+import math
 from typing import Final
 
 from autopilot_bridge.navigation import fusion as f
@@ -11,8 +12,17 @@ from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.report import Clocks
 from autopilot_bridge.navigation.solution import Solution
-from autopilot_bridge.navigation.states import X_POS, X_VEL
+from autopilot_bridge.navigation.states import (
+    GYRO_BIAS,
+    SUM_GYRO,
+    SUM_GYRO_TIME,
+    X_GYRO_BIAS,
+    X_POS,
+    X_VEL,
+)
 
+_TURN_GATE: Final = 5.0  # standard deviations of the gyro's mean beyond which the vehicle itself turns
+_STEADY_US: Final = 10_000_000  # no wind turns a parked vehicle this long at one rate: that is a bias
 _HELD_VELOCITY_M_S: Final = 2.0  # 1-sigma of the velocity when the position begins to be held in flight
 
 
@@ -23,7 +33,15 @@ class Standby:
         held: nothing aids the horizontal position; it is held, or adrift.
     """
 
-    __slots__ = ("_adrift", "_health", "_rested", "_solution", "held")
+    __slots__ = (
+        "_adrift",
+        "_health",
+        "_rested",
+        "_solution",
+        "_turn_rad_s",
+        "_turning_since_us",
+        "held",
+    )
 
     def __init__(self, solution: Solution, health: NavigationHealth) -> None:
         self._solution = solution
@@ -35,6 +53,8 @@ class Standby:
         self.held = False
         self._adrift = False
         self._rested = False
+        self._turn_rad_s = (0.0, 0.0, 0.0)
+        self._turning_since_us = -1
 
     def release(self) -> None:
         """The position is aided again."""
@@ -61,6 +81,8 @@ class Standby:
         if at_rest:
             if self._rested:
                 has |= f.HAS_REST
+                if not self._is_turned(parameters, time_us):
+                    has |= f.HAS_REST_RATE
             else:
                 f.restart_mean_rate(solution.core)
                 if self.held:
@@ -87,6 +109,28 @@ class Standby:
         else:
             clocks.height_held = False
         return has
+
+    def _is_turned(self, parameters: NavigationParameters, time_us: int) -> bool:
+        """The vehicle stands, and yet it turns: a gust swings an aircraft round on its wheels.
+
+        Taken for the gyro's bias, the turn would be lost to the heading, and go on in the flight.
+        """
+        core, p = self._solution.core, self._solution.p
+        span_s = core[SUM_GYRO_TIME]
+        if not span_s > 0.0:
+            return False
+        rate = [float(core[SUM_GYRO + a] / span_s) for a in range(3)]
+        floor = parameters.zero_rate_noise_rad_s**2
+        gate = [_TURN_GATE * math.sqrt(float(p[GYRO_BIAS + a, GYRO_BIAS + a]) + floor) for a in range(3)]
+        turned = any(abs(rate[a] - float(core[X_GYRO_BIAS + a])) > gate[a] for a in range(3))
+        if not turned:
+            self._turning_since_us = -1
+            return False
+        changed = any(abs(rate[a] - self._turn_rad_s[a]) > gate[a] for a in range(3))
+        if self._turning_since_us < 0 or changed:
+            self._turning_since_us = time_us
+            self._turn_rad_s = (rate[0], rate[1], rate[2])
+        return time_us - self._turning_since_us < _STEADY_US
 
     def _hold(self, clocks: Clocks, *, flying: bool) -> None:
         """From now on the position is held where it is, and the velocity taken as about zero."""
