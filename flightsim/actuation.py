@@ -6,13 +6,15 @@ from typing import Any, Final
 import jsbsim
 
 from flightsim.airframe import ActuatorChannel, Airframe, AirframeError, AirframeKind, Role
-from flightsim.interface import BRAKE, THROTTLE
+from flightsim.interface import AILERON, BRAKE, ELEVATOR, RUDDER, THROTTLE
 from flightsim.jsbsim_model import find_property
 
 _GROUND_ROLES: Final = (Role.FLAPS, Role.STEERING, Role.BRAKE)
 """Roles that need not be written every step."""
 
 _MOVING_THROTTLE: Final = 0.05
+_BACKLASH: Final = 0.2
+_SURFACES: Final = (AILERON, ELEVATOR, RUDDER)
 
 _Entry = tuple[Any, int, float, float, float, float]
 """Setter of a property, place of the command, scale, offset, minimum, maximum."""
@@ -93,6 +95,13 @@ class FixedWingActuators:
             value = commands[index] * scale + offset
             set_value(low if value < low else high if value > high else value)
         _write_sums(self._mixed_slow, commands)
+
+    def write_below(self, commands: list[float]) -> None:
+        """Write surfaces lower than commanded by more than an actuator's backlash, to come up to it next.
+
+        So that surfaces with backlash are where they were the last time they had these commands.
+        """
+        self.write([command - (_BACKLASH if i in _SURFACES else 0.0) for i, command in enumerate(commands)])
 
     def effectiveness(self, role: Role) -> float:
         """1 sound, 0 failed."""

@@ -125,6 +125,15 @@ def _read(path: Path) -> Airframe:
     except ValueError:
         accepted = ", ".join(member.value for member in AirframeKind)
         raise AirframeError(f"{path}: kind '{kind_name}' is unknown; accepted are {accepted}") from None
+    try:
+        return _described(data, vehicle, kind, path)
+    except AirframeError as error:
+        if str(path) in str(error):
+            raise
+        raise AirframeError(f"{path}: {error}") from None
+
+
+def _described(data: dict[str, Any], vehicle: dict[str, Any], kind: AirframeKind, path: Path) -> Airframe:
     fixed_wing = kind is AirframeKind.FIXED_WING
     xml = _jsbsim_file(text(vehicle, "jsbsim", path), path)
     height_m = None

@@ -321,10 +321,13 @@ class Vehicle:
         if self._surfaces is None:
             for set_actuator, value in zip(self._set_actuators, commands, strict=False):
                 set_actuator(value)
-        else:
+        hold_motion(self._fdm, True)
+        if self._surfaces is not None:
+            self._surfaces.write_below(commands)
+            for _ in range(round(_FOLLOW_S * self.physics_rate_hz / 10)):
+                self._run()
             self._surfaces.write(commands)
             self._surfaces.write_slow(commands)
-        hold_motion(self._fdm, True)
         for _ in range(round(_FOLLOW_S * self.physics_rate_hz)):
             self._run()
         hold_motion(self._fdm, False)

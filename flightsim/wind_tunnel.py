@@ -19,7 +19,7 @@ from flightsim.airframe import Airframe, AirframeError, AirframeKind, Role, load
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
-from flightsim.interface import AILERON, ELEVATOR, MAX_ACTUATORS, RUDDER
+from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
 from flightsim.rotations import quaternion_from_euler, rotate
 
@@ -34,8 +34,6 @@ _KG_PER_SLUG: Final = 14.593902937206364
 _SEA_LEVEL_KG_M3: Final = 1.225
 _BLOCK_S: Final = 0.4  # servos have followed by then
 _SETTLED: Final = 2e-5  # m/s2 and rad/s2 from block to block
-_BACKLASH: Final = 0.2  # of a surface's command
-_SURFACES: Final = (AILERON, ELEVATOR, RUDDER)
 _LONGEST_S: Final = 20.0  # a jet needs that to spool up
 _ACCELERATIONS: Final = (
     *(f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"),
@@ -181,7 +179,9 @@ class WindTunnel:
         commands = list(state.actuators)
         run = self._fdm.run
         if self._sticky:
-            self._approach(commands)
+            self.actuators.write_below(commands)
+            for _ in range(self._block_steps // 2):
+                run()
         self.actuators.write(commands)
         self.actuators.write_slow(commands)
         last = np.full(6, np.inf)
@@ -194,13 +194,6 @@ class WindTunnel:
             last = accelerations
         force = np.array([get() for get in self._forces]) * _N_PER_LBF
         return Reading(accelerations=accelerations, force_frd_n=force)
-
-    def _approach(self, commands: list[float]) -> None:
-        """Come to the commands from below always, by more than an actuator's backlash."""
-        below = [command - (_BACKLASH if i in _SURFACES else 0.0) for i, command in enumerate(commands)]
-        self.actuators.write(below)
-        for _ in range(self._block_steps // 2):
-            self._fdm.run()
 
     def value(self, name: str) -> float:
         """A JSBSim property of the model, now."""

@@ -127,3 +127,15 @@ def test_a_stronger_elevator_makes_a_lower_stall_speed(tunnel: WindTunnel) -> No
     assert 0.9 < slowest.actuators[ELEVATOR] <= 1.0
     assert slowest.angle_of_attack_rad < 0.4
     assert np.isfinite(slowest.current_a)
+
+
+def test_the_command_prints_the_table(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["aerosonde_book.py"])
+    assert load("aerosonde_book").main() == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == "78 figures, 0 off"
+    assert sum("straight" in line for line in lines) == 18
+    for mode in ("short period", "phugoid", "Dutch roll", "roll, 25", "spiral"):
+        assert any(mode in line for line in lines)

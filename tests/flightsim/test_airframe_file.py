@@ -219,8 +219,10 @@ pitch_deg = 8
     ],
 )
 def test_bad_descriptions_are_named(tmp_path: Path, more: str, message: str) -> None:
-    with pytest.raises(AirframeError, match=message):
+    with pytest.raises(AirframeError, match=message) as caught:
         make(described(tmp_path, more))
+    if not any(late in more for late in ("no-such", "no/such", "engine/on")):  # those the model tells
+        assert "mine.toml" in str(caught.value)
 
 
 @pytest.mark.parametrize(
