@@ -4,7 +4,7 @@ Source: seed 003, sections III.C (an anomaly is what exceeds the noise) and IV.B
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 _SQRT_2PI: Final = math.sqrt(2.0 * math.pi)
 _QUADRATURE: Final = np.polynomial.legendre.leggauss(8)
+_ENDS_AT: Final = 0.5  # of the threshold: noise about the threshold doesn't cut an anomaly in two
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,22 +94,33 @@ class Anomaly:
 class AnomalyDetector:
     """Threshold on the differential measurement: reading less map.
 
-    What differs slowly (bias of the sensor, daily variation, a map that is off) is followed by a running
-    level, which stands still while a reading is beyond the threshold. Readings that aren't finite, or come
-    late, are dropped and counted.
+    An anomaly begins beyond the threshold and ends below half of it. What differs slowly (bias of the
+    sensor, daily variation, a map that is off) is followed by a running level, which stands still
+    meanwhile. What goes on for too long is no target but a level that is off: it is begun anew. Readings
+    that aren't finite, or come late, are dropped and counted.
 
     Attributes:
         residual_nt: newest differential measurement, level removed; NaN before the first.
+        anomalous: an anomaly is going on.
         dropped: readings that were no use.
+        levels_lost: how often the level was begun anew.
     """
 
-    def __init__(self, *, threshold_nt: float, least_samples: int = 2, level_time_s: float = 20.0) -> None:
+    def __init__(
+        self,
+        *,
+        threshold_nt: float,
+        least_samples: int = 2,
+        level_time_s: float = 20.0,
+        longest_s: float = 40.0,
+    ) -> None:
         """Begin.
 
         Args:
             threshold_nt: what counts as an anomaly; several standard deviations of the noise.
-            least_samples: readings in a row that make one; a single outlier is none.
+            least_samples: readings beyond the threshold that make one; a single outlier is none.
             level_time_s: time constant of the running level.
+            longest_s: a target is passed in less.
 
         Raises:
             PlanError: a value out of its range.
@@ -119,12 +131,19 @@ class AnomalyDetector:
             raise PlanError(f"{least_samples} samples make no anomaly; at least 1 is needed")
         self.residual_nt = math.nan
         self.dropped = 0
+        self.levels_lost = 0
         self._threshold_nt = threshold_nt
         self._least_samples = least_samples
         self._level_time_us = level_time_s * 1e6
+        self._longest_us = longest_s * 1e6
         self._level_nt = math.nan
         self._time_us = -1
+        self._began_us = -1
         self._peak: Anomaly | None = None
+
+    @property
+    def anomalous(self) -> bool:
+        return self._peak is not None
 
     def update(
         self, time_us: int, reading_nt: float, map_nt: float, north_m: float, east_m: float
@@ -138,28 +157,33 @@ class AnomalyDetector:
         if time_us <= self._time_us or not math.isfinite(difference_nt + north_m + east_m):
             self.dropped += 1
             return None
+        if self._peak is not None and time_us - self._began_us > self._longest_us:
+            self._peak, self._level_nt = None, math.nan
+            self.levels_lost += 1
         if math.isnan(self._level_nt):
             self._level_nt = difference_nt
         elapsed_us = 0 if self._time_us < 0 else time_us - self._time_us
         self._time_us = time_us
         residual_nt = self.residual_nt = difference_nt - self._level_nt
-        if abs(residual_nt) > self._threshold_nt:
-            peak = self._peak
-            samples = 1 if peak is None else peak.samples + 1
-            if peak is None or abs(residual_nt) > abs(peak.peak_nt):
-                peak = Anomaly(
-                    time_us=time_us, north_m=north_m, east_m=east_m, peak_nt=residual_nt, samples=samples
-                )
-            else:
-                peak = Anomaly(
-                    time_us=peak.time_us,
-                    north_m=peak.north_m,
-                    east_m=peak.east_m,
-                    peak_nt=peak.peak_nt,
-                    samples=samples,
-                )
-            self._peak = peak
+        size_nt = abs(residual_nt)
+        if size_nt > self._threshold_nt or (
+            self._peak is not None and size_nt > _ENDS_AT * self._threshold_nt
+        ):
+            if self._peak is None:
+                self._began_us = time_us
+            self._peak = self._grown(time_us, residual_nt, north_m, east_m)
             return None
         ended, self._peak = self._peak, None
         self._level_nt += residual_nt * min(1.0, elapsed_us / self._level_time_us)
         return ended if ended is not None and ended.samples >= self._least_samples else None
+
+    def _grown(self, time_us: int, residual_nt: float, north_m: float, east_m: float) -> Anomaly:
+        """The anomaly that goes on, with one more reading."""
+        peak = self._peak
+        beyond = int(abs(residual_nt) > self._threshold_nt)
+        if peak is None or abs(residual_nt) > abs(peak.peak_nt):
+            samples = beyond if peak is None else peak.samples + beyond
+            return Anomaly(
+                time_us=time_us, north_m=north_m, east_m=east_m, peak_nt=residual_nt, samples=samples
+            )
+        return replace(peak, samples=peak.samples + beyond)

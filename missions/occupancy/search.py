@@ -16,6 +16,9 @@ from missions.occupancy.occupancy_map import Cell, GridLayout, OccupancyMap
 Array = NDArray[np.float64]
 
 _STEP_M: Final = 5.0  # least stretch of track that is worth an update
+_KEPT_SCORES: Final = 10_000_000  # in snapshots: 80 MB
+_LEAST_SNAPSHOTS: Final = 16
+_EVENTS_KEPT: Final = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,10 +37,10 @@ class SearchParameters:
     """
 
     detection: DetectionModel = field(default_factory=DetectionModel)
-    raise_radius_m: float = 250.0
+    raise_radius_m: float = 300.0
     raise_height: float = 4.0
     confirmations: int = 2
-    same_place_m: float = 120.0
+    same_place_m: float = 180.0
 
     def __post_init__(self) -> None:
         for name in ("raise_radius_m", "raise_height", "same_place_m"):
@@ -80,11 +83,13 @@ class Snapshot:
         time_us: vehicle time.
         scores: (rows, columns).
         places_ne_m: of each searcher; NaN: not heard of yet.
+        event: it was kept for an anomaly that was just reported.
     """
 
     time_us: int
     scores: Array
     places_ne_m: tuple[tuple[float, float], ...]
+    event: bool = False
 
 
 class Search:
@@ -96,7 +101,7 @@ class Search:
         found: the candidate that is the target; None while searching.
         found_us: when it became that.
         detection_curve: (time, cumulative probability of detection), one entry per update.
-        snapshots: the map at even intervals.
+        snapshots: the map at even intervals, which grow when there are too many to keep, and after anomalies.
     """
 
     def __init__(
@@ -106,7 +111,7 @@ class Search:
         decisions: Sequence[DecisionParameters],
         *,
         prior: Array | None = None,
-        snapshot_interval_s: float = 5.0,
+        snapshot_interval_s: float = 2.0,
     ) -> None:
         """Begin a search.
 
@@ -144,14 +149,17 @@ class Search:
             self.map.search(last, place, self.parameters.detection)
             self.detection_curve.append((time_us, self.map.probability_of_detection))
         if not self.snapshots or time_us - self.snapshots[-1].time_us >= self._snapshot_interval_us:
-            self.snapshots.append(
-                Snapshot(time_us=time_us, scores=self.map.scores.copy(), places_ne_m=tuple(self._places))
-            )
+            self._keep_snapshot(time_us, event=False)
 
-    def report_anomaly(self, searcher: int, anomaly: Anomaly) -> None:
+    def report_anomaly(self, searcher: int, anomaly: Anomaly, time_us: int | None = None) -> None:
         """A searcher has seen an anomaly: raise the scores around it, and see whether it is the target.
 
         An anomaly off the map is no candidate: it belongs to what isn't searched.
+
+        Args:
+            searcher: who.
+            anomaly: what and where.
+            time_us: when it was over and could be told; None: when it was largest.
         """
         parameters = self.parameters
         if not self.map.layout.contains(anomaly.north_m, anomaly.east_m):
@@ -164,7 +172,13 @@ class Search:
         )
         if self.found is None and candidate.passes >= parameters.confirmations:
             self.found = candidate
-            self.found_us = anomaly.time_us
+            self.found_us = anomaly.time_us if time_us is None else time_us
+        if sum(snapshot.event for snapshot in self.snapshots) < _EVENTS_KEPT:
+            self._keep_snapshot(anomaly.time_us if time_us is None else time_us, event=True)
+
+    def begin(self, time_us: int) -> None:
+        """Keep the map as it is before the search."""
+        self._keep_snapshot(time_us, event=False)
 
     def next_cell(self, searcher: int, north_m: float, east_m: float, heading_rad: float) -> Decision:
         """Where a searcher flies next (eq. 9); what others are on their way to is left to them."""
@@ -183,6 +197,17 @@ class Search:
     def leave(self, searcher: int) -> None:
         """A searcher is on its way home, or lost: its cell is free again."""
         self._targets[searcher] = None
+
+    def _keep_snapshot(self, time_us: int, *, event: bool) -> None:
+        layout = self.map.layout
+        if len(self.snapshots) >= max(_LEAST_SNAPSHOTS, _KEPT_SCORES // (layout.rows * layout.columns)):
+            self.snapshots = [s for k, s in enumerate(self.snapshots) if s.event or k % 2 == 0]
+            self._snapshot_interval_us *= 2
+        self.snapshots.append(
+            Snapshot(
+                time_us=time_us, scores=self.map.scores.copy(), places_ne_m=tuple(self._places), event=event
+            )
+        )
 
     def _candidate_at(self, anomaly: Anomaly) -> Candidate:
         place = (anomaly.north_m, anomaly.east_m)

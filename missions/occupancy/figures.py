@@ -1,0 +1,111 @@
+"""What `summary.json` says of a search."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from missions.occupancy.heading_score import HeadingScore, heading_score
+from missions.occupancy.separation import least_separation_m
+
+if TYPE_CHECKING:
+    from missions.mission import Debriefing
+    from missions.occupancy.detection import Anomaly
+    from missions.occupancy.team import Searcher, SearchTeam
+    from missions.score import FlightScore
+
+
+def search_figures(
+    team: "SearchTeam", debriefing: "Debriefing", target_ne_m: tuple[float, float] | None
+) -> Mapping[str, Any]:
+    """Figures of a search that is over.
+
+    Args:
+        team: as it ended.
+        debriefing: of the run.
+        target_ne_m: where the target truly is; None: not known.
+    """
+    search = team.search
+    found = search.found
+    estimate = None if found is None else found.place_ne_m
+    time_to_find_s = None if found is None else (search.found_us - team.began_us) * 1e-6
+    scores = [
+        _heading(searcher, score)
+        for searcher, (_, score) in zip(team.searchers, debriefing.flights, strict=False)
+    ]
+    known = [s.p95_rad for s in scores if math.isfinite(s.p95_rad)]
+    error_m = None if estimate is None or target_ne_m is None else math.dist(estimate, target_ne_m)
+    return {
+        "target_found": found is not None,
+        "time_to_find_s": None if time_to_find_s is None else round(time_to_find_s, 3),
+        "target_estimate_m": _place(estimate),
+        "target_m": _place(target_ne_m),
+        "target_error_m": None if error_m is None else round(error_m, 2),
+        "probability_of_detection": round(search.map.probability_of_detection, 5),
+        "heading_settled_error_95_deg": round(math.degrees(max(known)), 3) if known else None,
+        "least_separation_m": _rounded(
+            least_separation_m(debriefing.records, [notes.system_id for notes, _ in debriefing.flights])
+        ),
+        "candidates": [
+            {**(_place(candidate.place_ne_m) or {}), "passes": candidate.passes}
+            for candidate in search.candidates
+        ],
+        "searchers": [
+            _searcher_block(searcher, notes.system_id, notes.kind, heading)
+            for searcher, (notes, _), heading in zip(team.searchers, debriefing.flights, scores, strict=False)
+        ],
+    }
+
+
+def _heading(searcher: "Searcher", score: "FlightScore") -> HeadingScore:
+    track = score.truth if score.truth is not None else score.estimate
+    if track is None:
+        return HeadingScore(
+            rms_rad=math.nan,
+            p95_rad=math.nan,
+            largest_rad=math.nan,
+            settled_s=0.0,
+            commands=len(searcher.pilot.commands),
+        )
+    return heading_score(searcher.pilot.commands, track.time_s, track.yaw_rad, end_s=searcher.ended_us * 1e-6)
+
+
+def _searcher_block(searcher: "Searcher", system_id: int, kind: str, heading: HeadingScore) -> dict[str, Any]:
+    watch = searcher.watch
+    return {
+        "system_id": system_id,
+        "kind": kind,
+        "search_s": round(max(0, searcher.ended_us - searcher.began_us) * 1e-6, 3),
+        "heading_commands": heading.commands,
+        "heading_settled_s": round(heading.settled_s, 1),
+        "heading_settled_error_deg": {
+            "rms": _degrees(heading.rms_rad),
+            "p95": _degrees(heading.p95_rad),
+            "largest": _degrees(heading.largest_rad),
+        },
+        "readings": 0 if watch is None else watch.samples,
+        "readings_dropped": 0 if watch is None else watch.placer.dropped + watch.detector.dropped,
+        "anomalies": [_anomaly(anomaly) for anomaly in searcher.anomalies],
+    }
+
+
+def _anomaly(anomaly: "Anomaly") -> dict[str, float]:
+    return {
+        "time_s": anomaly.time_us * 1e-6,
+        "north_m": round(anomaly.north_m, 2),
+        "east_m": round(anomaly.east_m, 2),
+        "peak_nt": round(anomaly.peak_nt, 3),
+    }
+
+
+def _place(place_ne_m: tuple[float, float] | None) -> dict[str, float] | None:
+    if place_ne_m is None:
+        return None
+    return {"north": round(place_ne_m[0], 2), "east": round(place_ne_m[1], 2)}
+
+
+def _degrees(angle_rad: float) -> float | None:
+    return round(math.degrees(angle_rad), 3) if math.isfinite(angle_rad) else None
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 2)

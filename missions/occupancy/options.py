@@ -1,0 +1,182 @@
+"""What a person can choose about an occupancy-map search."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+from missions.errors import PlanError
+from missions.occupancy.decision import DecisionParameters
+from missions.occupancy.detection import DetectionModel
+from missions.occupancy.occupancy_map import GridLayout
+from missions.occupancy.search import SearchParameters
+from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
+from missions.planning.limits import FixedWingLimits, Limits
+
+LARGEST_SIDE_M: Final = 50_000.0
+LEAST_SIGMAS: Final = 3.0
+"""Threshold over noise: below, noise alone makes anomalies."""
+
+_PENALTY_OF_WINGS: Final = 0.2
+_PENALTY_OF_MULTICOPTERS: Final = 0.05
+_MULTICOPTER_M_S: Final = 10.0
+_SHARE_OF_SPEED: Final = 0.9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OccupancyOptions(MissionOptions):
+    """One vehicle's part in a search with a shared occupancy map. Places are metres from the map's home.
+
+    Attributes:
+        width_m, height_m: of the searched area, east and north.
+        area_ne_m: its centre.
+        cell_m: side of a cell.
+        neighbourhood: cells in each direction that a decision looks at.
+        heading_penalty: alpha of equation 9; None: by the kind of vehicle, small for a multicopter.
+        detection_probability: of a target by a pass right over it.
+        detection_range_m: standard deviation of the fall-off with distance.
+        threshold_nt: of the differential measurement; what is beyond is an anomaly.
+        noise_nt: standard deviation of the differential measurement where there is no target.
+        confirmations: passes that must see an anomaly at one place.
+        raise_radius_m: scores are raised within this distance of an anomaly.
+        search_time_s: the search is given up after this time.
+        speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: by the vehicle.
+        map_file: published magnetic map; None: the embedded world makes one from its seed.
+        target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle what
+            the result is compared with.
+        amplitude_nt, sigma_along_m, sigma_across_m: of the embedded world's target.
+    """
+
+    altitude_m: float = 80.0
+    separation_m: float = 15.0
+    width_m: float = 2400.0
+    height_m: float = 2400.0
+    area_ne_m: tuple[float, float] = (0.0, 0.0)
+    cell_m: float = 200.0
+    neighbourhood: int = 1
+    heading_penalty: float | None = None
+    detection_probability: float = 0.95
+    detection_range_m: float = 80.0
+    threshold_nt: float = 3.0
+    noise_nt: float = 0.5
+    confirmations: int = 2
+    raise_radius_m: float = 300.0
+    search_time_s: float = 900.0
+    speed_m_s: float | None = None
+    map_file: str | None = None
+    target_ne_m: tuple[float, float] | None = None
+    amplitude_nt: float = 30.0
+    sigma_along_m: float = 80.0
+    sigma_across_m: float = 60.0
+
+    def __post_init__(self) -> None:
+        super(OccupancyOptions, self).__post_init__()
+        check_positive(
+            altitude=self.altitude_m,
+            search_time=self.search_time_s,
+            noise=self.noise_nt,
+            threshold=self.threshold_nt,
+            speed=self.speed_m_s,
+        )
+        for side_m in (self.width_m, self.height_m):
+            if not 0.0 < side_m <= LARGEST_SIDE_M:
+                raise PlanError(
+                    f"--size {side_m:g} m is not possible; ask for more than 0, up to {LARGEST_SIDE_M:g} m"
+                )
+        if not all(math.isfinite(value) for value in self.area_ne_m):
+            raise PlanError(
+                f"--area {self.area_ne_m[0]:g},{self.area_ne_m[1]:g} is not a place; give NORTH,EAST"
+            )
+        if not self.search_time_s <= MAX_SEARCH_TIME_S:
+            raise PlanError(
+                f"--search-time {self.search_time_s:g} s is more than {MAX_SEARCH_TIME_S:g} s, a whole day"
+            )
+        if not self.threshold_nt >= LEAST_SIGMAS * self.noise_nt:
+            raise PlanError(
+                f"--threshold {self.threshold_nt:g} nT is below {LEAST_SIGMAS:g} standard deviations of the "
+                f"noise, {LEAST_SIGMAS * self.noise_nt:g} nT: noise would make anomalies; raise --threshold, "
+                "or give the --noise of a better magnetometer"
+            )
+        for name, value in (("--sigma", self.sigma_along_m), ("--sigma", self.sigma_across_m)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise PlanError(f"{name} {value:g} m of the target is not possible; ask for more than 0")
+        if not (math.isfinite(self.amplitude_nt) and abs(self.amplitude_nt) > self.threshold_nt):
+            raise PlanError(
+                f"--amplitude {self.amplitude_nt:g} nT of the target is not beyond --threshold "
+                f"{self.threshold_nt:g} nT: no pass could see it; lower the threshold"
+            )
+        layout = self.layout  # these refuse what makes no search
+        _ = self.search_parameters, self.decision_parameters
+        if self.target_ne_m is not None and not layout.contains(*self.target_ne_m):
+            raise PlanError(
+                f"--target {self.target_ne_m[0]:g},{self.target_ne_m[1]:g} is outside the searched map, "
+                f"which reaches from north {layout.south_m:g} to {layout.north_m:g} m and east "
+                f"{layout.west_m:g} to {layout.east_m:g} m; move it, or ask for a larger --size"
+            )
+
+    @property
+    def layout(self) -> GridLayout:
+        """The cells."""
+        return GridLayout.over(
+            width_m=self.width_m, height_m=self.height_m, cell_m=self.cell_m, centre_ne_m=self.area_ne_m
+        )
+
+    @property
+    def search_parameters(self) -> SearchParameters:
+        """How the team searches."""
+        return SearchParameters(
+            detection=DetectionModel(
+                probability_overhead=self.detection_probability, range_m=self.detection_range_m
+            ),
+            raise_radius_m=self.raise_radius_m,
+            confirmations=self.confirmations,
+        )
+
+    @property
+    def decision_parameters(self) -> DecisionParameters:
+        """This vehicle's habits."""
+        penalty = _PENALTY_OF_WINGS if self.heading_penalty is None else self.heading_penalty
+        return DecisionParameters(neighbourhood=self.neighbourhood, heading_penalty=penalty)
+
+    def for_vehicle(self, limits: Limits) -> "OccupancyOptions":
+        """The same options with the habits and the speed of a kind of vehicle, where nobody chose them."""
+        if isinstance(limits, FixedWingLimits):
+            penalty, speed_m_s = _PENALTY_OF_WINGS, limits.airspeed_trim_m_s
+        else:
+            penalty = _PENALTY_OF_MULTICOPTERS
+            speed_m_s = min(_MULTICOPTER_M_S, _SHARE_OF_SPEED * limits.speed_m_s)
+        return replace(
+            self,
+            heading_penalty=penalty if self.heading_penalty is None else self.heading_penalty,
+            speed_m_s=speed_m_s if self.speed_m_s is None else self.speed_m_s,
+        )
+
+
+def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
+    """Refuse what one vehicle of the team can't fly.
+
+    Args:
+        options: adapted to the vehicle.
+        limits: of the vehicle, in the wind to plan for.
+
+    Raises:
+        PlanError: it names the option to change.
+    """
+    limits.check_altitude(options.own_altitude_m)
+    north_m, east_m = options.area_ne_m
+    limits.check_reach(math.hypot(abs(north_m) + 0.5 * options.height_m, abs(east_m) + 0.5 * options.width_m))
+    speed_m_s = options.speed_m_s
+    if speed_m_s is None:
+        raise PlanError("the options are not those of a vehicle yet: call for_vehicle")
+    if not isinstance(limits, FixedWingLimits):
+        limits.check_speed(speed_m_s)
+        return
+    limits.check_airspeed(speed_m_s)
+    radius_m = limits.turn_radius_m(speed_m_s)
+    if options.neighbourhood * options.cell_m < radius_m:
+        larger_m = 10.0 * math.ceil(0.1 * radius_m / options.neighbourhood)
+        raise PlanError(
+            f"--cell {options.cell_m:g} m is too small for an aircraft whose turns have a radius of "
+            f"{radius_m:.0f} m at {speed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind: the cells beside it "
+            f"are out of reach; ask for --cell {larger_m:g} or more, a larger --neighbourhood, or less "
+            "--speed"
+        )

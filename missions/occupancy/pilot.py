@@ -1,0 +1,137 @@
+"""One searcher's flying: which cell next, when it is reached, the heading that leads there. No I/O."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from missions.occupancy.search import Search
+
+_REACHED: Final = 0.35  # of a cell: this near to its centre it counts as reached
+_SLOWEST_M_S: Final = 3.0  # over ground; below, the nose is the course
+_WIND_SHARE: Final = 0.9  # of the airspeed; a cross wind beyond can't be held
+_PATIENCE_S: Final = 12.0  # for the turn, in the time a leg may take
+
+
+def heading_for_course(course_rad: float, airspeed_m_s: float, wind_ne_m_s: tuple[float, float]) -> float:
+    """The heading whose track over ground has a course: the wind triangle.
+
+    Args:
+        course_rad: wanted, clockwise from north.
+        airspeed_m_s: true airspeed.
+        wind_ne_m_s: where the air moves to.
+
+    Returns:
+        Heading, 0..2 pi. In more cross wind than can be held, the largest correction.
+    """
+    across_m_s = wind_ne_m_s[1] * math.cos(course_rad) - wind_ne_m_s[0] * math.sin(course_rad)
+    share = across_m_s / airspeed_m_s if airspeed_m_s > 0.0 else 0.0
+    return (course_rad - math.asin(min(_WIND_SHARE, max(-_WIND_SHARE, share)))) % math.tau
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """What a searcher's telemetry says, in the frame of the search.
+
+    Attributes:
+        time_us: vehicle time of the position.
+        north_m, east_m: place.
+        vel_ne_m_s: over ground.
+        yaw_rad: where the nose points.
+        airspeed_m_s: true airspeed; 0: not known.
+        wind_ne_m_s: where the air moves to; zeros: not known.
+    """
+
+    time_us: int
+    north_m: float
+    east_m: float
+    vel_ne_m_s: tuple[float, float]
+    yaw_rad: float
+    airspeed_m_s: float = 0.0
+    wind_ne_m_s: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def ground_speed_m_s(self) -> float:
+        """Speed over ground."""
+        return math.hypot(*self.vel_ne_m_s)
+
+    @property
+    def course_rad(self) -> float:
+        """Direction over ground; when nearly at rest, where the nose points."""
+        if self.ground_speed_m_s < _SLOWEST_M_S:
+            return self.yaw_rad
+        return math.atan2(self.vel_ne_m_s[1], self.vel_ne_m_s[0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HeadingCommand:
+    """One heading a searcher was told.
+
+    Attributes:
+        time_us: vehicle time.
+        heading_rad: 0..2 pi.
+        goal_ne_m: where it leads to.
+    """
+
+    time_us: int
+    heading_rad: float
+    goal_ne_m: tuple[float, float]
+
+
+class Pilot:
+    """Flies one searcher: to its start, then from cell to cell.
+
+    Attributes:
+        commands: every heading commanded, in time.
+        searching: it has reached its start.
+    """
+
+    def __init__(self, search: Search, searcher: int, *, start_ne_m: tuple[float, float]) -> None:
+        """Begin.
+
+        Args:
+            search: of the team.
+            searcher: which of it.
+            start_ne_m: where its part of the search begins.
+        """
+        self.commands: list[HeadingCommand] = []
+        self.searching = False
+        self._search = search
+        self._searcher = searcher
+        self._start_ne_m = start_ne_m
+        self._goal_ne_m: tuple[float, float] | None = None
+        self._from_ne_m = (0.0, 0.0)
+        self._deadline_us = 0
+
+    def update(self, motion: Motion) -> HeadingCommand | None:
+        """Take the newest telemetry; a command when the next leg begins, else None."""
+        if self._goal_ne_m is None:
+            return self._fly_to(self._start_ne_m, motion)
+        if not self._done(self._goal_ne_m, motion):
+            return None
+        self.searching = True
+        decision = self._search.next_cell(
+            self._searcher, motion.north_m, motion.east_m, motion.course_rad % math.tau
+        )
+        return self._fly_to(self._search.map.layout.centre_of(decision.cell), motion)
+
+    def _done(self, goal_ne_m: tuple[float, float], motion: Motion) -> bool:
+        """Whether a goal is reached, abeam, or out of time."""
+        to_n, to_e = goal_ne_m[0] - motion.north_m, goal_ne_m[1] - motion.east_m
+        leg_n, leg_e = goal_ne_m[0] - self._from_ne_m[0], goal_ne_m[1] - self._from_ne_m[1]
+        reached = math.hypot(to_n, to_e) <= _REACHED * self._search.map.layout.cell_m
+        return reached or to_n * leg_n + to_e * leg_e <= 0.0 or motion.time_us >= self._deadline_us
+
+    def _fly_to(self, goal_ne_m: tuple[float, float], motion: Motion) -> HeadingCommand:
+        to_n, to_e = goal_ne_m[0] - motion.north_m, goal_ne_m[1] - motion.east_m
+        speed_m_s = max(motion.ground_speed_m_s, _SLOWEST_M_S)
+        self._goal_ne_m, self._from_ne_m = goal_ne_m, (motion.north_m, motion.east_m)
+        self._deadline_us = motion.time_us + round(
+            1e6 * (2.0 * math.hypot(to_n, to_e) / speed_m_s + _PATIENCE_S)
+        )
+        command = HeadingCommand(
+            time_us=motion.time_us,
+            heading_rad=heading_for_course(math.atan2(to_e, to_n), motion.airspeed_m_s, motion.wind_ne_m_s),
+            goal_ne_m=goal_ne_m,
+        )
+        self.commands.append(command)
+        return command

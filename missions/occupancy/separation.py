@@ -1,0 +1,52 @@
+"""How near the vehicles of a team came to each other in the air, from the truth in the log."""
+
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+
+if TYPE_CHECKING:
+    from missions.records import FlightRecords
+
+Array = NDArray[np.float64]
+
+_STEP_S: Final = 0.1
+_AIRBORNE_M: Final = 10.0  # above where it stood; beside each other on the ground is no danger
+
+
+def least_separation_m(records: "FlightRecords", system_ids: list[int]) -> float | None:
+    """Least distance of any two vehicles while both were more than 10 m up; None: never, or no truth."""
+    tracks: list[tuple[Array, Array]] = []
+    origin: GeodeticPosition | None = None
+    for system_id in system_ids:
+        table = records.table("HIL_STATE_QUATERNION", system_id)
+        if len(table) < 2:
+            return None
+        if origin is None:
+            first = table[0]
+            origin = GeodeticPosition(
+                lat_deg=first["lat"] * 1e-7, lon_deg=first["lon"] * 1e-7, alt_m=first["alt"] * 1e-3
+            )
+        per_lat, per_lon = LocalFrame(origin).metres_per_degree
+        places = np.column_stack(
+            (
+                (table["lat"] * 1e-7 - origin.lat_deg) * per_lat,
+                (table["lon"] * 1e-7 - origin.lon_deg) * per_lon,
+                table["alt"] * 1e-3,
+            )
+        )
+        tracks.append((table["time_usec"].astype(np.float64) * 1e-6, places))
+    if len(tracks) < 2:
+        return None
+    start_s, end_s = max(time[0] for time, _ in tracks), min(time[-1] for time, _ in tracks)
+    at_s = np.arange(start_s, end_s, _STEP_S)
+    least = np.inf
+    even = [np.column_stack([np.interp(at_s, time, axis) for axis in places.T]) for time, places in tracks]
+    for k, own in enumerate(even):
+        for other in even[k + 1 :]:
+            up = (own[:, 2] > own[0, 2] + _AIRBORNE_M) & (other[:, 2] > other[0, 2] + _AIRBORNE_M)
+            if up.any():
+                least = min(least, float(np.linalg.norm(own[up] - other[up], axis=1).min()))
+    return least if np.isfinite(least) else None

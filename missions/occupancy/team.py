@@ -1,0 +1,287 @@
+"""One flight of a team that searches together: every vehicle from the ground back to the ground."""
+
+import asyncio
+import math
+from collections.abc import Callable, Coroutine, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Final
+
+from autopilot_bridge.errors import BridgeError
+from missions.errors import MissionError, PlanError
+from missions.kind import VehicleKind
+from missions.occupancy.detection import Anomaly, AnomalyDetector
+from missions.occupancy.field_watch import FieldWatch, PlacedReading
+from missions.occupancy.noise_check import require_quiet
+from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.pilot import Motion, Pilot
+from missions.occupancy.search import Search
+from missions.occupancy.steering import Steering, steering
+from missions.occupancy.survey_map import SurveyMap
+from missions.occupancy.traffic import Traffic
+from missions.telemetry import AirData, Attitude, Position
+from missions.vehicle.adapter import Mode
+from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+SEARCH: Final = "search"
+"""Name of the phase in which a vehicle searches."""
+
+_TAKEOFF_S: Final = 300.0  # the longest a vehicle may take, for those that wait on it
+_LANDING_S: Final = 900.0
+_MODE_AGE_US: Final = 2_500_000  # heartbeats tell of a change of mode by then
+_RING: Final = 0.25  # of the area: where the searchers of a team start, around its centre
+
+
+@dataclass(slots=True, kw_only=True)
+class Searcher:
+    """One vehicle's part.
+
+    Attributes:
+        pilot: its legs and heading commands.
+        track: (team time us, north m, east m) of each placed reading of the search, by the vehicle's own
+            estimate.
+        anomalies: what it saw, at team times.
+        watch: its magnetometer.
+        began_us, ended_us: vehicle time of its search; -1: not yet.
+    """
+
+    pilot: Pilot
+    track: list[tuple[int, float, float]] = field(default_factory=list)
+    anomalies: list[Anomaly] = field(default_factory=list)
+    watch: FieldWatch | None = None
+    began_us: int = -1
+    ended_us: int = -1
+
+
+class SearchTeam:
+    """The vehicles of one flight and what they share.
+
+    Attributes:
+        search: the shared map, and what was found.
+        searchers: one per vehicle.
+        began_us: team time when the first began to search; -1: none has.
+    """
+
+    def __init__(
+        self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions], survey_map: SurveyMap
+    ) -> None:
+        """Prepare; nothing is sent.
+
+        Args:
+            vehicles: each ready to arm.
+            options: of each, adapted to it.
+            survey_map: the published map.
+
+        Raises:
+            PlanError: the map has no data somewhere in the area.
+        """
+        first = options[0]
+        layout = first.layout
+        survey_map.require_data(
+            south_m=layout.south_m,
+            north_m=layout.north_m,
+            west_m=layout.west_m,
+            east_m=layout.east_m,
+            what=f"the searched area (--size {first.width_m:g}x{first.height_m:g})",
+        )
+        self.search = Search(layout, first.search_parameters, [own.decision_parameters for own in options])
+        self.searchers = [
+            Searcher(pilot=Pilot(self.search, k, start_ne_m=start_place(own)))
+            for k, own in enumerate(options)
+        ]
+        self.began_us = -1
+        self._vehicles = tuple(vehicles)
+        self._options = tuple(options)
+        self._map = survey_map
+        self._frame = survey_map.frame()
+        self._traffic = Traffic([own.own_altitude_m for own in options])
+        # vehicles elsewhere booted at different times: the first one's clock is the team's
+        now_us = self._vehicles[0].clock.time_us
+        self._offsets_us = [now_us - vehicle.clock.time_us for vehicle in self._vehicles]
+
+    @property
+    def over(self) -> bool:
+        """The target is found, or time is up."""
+        if self.search.found is not None:
+            return True
+        limit_us = self.began_us + round(self._options[0].search_time_s * 1e6)
+        return self.began_us >= 0 and self._vehicles[0].clock.time_us >= limit_us
+
+    async def fly(self) -> None:
+        """Fly all of them."""
+        await _together([self._fly_one(index) for index in range(len(self._vehicles))])
+
+    async def _fly_one(self, index: int) -> None:
+        vehicle, own, traffic = self._vehicles[index], self._options[index], self._traffic
+        notes, clock = vehicle.notes, vehicle.clock
+        notes.begin("checks", clock.time_us)
+        await self._check(vehicle, own)
+        traffic.checked(index)
+        await self._wait(vehicle, lambda: traffic.may_rise(index), "the layers above to be taken", _TAKEOFF_S)
+        notes.begin("takeoff", clock.time_us)
+        await vehicle.takeoff(own.own_altitude_m)
+        traffic.risen(index)
+        notes.begin(SEARCH, clock.time_us)
+        if not self.over:
+            speed_m_s = own.speed_m_s or 0.0
+            async with steering(
+                vehicle, altitude_m=own.own_altitude_m, speed_m_s=speed_m_s, rate_hz=own.rate_hz
+            ) as flight:
+                await self._search(index, flight)
+        self.search.leave(index)
+        notes.begin("return", clock.time_us)
+        if not traffic.may_land(index):
+            await vehicle.hold()
+            await self._wait(
+                vehicle,
+                lambda: traffic.may_land(index),
+                "the layers below to be empty",
+                _LANDING_S,
+                flying=True,
+            )
+        if vehicle.kind is VehicleKind.FIXED_WING:
+            await vehicle.land_along()
+        else:
+            await vehicle.return_to_launch(timeout_s=_LANDING_S)
+        traffic.down(index)
+        notes.end(clock.time_us)
+
+    async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
+        """What can only be refused when the vehicle is heard, and still stands on the ground."""
+        north_m, east_m, _ = self._frame.ned_from_geodetic(
+            vehicle.home.lat_deg, vehicle.home.lon_deg, vehicle.home.alt_m
+        )
+        limits = await vehicle.limits()
+        layout = self.search.map.layout
+        farthest_m = max(
+            math.hypot(edge_n_m - north_m, edge_e_m - east_m)
+            for edge_n_m in (layout.south_m, layout.north_m)
+            for edge_e_m in (layout.west_m, layout.east_m)
+        )
+        if not farthest_m <= limits.reach_m:
+            raise PlanError(
+                f"the searched area reaches {farthest_m:.0f} m from vehicle {vehicle.system_id}, which "
+                f"stands at north {north_m:.0f} m, east {east_m:.0f} m of the map's home; accepted: up to "
+                f"{limits.reach_m:g} m. Choose --area, a smaller --size, or the map of this place"
+            )
+        await vehicle.payload.require(SURVEY_MAGNETOMETER_COMPONENT)
+        await require_quiet(vehicle, threshold_nt=own.threshold_nt)
+        if vehicle.kind is VehicleKind.FIXED_WING:
+            await vehicle.prepare_piloting()
+
+    async def _wait(
+        self,
+        vehicle: "Vehicle",
+        ready: Callable[[], bool],
+        what: str,
+        one_s: float,
+        *,
+        flying: bool = False,
+    ) -> None:
+        """Wait for the others, a share of time for each of them."""
+
+        def look() -> bool:
+            if flying and not vehicle.armed:
+                raise MissionError(f"the vehicle disarmed while it waited for {what}; {vehicle.heard()}")
+            return ready()
+
+        searching_s = 0.0 if flying else self._options[0].search_time_s
+        await vehicle.wait_until(
+            look, what=what, on=("HEARTBEAT",), timeout_s=searching_s + one_s * len(self._vehicles)
+        )
+
+    async def _search(self, index: int, flight: Steering) -> None:
+        """Fly from cell to cell until the search is over."""
+        vehicle, searcher = self._vehicles[index], self.searchers[index]
+        clock = vehicle.clock
+        if self.began_us < 0:
+            self.began_us = self._vehicles[0].clock.time_us
+            self.search.begin(self.began_us)
+        searcher.began_us = clock.time_us
+        watch = searcher.watch = self._watch(index)
+        guided = vehicle.adapter.modes[Mode.GUIDED]
+        watch.start()
+        try:
+            with vehicle.messages("GLOBAL_POSITION_INT") as stream:
+                async with vehicle.link_guard("the end of the search"):
+                    async for _ in stream:
+                        if self.over:
+                            break
+                        settled = clock.time_us - searcher.began_us > _MODE_AGE_US
+                        if not vehicle.armed or (settled and vehicle.custom_mode != guided):
+                            raise MissionError(f"the vehicle left the search; {vehicle.heard()}")
+                        command = searcher.pilot.update(self._motion(vehicle))
+                        if command is not None:
+                            await flight.turn_to(command.heading_rad)
+                        self._note_progress(vehicle)
+        finally:
+            watch.stop()
+            searcher.ended_us = clock.time_us
+
+    def _note_progress(self, vehicle: "Vehicle") -> None:
+        elapsed_s = (self._vehicles[0].clock.time_us - self.began_us) * 1e-6
+        vehicle.notes.progress = min(1.0, max(0.0, elapsed_s / self._options[0].search_time_s))
+
+    def _watch(self, index: int) -> FieldWatch:
+        searcher, offset_us = self.searchers[index], self._offsets_us[index]
+
+        def on_sample(reading: PlacedReading, anomalous: bool) -> None:
+            time_us = reading.time_us + offset_us
+            searcher.track.append((time_us, reading.north_m, reading.east_m))
+            self.search.report_place(index, time_us, reading.north_m, reading.east_m, anomalous=anomalous)
+
+        def on_anomaly(seen: Anomaly) -> None:
+            anomaly = replace(seen, time_us=seen.time_us + offset_us)
+            searcher.anomalies.append(anomaly)
+            last_us = searcher.track[-1][0]
+            self.search.report_anomaly(index, anomaly, last_us)
+
+        return FieldWatch(
+            self._vehicles[index],
+            self._map,
+            AnomalyDetector(threshold_nt=self._options[index].threshold_nt),
+            on_sample=on_sample,
+            on_anomaly=on_anomaly,
+        )
+
+    def _motion(self, vehicle: "Vehicle") -> Motion:
+        place, attitude, air = vehicle.latest(Position), vehicle.latest(Attitude), vehicle.latest(AirData)
+        if place is None or attitude is None:
+            raise MissionError(f"the vehicle tells no position or attitude; {vehicle.heard()}")
+        wings = vehicle.kind is VehicleKind.FIXED_WING
+        wind = vehicle.wind_ne_m_s() if wings else None
+        north_m, east_m, _ = self._frame.ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
+        return Motion(
+            time_us=place.time_us,
+            north_m=north_m,
+            east_m=east_m,
+            vel_ne_m_s=place.vel_ned_m_s[:2],
+            yaw_rad=attitude.yaw_rad,
+            airspeed_m_s=air.airspeed_m_s if wings and air is not None else 0.0,
+            wind_ne_m_s=(0.0, 0.0) if wind is None else wind,
+        )
+
+
+def start_place(options: OccupancyOptions) -> tuple[float, float]:
+    """Where a vehicle's search begins: those of a team on an ellipse around the area's centre."""
+    north_m, east_m = options.area_ne_m
+    angle_rad = math.tau * options.index / options.vehicles
+    return (
+        north_m + _RING * options.height_m * math.cos(angle_rad),
+        east_m + _RING * options.width_m * math.sin(angle_rad),
+    )
+
+
+async def _together(coroutines: Sequence[Coroutine[Any, Any, None]]) -> None:
+    """Run them all; the first failure ends the others, and is the one that is told."""
+    try:
+        async with asyncio.TaskGroup() as group:
+            for coroutine in coroutines:
+                group.create_task(coroutine)
+    except* (MissionError, PlanError, BridgeError) as errors:
+        first: BaseException = errors
+        while isinstance(first, BaseExceptionGroup):
+            first = first.exceptions[0]
+        raise first from None

@@ -1,0 +1,59 @@
+"""Who of a team may take off or land now: vehicles cross no layer that another one flies in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class _State:
+    checked: bool = False
+    risen: bool = False
+    down: bool = False
+
+
+class Traffic:
+    """Order of a team whose vehicles fly in layers.
+
+    The highest layer rises first and comes down last, so that nobody climbs or sinks through a layer in use.
+    Nobody rises before everybody was checked on the ground.
+    """
+
+    def __init__(self, heights_m: Sequence[float]) -> None:
+        """Begin on the ground.
+
+        Args:
+            heights_m: each vehicle's layer, above one common ground.
+        """
+        self._heights_m = tuple(heights_m)
+        self._states = [_State() for _ in self._heights_m]
+
+    def checked(self, index: int) -> None:
+        """A vehicle has passed the checks before takeoff."""
+        self._states[index].checked = True
+
+    def risen(self, index: int) -> None:
+        """A vehicle is in its layer."""
+        self._states[index].risen = True
+
+    def down(self, index: int) -> None:
+        """A vehicle is on the ground again."""
+        self._states[index].down = True
+
+    def may_rise(self, index: int) -> bool:
+        """Whether all layers above are taken, or left again."""
+        return all(state.checked for state in self._states) and all(
+            self._states[other].risen for other in self._higher(index)
+        )
+
+    def may_land(self, index: int) -> bool:
+        """Whether all layers below are empty: nobody there, or about to be."""
+        return all(
+            self._states[other].down
+            for other in range(len(self._states))
+            if other != index and index in self._higher(other)
+        )
+
+    def _higher(self, index: int) -> list[int]:
+        """Those in layers above; of equal heights the later vehicle counts as higher."""
+        own = (self._heights_m[index], index)
+        return [k for k, height_m in enumerate(self._heights_m) if (height_m, k) > own]
