@@ -41,7 +41,17 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
 
 @click.command()
 @click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
-@click.option("--model", default="iris", show_default=True, help="One of our models, or a path.")
+@click.option(
+    "--model",
+    multiple=True,
+    metavar="NAME|PATH",
+    help="One of our models, or a path; for all, or one for each (repeat, or A,B,C). [default: iris]",
+)
+@click.option(
+    "--launch",
+    type=click.Choice(["runway", "catapult", "hand"]),
+    help="How aircraft get into the air. [default: as described with the model]",
+)
 @click.option("--count", type=click.IntRange(1, 250), default=1, show_default=True, help="Vehicles.")
 @click.option(
     "--speedup",
@@ -69,7 +79,8 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
 )
 def sitl(
     autopilot: str,
-    model: str,
+    model: tuple[str, ...],
+    launch: str | None,
     count: int,
     speedup: float,
     links: tuple[str, ...],
@@ -100,11 +111,14 @@ def sitl(
         parse_home,
         team,
     )
+    from autopilot_bridge.sitl.configuration import HOMES
     from autopilot_bridge.tlog import TlogWriter
     from flightsim.environment import Environment
     from missions.options import parameters_from_file, parse_wind
 
     stop: list[int] = []
+    models = [name for text in model for name in text.split(",") if name] or ["iris"]
+    count = len(models) if count == 1 else count
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         stop.append(number)
@@ -112,25 +126,29 @@ def sitl(
     try:
         ports = _ports(links, gcs_links, count)
         wind_speed_m_s, wind_from_deg = parse_wind(wind)
+        place = None if home is None else parse_home(home)
+        heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
         world = Sitl(
             SitlConfiguration(
                 vehicles=team(
                     count,
-                    model=model,
+                    model=models[0] if len(models) == 1 else models,
                     flavour=autopilot,
+                    launch=launch,
+                    heading_deg=heading_deg,
                     parameters={
                         **_loss_times(autopilot, speedup),
                         **({} if params is None else parameters_from_file(params)),
                     },
                 ),
-                home=None if home is None else parse_home(home),
+                home=place,
                 environment=Environment.from_wind(
                     speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
                 ),
                 seed=seed,
             )
         )
-        compile_flight_code()
+        compile_flight_code(world.configuration.vehicles)
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
         recorder = None if log is None else TlogWriter(log)
         opened = server.open(ports)

@@ -12,16 +12,23 @@ from typing import Final
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.sitl import Sitl
-from flightsim.airframe import AirframeKind
+from flightsim.airframe import AirframeKind, load_airframe
 
 _BOOT_S: Final = 5.0
 _PHASE_S: Final = 2.5
 _MODELS: Final = {AirframeKind.MULTICOPTER: "iris", AirframeKind.FIXED_WING: "aerosonde"}
 
 
-def compile_flight_code(kinds: Iterable[AirframeKind] = (AirframeKind.MULTICOPTER,)) -> None:
-    """Fly a throwaway vehicle of each kind through take-off, an approach, a circle, a descent and streams."""
-    for kind in sorted(set(kinds)):
+def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpecification(),)) -> None:
+    """Fly a throwaway vehicle of each kind through take-off, an approach, a circle, a descent and streams.
+
+    Args:
+        vehicles: those that are to fly; only their kinds matter.
+
+    Raises:
+        AirframeError: a model that can't be used.
+    """
+    for kind in sorted({load_airframe(vehicle.model).kind for vehicle in vehicles}):
         specification = VehicleSpecification(model=_MODELS[kind])
         sitl = Sitl(SitlConfiguration(vehicles=(specification,)))
         link = sitl.connect(0)
