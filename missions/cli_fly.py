@@ -1,5 +1,6 @@
 """`flightstack fly`: a mission from one command."""
 
+import importlib
 import math
 import sys
 from pathlib import Path
@@ -10,9 +11,32 @@ import click
 from missions.cli_types import SPEEDUP
 
 if TYPE_CHECKING:
+    from missions.mission import Mission
+    from missions.mission_command import MissionCommand
     from missions.session import Flight, RunResult
 
-_FAILED, _USAGE, _INTERRUPTED = 1, 2, 130
+_FAILED, _INTERRUPTED = 1, 130
+
+_PATTERNS: Final = "missions.pattern_command"
+_COMMANDS: Final = {
+    "lissajous": _PATTERNS,
+    "sector": _PATTERNS,
+    "parallel-sweep": _PATTERNS,
+    "expanding-square": _PATTERNS,
+    "orbit": "missions.orbit.command",
+}
+"""Where each mission declares its options."""
+
+_EMBEDDED_ONLY: Final = (
+    "autopilot",
+    "model",
+    "launch",
+    "home",
+    "seed",
+    "wind",
+    "turbulence",
+    "speedup",
+)
 
 
 class _Line:
@@ -49,104 +73,87 @@ class _Line:
             click.echo("", err=True)
 
 
-def _arguments(pairs: tuple[str, ...]) -> dict[str, str]:
-    from missions.errors import PlanError
-
-    values = {}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        if not (name and equals):
-            raise PlanError(f"--arg {pair!r} is not NAME=VALUE")
-        values[name] = value
-    return values
+def _command_of(module: str) -> "MissionCommand":
+    command: MissionCommand = importlib.import_module(module).COMMAND
+    return command
 
 
-def _ratio(text: str) -> tuple[float, float]:
-    """ "3:4", or a single number for so much to one."""
-    from missions.options import parse_pair
+class FlyCommand(click.Command):
+    """`fly MISSION`: the options are those of every flight, and those the mission declares."""
 
-    x, y = parse_pair(text, "--ratio", ":/,")
-    if not any(mark in text for mark in ":/,"):
-        y = 1.0
-    for frequency in (x, y):
-        if frequency <= 0.0:
-            raise click.UsageError(f"--ratio {text}: frequency {frequency:g} is not above 0; try --ratio 3:4")
-    return x, y
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        named = next((a for a in args if a in _COMMANDS or a.endswith(".py")), None)
+        if named is not None:
+            ctx.meta["mission command"] = _command_of(_COMMANDS.get(named, _PATTERNS))
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            owners = _owners(error.option_name)
+            if owners and named is not None:
+                raise click.UsageError(
+                    f"{error.option_name} is for {', '.join(owners)}, not for {named}"
+                ) from None
+            raise
 
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        declared = ctx.meta.get("mission command")
+        own = [] if declared is None else list(declared.options)
+        common = super().get_params(ctx)
+        return [common[0], *own, *common[1:]]
 
-def _options(given: dict[str, Any]) -> Any:
-    from missions.options import FlightOptions, Via, parse_pair
-
-    width_m, height_m = parse_pair(given["size"], "--size", "x,")
-    if given["amplitude_x"] is not None:
-        width_m = 2.0 * given["amplitude_x"]
-    if given["amplitude_y"] is not None:
-        height_m = 2.0 * given["amplitude_y"]
-    ratio = None if given["ratio"] is None else _ratio(given["ratio"])
-    phase_x_deg = phase_y_deg = None
-    if given["phase"] is not None:
-        phase_x_deg, phase_y_deg = parse_pair(given["phase"], "--phase", ",")
-        if "," not in given["phase"]:
-            phase_y_deg = 0.0  # one number is the difference of the two phases
-    return FlightOptions(
-        pattern=given["pattern"],
-        width_m=width_m,
-        height_m=height_m,
-        ratio=ratio,
-        phase_x_rad=None if phase_x_deg is None else math.radians(phase_x_deg),
-        phase_y_rad=None if phase_y_deg is None else math.radians(phase_y_deg),
-        spacing_m=given["spacing"],
-        heading_rad=math.radians(given["heading"]),
-        altitude_m=given["altitude"],
-        speed_m_s=given["speed"],
-        period_s=given["period"],
-        periods=given["periods"],
-        search_time_s=given["search_time"],
-        via=Via(given["via"]),
-        acceptance_m=given["acceptance"],
-        rate_hz=given["rate"],
-        vehicles=given["vehicles"] or max(1, len(given["connect"])),
-        separation_m=given["separation"],
-        arguments=_arguments(given["arg"]),
-    )
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        declared = ctx.meta.get("mission command")
+        if declared is None:
+            super().format_help_text(ctx, formatter)
+            return
+        formatter.write_paragraph()
+        with formatter.indentation():
+            for paragraph in declared.help.split("\n\n"):
+                formatter.write_text(paragraph)
+                formatter.write_paragraph()
 
 
-_EMBEDDED_ONLY: Final = ("autopilot", "model", "home", "seed", "wind", "turbulence", "speedup")
+def _owners(option_name: str) -> list[str]:
+    """The missions that have an option."""
+    return [
+        name
+        for name, module in _COMMANDS.items()
+        if any(option_name in option.opts for option in _command_of(module).options)
+    ]
 
 
-@click.command(context_settings={"show_default": True})
+@click.command(cls=FlyCommand, context_settings={"show_default": True})
 @click.argument("mission")
-@click.option("--pattern", default="L3", help="Lissajous pattern: L1 (circle), L2, L3, L4.")
-@click.option("--size", default="100", help="Size of the pattern, m: SIDE or WIDTHxHEIGHT (east x north).")
-@click.option("--amplitude-x", type=float, help="Half the width, m (east), in place of --size.")
-@click.option("--amplitude-y", type=float, help="Half the height, m (north).")
-@click.option("--ratio", help="Frequencies X:Y of a Lissajous pattern of your own, e.g. 3:4 or 1.4.")
-@click.option("--phase", help="Phases of x and y, degrees: X,Y or their difference.")
-@click.option("--spacing", type=float, default=10.0, help="Track spacing of sweeps and squares, m.")
-@click.option("--heading", type=float, default=0.0, help="First leg of sweeps and sectors, degrees.")
-@click.option("--altitude", type=float, default=10.0, help="Above home, m.")
-@click.option("--speed", type=float, default=5.0, help="Ground speed, m/s.")
-@click.option("--period", type=float, help="Seconds once round a Lissajous pattern, in place of --speed.")
-@click.option("--periods", type=float, default=1.0, help="Times round.")
-@click.option("--search-time", type=float, help="Repeat the pattern for so many seconds.")
-@click.option(
-    "--via", type=click.Choice(["waypoints", "setpoints"]), default="waypoints", help="How it is flown."
-)
-@click.option("--acceptance", type=float, default=2.0, help="Waypoint acceptance radius, m.")
-@click.option("--rate", type=float, default=25.0, help="Setpoints per second.")
 @click.option("--vehicles", type=click.IntRange(1, 250), help="Team size. [default: 1, or one per --connect]")
-@click.option("--separation", type=float, default=4.0, help="Between the altitudes of a team, m.")
 @click.option(
     "--connect", multiple=True, metavar="URL", help="A vehicle elsewhere: udpin:0.0.0.0:14550, serial:..."
 )
 @click.option(
     "--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", help="Of the embedded SITL."
 )
-@click.option("--model", default="iris", help="Vehicle of the embedded SITL: a name, or a path.")
+@click.option(
+    "--model",
+    multiple=True,
+    metavar="NAME|PATH",
+    help="Vehicle of the embedded SITL; one for all of a team, or one for each (repeat, or A,B,C). "
+    "[default: iris, or an aircraft where the mission needs one]",
+)
+@click.option(
+    "--launch",
+    type=click.Choice(["runway", "catapult", "hand"]),
+    help="How aircraft get into the air. [default: as described with the model]",
+)
 @click.option("--home", help="lat,lon,alt[,heading] of the embedded SITL. [default: the firmware's own]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
-@click.option("--wind", default="0", metavar="SPEED[@FROM]", help="m/s, and degrees it comes from.")
-@click.option("--turbulence", type=click.Choice(["none", "light", "moderate", "severe"]), default="none")
+@click.option(
+    "--wind", metavar="SPEED[@FROM]", help="m/s, and degrees it comes from. [default: 0; orbit: 4 from north]"
+)
+@click.option(
+    "--turbulence",
+    type=click.Choice(["none", "light", "moderate", "severe"]),
+    help="[default: none; orbit: light]",
+)
+@click.option("--expect-wind", type=float, help="Wind to plan turns for, m/s. [default: --wind; elsewhere 5]")
 @click.option("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
 @click.option(
     "--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params)."
@@ -161,9 +168,10 @@ _EMBEDDED_ONLY: Final = ("autopilot", "model", "home", "seed", "wind", "turbulen
 @click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
 @click.option("--arg", multiple=True, metavar="NAME=VALUE", help="For a mission of your own.")
 def fly(**given: Any) -> int:
-    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, or a Python file of your own.
+    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, or a Python file of your own.
 
-    Your own file has `async def fly(vehicle, options)`.
+    `flightstack fly MISSION --help` tells a mission's own options. Your own file has
+    `async def fly(vehicle, options)`.
     The run folder gets flight.tlog, summary.json and track.png.
     """
     from missions.errors import PlanError
@@ -176,26 +184,63 @@ def fly(**given: Any) -> int:
         raise click.UsageError(str(error)) from error
 
 
+def _chosen(context: click.Context) -> frozenset[str]:
+    """Options that stand on the command line."""
+    return frozenset(
+        name
+        for name in context.params
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+    )
+
+
 def _refuse_embedded_options(context: click.Context) -> None:
     """A vehicle elsewhere has its own wind: an option that would do nothing is not passed over in silence."""
-    given = [
-        f"--{name}"
-        for name in _EMBEDDED_ONLY
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-    ]
+    chosen = _chosen(context)
+    given = [f"--{name}" for name in _EMBEDDED_ONLY if name in chosen]
     if given:
         raise click.UsageError(
             f"{', '.join(given)}: of the embedded SITL only, has no effect with --connect; leave it out"
         )
 
 
+def _arguments(pairs: tuple[str, ...]) -> dict[str, str]:
+    from missions.errors import PlanError
+
+    values = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not (name and equals):
+            raise PlanError(f"--arg {pair!r} is not NAME=VALUE")
+        values[name] = value
+    return values
+
+
+def _models(
+    given: tuple[str, ...], mission: "Mission[Any]", vehicles: int | None, connections: int
+) -> list[str]:
+    """A model for each vehicle."""
+    models = [name for text in given for name in text.split(",") if name] or [mission.world_defaults.model]
+    count = vehicles or max(1, connections, len(models))
+    return models * count if len(models) == 1 else models
+
+
 def _fly(given: dict[str, Any]) -> int:
     from missions.library import find_mission
-    from missions.options import parameters_from_file, parse_wind
+    from missions.options import check_positive, parameters_from_file, parse_wind
 
     mission = find_mission(given["mission"])
-    options = _options(given)
-    wind_speed_m_s, wind_from_deg = parse_wind(given["wind"])
+    context = click.get_current_context()
+    declared: MissionCommand = context.meta["mission command"]
+    models = _models(given["model"], mission, given["vehicles"], len(given["connect"]))
+    common = {
+        "vehicles": given["vehicles"] or max(1, len(given["connect"]), len(models)),
+        "arguments": _arguments(given["arg"]),
+        "given": declared.chosen_fields(_chosen(context)),
+    }
+    options = declared.build(given, common)
+    world = mission.world_defaults
+    wind_speed_m_s, wind_from_deg = parse_wind(world.wind if given["wind"] is None else given["wind"])
+    check_positive(expect_wind=given["expect_wind"] or None)
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
         raise click.UsageError(
@@ -219,12 +264,14 @@ def _fly(given: dict[str, Any]) -> int:
                 options=options,
                 connect=given["connect"],
                 autopilot=given["autopilot"],
-                model=given["model"],
+                model=models,
+                launch=given["launch"],
                 seed=given["seed"],
                 speedup=given["speedup"],
                 wind_speed_m_s=wind_speed_m_s,
                 wind_from_deg=wind_from_deg,
-                turbulence=given["turbulence"],
+                turbulence=given["turbulence"] or world.turbulence,
+                expected_wind_m_s=given["expect_wind"],
                 home=given["home"],
                 parameters=parameters,
                 out=given["out"],
@@ -239,10 +286,10 @@ def _fly(given: dict[str, Any]) -> int:
         raise click.UsageError(str(error)) from error
     finally:
         line.end()
-    return _tell(result)
+    return _tell(result, mission)
 
 
-def _tell(result: "RunResult") -> int:
+def _tell(result: "RunResult", mission: "Mission[Any]") -> int:
     summary = result.summary
     if result.outcome == "interrupted":
         click.echo(f"flightstack: interrupted; the log is in {result.folder}", err=True)
@@ -266,5 +313,7 @@ def _tell(result: "RunResult") -> int:
         if "waypoints" in block:
             w = block["waypoints"]
             click.echo(f"waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}")
+    for told in mission.said(summary):
+        click.echo(told)
     click.echo(f"run: {result.folder}")
     return 0

@@ -51,7 +51,9 @@ class PatternMission(Mission[FlightOptions]):
         if isinstance(limits, FixedWingLimits) and self.name == "lissajous":
             # a size that nobody chose is one whose bends the aircraft can fly
             radius_m = limits.turn_radius_m(options.speed_m_s)
-            factor = radius_m / smallest_radius_m(self.curve(replace(options, periods=1.0, search_time_s=None)))
+            factor = radius_m / smallest_radius_m(
+                self.curve(replace(options, periods=1.0, search_time_s=None))
+            )
             side_m = 100.0 * math.ceil(0.01 * WINGS_SIDE_M * max(1.0, 1.05 * factor))
             options = options.unless_chosen(width_m=side_m, height_m=side_m)
         return options

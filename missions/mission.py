@@ -88,6 +88,10 @@ class Mission(Generic[AnyOptions]):
         """What `summary.json` has beside the figures of every flight."""
         return {}
 
+    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+        """Lines that the command line says of a completed flight, beside those of every flight."""
+        return ()
+
     def title(self, options: AnyOptions) -> str:
         """First words of the picture's title."""
         return self.name

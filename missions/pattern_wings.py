@@ -39,7 +39,9 @@ def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -
         PlanError: says what, and which option to change.
     """
     if options.period_s is not None:
-        raise PlanError("--period is for vehicles that can fly slowly in bends; choose --speed for an aircraft")
+        raise PlanError(
+            "--period is for vehicles that can fly slowly in bends; choose --speed for an aircraft"
+        )
     limits.check_airspeed(options.speed_m_s)
     limits.check_altitude(options.own_altitude_m)
     coarse = curve.points(np.linspace(0.0, curve.end, 1000))
@@ -68,7 +70,11 @@ async def fly_pattern_with_wings(
 
 
 def _commanded(
-    vehicle: Vehicle, options: FlightOptions, path: FlyablePath, waypoints: list[tuple[float, float]], near_m: float
+    vehicle: Vehicle,
+    options: FlightOptions,
+    path: FlyablePath,
+    waypoints: list[tuple[float, float]],
+    near_m: float,
 ) -> CommandedPath:
     down_m = -options.own_altitude_m
     return CommandedPath(
@@ -124,9 +130,7 @@ async def _fly_waypoints(
     await vehicle.start_mission()
     reach_m = float(np.hypot(*path.points_m.T).max())
     slow_m_s = 0.5 * options.speed_m_s
-    await vehicle.wait_item_reached(
-        start + first, 180.0 + 2.0 * options.own_altitude_m + reach_m / slow_m_s
-    )
+    await vehicle.wait_item_reached(start + first, 180.0 + 2.0 * options.own_altitude_m + reach_m / slow_m_s)
     notes.begin(PATTERN, clock.time_us)
 
     def progress(done: int) -> None:
@@ -180,9 +184,7 @@ async def _fly_setpoints(
     notes.end(clock.time_us)
 
 
-async def _to_the_start(
-    vehicle: Vehicle, options: FlightOptions, path: FlyablePath, radius_m: float
-) -> None:
+async def _to_the_start(vehicle: Vehicle, options: FlightOptions, path: FlyablePath, radius_m: float) -> None:
     """A circle that touches the path at its start, until the aircraft passes there in its direction."""
     (north, east), course, _ = path.at(0.0)
     right = course + 0.5 * math.pi

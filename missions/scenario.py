@@ -116,4 +116,3 @@ class Setting:
 
     seed: int
     folder: Path
-

@@ -80,9 +80,7 @@ class OrbitCommand:
     relative_speed_m_s: float
 
 
-def bearing_off_velocity_rad(
-    velocity_ne_m_s: tuple[float, float], offset_ne_m: tuple[float, float]
-) -> float:
+def bearing_off_velocity_rad(velocity_ne_m_s: tuple[float, float], offset_ne_m: tuple[float, float]) -> float:
     """chi: from the velocity to the target, positive to the right, -pi..pi."""
     (vn, ve), (pn, pe) = velocity_ne_m_s, offset_ne_m
     return math.atan2(vn * pe - ve * pn, vn * pn + ve * pe)

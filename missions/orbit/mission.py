@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -77,6 +77,15 @@ class OrbitMission(Mission[OrbitOptions]):
 
         return orbit_figures(debriefing)
 
+    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+        if summary["radius_mean_error_percent"] is None:
+            return ()
+        return (
+            f"orbit of {summary['radius_m']:g} m for {summary['orbit_s']:.0f} s: mean radius "
+            f"{summary['radius_mean_error_percent']:+.2f} %, standard deviation {summary['radius_std_m']:.1f} m, "
+            f"altitude within {summary['altitude_error_m']:.1f} m",
+        )
+
     def title(self, options: OrbitOptions) -> str:
         way = "clockwise" if options.direction > 0 else "counter-clockwise"
         moving = f", target at {options.target_speed_m_s:g} m/s" if options.target_speed_m_s else ""
@@ -99,9 +108,7 @@ class OrbitFlight:
         self._tracker = TargetTracker(self._attitude)
         bank_max = min(math.radians(50.0), 0.95 * limits.bank_max_rad)
         self._guidance = OrbitGuidance(
-            OrbitParameters(
-                radius_m=options.radius_m, direction=options.direction, bank_max_rad=bank_max
-            )
+            OrbitParameters(radius_m=options.radius_m, direction=options.direction, bank_max_rad=bank_max)
         )
         self._pilot: AttitudePilot | None = None
         self._with_gps = True
@@ -305,9 +312,7 @@ class OrbitFlight:
                 self._begin("gps back")
                 await self._regain_gps()
                 back_us = self._now_us + round(_GPS_BACK_S * 1e6)
-                await guided.follow(
-                    lambda _t: self._fly_on(entered_us) if self._now_us < back_us else None
-                )
+                await guided.follow(lambda _t: self._fly_on(entered_us) if self._now_us < back_us else None)
         finally:
             if not self._with_gps:
                 await self._regain_gps()

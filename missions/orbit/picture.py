@@ -89,8 +89,12 @@ def _draw_ground(axes: Any, flown: OrbitTruth, orbit: OrbitTruth | None) -> None
         )  # fmt: skip
     axes.plot(target[::thin, 1], target[::thin, 0], color=_RED, linewidth=2.0, label="target")
     axes.plot(target[-1, 1], target[-1, 0], "o", color=_RED, markersize=6)
-    axes.plot(track[0, 1], track[0, 0], "o", color="#15803d", markersize=8, markeredgecolor="white", label="start")
-    axes.plot(track[-1, 1], track[-1, 0], "s", color="#b91c1c", markersize=6, markeredgecolor="white", label="end")
+    axes.plot(
+        track[0, 1], track[0, 0], "o", color="#15803d", markersize=8, markeredgecolor="white", label="start"
+    )
+    axes.plot(
+        track[-1, 1], track[-1, 0], "s", color="#b91c1c", markersize=6, markeredgecolor="white", label="end"
+    )
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_title("over ground", fontsize=10, color=_INK)
     axes.set_xlabel("east, m", fontsize=9, color=_INK)
@@ -98,10 +102,16 @@ def _draw_ground(axes: Any, flown: OrbitTruth, orbit: OrbitTruth | None) -> None
     axes.legend(fontsize=8, frameon=False)
 
 
-def _draw_around(axes: Any, entry: OrbitTruth | None, orbit: OrbitTruth | None, options: OrbitOptions) -> None:
+def _draw_around(
+    axes: Any, entry: OrbitTruth | None, orbit: OrbitTruth | None, options: OrbitOptions
+) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.plot(
-        options.radius_m * np.sin(angle), options.radius_m * np.cos(angle), color=_GREY, linewidth=5.0, alpha=0.6
+        options.radius_m * np.sin(angle),
+        options.radius_m * np.cos(angle),
+        color=_GREY,
+        linewidth=5.0,
+        alpha=0.6,
     )
     for part, colour, width in ((entry, _GREY, 1.0), (orbit, _BLUE, 0.8)):
         if part is not None and len(part.time_s):

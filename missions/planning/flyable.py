@@ -58,7 +58,9 @@ class FlyablePath:
         offset = self.points_m[low:high] - np.array((north_m, east_m))
         return float(self.arc_m[low + int(np.argmin((offset**2).sum(axis=1)))])
 
-    def waypoints(self, *, deviation_m: float, spacing_min_m: float, spacing_max_m: float) -> list[tuple[float, float]]:
+    def waypoints(
+        self, *, deviation_m: float, spacing_min_m: float, spacing_max_m: float
+    ) -> list[tuple[float, float]]:
         """Points so close that straight legs stay within a deviation, as far as the least spacing allows."""
         bend = np.maximum(np.abs(self.curvature_per_m), 1e-9)
         chord = np.clip(np.sqrt(8.0 * deviation_m / bend), spacing_min_m, spacing_max_m)

@@ -30,7 +30,9 @@ class Profile:
     acceleration_m_s2: Array
 
 
-def speed_profile(arc_m: Array, curvature_per_m: Array, speed_m_s: float, limits: MulticopterLimits) -> Profile:
+def speed_profile(
+    arc_m: Array, curvature_per_m: Array, speed_m_s: float, limits: MulticopterLimits
+) -> Profile:
     """Profile along a path without stops.
 
     Args:

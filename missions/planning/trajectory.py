@@ -168,7 +168,9 @@ class _Piece:
     turn_s: float
 
 
-def _plan_pieces(table: ArcLengthTable, end: int, speed_m_s: float, limits: MulticopterLimits) -> list[_Piece]:
+def _plan_pieces(
+    table: ArcLengthTable, end: int, speed_m_s: float, limits: MulticopterLimits
+) -> list[_Piece]:
     bounds = [0, *(k for k in table.stops if k < end), end]
     pieces: list[_Piece] = []
     for first, last in itertools.pairwise(bounds):
@@ -201,7 +203,11 @@ def _duration_s(pieces: list[_Piece]) -> float:
 
 
 def _cut(
-    table: ArcLengthTable, pieces: list[_Piece], speed_m_s: float, limits: MulticopterLimits, duration_s: float
+    table: ArcLengthTable,
+    pieces: list[_Piece],
+    speed_m_s: float,
+    limits: MulticopterLimits,
+    duration_s: float,
 ) -> list[_Piece]:
     """The longest plan that ends, at rest, within the time."""
     kept: list[_Piece] = []

@@ -51,9 +51,7 @@ def _check_corners(curve: Polyline, radius_m: float, needs: str) -> None:
     taken = [0.0] * len(lengths)
     for k in range(1, len(vertices) - 1):
         (n0, e0), (n1, e1), (n2, e2) = vertices[k - 1], vertices[k], vertices[k + 1]
-        turn = abs(
-            math.remainder(math.atan2(e2 - e1, n2 - n1) - math.atan2(e1 - e0, n1 - n0), math.tau)
-        )
+        turn = abs(math.remainder(math.atan2(e2 - e1, n2 - n1) - math.atan2(e1 - e0, n1 - n0), math.tau))
         if turn > math.radians(170.0):
             raise PlanError(
                 "the pattern turns straight back on its own leg, which an aircraft can't; choose another pattern"

@@ -47,7 +47,9 @@ class Approach:
         if not self.height_m >= 10.0:
             raise PlanError(f"an approach from {self.height_m:g} m is too low; ask for 10 m or more")
         if not abs(self.circle_radius_m) >= 20.0:
-            raise PlanError(f"an approach circle of {self.circle_radius_m:g} m is too tight; ask for 20 m or more")
+            raise PlanError(
+                f"an approach circle of {self.circle_radius_m:g} m is too tight; ask for 20 m or more"
+            )
 
     @property
     def length_m(self) -> float:

@@ -67,9 +67,10 @@ class HeadingFlight:
 
     def _settled(self) -> bool:
         attitude = self._vehicle.latest(telemetry.Attitude)
-        return attitude is not None and abs(
-            math.remainder(attitude.yaw_rad - self.heading_rad, math.tau)
-        ) < _SETTLED_RAD
+        return (
+            attitude is not None
+            and abs(math.remainder(attitude.yaw_rad - self.heading_rad, math.tau)) < _SETTLED_RAD
+        )
 
     async def change_altitude(self, altitude_m: float) -> None:
         """Another height above home."""

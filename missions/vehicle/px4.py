@@ -111,9 +111,7 @@ class Px4:
 
     def limits(self, parameters: Mapping[str, float]) -> Limits:
         values = {**self.limiting_parameters, **parameters}
-        return MulticopterLimits(
-            speed_m_s=values["MPC_XY_VEL_MAX"], acceleration_m_s2=values["MPC_ACC_HOR"]
-        )
+        return MulticopterLimits(speed_m_s=values["MPC_XY_VEL_MAX"], acceleration_m_s2=values["MPC_ACC_HOR"])
 
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
         return asked_m  # a waypoint's param2 counts

@@ -111,7 +111,9 @@ class Vehicle(FixedWingFlight):
             await self.arm()
         await self.adapter.take_off(self, altitude_m)
         wings = self.kind is VehicleKind.FIXED_WING
-        slack_m, level_m_s = (max(3.0, 0.05 * altitude_m), 2.0) if wings else (max(0.5, 0.05 * altitude_m), 0.4)
+        slack_m, level_m_s = (
+            (max(3.0, 0.05 * altitude_m), 2.0) if wings else (max(0.5, 0.05 * altitude_m), 0.4)
+        )
 
         def reached() -> bool:
             position = self.latest(telemetry.Position)

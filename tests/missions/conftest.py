@@ -413,6 +413,9 @@ class FakeSitl:
         for autopilot in self.autopilots:
             autopilot.step(self.time_us)
 
+    def parameters(self, index, names):
+        return {name: self.autopilots[index].parameters[name][0] for name in names}
+
     def on_truth(self, listener):
         self._listeners.append(listener)
 

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from missions.cli_fly import _ratio, fly
+from missions.cli_fly import fly
+from missions.pattern_command import ratio_of
 
 
 @pytest.mark.parametrize(
@@ -32,7 +33,7 @@ def test_options_of_the_embedded_sitl_are_refused_with_a_vehicle_elsewhere(optio
     ("text", "ratio"), [("3:4", (3.0, 4.0)), ("1.4", (1.4, 1.0)), ("2/3", (2.0, 3.0)), ("5,6", (5.0, 6.0))]
 )
 def test_ratios(text: str, ratio: tuple[float, float]) -> None:
-    assert _ratio(text) == ratio
+    assert ratio_of(text) == ratio
 
 
 @pytest.mark.parametrize("text", ["0:0", "1:0", "-1:2", "0", "x:y", ""])

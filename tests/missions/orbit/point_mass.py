@@ -64,9 +64,7 @@ class PointMass:
         self.phi += rate * dt
         self.psi += G * math.tan(self.phi) / self.v * dt
         decay = math.exp(-dt / 4.0)
-        self.gusts = (
-            decay * self.gusts + self.gust * math.sqrt(1 - decay**2) * self.rng.standard_normal(2)
-        )
+        self.gusts = decay * self.gusts + self.gust * math.sqrt(1 - decay**2) * self.rng.standard_normal(2)
         air = self.v * np.array((math.cos(self.psi), math.sin(self.psi)))
         self.p = self.p + dt * (air + self.wind + self.gusts)
         self.target = self.target + dt * self.target_velocity

@@ -1,0 +1,129 @@
+"""The search patterns on the command line; a mission file of a user's own takes the same options."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import click
+
+from missions.mission_command import Given, MissionCommand, option
+
+_WINGS: Final = " Aircraft: {}."
+
+
+def ratio_of(text: str) -> tuple[float, float]:
+    """ "3:4", or a single number for so much to one."""
+    from missions.options import parse_pair
+
+    x, y = parse_pair(text, "--ratio", ":/,")
+    if not any(mark in text for mark in ":/,"):
+        y = 1.0
+    for frequency in (x, y):
+        if frequency <= 0.0:
+            raise click.UsageError(f"--ratio {text}: frequency {frequency:g} is not above 0; try --ratio 3:4")
+    return x, y
+
+
+def _build(given: Given, common: Mapping[str, Any]) -> Any:
+    from missions.options import FlightOptions, Via, parse_pair
+
+    width_m, height_m = parse_pair(given["size"], "--size", "x,")
+    if given["amplitude_x"] is not None:
+        width_m = 2.0 * given["amplitude_x"]
+    if given["amplitude_y"] is not None:
+        height_m = 2.0 * given["amplitude_y"]
+    phase_x_deg = phase_y_deg = None
+    if given["phase"] is not None:
+        phase_x_deg, phase_y_deg = parse_pair(given["phase"], "--phase", ",")
+        if "," not in given["phase"]:
+            phase_y_deg = 0.0  # one number is the difference of the two phases
+    return FlightOptions(
+        **common,
+        altitude_m=given["altitude"],
+        separation_m=given["separation"],
+        rate_hz=given["rate"],
+        pattern=given["pattern"],
+        width_m=width_m,
+        height_m=height_m,
+        ratio=None if given["ratio"] is None else ratio_of(given["ratio"]),
+        phase_x_rad=None if phase_x_deg is None else math.radians(phase_x_deg),
+        phase_y_rad=None if phase_y_deg is None else math.radians(phase_y_deg),
+        spacing_m=given["spacing"],
+        heading_rad=math.radians(given["heading"]),
+        speed_m_s=given["speed"],
+        period_s=given["period"],
+        periods=given["periods"],
+        search_time_s=given["search_time"],
+        via=Via(given["via"]),
+        acceptance_m=given["acceptance"],
+    )
+
+
+COMMAND: Final = MissionCommand(
+    names=("lissajous", "sector", "parallel-sweep", "expanding-square"),
+    help="Fly a search pattern: lissajous, sector, parallel-sweep or expanding-square.",
+    options=(
+        option(
+            "--pattern",
+            default="L3",
+            help="Lissajous pattern: L1 (circle), L2, L3, L4." + _WINGS.format("L2"),
+        ),
+        option(
+            "--size",
+            default="100",
+            help="Size of the pattern, m: SIDE or WIDTHxHEIGHT (east x north)."
+            + _WINGS.format("1000, or what its turns need"),
+        ),
+        option("--amplitude-x", type=float, help="Half the width, m (east), in place of --size."),
+        option("--amplitude-y", type=float, help="Half the height, m (north)."),
+        option("--ratio", help="Frequencies X:Y of a Lissajous pattern of your own, e.g. 3:4 or 1.4."),
+        option("--phase", help="Phases of x and y, degrees: X,Y or their difference."),
+        option(
+            "--spacing",
+            type=float,
+            default=10.0,
+            help="Track spacing of sweeps and squares, m." + _WINGS.format("2.5 turn radii"),
+        ),
+        option("--heading", type=float, default=0.0, help="First leg of sweeps and sectors, degrees."),
+        option("--altitude", type=float, default=10.0, help="Above home, m." + _WINGS.format("100")),
+        option(
+            "--speed",
+            type=float,
+            default=5.0,
+            help="Ground speed, m/s; of an aircraft, airspeed." + _WINGS.format("its own"),
+        ),
+        option("--period", type=float, help="Seconds once round a Lissajous pattern, in place of --speed."),
+        option("--periods", type=float, default=1.0, help="Times round."),
+        option("--search-time", type=float, help="Repeat the pattern for so many seconds."),
+        option(
+            "--via",
+            type=click.Choice(["waypoints", "setpoints"]),
+            default="waypoints",
+            help="How it is flown.",
+        ),
+        option(
+            "--acceptance",
+            type=float,
+            default=2.0,
+            help="Waypoint acceptance radius, m." + _WINGS.format("by its speed"),
+        ),
+        option("--rate", type=float, default=25.0, help="Setpoints per second."),
+        option(
+            "--separation",
+            type=float,
+            default=4.0,
+            help="Between the altitudes of a team, m." + _WINGS.format("20"),
+        ),
+    ),
+    build=_build,
+    fields=MappingProxyType(
+        {
+            "size": ("width_m", "height_m"),
+            "amplitude_x": ("width_m",),
+            "amplitude_y": ("height_m",),
+            "ratio": ("ratio", "pattern"),
+            "rate": ("rate_hz",),
+        }
+    ),
+)
