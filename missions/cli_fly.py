@@ -24,6 +24,7 @@ _COMMANDS: Final = {
     "parallel-sweep": _PATTERNS,
     "expanding-square": _PATTERNS,
     "orbit": "missions.orbit.command",
+    "occupancy": "missions.occupancy.command",
 }
 """Where each mission declares its options."""
 
@@ -168,7 +169,8 @@ def _owners(option_name: str) -> list[str]:
 @click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
 @click.option("--arg", multiple=True, metavar="NAME=VALUE", help="For a mission of your own.")
 def fly(**given: Any) -> int:
-    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, or a Python file of your own.
+    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, or a
+    Python file of your own.
 
     `flightstack fly MISSION --help` tells a mission's own options. Your own file has
     `async def fly(vehicle, options)`.

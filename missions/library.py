@@ -13,6 +13,7 @@ from typing import Any, Final
 from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
 from missions.mission import Mission
+from missions.occupancy.mission import OccupancyMission
 from missions.options import WINGS_SIDE_M, FlightOptions
 from missions.orbit.mission import OrbitMission
 from missions.patterns import (
@@ -29,7 +30,6 @@ from missions.patterns.lissajous import reduced_ratio
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.planning.turns import smallest_radius_m
 from missions.vehicle.vehicle import Vehicle
-
 
 CurveMaker = Callable[[FlightOptions], Curve]
 
@@ -201,6 +201,7 @@ MISSIONS: Final[Mapping[str, Mission[Any]]] = MappingProxyType(
         "parallel-sweep": PatternMission("parallel-sweep", _parallel_sweep),
         "expanding-square": PatternMission("expanding-square", _expanding_square),
         "orbit": OrbitMission(),
+        "occupancy": OccupancyMission(),
     }
 )
 """The missions that can be named on the command line."""

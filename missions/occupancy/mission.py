@@ -59,7 +59,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
     """A team shares an occupancy map and flies headings from cell to cell until the target is found."""
 
     name = "occupancy"
-    world_defaults = WorldDefaults(model="aerosonde")
+    world_defaults = WorldDefaults(model="aerosonde", wind="5@270", turbulence="light")
     together = True
 
     def __init__(self) -> None:
@@ -133,6 +133,14 @@ class OccupancyMission(Mission[OccupancyOptions]):
         if flown is None:
             return {"target_found": False, "time_to_find_s": None}
         return search_figures(flown.team, debriefing, flown.target_ne_m)
+
+    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+        detected = f"probability of detection {summary.get('probability_of_detection', 0.0):.2f}"
+        if not summary["target_found"]:
+            return (f"target not found, {detected}",)
+        error_m = summary["target_error_m"]
+        off = "" if error_m is None else f", {error_m:.0f} m off"
+        return (f"target found after {summary['time_to_find_s']:.0f} s{off}, {detected}",)
 
     def title(self, options: OccupancyOptions) -> str:
         return f"{self.name}, {options.vehicles} vehicles over {options.width_m:g} m x {options.height_m:g} m"
