@@ -47,6 +47,13 @@ class FlightPath(NamedTuple):
         """From a position to the place, clockwise from north."""
         return math.atan2(self.east_m - east_m, self.north_m - north_m)
 
+    def direction_rad(self, north_m: float, east_m: float) -> float:
+        """Direction of the path: of the tangent of a circle, else the bearing of the place; -pi..pi."""
+        bearing = self.bearing_rad(north_m, east_m)
+        if not self.circles:
+            return bearing
+        return math.remainder(bearing - math.copysign(0.5 * math.pi, self.radius_m), 2.0 * math.pi)
+
     def track_error_m(self, north_m: float, east_m: float) -> float:
         """Distance from the path: from a circle positive outside, from a line positive right of it."""
         if self.circles:

@@ -88,7 +88,8 @@ class Px4PlaneMessages(Px4Messages):
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62): nav_roll and nav_pitch stay 0, bearings are signed, as in PX4.
 
-        The height error is wanted less flown, the airspeed error flown less wanted.
+        In a circle the target bearing is the direction of the path. The height error is wanted less flown,
+        the airspeed error flown less wanted.
         """
         v = self.view.refreshed()
         if not v.has_global:
@@ -101,7 +102,7 @@ class Px4PlaneMessages(Px4Messages):
             return (0.0, 0.0, 0, 0, 0, error_m if flown else -v.alt_amsl_m, self._airspeed_error(), 0.0)
         north_m, east_m, down_m = v.pos
         course_rad = controller.course_setpoint_rad
-        bearing_rad = path.bearing_rad(north_m, east_m)
+        bearing_rad = path.direction_rad(north_m, east_m)
         return (
             0.0,
             0.0,

@@ -132,8 +132,13 @@ def test_guided_changes_fail_in_other_modes(command: int) -> None:
 
 @pytest.mark.parametrize(
     ("number", "text"),
-    [(16, "Flight mode change failed"), (24, "Flight mode change failed"), (17, "Q_ENABLE 0")]
-    + [(26, "No such mode 26"), (99, "No such mode 99")],
+    [
+        (16, "Flight mode change failed"),
+        (24, "Flight mode change failed"),
+        (17, "Q_ENABLE 0"),
+        (26, "No such mode 26"),
+        (99, "No such mode 99"),
+    ],
 )
 def test_arduplane_says_why_a_mode_is_refused(number: int, text: str) -> None:
     rig = rig_of("ardupilot", "ready")

@@ -1,0 +1,210 @@
+"""Missions of aircraft: which ones PX4 takes for flyable, ArduPlane's capacity; texts of flights."""
+
+import math
+
+import pytest
+
+from autopilot_bridge.commander import events
+from autopilot_bridge.commander.events import DisarmReason, FailsafeAction, FailsafeKind
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.flavours import ardupilot_plane_texts, px4_plane_texts
+from autopilot_bridge.flavours.px4_plane_parameters import PX4_PLANE_PARAMETERS
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.mission import MissionService, new_stores
+from autopilot_bridge.services.mission_feasibility import mission_problems
+from autopilot_bridge.services.mission_feasibility_aircraft import AircraftRules
+from autopilot_bridge.services.mission_policy import ARDUPLANE_MISSION_POLICY, PX4_PLANE_MISSION_POLICY
+from tests.services.mission_rig import HOME, Recorder
+
+TAKEOFF, WAYPOINT, LAND, LOITER_TO_ALT, LAND_START = 22, 16, 21, 31, 189
+FRAME = LocalFrame(HOME)
+RULES = AircraftRules(landing_angle_rad=math.radians(5.0), loiter_radius_m=80.0, required=2)
+
+
+def item(command: int, north_m: float = 0.0, east_m: float = 0.0, z: float = 50.0, **fields) -> MissionItem:
+    lat, lon, _ = FRAME.geodetic_from_ned(north_m, east_m, 0.0)
+    return MissionItem(command=command, **{"frame": 6, "x": lat, "y": lon, "z": z, **fields})
+
+
+def problems(*items: MissionItem, rules: AircraftRules = RULES, landed: bool = True) -> tuple[str, ...]:
+    return mission_problems(items, home_alt_m=HOME.alt_m, landed=landed, aircraft=rules)
+
+
+START = item(TAKEOFF, 200.0)
+LAND_HERE = item(LAND, 0.0, 0.0, 0.0)
+
+
+def test_a_shallow_approach_is_flyable_and_a_steep_one_is_not() -> None:
+    distance_m = 40.0 / math.tan(math.radians(5.0))
+    assert problems(START, item(WAYPOINT, -distance_m - 1.0, 0.0, 40.0), LAND_HERE) == ()
+    steep = problems(START, item(WAYPOINT, -0.9 * distance_m, 0.0, 40.0), LAND_HERE)
+    assert steep == ("Mission rejected: the landing approach is too steep",)
+    gentle = AircraftRules(landing_angle_rad=math.radians(10.0), loiter_radius_m=80.0, required=2)
+    assert problems(START, item(WAYPOINT, -0.9 * distance_m, 0.0, 40.0), LAND_HERE, rules=gentle) == ()
+
+
+def test_altitudes_over_sea_level_count_from_home() -> None:
+    entry = item(WAYPOINT, -500.0, 0.0, HOME.alt_m + 40.0, frame=5)
+    assert problems(START, entry, LAND_HERE) == ()
+
+
+def test_a_circle_is_left_along_its_tangent() -> None:
+    height_m = 30.0
+    way_m = height_m / math.tan(RULES.landing_angle_rad)
+    centre_m = math.hypot(way_m, 80.0)
+    assert problems(START, item(LOITER_TO_ALT, -centre_m - 1.0, 0.0, height_m), LAND_HERE) == ()
+    assert problems(START, item(LOITER_TO_ALT, -centre_m + 5.0, 0.0, height_m), LAND_HERE) != ()
+    assert problems(START, item(LOITER_TO_ALT, -90.0, 0.0, 30.0, param2=100.0), LAND_HERE) == (
+        "Mission rejected: landing point is within the loiter radius",
+    )
+
+
+def test_the_approach_comes_from_above_and_from_somewhere() -> None:
+    assert problems(START, item(WAYPOINT, -500.0, 0.0, -5.0), LAND_HERE) == (
+        "Mission rejected: the approach waypoint must be above the landing point",
+    )
+    assert problems(START, LAND_HERE) == ("Mission rejected: need landing approach",)
+
+
+@pytest.mark.parametrize(
+    ("required", "takeoff", "landing", "accepted"),
+    [
+        (0, False, False, True),
+        (1, False, True, False),
+        (1, True, False, True),
+        (2, True, False, False),
+        (2, False, True, True),
+        (3, True, False, False),
+        (3, True, True, True),
+        (4, True, False, False),
+        (4, False, False, True),
+        (4, True, True, True),
+    ],
+)
+def test_required_items(required: int, takeoff: bool, landing: bool, accepted: bool) -> None:
+    rules = AircraftRules(landing_angle_rad=0.1, loiter_radius_m=80.0, required=required)
+    plan = (
+        *((START,) if takeoff else ()),
+        item(WAYPOINT, -900.0, 0.0, 40.0),
+        *((LAND_HERE,) if landing else ()),
+    )
+    assert (problems(*plan, rules=rules, landed=False) == ()) is accepted
+
+
+def test_land_starts() -> None:
+    begin = MissionItem(command=LAND_START, frame=2)
+    entry = item(WAYPOINT, -900.0, 0.0, 40.0)
+    assert problems(START, begin, entry, LAND_HERE) == ()
+    assert "Mission rejected: more than one land start commands" in problems(
+        START, begin, begin, entry, LAND_HERE
+    )
+    assert "Mission rejected: invalid land start" in problems(START, entry, LAND_HERE, begin)
+
+
+def test_the_rules_follow_the_parameters() -> None:
+    store = ParameterStore(PX4_PLANE_PARAMETERS)
+    stores = new_stores()
+    channel = Recorder("one")
+
+    class Link:
+        channels = (channel,)
+
+    service = MissionService(
+        PX4_PLANE_MISSION_POLICY,
+        stores,
+        Link(),
+        lambda severity, text: None,
+        home=lambda: GeodeticPosition(lat_deg=HOME.lat_deg, lon_deg=HOME.lon_deg, alt_m=HOME.alt_m),
+        parameters=store,
+    )
+    plan = (START, item(WAYPOINT, -400.0, 0.0, 40.0), LAND_HERE)
+    stores[MissionType.MISSION].replace(plan, 1)
+    assert not service.mission_valid()
+    store.set("FW_LND_ANG", 10.0)
+    assert service.mission_valid()
+    stores[MissionType.MISSION].replace(plan[:2], 2)
+    assert service.problems() == ("Mission rejected: Landing waypoint/pattern required",)
+    store.set("MIS_TKO_LAND_REQ", 0)
+    assert service.mission_valid()
+
+
+def test_a_multicopters_missions_are_judged_as_before() -> None:
+    assert mission_problems((START, item(WAYPOINT)), home_alt_m=HOME.alt_m) == ()
+
+
+def test_arduplane_holds_655_items() -> None:
+    assert ARDUPLANE_MISSION_POLICY.capacity[MissionType.MISSION] == 655
+
+
+def text_of(flavour: str, event: events.Event) -> list[str]:
+    texts = {"px4": px4_plane_texts, "ardupilot": ardupilot_plane_texts}[flavour]
+    return [notice.text for notice in texts.notices(event)]
+
+
+T = {"time_us": 0}
+
+
+@pytest.mark.parametrize(
+    ("event", "text"),
+    [
+        (events.Armed(**T), "Throttle armed"),
+        (
+            events.LaunchDetected(**T, acceleration_m_s2=0.0, delay_s=0.2),
+            "Armed AUTO, xaccel = 0.0 m/s/s, waiting 0.2 sec",
+        ),
+        (
+            events.TakeoffStarted(**T, ground_speed_m_s=0.0, height_m=50.0, heading_deg=353.1),
+            "Triggered AUTO. GPS speed = 0.0",
+        ),
+        (events.MissionItemReached(**T, index=2, distance_m=51.2), "Reached waypoint #2 dist 51m"),
+        (events.MissionFinished(**T), "Mission complete, changing mode to RTL"),
+        (events.LandingApproachStarted(**T, height_m=32.53), "Landing approach start at 32.5m"),
+        (
+            events.FlareStarted(**T, height_m=4.46, sink_m_s=1.531, ground_speed_m_s=17.2),
+            "Flare 4.5m sink=1.53 speed=17.2",
+        ),
+        (events.AltitudeChanged(**T, height_m=100.0), "Change alt to 100.0"),
+        (events.LandingAborted(**T, height_m=30.0), "Landing aborted, climbing to 30m"),
+        (events.AirspeedChanged(**T, valid=False), "Airspeed sensor 1 failure. Disabling"),
+        (
+            events.ArmingDenied(**T, mode=FlightMode.RETURN, reasons=(Reason.MODE_NOT_ARMABLE,)),
+            "Arm: RTL mode not armable",
+        ),
+        (
+            events.FailsafeActivated(**T, kind=FailsafeKind.MANUAL_LOST, action=FailsafeAction.CIRCLE),
+            "RC Short Failsafe: switched to CIRCLE",
+        ),
+        (
+            events.FailsafeActivated(**T, kind=FailsafeKind.MANUAL_LOST_LONG, action=FailsafeAction.RETURN),
+            "RC Long Failsafe On: switched to RTL",
+        ),
+    ],
+)
+def test_what_arduplane_says(event: events.Event, text: str) -> None:
+    assert text_of("ardupilot", event) == [text]
+
+
+def test_arduplane_after_a_landing() -> None:
+    landed = events.Disarmed(**T, reason=DisarmReason.LANDED)
+    assert text_of("ardupilot", landed) == ["Throttle disarmed", "Auto disarmed"]
+    assert text_of("ardupilot", events.MissionFinished(**T, landed=True)) == []
+    assert text_of("ardupilot", events.MissionItemReached(**T, index=1)) == []
+
+
+@pytest.mark.parametrize(
+    ("event", "text"),
+    [
+        (events.Armed(**T), "Armed by external command"),
+        (events.ModeChanged(**T, mode=FlightMode.MISSION, previous=FlightMode.HOLD), "Executing Mission"),
+        (events.TakeoffDetected(**T), "Takeoff detected"),
+        (events.LandingDetected(**T), "Landing detected"),
+        (events.MissionFinished(**T, landed=True), "Mission finished, landed"),
+        (events.Disarmed(**T, reason=DisarmReason.LANDED), "Disarmed by landing"),
+        (events.FlareStarted(**T, height_m=1.5, sink_m_s=1.0, ground_speed_m_s=18.0), "Landing, flaring"),
+    ],
+)
+def test_what_px4_says(event: events.Event, text: str) -> None:
+    assert text_of("px4", event) == [text]
