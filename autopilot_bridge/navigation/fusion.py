@@ -82,7 +82,6 @@ HAS_MAG: Final = 4
 HAS_HOLD: Final = 8
 HAS_HOLD_HEIGHT: Final = 16
 HAS_REST: Final = 32
-HAS_REST_RATE: Final = 128
 # what was accepted
 ACCEPTED_GPS_VEL: Final = 1
 ACCEPTED_GPS_POS: Final = 2
@@ -291,11 +290,11 @@ def fuse_direct(p: Array, work: Array, index: int, residual: float, variance: fl
 
 
 @kernel
-def fuse_rest(p: Array, core: Array, work: Array, obs: Array, with_rate: bool) -> None:
-    """Standing still: velocity zero, and (`with_rate`) the mean gyro reading is bias and Earth's rotation."""
+def fuse_rest(p: Array, core: Array, work: Array, obs: Array) -> None:
+    """Standing still: velocity zero, and the mean gyro reading is bias and Earth's rotation."""
     for a in range(3):
         fuse_direct(p, work, VEL + a, -core[X_VEL + a], obs[REST_VEL_VAR])
-    if with_rate and core[SUM_GYRO_TIME] > 0.0:
+    if core[SUM_GYRO_TIME] > 0.0:
         for a in range(3):
             rate = core[SUM_GYRO + a] / core[SUM_GYRO_TIME]
             for k in range(3):
@@ -339,7 +338,7 @@ def update(
     if has & HAS_HOLD_HEIGHT:
         fuse_direct(p, work, POS + 2, obs[HOLD + 2] - core[X_POS + 2], obs[HOLD_HEIGHT_VAR])
     if has & HAS_REST:
-        fuse_rest(p, core, work, obs, has & HAS_REST_RATE != 0)
+        fuse_rest(p, core, work, obs)
         restart_mean_rate(core)
     if has:
         inject(core, work)

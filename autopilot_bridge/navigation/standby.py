@@ -79,13 +79,11 @@ class Standby:
         p, solution, obs = parameters, self._solution, self._solution.obs
         has = 0
         if at_rest:
-            if self._rested:
+            if self._rested and not self._is_turned(parameters, time_us):
                 has |= f.HAS_REST
-                if not self._is_turned(parameters, time_us):
-                    has |= f.HAS_REST_RATE
             else:
                 f.restart_mean_rate(solution.core)
-                if self.held:
+                if self.held and not self._rested:
                     self._forget_velocity(clocks)
         self._rested = at_rest
         lost = clocks.horizontal_aid_us < 0 or time_us - clocks.horizontal_aid_us > p.no_aid_timeout_s * 1e6
@@ -111,9 +109,10 @@ class Standby:
         return has
 
     def _is_turned(self, parameters: NavigationParameters, time_us: int) -> bool:
-        """The vehicle stands, and yet it turns: a gust swings an aircraft round on its wheels.
+        """The vehicle stands, and yet it turns: a gust rocks an aircraft and swings it round on its wheels.
 
-        Taken for the gyro's bias, the turn would be lost to the heading, and go on in the flight.
+        Taken for the gyro's bias, the turn would be lost to the heading, and go on in the flight; nor does
+        the vehicle's middle stand still in it.
         """
         core, p = self._solution.core, self._solution.p
         span_s = core[SUM_GYRO_TIME]
