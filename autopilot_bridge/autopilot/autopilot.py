@@ -6,7 +6,7 @@ clock.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,8 +42,10 @@ from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.px4 import Px4Messages
 from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
-from flightsim.flight_envelope import FlightEnvelope
 from flightsim.interface import SensorReadings
+
+if TYPE_CHECKING:  # its module brings scipy
+    from flightsim.flight_envelope import FlightEnvelope
 
 SLOW_RATE_HZ: Final = 50
 _COMPONENT: Final = 1
@@ -113,7 +115,7 @@ class Autopilot:
         readings: SensorReadings,
         physics_rate_hz: int,
         parameters: Mapping[str, float] | None = None,
-        envelope: FlightEnvelope | None = None,
+        envelope: "FlightEnvelope | None" = None,
         unix_epoch_us: int = 0,
         inject_failure: FailureHook | None = None,
     ) -> None:

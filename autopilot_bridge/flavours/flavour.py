@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,9 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 from autopilot_bridge.services.channel import AddressRule
 from flightsim.airframe import AirframeKind, LaunchKind
-from flightsim.flight_envelope import FlightEnvelope
+
+if TYPE_CHECKING:  # its module brings scipy
+    from flightsim.flight_envelope import FlightEnvelope
 
 Array = NDArray[np.float64]
 
@@ -177,7 +179,7 @@ class Flavour:
     command_address: Callable[[int], AddressRule]
     parameter_definitions: Callable[[], tuple[ParameterDefinition, ...]]
     airframe: Mapping[str, float]
-    airframe_of: Callable[[FlightEnvelope], Mapping[str, float]] | None
+    airframe_of: "Callable[[FlightEnvelope], Mapping[str, float]] | None"
     launch_parameters: Mapping[LaunchKind, Mapping[str, float]]
     sensor_bits: SensorBits
     has_airspeed: bool

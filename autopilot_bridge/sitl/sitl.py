@@ -6,7 +6,7 @@ autopilots.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.flavours import get_flavour
@@ -21,7 +21,6 @@ from autopilot_bridge.sitl.launch_crew import LaunchCrew
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder, TruthEncoder
 from autopilot_bridge.tlog import TlogWriter
 from flightsim.airframe import Airframe, AirframeKind, LaunchKind
-from flightsim.flight_envelope import FlightEnvelope, flight_envelope
 from flightsim.initial_state import InitialState
 from flightsim.payload import GroundTargets, Payload, PayloadParameters
 from flightsim.sensors import (
@@ -32,6 +31,9 @@ from flightsim.sensors import (
     SensorSuiteParameters,
 )
 from flightsim.world import World, WorldParameters
+
+if TYPE_CHECKING:
+    from flightsim.flight_envelope import FlightEnvelope
 
 TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a frame of truth."""
@@ -193,8 +195,10 @@ def _gps(flavour: str) -> GpsParameters:
     return GpsParameters(fix_timeline=RTK_FIX_AFTER_10_S if flavour == "ardupilot" else FIX_AT_BOOT)
 
 
-def _envelope(airframe: Airframe, configuration: SitlConfiguration) -> FlightEnvelope:
+def _envelope(airframe: Airframe, configuration: SitlConfiguration) -> "FlightEnvelope":
     """What an aircraft can do, found by trimming its model."""
+    from flightsim.flight_envelope import flight_envelope  # brings scipy, which a multicopter needs not
+
     return flight_envelope(airframe, home=configuration.place, environment=configuration.environment)
 
 

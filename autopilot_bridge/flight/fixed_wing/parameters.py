@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final, Self
 
+from autopilot_bridge.control.fixed_wing.gains import gains_for
+
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
 
@@ -43,6 +45,9 @@ _MAY_BE_ZERO: Final = frozenset(
     }
 )
 _MAY_BE_INFINITE: Final = frozenset({"acceptance_altitude_m", "position_lost_wait_s"})
+
+
+_PERIODS: Final = 2.5  # of the guidance over the time of a turn through a radian and of a bank's reversal
 
 
 class LaunchKind(IntEnum):
@@ -175,6 +180,10 @@ class FixedWingFlightParameters:
         # a circle flown at two thirds of the bank limit's turn rate leaves room for wind
         radius = e.airspeed_trim_m_s**2 / (9.80665 * math.tan(0.6 * bank))
         climb = max(0.3, 0.6 * e.climb_max_m_s)
+        # the guidance asks for no turn faster than the aircraft can roll into and fly: else it swings to and
+        # fro between its bank limits
+        turn_s = e.airspeed_trim_m_s / (9.80665 * math.tan(bank))
+        reversal_s = 2.0 * bank / float(gains_for(e)["roll_slew_rad_s"])
         climb_pitch = e.trim_pitch_rad + math.atan2(max(0.0, e.climb_max_m_s), e.airspeed_trim_m_s)
         values: dict[str, Any] = {
             "airspeed_min_m_s": e.airspeed_min_m_s,
@@ -189,6 +198,7 @@ class FixedWingFlightParameters:
             "pitch_max_rad": e.pitch_max_rad,
             "trim_pitch_rad": e.trim_pitch_rad,
             "trim_throttle": e.trim_throttle,
+            "guidance_period_s": max(10.0, _PERIODS * (turn_s + reversal_s)),
             "manual_bank_max_rad": bank,
             "manual_pitch_max_rad": e.pitch_max_rad,
             "manual_pitch_down_max_rad": -e.pitch_min_rad,
