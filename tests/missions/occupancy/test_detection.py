@@ -104,3 +104,26 @@ def test_bad_readings_are_dropped_and_counted():
 def test_bad_threshold_is_refused_by_name(threshold_nt):
     with pytest.raises(PlanError, match="--threshold"):
         AnomalyDetector(threshold_nt=threshold_nt)
+
+
+def test_noise_about_the_threshold_does_not_cut_an_anomaly_in_two():
+    detector = AnomalyDetector(threshold_nt=3.0)
+    ended = []
+    for k, residual in enumerate([0.0, 0.0, 3.5, 4.0, 2.9, 3.2, 2.0, 3.4, 1.0, 0.0]):
+        anomaly = detector.update(100_000 * (k + 1), 48_000.0 + residual, 48_000.0, 2.5 * k, 0.0)
+        if anomaly is not None:
+            ended.append(anomaly)
+    (anomaly,) = ended
+    assert anomaly.samples == 4  # beyond the threshold itself
+    assert anomaly.peak_nt == pytest.approx(4.0, abs=0.1)
+
+
+def test_a_level_that_is_off_does_not_blind_for_good():
+    detector = AnomalyDetector(threshold_nt=3.0, longest_s=10.0)
+    for k in range(3):
+        detector.update(100_000 * (k + 1), 48_020.0, 48_000.0, 0.0, 0.0)  # begun over a target
+    for k in range(3, 150):
+        assert detector.update(100_000 * (k + 1), 48_000.0, 48_000.0, 2.5 * k, 0.0) is None
+    assert detector.levels_lost == 1
+    assert not detector.anomalous
+    assert detector.residual_nt == pytest.approx(0.0)
