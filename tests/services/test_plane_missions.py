@@ -199,6 +199,11 @@ def test_arduplane_after_a_landing() -> None:
     [
         (events.Armed(**T), "Armed by external command"),
         (events.ModeChanged(**T, mode=FlightMode.MISSION, previous=FlightMode.HOLD), "Executing Mission"),
+        (events.LaunchDetected(**T, acceleration_m_s2=1.0, delay_s=0.0), "Takeoff on runway"),
+        (
+            events.LaunchDetected(**T, acceleration_m_s2=50.0, delay_s=0.2),
+            "Launch detected. Enabling motors in 0.2s",
+        ),
         (events.TakeoffDetected(**T), "Takeoff detected"),
         (events.LandingDetected(**T), "Landing detected"),
         (events.MissionFinished(**T, landed=True), "Mission finished, landed"),

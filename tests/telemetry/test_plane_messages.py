@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingParameters
 from autopilot_bridge.flavours.ardupilot_plane_modes import CUSTOM_MODES
@@ -22,14 +24,18 @@ from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.services.channel import Source
+from autopilot_bridge.services.message_interval import MessageIntervalService
 from autopilot_bridge.telemetry import ardupilot_plane, px4_plane
 from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
 from autopilot_bridge.telemetry.common import TelemetrySources
 from autopilot_bridge.telemetry.flight_path import FlightPath, flight_path
 from autopilot_bridge.telemetry.px4_plane import Px4PlaneMessages
+from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
 from autopilot_bridge.tlog import TlogReader
 from flightsim import interface
+from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 from flightsim.rotations import quaternion_from_euler
 
@@ -248,6 +254,28 @@ def test_every_message_has_the_fields_of_its_definition() -> None:
         for message_id in group:
             assert message_id in arduplane
     assert set(px4_plane.ONBOARD_RATES_HZ) <= set(Aircraft().px4.builders())
+
+
+@pytest.mark.parametrize(("rate_hz", "result"), [(40.0, Result.ACCEPTED), (45.0, 2), (50.0, 2), (4.0, 0)])
+def test_arduplane_refuses_rates_beyond_its_loop(rate_hz: float, result: int) -> None:
+    """Reference section 2: a loop of 50 Hz sends 40 Hz, and says what to increase for more."""
+    aircraft = Aircraft()
+    cache = PayloadCache(aircraft.ardupilot.builders())
+    channel = SimpleNamespace(name="one", send=lambda message: None)
+    table = StreamTable(cache, channel, {}, physics_step_us=4000)  # type: ignore[arg-type]
+    texts: list[str] = []
+    service = MessageIntervalService(
+        FIRMWARES["ardupilot", AirframeKind.FIXED_WING].intervals,
+        {"one": table},
+        cache,
+        lambda severity, text: texts.append(text),
+        {},
+    )
+    source = Source(channel, 255, 190)
+    assert service.set_interval(source, definition("ATTITUDE").message_id, 1e6 / rate_hz) == result
+    assert bool(texts) is (result == 2)
+    if texts:
+        assert texts == ["Requested rate for message ID 30 too fast. Increase SCHED_LOOP_RATE"]
 
 
 # the recorded flights
