@@ -207,10 +207,12 @@ class MissionTask(PlanTask):
         return circle.done(ctx, self._state, self._place_after(ctx))
 
     def _came_from(self, ctx: FlightContext) -> Array | None:
-        """A circle is left where the aircraft is, on its height."""
-        circle, state = self._circle, self._state
+        """A circle is left where the aircraft is, on its height; a waypoint circled at for height as any other."""
+        circle, state, leg = self._circle, self._state, self._leg
         if circle is None:
             return None
+        if leg is not None:
+            return np.array(leg.target)
         return np.array([state.north_m, state.east_m, float(circle.task.centre_ned_m[2])])
 
     def _fly_here(self, ctx: FlightContext) -> None:
