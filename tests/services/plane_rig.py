@@ -72,7 +72,6 @@ class PlaneRig(ServiceRig):
         self.tick()
         self.tick()
         self.connect()
-        self.status._greeted.add(self.channel.name)
 
     def _flight_parameters(self):
         return self.flavour.flight_parameters(self.store, envelope=SMALL_AIRCRAFT)
