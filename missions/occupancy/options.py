@@ -163,7 +163,12 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
     """
     limits.check_altitude(options.own_altitude_m)
     north_m, east_m = options.area_ne_m
-    limits.check_reach(math.hypot(abs(north_m) + 0.5 * options.height_m, abs(east_m) + 0.5 * options.width_m))
+    reach_m = math.hypot(abs(north_m) + 0.5 * options.height_m, abs(east_m) + 0.5 * options.width_m)
+    if not reach_m <= limits.reach_m:
+        raise PlanError(
+            f"the searched area reaches {reach_m:.0f} m from the map's home, more than {limits.reach_m:g} m; "
+            "ask for a smaller --size, or an --area nearer to it"
+        )
     speed_m_s = options.speed_m_s
     if speed_m_s is None:
         raise PlanError("the options are not those of a vehicle yet: call for_vehicle")

@@ -1,4 +1,4 @@
-"""Aircraft as points that turn at one rate in wind, over a target's Gaussian: what a search is tried out on."""
+"""Aircraft as points that turn at one rate in wind, over a target: what a search is tried out on."""
 
 import math
 

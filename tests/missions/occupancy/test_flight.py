@@ -1,0 +1,209 @@
+"""Whole searches in embedded worlds: from the ground, until the target is found, back to the ground."""
+
+import asyncio
+import json
+import math
+from contextlib import asynccontextmanager
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from missions import cli
+from missions.errors import PlanError
+from missions.occupancy.mission import MAP_NAME, OccupancyMission
+from missions.occupancy.noise_check import require_quiet
+from missions.occupancy.options import OccupancyOptions
+from missions.request import RunRequest
+from missions.scenario import Scenario
+from missions.session import fly
+
+SMALL = OccupancyOptions(
+    vehicles=2,
+    altitude_m=15.0,
+    separation_m=6.0,
+    width_m=400.0,
+    height_m=400.0,
+    cell_m=100.0,
+    detection_range_m=60.0,
+    confirmations=1,
+    target_ne_m=(110.0, 30.0),
+)
+
+
+def request(out, options=SMALL, **values) -> RunRequest:
+    return RunRequest(options=options, out=out, **{"seed": 1, "model": "iris", **values})
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """A team of two quadrotors that finds its target."""
+    return fly(OccupancyMission(), request(tmp_path_factory.mktemp("runs") / "found"))
+
+
+def test_the_target_is_found_and_all_are_down_again(found):
+    summary = found.summary
+    assert (found.outcome, found.reason) == ("completed", "")
+    assert summary["target_found"] is True
+    assert 0.0 < summary["time_to_find_s"] < 300.0
+    assert summary["target_error_m"] < 80.0
+    assert summary["target_m"] == {"north": 110.0, "east": 30.0}
+    assert 0.0 < summary["probability_of_detection"] < 1.0
+    assert summary["least_separation_m"] > 5.0
+    assert [block["phases"][-1]["name"] for block in summary["vehicles"]] == ["return", "return"]
+    for searcher in summary["searchers"]:
+        assert searcher["readings"] > 100
+        assert searcher["readings_dropped"] <= 2
+        assert searcher["heading_commands"] >= 1
+    assert sum(len(searcher["anomalies"]) for searcher in summary["searchers"]) >= 1
+
+
+def test_the_folder_holds_map_summary_log_and_picture(found):
+    names = {path.name for path in found.folder.iterdir()}
+    assert names == {MAP_NAME, "summary.json", "flight.tlog", "track.png"}
+    assert json.loads((found.folder / "summary.json").read_text())["target_found"] is True
+    assert (found.folder / "track.png").stat().st_size > 20_000
+
+
+def test_a_search_with_the_published_map_is_the_same_search(found, tmp_path):
+    options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
+    again = fly(OccupancyMission(), request(tmp_path / "again", options, picture=False))
+    assert (again.folder / "flight.tlog").read_bytes() == (found.folder / "flight.tlog").read_bytes()
+    assert not (again.folder / MAP_NAME).exists()
+
+
+def test_a_map_without_data_in_the_area_is_refused_before_anything_starts(found, tmp_path):
+    with np.load(found.folder / MAP_NAME) as archive:
+        content = dict(archive)
+    content["total_field_nt"][content["total_field_nt"].shape[0] // 2] = math.nan
+    np.savez(tmp_path / "hole.npz", **content)
+    options = replace(SMALL, map_file=str(tmp_path / "hole.npz"))
+    with pytest.raises(PlanError, match="the magnetic map has no data in part of it"):
+        fly(OccupancyMission(), request(tmp_path / "run", options))
+    assert not (tmp_path / "run").exists()
+    with pytest.raises(PlanError, match="does not cover it"):
+        fly(
+            OccupancyMission(),
+            request(
+                tmp_path / "run", replace(options, width_m=4000.0, map_file=str(found.folder / MAP_NAME))
+            ),
+        )
+
+
+class WithoutMagnetometer(OccupancyMission):
+    def scenario(self, options, setting):
+        super().scenario(options, setting)
+        return Scenario()
+
+
+def test_without_a_magnetometer_nobody_takes_off(found, tmp_path):
+    options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
+    result = fly(WithoutMagnetometer(), request(tmp_path / "run", options))
+    assert result.outcome == "failed"
+    assert "no survey magnetometer" in result.reason
+    for block in result.summary["vehicles"]:
+        assert [phase["name"] for phase in block["phases"]] == ["checks"]
+    assert result.summary["target_found"] is False
+
+
+def test_a_map_of_another_place_keeps_everybody_on_the_ground(found, tmp_path):
+    options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
+    elsewhere = request(tmp_path / "run", options, home="47.6,8.6,500")
+    result = fly(OccupancyMission(), elsewhere)
+    assert result.outcome == "failed"
+    assert "the map of this place" in result.reason
+    assert all(block["distance_m"] < 5.0 for block in result.summary["vehicles"])
+
+
+def test_a_search_that_finds_nothing_ends_in_time(found, tmp_path):
+    options = replace(SMALL, vehicles=1, confirmations=50, search_time_s=60.0)
+    result = fly(OccupancyMission(), request(tmp_path / "run", options))
+    assert result.outcome == "completed"
+    assert result.summary["target_found"] is False
+    assert result.summary["time_to_find_s"] is None
+    assert result.summary["searchers"][0]["search_s"] == pytest.approx(60.0, abs=1.0)
+    assert (result.folder / "track.png").exists()
+
+
+class Magnetometer:
+    """A vehicle that is nothing but a magnetometer."""
+
+    system_id = 1
+
+    def __init__(self, readings_nt):
+        self.payload = SimpleNamespace(on_total_field=self.listen)
+        self.readings_nt = readings_nt
+
+    def listen(self, listener):
+        for k, value in enumerate(self.readings_nt):
+            listener(100_000 * k, value)
+        return lambda: None
+
+    @asynccontextmanager
+    async def deadline(self, seconds, awaited):
+        yield
+
+
+def test_a_threshold_within_the_noise_is_refused_on_the_ground():
+    readings = 48_000.0 + np.random.default_rng(1).normal(0.0, 2.0, 20)
+    with pytest.raises(PlanError, match=r"--threshold 3 nT is below 3 times the noise of vehicle 1"):
+        asyncio.run(require_quiet(Magnetometer(readings), threshold_nt=3.0))
+    quiet = Magnetometer(0.1 * readings)
+    assert asyncio.run(require_quiet(quiet, threshold_nt=3.0)) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--connect", "udpin:127.0.0.1:24999"], "give it with --map FILE"),
+        (["--target", "500"], "give NORTH,EAST"),
+        (["--target", "9000,0"], "outside the searched map"),
+        (["--cell", "50"], "too small for an aircraft"),
+        (["--threshold", "0.5"], "below 3 standard deviations of the noise"),
+        (["--size", "20000"], "smaller --size"),
+    ],
+)
+def test_the_command_line_refuses_with_usage_errors(arguments, words, tmp_path, capsys):
+    out = tmp_path / "run"
+    assert cli.run_command_line(["fly", "occupancy", "--out", str(out), *arguments]) == 2
+    assert words in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_three_aircraft_search_in_wind(autopilot, tmp_path):
+    options = OccupancyOptions(vehicles=3)
+    result = fly(
+        OccupancyMission(),
+        request(
+            tmp_path / "run",
+            options,
+            model="aerosonde",
+            autopilot=autopilot,
+            wind_speed_m_s=5.0,
+            wind_from_deg=270.0,
+            turbulence="light",
+        ),
+    )
+    assert (result.outcome, result.reason) == ("completed", "")
+    summary = result.summary
+    assert summary["target_found"] is True
+    assert summary["time_to_find_s"] < 900.0
+    assert summary["target_error_m"] < 200.0
+    assert summary["heading_settled_error_95_deg"] < 5.0
+    assert summary["least_separation_m"] > 10.0
+
+
+@pytest.mark.slow
+def test_a_quadrotor_and_two_aircraft_search_together(tmp_path):
+    options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0, target_ne_m=(-500.0, 400.0))
+    models = ("aerosonde", "aerosonde", "iris")
+    result = fly(OccupancyMission(), request(tmp_path / "run", options, model=models, wind_speed_m_s=4.0))
+    assert (result.outcome, result.reason) == ("completed", "")
+    summary = result.summary
+    assert [searcher["kind"] for searcher in summary["searchers"]] == ["fixed_wing"] * 2 + ["multicopter"]
+    assert summary["target_found"] is True
+    assert summary["heading_settled_error_95_deg"] < 5.0
+    assert summary["least_separation_m"] > 8.0
