@@ -36,12 +36,15 @@ from autopilot_bridge.services.parameters import ParameterService
 from autopilot_bridge.services.setpoints import SetpointService
 from autopilot_bridge.services.status_text import StatusTextService
 from autopilot_bridge.services.timesync import TimeSyncService
-from autopilot_bridge.telemetry.ardupilot import STREAM_GROUPS, STREAM_RATE_PARAMETERS, ArdupilotMessages
+from autopilot_bridge.telemetry.ardupilot import STREAM_RATE_PARAMETERS, ArdupilotMessages
+from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
 from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.px4 import Px4Messages
+from autopilot_bridge.telemetry.px4_plane import Px4PlaneMessages
 from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
+from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 
 if TYPE_CHECKING:  # its module brings scipy
@@ -358,7 +361,7 @@ class Autopilot:
                 continue
             rate_hz = self.parameters.get(name)
             interval_us = round(MICROSECONDS / rate_hz) if rate_hz > 0 else -1
-            for message_id in STREAM_GROUPS[group]:
+            for message_id in self._firmware.intervals.groups[group]:
                 self._ports[index].set_default(message_id, interval_us, self._time_us)
 
     def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
@@ -375,12 +378,16 @@ class Autopilot:
             battery_level=lambda: int(self.commander.battery_level),
             position_ready=lambda: self.commander.situation.position,
             unix_epoch_us=unix_epoch_us,
+            task=lambda: self.commander.tasks.task,
+            missions=self.commander.missions,
         )
+        aircraft = self.flavour.kind is AirframeKind.FIXED_WING
         if self.flavour.name == "px4":
-            return Px4Messages(
+            messages = Px4PlaneMessages if aircraft else Px4Messages
+            return messages(
                 sources, current_mode=self._status.current_mode, orbit=lambda: self.commander.tasks.orbit
             )
-        return ArdupilotMessages(sources)
+        return ArduPlaneMessages(sources) if aircraft else ArdupilotMessages(sources)
 
     def _on_plan_changed(self, mission_type: MissionType) -> None:
         if mission_type is MissionType.MISSION:

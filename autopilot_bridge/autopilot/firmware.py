@@ -22,7 +22,7 @@ from autopilot_bridge.services.parameters import (
     PX4_PARAMETER_POLICY,
     ParameterPolicy,
 )
-from autopilot_bridge.telemetry import ardupilot, px4
+from autopilot_bridge.telemetry import ardupilot, ardupilot_plane, px4, px4_plane
 from flightsim.airframe import AirframeKind
 
 _ARDUPILOT_MAX_RATE_HZ: Final = 0.8 * 400.0  # of SCHED_LOOP_RATE
@@ -97,12 +97,26 @@ _ARDUPILOT: Final = Firmware(
 FIRMWARES: Final[Mapping[tuple[str, AirframeKind], Firmware]] = MappingProxyType(
     {
         ("px4", AirframeKind.MULTICOPTER): _PX4,
-        ("px4", AirframeKind.FIXED_WING): replace(_PX4, missions=PX4_PLANE_MISSION_POLICY),
+        ("px4", AirframeKind.FIXED_WING): replace(
+            _PX4,
+            missions=PX4_PLANE_MISSION_POLICY,
+            rates_hz=MappingProxyType(
+                {
+                    **_PX4.rates_hz,
+                    "onboard": px4_plane.ONBOARD_RATES_HZ,
+                    "gcs": px4_plane.GCS_RATES_HZ,
+                }
+            ),
+        ),
         ("ardupilot", AirframeKind.MULTICOPTER): _ARDUPILOT,
         ("ardupilot", AirframeKind.FIXED_WING): replace(
             _ARDUPILOT,
             missions=ARDUPLANE_MISSION_POLICY,
-            intervals=replace(_ARDUPILOT.intervals, max_rate_hz=_ARDUPLANE_MAX_RATE_HZ),
+            intervals=replace(
+                _ARDUPILOT.intervals,
+                max_rate_hz=_ARDUPLANE_MAX_RATE_HZ,
+                groups=ardupilot_plane.STREAM_GROUPS,
+            ),
         ),
     }
 )
