@@ -8,11 +8,11 @@ import math
 from collections.abc import Callable
 from typing import Final
 
+from autopilot_bridge.commander.airspeed import AirspeedWatch
 from autopilot_bridge.commander.arming import MODE_REASONS, arming_reasons, shortfalls
 from autopilot_bridge.commander.battery import BatteryMonitor
 from autopilot_bridge.commander.disarming import AutoDisarm
 from autopilot_bridge.commander.events import (
-    AirspeedChanged,
     Armed,
     ArmingDenied,
     BatteryLevel,
@@ -130,7 +130,7 @@ class Commander:
         self._disarming = AutoDisarm()
         self._last_prearm_report_us = 0
         self._sticks_at_command = flight.ManualInput()
-        self._airspeed_valid = True
+        self._airspeed = AirspeedWatch()
         self._memory = ModeMemory(active=policy.radio_restores_mode)
         self._follower = TaskFollower(self)
 
@@ -318,7 +318,9 @@ class Commander:
         if not self.armed:
             self._check_arming()
             self._report_prearm()
-        self._follow_airspeed()
+        changed = self._airspeed.update(self.situation.health, armed=self.armed, time_us=time_us)
+        if changed is not None:
+            self.emit(changed)
         told = self.failsafes.update(self.situation, self.parameters)
         self._events.extend(told)
         self._select()
@@ -480,17 +482,6 @@ class Commander:
         if self.time_us - self._last_prearm_report_us >= interval_us:
             self._last_prearm_report_us = self.time_us
             self._tell_reasons(self.arming_reasons, check_only=True)
-
-    def _follow_airspeed(self) -> None:
-        """Tell when the airspeed sensor is given up in flight, or used again."""
-        health = self.situation.health
-        if not health.has_airspeed:
-            return
-        if not self.armed:
-            self._airspeed_valid = True
-        elif health.airspeed is not self._airspeed_valid:
-            self._airspeed_valid = health.airspeed
-            self.emit(AirspeedChanged(time_us=self.time_us, valid=health.airspeed))
 
     def _take_over_by_sticks(self) -> None:
         """PX4 COM_RC_OVERRIDE: moved sticks end automatic flight."""
