@@ -89,6 +89,15 @@ PLAIN_COMMANDS: Final = frozenset(
 )
 """Mission commands without a position; their frame is not looked at."""
 
+_MARKERS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_RETURN_PATH_START,
+        mavlink.MAV_CMD_DO_GO_AROUND,
+    )
+)
+"""Commands that may do without their position: ground stations send them in MAV_FRAME_MISSION."""
+
 _YAW_IN_PARAM4: Final = frozenset(
     (
         mavlink.MAV_CMD_NAV_WAYPOINT,
@@ -109,11 +118,12 @@ class ArdupilotItemRules:
             return check_rally(item)
         if seq == 0:  # home: whatever it holds is replaced
             return int(mavlink.MAV_MISSION_ACCEPTED)
-        if item.command in POSITION_COMMANDS:
+        placeless = item.command in _MARKERS and item.frame == mavlink.MAV_FRAME_MISSION
+        if item.command in POSITION_COMMANDS and not placeless:
             if item.frame not in GEODETIC_FRAMES:
                 return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
             result = self._check_params(item) or check_position(item)
-        elif item.command in PLAIN_COMMANDS:
+        elif item.command in PLAIN_COMMANDS or placeless:
             result = self._check_params(item) or check_finite(item)
         else:
             return int(mavlink.MAV_MISSION_UNSUPPORTED)
@@ -123,7 +133,7 @@ class ArdupilotItemRules:
         return item
 
     def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
-        if item.command not in POSITION_COMMANDS and item.frame not in GEODETIC_FRAMES:
+        if item.frame not in GEODETIC_FRAMES:
             return replace(item, frame=mavlink.MAV_FRAME_GLOBAL, x=0.0, y=0.0)
         if item.command in PLAIN_COMMANDS or item.frame in GLOBAL_FRAMES:
             frame = mavlink.MAV_FRAME_GLOBAL
