@@ -33,6 +33,7 @@ CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
         FlightMode.SMART_RETURN: 21,
         FlightMode.ZIGZAG: 24,
         FlightMode.AUTO_RETURN: 27,
+        FlightMode.TERMINATION: 0,  # no mode of its own
     }
 )
 
@@ -56,6 +57,7 @@ MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
         FlightMode.SMART_RETURN: "SMART_RTL",
         FlightMode.ZIGZAG: "ZIGZAG",
         FlightMode.AUTO_RETURN: "AUTO RTL",
+        FlightMode.TERMINATION: "STABILIZE",
     }
 )
 
@@ -73,7 +75,7 @@ REFUSED_NAMES: Final[Mapping[int, str]] = MappingProxyType(
 """Numbers the firmware knows and refuses on this vehicle: "Mode change to X failed", not "No such mode N"."""
 
 _MANUAL_MODES: Final = frozenset(
-    {FlightMode.STABILIZED, FlightMode.ACRO, FlightMode.ALTITUDE, FlightMode.DRIFT}
+    {FlightMode.STABILIZED, FlightMode.ACRO, FlightMode.ALTITUDE, FlightMode.DRIFT, FlightMode.TERMINATION}
 )
 
 
@@ -99,4 +101,6 @@ def _position_controlled(display: ModeDisplay) -> bool:
     return not (display.armed and display.mode is FlightMode.GUIDED and display.thrust_setpoints)
 
 
-_BY_NUMBER: Final = {number: mode for mode, number in CUSTOM_MODES.items()}
+_BY_NUMBER: Final = {
+    number: mode for mode, number in CUSTOM_MODES.items() if mode is not FlightMode.TERMINATION
+}

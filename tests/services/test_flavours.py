@@ -9,6 +9,7 @@ from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours import FLAVOUR_NAMES, ardupilot_modes, get_flavour, px4_modes
 from autopilot_bridge.flavours.flavour import ModeDisplay
 from autopilot_bridge.parameters import ParameterStore
+from flightsim.airframe import AirframeKind
 
 M = FlightMode
 
@@ -104,6 +105,17 @@ def test_ardupilot_base_mode_in_flight() -> None:
 @pytest.mark.parametrize("number", [8, 10, 12, 13, 14, 15, 22, 23, 25, 26, 27, 28, 29, 99])
 def test_ardupilot_numbers_that_are_refused(number: int) -> None:
     assert ardupilot_modes.commanded_mode(number) is None
+
+
+@pytest.mark.parametrize("kind", AirframeKind)
+@pytest.mark.parametrize("name", FLAVOUR_NAMES)
+def test_every_mode_the_commander_can_end_in_is_shown(name: str, kind: AirframeKind) -> None:
+    flavour = get_flavour(name, kind)
+    policy = flavour.policy
+    ends = {FlightMode.TERMINATION, policy.boot_mode, policy.fallback_land, policy.reposition_mode}
+    for mode in policy.ground_modes | policy.flown_modes | ends:
+        assert mode in flavour.custom_modes
+        assert mode in flavour.mode_names
 
 
 @pytest.mark.parametrize("name", FLAVOUR_NAMES)
