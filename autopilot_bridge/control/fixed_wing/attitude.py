@@ -30,6 +30,7 @@ _NAV_YAW: Final = 27
 _STEERING_HEADING: Final = 15  # setpoint slot, as in control.fixed_wing_setpoint
 
 _WHEEL_SPEED_SHARE: Final = 0.6  # of the lowest airspeed: below it wheel gains stay as they are (PX4)
+_ROLLING_SPEED_SHARE: Final = 0.7  # of the stall speed: below it the runway carries, and the surfaces give way
 _RATE_LIMIT_RAD_S: Final = 40.0  # no gyro reads more
 _SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
 
@@ -85,6 +86,17 @@ def rate_control(nav: Array, p: Array, s: Array, surfaces: Array, rolling: bool)
             limit = p[g + 4]
             s[c.RATE_INTEGRAL + i] = min(limit, max(-limit, s[c.RATE_INTEGRAL + i] + p[g + 1] * error * dt))
         surfaces[i] = surface
+
+
+@kernel
+def ease_on_runway(p: Array, s: Array, surfaces: Array) -> None:
+    """Aileron and elevator fade in with the airspeed of the take-off roll.
+
+    Without airspeed they have no effect; in a wind from behind the wrong one, and turn the vehicle over.
+    """
+    share = min(1.0, s[c.EAS] / (_ROLLING_SPEED_SHARE * stall_speed(p)))
+    surfaces[0] = share * min(1.0, max(-1.0, surfaces[0]))
+    surfaces[1] = share * min(1.0, max(-1.0, surfaces[1]))
 
 
 @kernel

@@ -11,6 +11,7 @@ from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.air import update_air
 from autopilot_bridge.control.fixed_wing.attitude import (
     attitude_control,
+    ease_on_runway,
     limit_surfaces,
     rate_control,
     wheel_control,
@@ -143,6 +144,8 @@ def control_step(nav: Array, sp: Array, p: Array, s: Array, actuators: Array) ->
         else:
             s[c.WHEEL_INTEGRAL] = 0.0
         rate_control(nav, p, s, surfaces, rolling)
+        if rolling:
+            ease_on_runway(p, s, surfaces)
         limit_surfaces(p, s, yaw_stick, surfaces)
     aileron, elevator, rudder = surfaces[0], surfaces[1], surfaces[2]
     actuators[AILERON] = aileron
