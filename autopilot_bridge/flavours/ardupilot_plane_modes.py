@@ -53,6 +53,7 @@ MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
         FlightMode.AVOID: "AVOID_ADSB",
         FlightMode.GUIDED: "GUIDED",
         FlightMode.INITIALISING: "INITIALISING",
+        FlightMode.TERMINATION: "MANUAL",
     }
 )
 
