@@ -1,14 +1,16 @@
 """A script's worth of pymavlink's mavutil, for tests that fly a SITL with it."""
 
 import math
+import struct
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import all as mavlink
 
-mavlink = mavutil.mavlink
+from tests.clients.runway import PlanItem
+
 WALL_DEADLINE_S: Final = 30.0
 EKF_READY: Final = 831
 """Attitude, velocity and position, as ArduPilot reports a filter that uses GPS."""
@@ -19,21 +21,6 @@ POSITION_ONLY: Final = 0b110111111000
 
 Found = Callable[[Any], bool]
 Each = Callable[[], None] | None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PlanItem:
-    """One item of a plan; a place is degrees and metres over home, and without one it is MAV_FRAME_MISSION.
-
-    Attributes:
-        command: MAV_CMD.
-        place: latitude, longitude, height.
-        parameters: the first of param1 to param4; what is left out is 0, and the heading the firmware's.
-    """
-
-    command: int
-    place: tuple[float, float, float] | None = None
-    parameters: tuple[float, ...] = ()
 
 
 class Client:
@@ -169,6 +156,14 @@ class Client:
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate_hz if rate_hz > 0.0 else -1.0
         )
 
+    def parameter(self, name: str) -> float:
+        """Value of a parameter; PX4's integers come as bit patterns."""
+        self.link.mav.param_request_read_send(1, 1, name.encode(), -1)
+        value = self.next("PARAM_VALUE", lambda m: m.param_id == name)
+        if self.flavour == "px4" and value.param_type == mavlink.MAV_PARAM_TYPE_INT32:
+            return float(struct.unpack("<i", struct.pack("<f", value.param_value))[0])
+        return float(value.param_value)
+
     def upload(self, items: Sequence[PlanItem]) -> None:
         """Upload a plan, which must be accepted."""
         self.link.mav.mission_count_send(1, 1, len(items), 0)
@@ -184,11 +179,20 @@ class Client:
 
     def _send_item(self, seq: int, item: PlanItem) -> None:
         lat, lon, height_m = item.place or (0.0, 0.0, 0.0)
-        frame = mavlink.MAV_FRAME_MISSION if item.place is None else mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         heading = math.nan if self.flavour == "px4" and item.place is not None else 0.0
         parameters = (*item.parameters, *(0.0, 0.0, 0.0, heading)[len(item.parameters) :])
         self.link.mav.mission_item_int_send(
-            1, 1, seq, frame, item.command, 0, 1, *parameters, round(lat * 1e7), round(lon * 1e7), height_m
+            1,
+            1,
+            seq,
+            item.frame,
+            item.command,
+            0,
+            1,
+            *parameters,
+            round(lat * 1e7),
+            round(lon * 1e7),
+            height_m,
         )
 
     # usual steps

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from tests.clients.mavutil_client import Client, PlanItem
+from tests.clients.mavutil_client import Client
+from tests.clients.runway import PlanItem
 from tests.clients.sitl_process import free_port, running_sitl
 
 mavlink = mavutil.mavlink
