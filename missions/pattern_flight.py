@@ -25,12 +25,12 @@ from missions.planning.trajectory import (
     line_trajectory,
     plan_trajectory,
 )
-from missions.pattern_wings import check_wings, fly_pattern_with_wings
 from missions.planning.waypoints import leg_speeds, waypoints_along
 from missions.telemetry import Attitude
 from missions.vehicle.guided import GuidedSession
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.vehicle import Vehicle
+from missions.wings.pattern import check_wings, fly_pattern_with_wings
 
 _SETTLE_S: Final = 1.5
 _SAME_PLACE_M: Final = 0.3

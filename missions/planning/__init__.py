@@ -6,9 +6,9 @@ from missions.planning.trajectory import Trajectory, TrajectoryPoint, line_traje
 from missions.planning.waypoints import leg_speeds, waypoints_along
 
 __all__ = [
+    "MulticopterLimits",
     "Trajectory",
     "TrajectoryPoint",
-    "MulticopterLimits",
     "leg_speeds",
     "line_trajectory",
     "natural_trajectory",

@@ -1,4 +1,6 @@
-"""A pattern as an aircraft can follow it: corners as arcs, sampled finely, with course and curvature."""
+"""A pattern as an aircraft can follow it: corners turned with its own radius, sampled finely, with course and
+curvature.
+"""
 
 import math
 from dataclasses import dataclass
@@ -8,9 +10,11 @@ import numpy as np
 
 from missions.patterns.curve import ArcLengthTable, Array, Curve
 from missions.patterns.polyline import Polyline
+from missions.planning.corners import Corner
 
 _STEP_M: Final = 2.0
 _STRAIGHT_RAD: Final = 1e-3
+_BACK_M: Final = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,7 +23,7 @@ class FlyablePath:
 
     Attributes:
         points_m: (n, 2) north, east.
-        arc_m: (n,) distance flown, increasing.
+        arc_m: (n,) distance flown from the pattern's start, increasing; less than 0 on the way to it.
         course_rad: (n,) direction, unwrapped.
         curvature_per_m: (n,) positive turning right.
     """
@@ -31,8 +35,13 @@ class FlyablePath:
 
     @property
     def length_m(self) -> float:
-        """Of the whole path."""
+        """From the pattern's start to the path's end."""
         return float(self.arc_m[-1])
+
+    @property
+    def reach_m(self) -> float:
+        """Farthest from the origin."""
+        return float(np.hypot(*self.points_m.T).max())
 
     def until(self, length_m: float) -> "FlyablePath":
         """The first part of it."""
@@ -44,6 +53,35 @@ class FlyablePath:
             curvature_per_m=self.curvature_per_m[:count],
         )
 
+    def moved(self, north_m: float, east_m: float) -> "FlyablePath":
+        """The same somewhere else."""
+        return FlyablePath(
+            points_m=self.points_m + np.array((north_m, east_m)),
+            arc_m=self.arc_m,
+            course_rad=self.course_rad,
+            curvature_per_m=self.curvature_per_m,
+        )
+
+    def with_leads(self, before_m: float, after_m: float) -> "FlyablePath":
+        """With straight flight before and after, in its direction there. Its start stays at distance 0."""
+        first, last = self._straight(0, -before_m), self._straight(-1, after_m)
+        return FlyablePath(
+            points_m=np.concatenate((first[0], self.points_m, last[0])),
+            arc_m=np.concatenate((first[1], self.arc_m, last[1])),
+            course_rad=np.concatenate((first[2], self.course_rad, last[2])),
+            curvature_per_m=np.concatenate((first[3], self.curvature_per_m, last[3])),
+        )
+
+    def _straight(self, end: int, distance_m: float) -> tuple[Array, Array, Array, Array]:
+        """Points off one end, in the order of flight; those of distances 0 are left out."""
+        count = max(1, math.ceil(abs(distance_m) / _STEP_M))
+        along = np.linspace(0.0, distance_m, count + 1)[1:]
+        course = float(self.course_rad[end])
+        points = self.points_m[end] + along[:, None] * np.array((math.cos(course), math.sin(course)))
+        if distance_m < 0.0:
+            points, along = points[::-1], along[::-1]
+        return points, self.arc_m[end] + along, np.full(count, course), np.zeros(count)
+
     def at(self, arc_m: float) -> tuple[tuple[float, float], float, float]:
         """((north, east), course, curvature) at a distance."""
         north = float(np.interp(arc_m, self.arc_m, self.points_m[:, 0]))
@@ -52,11 +90,17 @@ class FlyablePath:
         return (north, east), course, float(np.interp(arc_m, self.arc_m, self.curvature_per_m))
 
     def nearest(self, north_m: float, east_m: float, *, from_arc_m: float, ahead_m: float) -> float:
-        """Distance along the path of its point nearest to a place, looked for from a bit before one place on."""
-        low = int(np.searchsorted(self.arc_m, from_arc_m - 20.0))
+        """Distance along the path of its place nearest to another; looked for from 20 m before one."""
+        low = int(np.searchsorted(self.arc_m, from_arc_m - _BACK_M))
+        low = min(low, len(self.arc_m) - 2)
         high = max(low + 2, int(np.searchsorted(self.arc_m, from_arc_m + ahead_m)))
         offset = self.points_m[low:high] - np.array((north_m, east_m))
-        return float(self.arc_m[low + int(np.argmin((offset**2).sum(axis=1)))])
+        best = low + int(np.argmin((offset**2).sum(axis=1)))
+        course = float(self.course_rad[best])
+        on_m = (north_m - self.points_m[best, 0]) * math.cos(course) + (
+            east_m - self.points_m[best, 1]
+        ) * math.sin(course)
+        return float(self.arc_m[best] + min(_STEP_M, max(-_STEP_M, on_m)))
 
     def waypoints(
         self, *, deviation_m: float, spacing_min_m: float, spacing_max_m: float
@@ -71,10 +115,14 @@ class FlyablePath:
         return [self.at(float(s))[0] for s in where]
 
 
-def flyable_path(curve: Curve, radius_m: float) -> FlyablePath:
-    """The path of a curve; a polyline gets arcs of a radius at its corners (the legs are long enough)."""
+def flyable_path(curve: Curve, radius_m: float, ramp_m: float) -> FlyablePath:
+    """The path of a curve; a polyline gets corners of a radius (the legs are long enough: `check_turns`).
+
+    Args:
+        ramp_m: distance over which a corner's curvature rises.
+    """
     if isinstance(curve, Polyline):
-        return _with_arcs(curve, radius_m)
+        return _with_corners(curve, radius_m, ramp_m)
     table = ArcLengthTable.of(curve, _STEP_M)
     return FlyablePath(
         points_m=table.points_m,
@@ -84,7 +132,7 @@ def flyable_path(curve: Curve, radius_m: float) -> FlyablePath:
     )
 
 
-def _with_arcs(polyline: Polyline, radius_m: float) -> FlyablePath:
+def _with_corners(polyline: Polyline, radius_m: float, ramp_m: float) -> FlyablePath:
     vertices = np.asarray(polyline.vertices_m)
     legs = np.diff(vertices, axis=0)
     courses = np.unwrap(np.arctan2(legs[:, 1], legs[:, 0]))
@@ -102,21 +150,20 @@ def _with_arcs(polyline: Polyline, radius_m: float) -> FlyablePath:
         bend.append(np.zeros(count))
 
     for k in range(1, len(vertices) - 1):
-        turn = courses[k] - courses[k - 1]
+        turn = float(courses[k] - courses[k - 1])
         if abs(turn) < _STRAIGHT_RAD:
             continue
-        cut = radius_m * math.tan(0.5 * abs(turn))
-        along = np.array((math.cos(courses[k - 1]), math.sin(courses[k - 1])))
-        entry = vertices[k] - cut * along
-        straight(entry, float(courses[k - 1]))
         side = math.copysign(1.0, turn)
-        centre = entry + side * radius_m * np.array((-along[1], along[0]))
-        count = max(4, math.ceil(radius_m * abs(turn) / _STEP_M))
-        angle = courses[k - 1] + turn * np.linspace(0.0, 1.0, count, endpoint=False)
-        points.append(centre + side * radius_m * np.column_stack((np.sin(angle), -np.cos(angle))))
-        course.append(angle)
-        bend.append(np.full(count, side / radius_m))
-        start = vertices[k] + cut * np.array((math.cos(courses[k]), math.sin(courses[k])))
+        corner = Corner.of(abs(turn), radius_m, ramp_m)
+        before = float(courses[k - 1])
+        along = np.array((math.cos(before), math.sin(before)))
+        across = side * np.array((-along[1], along[0]))
+        entry = vertices[k] - corner.reach_m * along
+        straight(entry, before)
+        points.append(entry + corner.points_m[:-1, :1] * along + corner.points_m[:-1, 1:] * across)
+        course.append(before + side * corner.course_rad[:-1])
+        bend.append(side * corner.curvature_per_m[:-1])
+        start = vertices[k] + corner.reach_m * np.array((math.cos(courses[k]), math.sin(courses[k])))
     straight(vertices[-1], float(courses[-1]))
     points.append(vertices[-1:])
     course.append(np.array([float(courses[-1])]))

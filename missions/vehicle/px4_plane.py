@@ -38,10 +38,13 @@ class Px4Plane(Px4):
     async def loiter(
         self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
     ) -> None:
+        if radius_m is None:
+            radius_m = abs(await vehicle.parameter_or("NAV_LOITER_RAD", 80.0))
         await vehicle.command_int(
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL,
-            (-1.0, 1.0, math.nan if radius_m is None else radius_m, 0.0 if clockwise else 1.0),
+            # the sign of the radius is the direction; the fourth is a yaw, which a fixed wing doesn't take
+            (-1.0, 1.0, radius_m if clockwise else -radius_m, math.nan),
             round(place.lat_deg * 1e7),
             round(place.lon_deg * 1e7),
             place.alt_m,

@@ -1,0 +1,1 @@
+"""Patterns flown by aircraft with wings."""

@@ -1,0 +1,63 @@
+"""Flying a pattern with wings: along the path by setpoints, or as an uploaded mission with its landing."""
+
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.geodesy import LocalFrame
+from missions.errors import PlanError
+from missions.options import FlightOptions, Via
+from missions.patterns.curve import Curve
+from missions.planning.flyable import flyable_path
+from missions.planning.limits import FixedWingLimits
+from missions.planning.turns import check_turns, roll_in_m
+from missions.vehicle.vehicle import Vehicle
+from missions.wings.entry import with_leads
+from missions.wings.flight import PatternFlight
+from missions.wings.setpoints import fly_setpoints
+from missions.wings.waypoints import fly_waypoints
+
+_REACH_SAMPLES: Final = 1000
+
+
+def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -> float:
+    """Refuse a pattern that an aircraft can't fly; gives the turn radius it was checked for.
+
+    Raises:
+        PlanError: says what, and which option to change.
+    """
+    if options.period_s is not None:
+        raise PlanError(
+            "--period is for vehicles that can fly slowly in bends; choose --speed for an aircraft"
+        )
+    limits.check_airspeed(options.speed_m_s)
+    limits.check_altitude(options.own_altitude_m)
+    coarse = curve.points(np.linspace(0.0, curve.end, _REACH_SAMPLES))
+    limits.check_reach(float(np.hypot(*coarse.T).max()))
+    return check_turns(curve, options.speed_m_s, limits)
+
+
+async def fly_pattern_with_wings(
+    vehicle: Vehicle, options: FlightOptions, curve: Curve, limits: FixedWingLimits
+) -> None:
+    """From the ground back to the ground; see `missions.pattern_flight.fly_pattern`."""
+    radius_m = check_wings(curve, options, limits)
+    path = flyable_path(curve, radius_m, roll_in_m(options.speed_m_s, limits))
+    if options.search_time_s is not None:
+        path = path.until(options.search_time_s * options.speed_m_s)
+    if options.centre is not None:
+        c = options.centre
+        north, east, _ = LocalFrame(vehicle.home).ned_from_geodetic(c.lat_deg, c.lon_deg, c.alt_m)
+        path = path.moved(north, east)
+    flight = PatternFlight(
+        options=options,
+        limits=limits,
+        path=path,
+        route=with_leads(path, options.speed_m_s + limits.wind_m_s),
+        turn_radius_m=radius_m,
+    )
+    vehicle.note_runway()
+    if options.via is Via.SETPOINTS:
+        await fly_setpoints(vehicle, flight)
+    else:
+        await fly_waypoints(vehicle, flight)

@@ -1,0 +1,62 @@
+"""Where along a path an aircraft is, by its telemetry."""
+
+import math
+
+from autopilot_bridge.geodesy import LocalFrame
+from missions import telemetry
+from missions.errors import MissionError
+from missions.planning.flyable import FlyablePath
+from missions.vehicle.vehicle import Vehicle
+
+_AHEAD_M = 80.0
+_OLDEST_S = 1.0  # a position is carried on by its velocity for so long
+
+
+class PlaceOnPath:
+    """The place along a path, found again at every `update`; it never goes back.
+
+    Args:
+        vehicle: its home is the path's origin.
+        path: with its leads.
+        from_arc_m: where along it the aircraft is to begin with.
+
+    Attributes:
+        arc_m: distance of the place along the path.
+        north_m, east_m: of the aircraft, now.
+        vel_north_m_s, vel_east_m_s: its velocity over ground.
+        ground_speed_m_s: at least 1.
+        across_m: distance from the path, positive right of it.
+    """
+
+    def __init__(self, vehicle: Vehicle, path: FlyablePath, from_arc_m: float) -> None:
+        self.arc_m = from_arc_m
+        self.north_m = self.east_m = 0.0
+        self.vel_north_m_s = self.vel_east_m_s = 0.0
+        self.ground_speed_m_s = 1.0
+        self.across_m = 0.0
+        self._vehicle = vehicle
+        self._path = path
+        self._frame = LocalFrame(vehicle.home)
+
+    def update(self) -> None:
+        """Look where the aircraft is now.
+
+        Raises:
+            MissionError: it tells no position, or is not armed any more.
+        """
+        vehicle = self._vehicle
+        p = vehicle.latest(telemetry.Position)
+        if p is None or not vehicle.armed:
+            raise MissionError(f"the vehicle tells no position in flight; {vehicle.heard()}")
+        north, east, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
+        late_s = min(_OLDEST_S, max(0.0, (vehicle.clock.time_us - p.time_us) * 1e-6))
+        self.vel_north_m_s, self.vel_east_m_s = p.vel_ned_m_s[0], p.vel_ned_m_s[1]
+        self.north_m = north + late_s * self.vel_north_m_s
+        self.east_m = east + late_s * self.vel_east_m_s
+        self.ground_speed_m_s = max(1.0, p.ground_speed_m_s)
+        found = self._path.nearest(self.north_m, self.east_m, from_arc_m=self.arc_m, ahead_m=_AHEAD_M)
+        self.arc_m = max(self.arc_m, found)
+        (path_north, path_east), course, _ = self._path.at(self.arc_m)
+        self.across_m = (self.east_m - path_east) * math.cos(course) - (self.north_m - path_north) * math.sin(
+            course
+        )

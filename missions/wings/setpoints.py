@@ -1,0 +1,118 @@
+"""A pattern by streamed setpoints: points of the path for PX4, bank angles for ArduPilot's plane."""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from missions import telemetry
+from missions.errors import MissionError
+from missions.notes import PATTERN
+from missions.vehicle.attitude_setpoint import AttitudeSetpoint
+from missions.vehicle.guided import AnySetpoint
+from missions.vehicle.setpoint import Setpoint
+from missions.vehicle.vehicle import Vehicle
+from missions.wings.entry import Entry
+from missions.wings.flight import PatternFlight
+from missions.wings.guidance import PathRoll, PathRollParameters
+from missions.wings.place import PlaceOnPath
+
+_LEAD_S: Final = 0.3  # the bend is commanded so long before it: the time a bank takes
+_ENTRY_S: Final = 0.8  # from the decision to leave the circle to the first setpoint that is flown
+_BANK_SHARE: Final = 0.95
+
+
+async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
+    """From the ground back to the ground."""
+    notes, clock, options = vehicle.notes, vehicle.clock, flight.options
+    notes.commanded = flight.commanded(vehicle, [], options.acceptance_m)
+    notes.begin("takeoff", clock.time_us)
+    await vehicle.takeoff(options.own_altitude_m)
+    notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
+    notes.begin("transit", clock.time_us)
+    await _to_the_start(vehicle, flight)
+    stream = _Stream(vehicle, flight)
+    if vehicle.adapter.roll_alone:
+        await vehicle.change_altitude(options.own_altitude_m)
+        await vehicle.follow(stream.roll, options.rate_hz)
+    else:
+        await vehicle.follow(stream.point, options.rate_hz)
+    await vehicle.land_along(flight.approach(vehicle))
+    notes.end(clock.time_us)
+
+
+async def _to_the_start(vehicle: Vehicle, flight: PatternFlight) -> None:
+    """Circle beside the way into the pattern until the aircraft flies along it, at its height."""
+    frame = LocalFrame(vehicle.home)
+    here = await vehicle.position()
+    north, east, _ = frame.ned_from_geodetic(here.lat_deg, here.lon_deg, here.alt_m)
+    entry = Entry.to(flight.route, flight.turn_radius_m, (north, east))
+    lat, lon, alt = frame.geodetic_from_ned(*entry.centre_m, -flight.options.own_altitude_m)
+    await vehicle.loiter(
+        GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt),
+        radius_m=entry.radius_m,
+        clockwise=entry.clockwise,
+        wait=False,
+    )
+    await vehicle.change_airspeed(flight.options.speed_m_s)
+    await vehicle.wait_until(
+        lambda: entry.leaving(vehicle, _ENTRY_S),
+        what="the way into the pattern",
+        on=("GLOBAL_POSITION_INT",),
+        timeout_s=240.0 + flight.away_s,
+    )
+
+
+class _Stream:
+    """Setpoints by where the aircraft is along the route; tells the pattern's beginning and end."""
+
+    def __init__(self, vehicle: Vehicle, flight: PatternFlight) -> None:
+        self._vehicle = vehicle
+        self._flight = flight
+        self._place = PlaceOnPath(vehicle, flight.route, float(flight.route.arc_m[0]))
+        self._law = PathRoll(
+            flight.route,
+            PathRollParameters(bank_max_rad=_BANK_SHARE * flight.limits.bank_max_rad),
+        )
+
+    def _go_on(self) -> bool:
+        """Find the place; False behind the pattern's end."""
+        notes, place = self._vehicle.notes, self._place
+        place.update()
+        length_m = self._flight.path.length_m
+        if place.arc_m < 0.0:
+            return True
+        if notes.current != PATTERN:
+            notes.begin(PATTERN, self._vehicle.clock.time_us)
+        notes.progress = min(1.0, place.arc_m / length_m)
+        if place.arc_m < length_m:
+            return True
+        notes.begin("return", self._vehicle.clock.time_us)
+        return False
+
+    def point(self, _time_s: float) -> AnySetpoint | None:
+        """For PX4: the path's nearest point, its direction as velocity, its bend as acceleration."""
+        if not self._go_on():
+            return None
+        place, route = self._place, self._flight.route
+        speed = place.ground_speed_m_s
+        (north, east), course, _ = route.at(place.arc_m)
+        _, _, bend = route.at(place.arc_m + _LEAD_S * speed)
+        push = speed * speed * bend
+        return Setpoint(
+            position_ned_m=(north, east, -self._flight.options.own_altitude_m),
+            velocity_ned_m_s=(speed * math.cos(course), speed * math.sin(course), 0.0),
+            acceleration_ned_m_s2=(-push * math.sin(course), push * math.cos(course), 0.0),
+        )
+
+    def roll(self, _time_s: float) -> AnySetpoint | None:
+        """For ArduPilot's plane, which takes no path: the bank that follows it."""
+        vehicle = self._vehicle
+        if not self._go_on():
+            return None
+        attitude = vehicle.latest(telemetry.Attitude)
+        if attitude is None:
+            raise MissionError(f"the vehicle tells no attitude (ATTITUDE); {vehicle.heard()}")
+        return AttitudeSetpoint(
+            roll_rad=self._law.roll_rad(self._place, attitude.yaw_rad, vehicle.clock.time_us)
+        )

@@ -1,0 +1,116 @@
+"""A pattern as an uploaded mission: takeoff, a circle to begin it from, its waypoints, the landing."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import VehicleTimeout
+from missions.notes import PATTERN
+from missions.options import FlightOptions
+from missions.vehicle.vehicle import Vehicle
+from missions.wings.entry import Entry
+from missions.wings.flight import PatternFlight
+from missions.wings.place import PlaceOnPath
+
+_DEVIATION_M: Final = 1.0
+_SPACING_MIN_S: Final = 1.6
+_SPACING_MAX_M: Final = 300.0
+
+
+async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
+    """From the ground back to the ground."""
+    notes, clock, options = vehicle.notes, vehicle.clock, flight.options
+    waypoints = flight.path.waypoints(
+        deviation_m=_DEVIATION_M,
+        spacing_min_m=_SPACING_MIN_S * options.speed_m_s,
+        spacing_max_m=_SPACING_MAX_M,
+    )
+    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
+    items = _way_in(vehicle, flight)
+    first = len(items)
+    items += [_waypoint(vehicle, options, north, east) for north, east in waypoints]
+    last = len(items) - 1
+    out, _, _ = flight.route.at(flight.route.length_m)
+    items.append(_waypoint(vehicle, options, *out))
+    items += flight.approach(vehicle).items()
+    notes.commanded = flight.commanded(vehicle, waypoints, acceptance_m)
+    notes.begin("upload", clock.time_us)
+    start = await vehicle.upload_mission(items)
+    notes.begin("takeoff", clock.time_us)
+    await vehicle.start_mission()
+    place = PlaceOnPath(vehicle, flight.route, -options.speed_m_s)
+    await vehicle.wait_item_reached(start + first - 1, 180.0 + 2.0 * options.own_altitude_m + flight.away_s)
+    notes.begin("transit", clock.time_us)
+    lead_s = -float(flight.route.arc_m[0]) / flight.slow_m_s
+    await vehicle.wait_item_reached(start + first, 60.0 + lead_s)
+    await _passed(vehicle, place, 0.0)
+    notes.begin(PATTERN, clock.time_us)
+
+    def progress(done: int) -> None:
+        place.update()
+        notes.progress = min(1.0, max(0.0, (done - start - first) / max(1, last - first)))
+
+    limit_s = 60.0 + flight.path.length_m / flight.slow_m_s
+    try:
+        await vehicle.wait_item_reached(
+            start + last, min(limit_s, options.search_time_s or limit_s), progress
+        )
+        place.arc_m = max(place.arc_m, flight.path.length_m - 4.0 * acceptance_m)
+        await _passed(vehicle, place, flight.path.length_m)
+    except VehicleTimeout:
+        if options.search_time_s is None:
+            raise
+        await vehicle.land_along(flight.approach(vehicle), wait=False)  # the search time is over
+    notes.begin("return", clock.time_us)
+    await vehicle.wait_disarmed(600.0 + 2.0 * flight.away_s)
+    notes.end(clock.time_us)
+
+
+def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
+    """Takeoff, airspeed, and a circle that is left along the first leg, at the pattern's height."""
+    options = flight.options
+    entry = Entry.to(flight.route, flight.turn_radius_m)
+    lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(*entry.centre_m, 0.0)
+    return [
+        vehicle.adapter.takeoff_item(vehicle.home, options.own_altitude_m),
+        MissionItem(
+            command=dialect.MAV_CMD_DO_CHANGE_SPEED,
+            frame=dialect.MAV_FRAME_MISSION,
+            param1=0.0,  # airspeed
+            param2=options.speed_m_s,
+            param3=-1.0,
+        ),
+        MissionItem(
+            command=dialect.MAV_CMD_NAV_LOITER_TO_ALT,
+            param1=1.0,  # leave it in the direction of the next item only
+            param2=math.copysign(entry.radius_m, 1.0 if entry.clockwise else -1.0),
+            param4=1.0,  # the leg begins where the circle is left
+            x=lat,
+            y=lon,
+            z=options.own_altitude_m,
+        ),
+    ]
+
+
+def _waypoint(vehicle: Vehicle, options: FlightOptions, north_m: float, east_m: float) -> MissionItem:
+    lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(north_m, east_m, 0.0)
+    return MissionItem(
+        command=dialect.MAV_CMD_NAV_WAYPOINT,
+        param2=options.acceptance_m,
+        param4=vehicle.adapter.unset,
+        x=lat,
+        y=lon,
+        z=options.own_altitude_m,
+    )
+
+
+async def _passed(vehicle: Vehicle, place: PlaceOnPath, arc_m: float) -> None:
+    """Wait until the aircraft is so far along: waypoints count as reached before they are passed."""
+
+    def there() -> bool:
+        place.update()
+        return place.arc_m >= arc_m
+
+    await vehicle.wait_until(there, what="the waypoint abeam", on=("GLOBAL_POSITION_INT",), timeout_s=60.0)
