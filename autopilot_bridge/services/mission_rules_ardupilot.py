@@ -98,6 +98,15 @@ _MARKERS: Final = frozenset(
 )
 """Commands that may do without their position: ground stations send them in MAV_FRAME_MISSION."""
 
+_PLACE_OPTIONAL: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_RETURN_PATH_START,
+        mavlink.MAV_CMD_DO_GO_AROUND,
+    )
+)
+"""Ground stations send these without a place, in MAV_FRAME_MISSION (QGroundControl's landing pattern)."""
+
 _YAW_IN_PARAM4: Final = frozenset(
     (
         mavlink.MAV_CMD_NAV_WAYPOINT,
@@ -120,7 +129,7 @@ class ArdupilotItemRules:
             return int(mavlink.MAV_MISSION_ACCEPTED)
         placeless = item.command in _MARKERS and item.frame == mavlink.MAV_FRAME_MISSION
         if item.command in POSITION_COMMANDS and not placeless:
-            if item.frame not in GEODETIC_FRAMES:
+            if item.frame not in GEODETIC_FRAMES and not _without_place(item):
                 return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
             result = self._check_params(item) or check_position(item)
         elif item.command in PLAIN_COMMANDS or placeless:
@@ -130,7 +139,7 @@ class ArdupilotItemRules:
         return result or check_special(item, seq, count)
 
     def stored(self, item: MissionItem) -> MissionItem:
-        return item
+        return replace(item, frame=mavlink.MAV_FRAME_GLOBAL) if _without_place(item) else item
 
     def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
         if item.frame not in GEODETIC_FRAMES:
@@ -148,3 +157,7 @@ class ArdupilotItemRules:
         vtol_land = item.command == mavlink.MAV_CMD_NAV_VTOL_LAND
         yaw_may_be_nan = vtol_land or item.command in _YAW_IN_PARAM4
         return check_params(item, nan_allowed=(False, False, vtol_land, yaw_may_be_nan))
+
+
+def _without_place(item: MissionItem) -> bool:
+    return item.frame == mavlink.MAV_FRAME_MISSION and item.command in _PLACE_OPTIONAL
