@@ -3,6 +3,7 @@
 import asyncio
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
@@ -289,6 +290,7 @@ class OrbitFlight:
         vehicle, options, pilot = self._vehicle, self._options, self._pilot
         assert pilot is not None
         self._begin("entry")
+        self._require_air_data()
         try:
             await self._lose_gps()
             self._with_gps = False
@@ -313,9 +315,21 @@ class OrbitFlight:
                 await self._regain_gps()
                 back_us = self._now_us + round(_GPS_BACK_S * 1e6)
                 await guided.follow(lambda _t: self._fly_on(entered_us) if self._now_us < back_us else None)
-        finally:
+        except BaseException:
             if not self._with_gps:
-                await self._regain_gps()
+                with suppress(MissionError):  # what went wrong first is told
+                    await self._regain_gps()
+            raise
+
+    def _require_air_data(self) -> None:
+        """Without GPS the airspeed is the only speed there is."""
+        assert self._pilot is not None
+        airspeed_m_s = self._pilot.airspeed_true_m_s
+        if not airspeed_m_s > 0.5 * self._limits.airspeed_min_m_s:
+            raise MissionError(
+                f"the vehicle's airspeed is {airspeed_m_s:.1f} m/s in flight (VFR_HUD), so the orbit can't be flown "
+                f"without GPS; is its airspeed sensor sound? {self._vehicle.heard()}"
+            )
 
     async def _give_altitude(self, following: "asyncio.Future[None]") -> None:
         """An autopilot that holds altitude and airspeed itself is told them in its guided mode."""

@@ -6,10 +6,11 @@ no position is needed for either.
 """
 
 import math
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from missions import telemetry
-from missions.errors import MissionError
+from missions.errors import MissionError, VehicleTimeout
 from missions.piloting.energy import EnergyController, EnergyParameters, EnergyState
 from missions.piloting.pressure_height import PressureHeight, air_density_ratio
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 _RATES_HZ: Final = {"ATTITUDE": 40.0, "VFR_HUD": 20.0, "SCALED_PRESSURE": 20.0}
 _STEP_S: Final = 0.02
+_GROUND_SAMPLES: Final = 20
+_GROUND_S: Final = 10.0
 
 
 class AttitudePilot:
@@ -53,11 +56,15 @@ class AttitudePilot:
         if vehicle.armed and position.height_m > 5.0:
             raise MissionError("the pressure on the ground must be taken before takeoff")
         total, count = 0.0, 0
-        with vehicle.messages("SCALED_PRESSURE") as stream:
-            async with vehicle.deadline(10.0, "static pressure (SCALED_PRESSURE)"):
-                while count < 20:
+        with vehicle.messages("SCALED_PRESSURE") as stream, suppress(TimeoutError):
+            async with vehicle.deadline(_GROUND_S, "static pressure"):
+                while count < _GROUND_SAMPLES:
                     message = await anext(stream)
                     total, count = total + 100.0 * message.press_abs, count + 1
+        if not count:
+            raise VehicleTimeout(
+                f"the vehicle tells no static pressure (SCALED_PRESSURE) within {_GROUND_S:g} s; {vehicle.heard()}"
+            )
         return cls(vehicle, total / count)
 
     def close(self) -> None:
