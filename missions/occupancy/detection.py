@@ -4,7 +4,7 @@ Source: seed 003, sections III.C (an anomaly is what exceeds the noise) and IV.B
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -81,7 +81,8 @@ class Anomaly:
         time_us: vehicle time of the greatest difference.
         north_m, east_m: where that was.
         peak_nt: the difference there, with its sign.
-        samples: how many readings in a row were beyond the threshold.
+        samples: how many readings were beyond the threshold.
+        profile: (north m, east m, difference nT) of each reading from the first to the last beyond it.
     """
 
     time_us: int
@@ -89,6 +90,7 @@ class Anomaly:
     east_m: float
     peak_nt: float
     samples: int
+    profile: tuple[tuple[float, float, float], ...] = field(default=(), repr=False)
 
 
 class AnomalyDetector:
@@ -140,6 +142,7 @@ class AnomalyDetector:
         self._time_us = -1
         self._began_us = -1
         self._peak: Anomaly | None = None
+        self._profile: list[tuple[float, float, float]] = []
 
     @property
     def anomalous(self) -> bool:
@@ -171,11 +174,15 @@ class AnomalyDetector:
         ):
             if self._peak is None:
                 self._began_us = time_us
+                self._profile = []
+            self._profile.append((north_m, east_m, residual_nt))
             self._peak = self._grown(time_us, residual_nt, north_m, east_m)
             return None
         ended, self._peak = self._peak, None
         self._level_nt += residual_nt * min(1.0, elapsed_us / self._level_time_us)
-        return ended if ended is not None and ended.samples >= self._least_samples else None
+        if ended is None or ended.samples < self._least_samples:
+            return None
+        return replace(ended, profile=tuple(self._profile))
 
     def _grown(self, time_us: int, residual_nt: float, north_m: float, east_m: float) -> Anomaly:
         """The anomaly that goes on, with one more reading."""

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 from missions.errors import PlanError
 from missions.occupancy.decision import Decision, DecisionParameters, decide
 from missions.occupancy.detection import Anomaly, DetectionModel
+from missions.occupancy.localisation import gaussian_centre
 from missions.occupancy.occupancy_map import Cell, GridLayout, OccupancyMap
 
 Array = NDArray[np.float64]
 
+_NOISE_NT: Final = 0.5  # of a reading, for how much a fit believes it
+_FAR_M: Final = 250.0  # from the peaks: no centre of theirs
 _STEP_M: Final = 5.0  # least stretch of track that is worth an update
 _KEPT_SCORES: Final = 10_000_000  # in snapshots: 80 MB
 _LEAST_SNAPSHOTS: Final = 16
@@ -68,10 +71,15 @@ class Candidate:
 
     @property
     def place_ne_m(self) -> tuple[float, float]:
-        """Mean of the peaks, by their size."""
+        """Centre of a Gaussian through the readings; where they don't tell, weighted mean of the peaks."""
         weights = np.array([abs(anomaly.peak_nt) for _, anomaly in self.anomalies])
         places = np.array([(anomaly.north_m, anomaly.east_m) for _, anomaly in self.anomalies])
         north_m, east_m = (weights @ places / weights.sum()).tolist()
+        profile = np.array([reading for _, anomaly in self.anomalies for reading in anomaly.profile])
+        if len(profile):
+            centre = gaussian_centre(profile[:, 0], profile[:, 1], profile[:, 2], noise_nt=_NOISE_NT)
+            if centre is not None and math.dist(centre, (north_m, east_m)) <= _FAR_M:
+                return centre
         return north_m, east_m
 
 
