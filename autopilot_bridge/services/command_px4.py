@@ -11,9 +11,7 @@ from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.flavours import px4_modes
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_common import (
-    AMSL_FRAMES,
     FORCE_NUMBER,
-    RELATIVE_FRAMES,
     Command,
     CommandHandlers,
     CommandHooks,
@@ -92,17 +90,16 @@ class Px4Commands(CommandHandlers):
 
     def takeoff(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: p4 yaw deg, altitude over mean sea level; none: MIS_TAKEOFF_ALT over home."""
-        relative = command.frame in RELATIVE_FRAMES
-        down_m = self.down_from(command.z, relative=relative)
+        down_m = self.down_from(command.z, relative=False)
         return self.commander.guidance.takeoff(down_m=down_m, yaw_rad=math.radians(command.p4)).result
 
     def reposition(self, command: Command, source: Source) -> Result:
-        """DO_REPOSITION: p1 speed, p2 bit 0 change mode, p4 yaw rad. The frame is not checked."""
+        """DO_REPOSITION: p1 speed, p2 bit 0 change mode, p4 yaw rad, altitude over mean sea level."""
         if not flags(command.p2) & mavlink.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE:
             return Result.UNSUPPORTED
         if not on_earth(command):
             return Result.DENIED
-        north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
+        north_m, east_m, down_m = self.ned_from(command, relative=False)
         return self.commander.guidance.reposition(
             north_m=north_m,
             east_m=east_m,
@@ -118,9 +115,9 @@ class Px4Commands(CommandHandlers):
 
     def orbit(self, command: Command, source: Source) -> Result:
         """DO_ORBIT: p1 radius (negative: counter-clockwise), p2 speed, p3 ORBIT_YAW_BEHAVIOUR, centre."""
-        if not on_earth(command) or (command.is_int and command.frame not in AMSL_FRAMES | RELATIVE_FRAMES):
+        if not on_earth(command):
             return Result.DENIED
-        north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
+        north_m, east_m, down_m = self.ned_from(command, relative=False)
         return self.commander.guidance.orbit(
             radius_m=command.p1,
             speed_m_s=command.p2,

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.command_common import RELATIVE_FRAMES, Command, CommandHooks
+from autopilot_bridge.services.command_common import Command, CommandHooks
 from autopilot_bridge.services.command_px4 import Px4Commands
 
 
@@ -23,7 +23,7 @@ class Px4PlaneCommands(Px4Commands):
 
     def takeoff(self, command: Command, source: Source) -> Result:
         """NAV_TAKEOFF: altitude over mean sea level (none: MIS_TAKEOFF_ALT over home), place to circle at."""
-        north_m, east_m, down_m = self.ned_from(command, relative=command.frame in RELATIVE_FRAMES)
+        north_m, east_m, down_m = self.ned_from(command, relative=False)
         verdict = self.commander.guidance.takeoff(
             down_m=down_m, yaw_rad=math.nan, north_m=north_m, east_m=east_m
         )

@@ -180,7 +180,9 @@ def test_arduplane_reposition_changes_the_mode_only_when_told() -> None:
 @pytest.mark.parametrize(("radius_m", "flown_m"), [(90.0, 90.0), (-90.0, -90.0), (NAN, None), (0.0, None)])
 def test_px4_reposition_circles_with_the_radius_of_param3(radius_m: float, flown_m: float | None) -> None:
     rig = rig_of("px4", "flying")
-    assert rig.int(192, -1, 1, radius_m, math.radians(90.0), *rig.place(0.0, 500.0), 150.0, frame=6) == [0]
+    altitude_m = 489.0 + 150.0  # over the sea in every frame: PX4 doesn't look at it
+    place = rig.place(0.0, 500.0)
+    assert rig.int(192, -1, 1, radius_m, math.radians(90.0), *place, altitude_m, frame=6) == [0]
     rig.tick()
     task = rig.commander.tasks.task
     assert task.radius_m == pytest.approx(flown_m or rig.context.fixed_wing.loiter_radius_m)
@@ -190,10 +192,12 @@ def test_px4_reposition_circles_with_the_radius_of_param3(radius_m: float, flown
 @pytest.mark.parametrize("radius_m", [150.0, -150.0])
 def test_px4_orbit_stays_in_hold(radius_m: float) -> None:
     rig = rig_of("px4", "flying")
-    assert rig.int(34, radius_m, NAN, 0, NAN, *rig.place(300.0, 0.0), 110.0, frame=6) == [0]
+    # MAVSDK sends the altitude over the sea in a frame of heights over home, which PX4 doesn't look at
+    assert rig.int(34, radius_m, NAN, 0, NAN, *rig.place(300.0, 0.0), 489.0 + 110.0, frame=6) == [0]
     rig.tick()
     assert rig.commander.mode is FlightMode.HOLD
     assert rig.commander.tasks.task.radius_m == radius_m
+    assert rig.commander.tasks.task.centre_ned_m == pytest.approx((300.0, 0.0, -110.0), abs=0.05)
 
 
 def test_px4_takeoff_goes_to_the_place_given() -> None:
