@@ -180,6 +180,7 @@ class Autopilot:
             home=lambda: self.commander.home.position,
             progress=self._progress,
             on_plan_changed=self._on_plan_changed,
+            parameters=self.parameters,
         )
         self._status = StatusReport(flavour, self.commander)
         self._view = TelemetryView(self.context, self.navigation.state, readings)
