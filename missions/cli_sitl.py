@@ -1,13 +1,16 @@
 """`flightstack sitl`: vehicles for other people's clients."""
 
+import math
 import signal
 import sys
+from pathlib import Path
 from types import FrameType
 
 import click
 
 from autopilot_bridge.errors import BridgeError
 from missions.cli_types import SLOWEST, FiniteRange
+from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
 
 
 def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...], count: int):  # type: ignore[no-untyped-def]
@@ -37,6 +40,53 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
         "COM_OF_LOSS_T": min(speedup, 60.0),
         "COM_OBC_LOSS_T": min(5.0 * speedup, 60.0),
     }
+
+
+def _scenario(
+    camera: bool, targets: tuple[str, ...], map_file: str | None, map_target: str | None
+) -> Scenario:
+    """Targets and payload from the options.
+
+    Raises:
+        ValueError: a target that can't be, or one that nobody could find.
+    """
+    if targets and not camera:
+        raise ValueError("--target is seen by cameras only; add --camera")
+    if map_target is not None and map_file is None:
+        raise ValueError("--map-target needs a --map to be in")
+    survey = None
+    if map_file is not None:
+        place = None if map_target is None else _numbers(map_target, "--map-target", (2,))
+        survey = SurveyScenario(
+            map_path=Path(map_file), target_ne_m=None if place is None else (place[0], place[1])
+        )
+    return Scenario(
+        targets=tuple(_target(text, tag) for tag, text in enumerate(targets)), camera=camera, survey=survey
+    )
+
+
+def _target(text: str, tag: int) -> TargetScenario:
+    numbers = _numbers(text, "--target", (2, 4))
+    speed_m_s, heading_deg = numbers[2:] or (0.0, 0.0)
+    return TargetScenario(
+        north_m=numbers[0],
+        east_m=numbers[1],
+        motion=TargetMotion.STRAIGHT if speed_m_s else TargetMotion.STATIC,
+        speed_m_s=speed_m_s,
+        course_rad=math.radians(heading_deg),
+        tag=tag,
+    )
+
+
+def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in counts or not all(math.isfinite(number) for number in numbers):
+        accepted = " or ".join(str(count) for count in counts)
+        raise ValueError(f"{option} {text!r} is not {accepted} numbers with commas, for example 500,300")
+    return numbers
 
 
 @click.command()
@@ -71,6 +121,23 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
     default="none",
     show_default=True,
 )
+@click.option("--camera", is_flag=True, help="Every vehicle carries a camera on a gimbal.")
+@click.option(
+    "--target",
+    "targets",
+    multiple=True,
+    metavar="NORTH,EAST[,SPEED,HEADING]",
+    help="A target on the ground for cameras: m from home, m/s and degrees. Repeat for more.",
+)
+@click.option(
+    "--map",
+    "map_file",
+    metavar="FILE",
+    help="Magnetic map (.npz, as `fly occupancy` publishes it); every vehicle carries a survey magnetometer.",
+)
+@click.option(
+    "--map-target", metavar="NORTH,EAST", help="A target's magnetic signature there, m from the map's home."
+)
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
@@ -89,6 +156,10 @@ def sitl(
     seed: int,
     wind: str,
     turbulence: str,
+    camera: bool,
+    targets: tuple[str, ...],
+    map_file: str | None,
+    map_target: str | None,
     params: str | None,
     log: str | None,
     no_wait: bool,
@@ -114,6 +185,7 @@ def sitl(
     from autopilot_bridge.sitl.configuration import HOMES
     from autopilot_bridge.tlog import TlogWriter
     from flightsim.environment import Environment
+    from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
 
     stop: list[int] = []
@@ -128,26 +200,25 @@ def sitl(
         wind_speed_m_s, wind_from_deg = parse_wind(wind)
         place = None if home is None else parse_home(home)
         heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
-        world = Sitl(
-            SitlConfiguration(
-                vehicles=team(
-                    count,
-                    model=models[0] if len(models) == 1 else models,
-                    flavour=autopilot,
-                    launch=launch,
-                    heading_deg=heading_deg,
-                    parameters={
-                        **_loss_times(autopilot, speedup),
-                        **({} if params is None else parameters_from_file(params)),
-                    },
-                ),
-                home=place,
-                environment=Environment.from_wind(
-                    speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
-                ),
-                seed=seed,
-            )
+        configuration = SitlConfiguration(
+            vehicles=team(
+                count,
+                model=models[0] if len(models) == 1 else models,
+                flavour=autopilot,
+                launch=launch,
+                heading_deg=heading_deg,
+                parameters={
+                    **_loss_times(autopilot, speedup),
+                    **({} if params is None else parameters_from_file(params)),
+                },
+            ),
+            home=place,
+            environment=Environment.from_wind(
+                speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
+            ),
+            seed=seed,
         )
+        world = Sitl(equipped(configuration, _scenario(camera, targets, map_file, map_target)))
         compile_flight_code(world.configuration.vehicles)
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
         recorder = None if log is None else TlogWriter(log)

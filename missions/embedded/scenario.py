@@ -1,7 +1,12 @@
 """Building the scenario of a mission into an embedded SITL: ground targets, payload, magnetic field."""
 
+import math
+from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.sitl import SitlConfiguration
 from flightsim.home import Home
 from flightsim.payload import (
     NO_TAG,
@@ -25,6 +30,24 @@ from flightsim.random_streams import RandomStreams
 from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
 
 _MAP_SPACING_M = 50.0
+_REACH_M: Final = 5000.0  # the farthest from home that missions fly
+
+
+def equipped(world: SitlConfiguration, scenario: Scenario) -> SitlConfiguration:
+    """The world with what the scenario asks for.
+
+    Raises:
+        ValueError: an unusable map, or a target outside it.
+    """
+    payload = payload_of(scenario)
+    return replace(
+        world,
+        vehicles=tuple(replace(vehicle, payload=payload) for vehicle in world.vehicles),
+        targets=targets_of(scenario),
+        magnetic_field=magnetic_field_of(
+            scenario, home=world.place, seed=world.seed, decimal_year=world.environment.decimal_year
+        ),
+    )
 
 
 def payload_of(scenario: Scenario) -> PayloadParameters:
@@ -59,6 +82,7 @@ def magnetic_field_of(
         return None
     if survey.map_path is not None:
         published = MagneticMap.load(survey.map_path)
+        _require_here(published, survey.map_path, home)
     else:
         published = _made_map(survey, home, seed, decimal_year)
         if survey.publish_to is not None:
@@ -76,6 +100,28 @@ def magnetic_field_of(
             )
         )
     return MagneticField(published, signatures, decimal_year=decimal_year)
+
+
+def _require_here(published: MagneticMap, path: Path, home: Home) -> None:
+    """Refuse a map of a place that no vehicle could reach from home."""
+    frame = LocalFrame(
+        GeodeticPosition(
+            lat_deg=published.home.lat_deg, lon_deg=published.home.lon_deg, alt_m=published.home.alt_m
+        )
+    )
+    north_m, east_m, _ = frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
+    outside_m = math.hypot(
+        *(
+            max(float(lines[0]) - place_m, place_m - float(lines[-1]), 0.0)
+            for lines, place_m in ((published.north_m, north_m), (published.east_m, east_m))
+        )
+    )
+    if not outside_m <= _REACH_M:
+        raise ValueError(
+            f"{path} is the magnetic map of another place: its home is {published.home.lat_deg:.6f},"
+            f"{published.home.lon_deg:.6f}, and the vehicles stand at {home.lat_deg:.6f},{home.lon_deg:.6f}, "
+            f"{outside_m / 1000.0:.0f} km from what it covers; choose the map of this place, or --home"
+        )
 
 
 def _made_map(survey: SurveyScenario, home: Home, seed: int, decimal_year: float) -> MagneticMap:

@@ -1,7 +1,7 @@
 """An embedded SITL: the world in this process, on virtual time, one memory link per vehicle."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from autopilot_bridge.clock import VirtualTimeLoop
@@ -11,9 +11,9 @@ from autopilot_bridge.sitl.configuration import FIXED_EPOCH_UNIX_US, HOMES
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
-from missions.embedded.scenario import magnetic_field_of, payload_of, targets_of
-from missions.scenario import Scenario
+from missions.embedded.scenario import equipped
 from missions.kind import VehicleKind
+from missions.scenario import Scenario
 
 MAX_FLIGHT_S = 24 * 3600.0
 
@@ -70,13 +70,11 @@ class EmbeddedSitl:
     log_epoch_unix_us = FIXED_EPOCH_UNIX_US
 
     def __init__(self, configuration: EmbeddedConfiguration) -> None:
-        scenario = configuration.scenario
         flavour = configuration.flavour
         if configuration.home is not None:
             home = parse_home(configuration.home)
         else:
             home = HOMES.get(flavour, HOMES["px4"])
-        payload = payload_of(scenario)
         vehicles = team(
             configuration.vehicles,
             model=configuration.model,
@@ -91,17 +89,13 @@ class EmbeddedSitl:
             turbulence=configuration.turbulence,
         )
         world = SitlConfiguration(
-            vehicles=tuple(replace(vehicle, payload=payload) for vehicle in vehicles),
+            vehicles=vehicles,
             home=home,
             environment=environment,
             seed=configuration.seed,
             physics_rate_hz=configuration.physics_rate_hz,
-            targets=targets_of(scenario),
         )
-        magnetic_field = magnetic_field_of(
-            scenario, home=world.place, seed=world.seed, decimal_year=environment.decimal_year
-        )
-        self.sitl = Sitl(replace(world, magnetic_field=magnetic_field))
+        self.sitl = Sitl(equipped(world, configuration.scenario))
         self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
         sitl = self.sitl
         self.loop = VirtualTimeLoop(
