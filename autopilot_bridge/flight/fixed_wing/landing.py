@@ -181,7 +181,10 @@ class LandTask(AircraftTask):
             return self._fly_blind(ctx)
         if self._blind is not None:
             self._blind = None
-            self._enter_circle(ctx)
+            if self._line.known:
+                self._enter_circle(ctx)
+            else:  # there was no position from the start
+                self._begin(ctx)
         command = self._command
         command.flaps = p.flaps_landing
         command.airspeed_m_s = p.landing_airspeed_m_s

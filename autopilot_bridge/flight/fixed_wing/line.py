@@ -33,6 +33,11 @@ class Line:
         """The line through the aircraft."""
         self.set(state.north_m, state.east_m, heading_rad)
 
+    @property
+    def known(self) -> bool:
+        """The line was laid through a known place."""
+        return math.isfinite(self._north_m + self._east_m + self.heading_rad)
+
     def offset_m(self, state: AircraftState) -> float:
         """How far right of the line."""
         return self._cos * (state.east_m - self._east_m) - self._sin * (state.north_m - self._north_m)

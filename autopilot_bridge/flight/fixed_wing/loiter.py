@@ -15,7 +15,7 @@ from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 class LoiterTask(AircraftTask):
     """Fly to a circle along its tangent and circle there, climbing or descending on the way.
 
-    Without a position the bank is held instead, and the height.
+    Without a position the bank is held instead, and the height; "here" is then where it is found again.
 
     Args:
         centre_ned_m: centre and height, (3,); NaN components: of the place where the task starts; None: here.
@@ -34,6 +34,7 @@ class LoiterTask(AircraftTask):
         "_finished",
         "_lost",
         "_path",
+        "_placeless",
         "_turns",
         "_wanted",
         "centre_ned_m",
@@ -59,6 +60,7 @@ class LoiterTask(AircraftTask):
         self._lost = PositionLost()
         self._circle = Circle(0.0, 0.0, 1.0)
         self._finished = False
+        self._placeless = False
 
     @property
     def circling(self) -> bool:
@@ -81,6 +83,7 @@ class LoiterTask(AircraftTask):
 
     def _begin(self, ctx: FlightContext) -> None:
         state = self._state
+        self._placeless = not ctx.position_valid and not bool(np.isfinite(self._wanted[0:2]).all())
         here = (state.north_m, state.east_m, state.down_m)
         self.centre_ned_m[:] = np.where(np.isfinite(self._wanted), self._wanted, here)
         if not (math.isfinite(self.radius_m) and abs(self.radius_m) >= 1.0):
@@ -117,6 +120,8 @@ class LoiterTask(AircraftTask):
         command.down_m = float(self.centre_ned_m[2])
         if ctx.position_valid:
             if self._lost.found():
+                if self._placeless:
+                    self._begin(ctx)
                 self._circle.begin(self._state)
             self._circle.follow(self._state, guidance, ctx.fixed_wing.roll_time_constant_s)
             command.course_rad = guidance.course_rad

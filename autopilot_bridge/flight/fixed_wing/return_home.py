@@ -7,7 +7,6 @@ import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, LandingTask
-from autopilot_bridge.flight.fixed_wing.descend import DescendTask
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, ReturnDestination
@@ -45,7 +44,7 @@ def return_height(distance_m: float, height_m: float, parameters: FixedWingFligh
 class ReturnTask(AircraftTask):
     """Climb, fly home, circle down, circle there or land; or fly the landing sequence of the plan.
 
-    Without a home it circles where it is; without a position it descends there.
+    Without a home it circles where it is; without a position it does as `LoiterTask`.
 
     Args:
         store: the plan, whose landing sequence the parameters may send the return to; None: there is none.
@@ -140,10 +139,7 @@ class ReturnTask(AircraftTask):
         sub = self._sub
         assert sub is not None
         sub.update(ctx)
-        if isinstance(sub, DescendTask):
-            if ctx.position_valid:
-                self.activate(ctx)
-        elif isinstance(sub, LoiterTask):
+        if isinstance(sub, LoiterTask):
             self._advance(ctx, sub)
         return TaskStatus.RUNNING
 

@@ -174,7 +174,9 @@ class TakeoffTask(AircraftTask):
         command.throttle = self._throttle
         command.roll_rad = 0.0
         command.pitch_rad = p.takeoff_roll_pitch_rad
-        command.steering_heading_rad = self._runway.steering_heading(state, ctx.position_valid)
+        command.steering_heading_rad = self._runway.steering_heading(
+            state, ctx.position_valid and self._runway.known
+        )
         airspeed = state.airspeed_m_s if state.airspeed_m_s == state.airspeed_m_s else state.true_airspeed_m_s
         off_ground = self._start_down_m - state.down_m > _LEFT_GROUND_M
         if airspeed >= p.rotation_airspeed_m_s or off_ground:
@@ -186,6 +188,8 @@ class TakeoffTask(AircraftTask):
         Where the aircraft gets too fast at that, or its airspeed isn't known, a climb rate is flown instead.
         """
         state, command = self._state, self._command
+        if ctx.position_valid and not self._runway.known:  # found on the way
+            self._runway.begin(state, state.course_rad)
         self._rotated_s += ctx.dt_s
         self._throttle = p.takeoff_throttle_max
         climbed = self._start_down_m - state.down_m
