@@ -1,0 +1,67 @@
+"""`flightstack sitl`: what its vehicles carry."""
+
+from collections import Counter
+
+import pytest
+from click.testing import CliRunner
+
+from autopilot_bridge.mavlink import DEFINITIONS
+from autopilot_bridge.tlog import TlogReader
+from flightsim.home import Home
+from flightsim.payload import SyntheticMapParameters, synthetic_map
+from flightsim.random_streams import RandomStreams
+from missions.cli_sitl import sitl as command
+
+LINK = ("--link", "udpin:127.0.0.1:0")
+
+
+def sitl(*arguments: str):
+    return CliRunner().invoke(command, ["--speedup", "0", "--duration", "3", *arguments])
+
+
+@pytest.fixture
+def survey_map(tmp_path):
+    home = Home(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
+    path = tmp_path / "map.npz"
+    seed = RandomStreams(1).child("magnetic_map")
+    synthetic_map(SyntheticMapParameters(), home=home, seed=seed).save(path)
+    return path
+
+
+def test_payload_speaks_on_the_vehicles_links_and_targets_are_in_the_log(tmp_path, survey_map):
+    log = tmp_path / "carried.tlog"
+    result = sitl(
+        *LINK, "--camera", "--target", "40,0", "--target", "0,60,2,90", "--map", str(survey_map),
+        "--map-target", "100,-50", "--log", str(log),
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    heard = Counter((f.system_id, f.component_id, DEFINITIONS[f.message_id].name) for _, f in TlogReader(log))
+    for component in (100, 154, 158):
+        assert heard[1, component, "HEARTBEAT"] == 3
+    assert heard[1, 158, "NAMED_VALUE_FLOAT"] == 30
+    for target in (1, 2):
+        assert heard[251, target, "HIL_STATE_QUATERNION"] == 150
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--target", "5,5"), "add --camera"),
+        (("--camera", "--target", "5"), "--target '5' is not 2 or 4 numbers"),
+        (("--camera", "--target", "1,2,nan,4"), "--target '1,2,nan,4' is not"),
+        (("--camera", "--target", "1e9,0"), "not within 50000 m of home"),
+        (("--camera", "--target", "0,0,-3,90"), "target speed -3 m/s"),
+        (("--map-target", "1,2"), "--map-target needs a --map"),
+        (("--map", "nowhere.npz"), "nowhere.npz is not a magnetic map"),
+    ],
+)
+def test_payload_that_can_not_be_is_refused_by_name(arguments, told):
+    result = sitl(*LINK, *arguments)
+    assert result.exit_code == 2
+    assert told in result.output
+
+
+def test_signature_off_the_map_is_refused_by_name(survey_map):
+    result = sitl(*LINK, "--map", str(survey_map), "--map-target", "9000,0")
+    assert result.exit_code == 2
+    assert "target 1 at north 9000 m, east 0 m is outside the magnetic map" in result.output
