@@ -20,6 +20,7 @@ from autopilot_bridge.navigation.gps_quality import GpsQuality
 from autopilot_bridge.navigation.heading_check import HeadingCheck
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.navigation.pressure_scale import PressureScale
 from autopilot_bridge.navigation.report import Clocks, report
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
 from autopilot_bridge.navigation.standby import Standby
@@ -73,6 +74,7 @@ class Aiding:
         "_health",
         "_mag_ned",
         "_parameters",
+        "_pressure_scale",
         "_quality",
         "_readings",
         "_rejoining",
@@ -109,6 +111,7 @@ class Aiding:
             self._mag_ned = np.array(parameters.mag_ned_gauss)
         self.frame: LocalFrame | None = None
         self._heading = HeadingCheck()
+        self._pressure_scale = PressureScale()
         self.air: AirAiding | None = None
         if parameters.fixed_wing:
             self.air = AirAiding(parameters, readings=readings, solution=solution, health=health)
@@ -123,6 +126,7 @@ class Aiding:
         self._gps_height_known = False
         self._standby.restart()
         self._heading.restart()
+        self._pressure_scale.restart()
         self._rejoining = False
         self._contradictions = 0
         self._contradicted_us = 0
@@ -248,7 +252,7 @@ class Aiding:
             clocks.mag_us = time_us
             clocks.mag_refused_us = time_us
         if accepted & f.ACCEPTED_BARO:
-            clocks.baro_us = clocks.height_us = time_us
+            self._baro_fused(time_us)
         elif has & f.HAS_BARO:
             self._baro_refused(time_us)
         if has & f.HAS_MAG and not accepted & f.ACCEPTED_MAG:
@@ -441,6 +445,13 @@ class Aiding:
             self._baro_known = True
             solution.set_baro_offset(height + float(solution.past_position(row)[2]))
         return row
+
+    def _baro_fused(self, time_us: int) -> None:
+        self._clocks.baro_us = self._clocks.height_us = time_us
+        height = float(self._solution.obs[f.BARO_HEIGHT])
+        grown = self._pressure_scale.variance_m2(height, self._parameters.barometer_scale_error)
+        if grown > 0.0:
+            self._solution.widen_baro_offset(grown)
 
     def _baro_refused(self, time_us: int) -> None:
         """Refused for too long: with GPS heights the offset is learnt anew, without them the height jumps."""

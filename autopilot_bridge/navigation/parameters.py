@@ -11,6 +11,7 @@ _MAY_BE_ZERO = frozenset(
         "rangefinder_noise_fraction",
         "gps_check_time_s",
         "barometer_offset_walk_m_per_sqrt_s",
+        "barometer_scale_error",
         "terrain_walk_m_per_sqrt_s",
         "terrain_gradient",
         "use_gps",
@@ -62,6 +63,7 @@ class NavigationParameters:
         barometer_noise_m: white noise of the pressure altitude.
         barometer_lag_s: first-order lag of the barometer, taken as a delay (EKF2_BARO_DELAY).
         barometer_offset_walk_m_per_sqrt_s: random walk of the offset between pressure altitude and height.
+        barometer_scale_error: 1-sigma of height over pressure altitude: days colder and warmer than standard.
         magnetometer_noise_gauss: white noise of one axis.
         magnetometer_bias_gauss: 1-sigma of the hard and soft iron that calibration left.
         magnetometer_bias_tau_s, magnetometer_bias_turn_rad: its correlation time, and the angle turned after
@@ -148,6 +150,7 @@ class NavigationParameters:
     barometer_noise_m: float = 0.11
     barometer_lag_s: float = 0.02
     barometer_offset_walk_m_per_sqrt_s: float = 0.01
+    barometer_scale_error: float = 0.04
     magnetometer_gate: float = 3.0
     magnetometer_noise_gauss: float = 0.003
     magnetometer_bias_gauss: float = 0.0032

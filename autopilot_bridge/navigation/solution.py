@@ -245,6 +245,10 @@ class Solution:
         self.core[X_BARO_OFFSET] = offset_m
         cov.forget(self.p, BARO_OFFSET, UNKNOWN_HEIGHT_M**2)
 
+    def widen_baro_offset(self, variance_m2: float) -> None:
+        """The barometer's offset may have changed by so much."""
+        self.p[BARO_OFFSET, BARO_OFFSET] += variance_m2
+
     def position(self) -> tuple[float, float, float]:
         """Present position, NED, m."""
         return (float(self.core[X_POS]), float(self.core[X_POS + 1]), float(self.core[X_POS + 2]))
