@@ -5,8 +5,7 @@ The whole action, mission and offboard surface on the px4 flavour; on ardupilot 
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
@@ -26,10 +25,10 @@ from mavsdk.plugins.mission_raw import MissionRaw
 from mavsdk.plugins.offboard import Offboard, PositionNedYaw
 from mavsdk.plugins.telemetry import Telemetry
 
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
 from tests.clients.sitl_process import free_port, running_sitl
 
 SPEEDUP = 10.0
-WALL_DEADLINE_S = 25.0
 
 
 def mission_items(latitude_deg: float, longitude_deg: float) -> list[MissionItem]:
@@ -68,19 +67,6 @@ def raw_items(latitude_deg: float, longitude_deg: float) -> list[RawItem]:
         )
         for seq, (frame, command, north, east) in enumerate(corners)
     ]
-
-
-async def first(stream: AsyncIterator[Any], found: Callable[[Any], bool], what: str) -> Any:
-    """First element of a telemetry stream that satisfies `found`."""
-    last: Any = None
-    try:
-        async with asyncio.timeout(WALL_DEADLINE_S):
-            async for last in stream:
-                if found(last):
-                    return last
-    except TimeoutError:
-        raise AssertionError(f"{what} was not seen; last: {last}") from None
-    raise AssertionError(f"the stream ended before {what}")
 
 
 async def fly_px4(url: str) -> None:
