@@ -25,7 +25,7 @@ class Leg:
         target: the waypoint.
         ramps: the height goes evenly from the start's to the target's; False: to the target's at once.
         radius_m: acceptance radius.
-        turn_rad: change of course behind the waypoint, 0..pi; NaN: not known.
+        turn_rad: change of course behind the waypoint, 0..pi; NaN: not known, or of no matter.
     """
 
     __slots__ = (

@@ -177,7 +177,8 @@ class MissionTask(PlanTask):
         start = (state.north_m, state.east_m, state.down_m) if came_from is None else _place(came_from)
         place = _place(target)
         after = self._place_after(ctx)
-        turn = math.nan if after is None else turn_angle(start, place, _place(after))
+        # an item's own radius holds whatever the turn behind it, as ArduPlane has it
+        turn = math.nan if after is None or own > 0.0 else turn_angle(start, place, _place(after))
         self._leg = Leg(
             start,
             place,
