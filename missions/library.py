@@ -14,7 +14,7 @@ from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
 from missions.mission import Mission
 from missions.occupancy.mission import OccupancyMission
-from missions.options import WINGS_SIDE_M, FlightOptions
+from missions.options import FlightOptions
 from missions.orbit.mission import OrbitMission
 from missions.patterns import (
     Curve,
@@ -28,10 +28,11 @@ from missions.patterns import (
 )
 from missions.patterns.lissajous import reduced_ratio
 from missions.planning.limits import FixedWingLimits, Limits
-from missions.planning.turns import smallest_radius_m
+from missions.planning.sizing import curve_side_m, legs_side_m, sector_side_m, spacing_within_m
 from missions.vehicle.vehicle import Vehicle
 
 CurveMaker = Callable[[FlightOptions], Curve]
+Sizing = Callable[[FlightOptions, FixedWingLimits], FlightOptions]
 
 
 class PatternMission(Mission[FlightOptions]):
@@ -40,23 +41,17 @@ class PatternMission(Mission[FlightOptions]):
     Args:
         name: for people and file names.
         make_curve: the pattern for some options.
+        size: what nobody chose of its size, so that an aircraft with wings can fly its turns.
     """
 
-    def __init__(self, name: str, make_curve: CurveMaker) -> None:
+    def __init__(self, name: str, make_curve: CurveMaker, size: Sizing) -> None:
         self.name = name
         self._make_curve = make_curve
+        self._size = size
 
     def adapted(self, options: FlightOptions, limits: Limits) -> FlightOptions:
         options = options.for_vehicle(limits)
-        if isinstance(limits, FixedWingLimits) and self.name == "lissajous":
-            # a size that nobody chose is one whose bends the aircraft can fly
-            radius_m = limits.turn_radius_m(options.speed_m_s)
-            factor = radius_m / smallest_radius_m(
-                self.curve(replace(options, periods=1.0, search_time_s=None))
-            )
-            side_m = 100.0 * math.ceil(0.01 * WINGS_SIDE_M * max(1.0, 1.05 * factor))
-            options = options.unless_chosen(width_m=side_m, height_m=side_m)
-        return options
+        return self._size(options, limits) if isinstance(limits, FixedWingLimits) else options
 
     def check(self, options: FlightOptions, limits: Limits) -> None:
         from missions.pattern_flight import check_pattern
@@ -85,12 +80,16 @@ class PatternMission(Mission[FlightOptions]):
 MAX_LENGTH_M: Final = 100_000.0
 """Longest pattern that is planned: some hours of flight, and what a planner holds in memory with ease."""
 
+MAX_FLIGHT_S: Final = 20_000.0
+"""The same in time: who flies fast may fly farther."""
 
-def _check_length(length_m: float) -> None:
+
+def _check_length(length_m: float, options: FlightOptions) -> None:
     """Refuse a pattern by its rough length, before it is built point by point."""
-    if length_m > MAX_LENGTH_M:
+    most_m = max(MAX_LENGTH_M, MAX_FLIGHT_S * options.speed_m_s)
+    if length_m > most_m:
         raise PlanError(
-            f"the pattern is about {1e-3 * length_m:.4g} km long, more than {1e-3 * MAX_LENGTH_M:g} km; "
+            f"the pattern is about {1e-3 * length_m:.4g} km long, more than {1e-3 * most_m:g} km; "
             "ask for less --periods or --search-time, a smaller --size, a wider --spacing, a simpler --ratio"
         )
 
@@ -112,10 +111,10 @@ def _passes(options: FlightOptions, one_pass_m: float) -> int:
 
 def _in_passes(make: Callable[[int], Polyline], options: FlightOptions, rough_length_m: float) -> Polyline:
     """As many passes as asked for of a pattern whose single pass has about a length."""
-    _check_length(rough_length_m)
+    _check_length(rough_length_m, options)
     one_pass_m = make(1).length_m
     passes = _passes(options, one_pass_m)
-    _check_length(one_pass_m * passes)
+    _check_length(one_pass_m * passes, options)
     return make(passes)
 
 
@@ -143,7 +142,7 @@ def lissajous_curve(options: FlightOptions) -> Curve:
             slower_turns = max(1.0, options.search_time_s * options.speed_m_s / slowest_turn_m)
         spread = math.tau * options.index / options.vehicles
         shape = replace(shape, open_turns=slower_turns)
-        _check_length(_lissajous_length_m(shape, 1.0))
+        _check_length(_lissajous_length_m(shape, 1.0), options)
         return replace(
             shape,
             phase_x_rad=shape.phase_x_rad + spread * shape.ratio_x,
@@ -156,14 +155,14 @@ def lissajous_curve(options: FlightOptions) -> Curve:
         else:
             once_m = 2.0 * math.hypot(options.width_m, options.height_m)
             laps = max(1, math.ceil(options.search_time_s * options.speed_m_s / once_m))
-    _check_length(_lissajous_length_m(shape, laps))
+    _check_length(_lissajous_length_m(shape, laps), options)
     return Lap(curve=shape, laps=laps, start=options.index / options.vehicles)
 
 
 def _sector(options: FlightOptions) -> Curve:
     radius_m = 0.5 * min(options.width_m, options.height_m)
     passes = _passes(options, 9.0 * max(radius_m, 1e-3))
-    _check_length(9.0 * radius_m * passes)
+    _check_length(9.0 * radius_m * passes, options)
     heading = options.heading_rad + math.radians(30.0) * options.index / options.vehicles
     return sector(radius_m=radius_m, heading_rad=heading, passes=passes)
 
@@ -194,12 +193,36 @@ def _expanding_square(options: FlightOptions) -> Curve:
     return _in_passes(make, options, min(options.width_m, options.height_m) ** 2 / options.spacing_m)
 
 
+def _lissajous_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOptions:
+    once = lissajous_curve(replace(options, periods=1.0, search_time_s=None))
+    side_m = curve_side_m(once, options.width_m, options.speed_m_s, limits)
+    return options.unless_chosen(width_m=side_m, height_m=side_m)
+
+
+def _sector_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOptions:
+    side_m = sector_side_m(options.speed_m_s, limits)
+    return options.unless_chosen(width_m=side_m, height_m=side_m)
+
+
+def _sweep_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOptions:
+    """A sweep makes its spacing smaller until it parts the side: the one is chosen by the other."""
+    if options.chosen("width_m") or options.chosen("height_m"):
+        short_m = min(options.width_m, options.height_m)
+        return options.unless_chosen(spacing_m=spacing_within_m(short_m, options.speed_m_s, limits))
+    return _square_size(options, limits)
+
+
+def _square_size(options: FlightOptions, _limits: FixedWingLimits) -> FlightOptions:
+    side_m = legs_side_m(options.spacing_m)
+    return options.unless_chosen(width_m=side_m, height_m=side_m)
+
+
 MISSIONS: Final[Mapping[str, Mission[Any]]] = MappingProxyType(
     {
-        "lissajous": PatternMission("lissajous", lissajous_curve),
-        "sector": PatternMission("sector", _sector),
-        "parallel-sweep": PatternMission("parallel-sweep", _parallel_sweep),
-        "expanding-square": PatternMission("expanding-square", _expanding_square),
+        "lissajous": PatternMission("lissajous", lissajous_curve, _lissajous_size),
+        "sector": PatternMission("sector", _sector, _sector_size),
+        "parallel-sweep": PatternMission("parallel-sweep", _parallel_sweep, _sweep_size),
+        "expanding-square": PatternMission("expanding-square", _expanding_square, _square_size),
         "orbit": OrbitMission(),
         "occupancy": OccupancyMission(),
     }

@@ -13,6 +13,7 @@ from autopilot_bridge.parameter_files import read_untyped_parameter_file
 from autopilot_bridge.parameters import ParameterError
 from missions.errors import PlanError
 from missions.planning.limits import Limits, MulticopterLimits
+from missions.planning.sizing import WINGS_SIDE_M, spacing_for_turns_m
 
 MAX_PERIODS: Final = 1000.0
 MAX_SEARCH_TIME_S: Final = 24 * 3600.0
@@ -21,8 +22,6 @@ MAX_SPEED_M_S: Final = 100.0
 MIN_ACCEPTANCE_M: Final = 0.1
 MAX_ACCEPTANCE_M: Final = 1000.0
 MIN_SIDE_M: Final = 1.0
-WINGS_SIDE_M: Final = 1000.0  # of a fixed wing's pattern, unless its turns need more
-_SPACING_RADII: Final = 2.5
 MAX_PHASE_RAD: Final = math.radians(3600.0) + 1e-9
 
 
@@ -165,14 +164,14 @@ class FlightOptions(MissionOptions):
         if isinstance(limits, MulticopterLimits):
             return self
         speed_m_s = self.speed_m_s if self.chosen("speed_m_s") else limits.airspeed_trim_m_s
-        radius_m = limits.turn_radius_m(speed_m_s)
         return self.unless_chosen(
             pattern="L2",
+            via=Via.SETPOINTS,
             width_m=WINGS_SIDE_M,
             height_m=WINGS_SIDE_M,
             speed_m_s=speed_m_s,
             altitude_m=min(100.0, limits.altitude_max_m),
-            spacing_m=10.0 * math.ceil(0.1 * _SPACING_RADII * radius_m),
+            spacing_m=spacing_for_turns_m(speed_m_s, limits),
             acceptance_m=min(30.0, max(10.0, speed_m_s)),
             separation_m=20.0,
         )

@@ -104,6 +104,7 @@ class FixedWingLimits(_Limits):
     """
 
     altitude_min_m: float = 20.0
+    reach_m: float = 20_000.0
     airspeed_min_m_s: float = 10.0
     airspeed_trim_m_s: float = 15.0
     airspeed_max_m_s: float = 20.0

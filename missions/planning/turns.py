@@ -70,7 +70,7 @@ def _check_corners(curve: Polyline, radius_m: float, ramp_m: float, needs: str) 
         if turn > _SHARPEST_RAD:
             raise PlanError(
                 "the pattern turns straight back on its own leg, which an aircraft can't; choose another "
-                "pattern, or --periods 1"
+                "pattern, --periods 1 or a shorter --search-time"
             )
         part = corner_reach_m(turn, radius_m, ramp_m)
         taken[k - 1] += part

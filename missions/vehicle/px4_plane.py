@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.planning.limits import FixedWingLimits, Limits
 from missions.kind import VehicleKind
+from missions.planning.limits import FixedWingLimits, Limits
 from missions.vehicle.px4 import Px4
 
 if TYPE_CHECKING:
