@@ -40,6 +40,7 @@ class OccupancyOptions(MissionOptions):
         raise_radius_m: scores are raised within this distance of an anomaly.
         search_time_s: the search is given up after this time.
         speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: by the vehicle.
+        planned_wind_m_s: wind that the turns of an aircraft are planned for.
         map_file: published magnetic map; None: the embedded world makes one from its seed.
         target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle what
             the result is compared with.
@@ -62,6 +63,7 @@ class OccupancyOptions(MissionOptions):
     raise_radius_m: float = 300.0
     search_time_s: float = 900.0
     speed_m_s: float | None = None
+    planned_wind_m_s: float = 0.0
     map_file: str | None = None
     target_ne_m: tuple[float, float] | None = None
     amplitude_nt: float = 30.0
@@ -140,14 +142,15 @@ class OccupancyOptions(MissionOptions):
     def for_vehicle(self, limits: Limits) -> "OccupancyOptions":
         """The same options with the habits and the speed of a kind of vehicle, where nobody chose them."""
         if isinstance(limits, FixedWingLimits):
-            penalty, speed_m_s = _PENALTY_OF_WINGS, limits.airspeed_trim_m_s
+            penalty, speed_m_s, wind_m_s = _PENALTY_OF_WINGS, limits.airspeed_trim_m_s, limits.wind_m_s
         else:
-            penalty = _PENALTY_OF_MULTICOPTERS
+            penalty, wind_m_s = _PENALTY_OF_MULTICOPTERS, 0.0
             speed_m_s = min(_MULTICOPTER_M_S, _SHARE_OF_SPEED * limits.speed_m_s)
         return replace(
             self,
             heading_penalty=penalty if self.heading_penalty is None else self.heading_penalty,
             speed_m_s=speed_m_s if self.speed_m_s is None else self.speed_m_s,
+            planned_wind_m_s=wind_m_s,
         )
 
 

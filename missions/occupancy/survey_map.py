@@ -7,7 +7,9 @@ data, `height_m` above home that the map is valid at, its home (`home_lat_deg`, 
 """
 
 import math
+import tokenize
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -21,6 +23,10 @@ from missions.errors import PlanError
 Array = NDArray[np.float64]
 
 FORMAT: Final = "flightstack-magnetic-map-1"
+_UNREADABLE: Final = (  # what zipfile, zlib and numpy's reader of array headers raise for spoiled bytes
+    *(EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError),
+    *(ValueError, TypeError, SyntaxError, tokenize.TokenError),
+)
 _NEEDED: Final = (
     "format",
     "north_m",
@@ -115,23 +121,29 @@ def load_survey_map(path: Path) -> SurveyMap:
         PlanError: no such file, not such a file, or a map without data.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            found = {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise PlanError(f"--map {path} is not a magnetic map (.npz): {error}") from None
+        # not np.load, which takes for a pickle what is no archive, and advises to trust it
+        with zipfile.ZipFile(path) as archive:
+            found = {}
+            for name in archive.namelist():
+                with archive.open(name) as file:
+                    found[name.removesuffix(".npy")] = np.lib.format.read_array(file, allow_pickle=False)
+    except OSError as error:
+        raise PlanError(f"--map {path} can't be read: {error.strerror or error}") from None
+    except _UNREADABLE as error:
+        why = str(error) or type(error).__name__
+        raise PlanError(f"--map {path} is not a magnetic map (a numpy .npz archive): {why}") from None
     missing = [name for name in _NEEDED if name not in found]
     if missing:
         raise PlanError(f"--map {path} is not a magnetic map: it has no {', '.join(missing)}")
     if str(found["format"]) != FORMAT:
         raise PlanError(f"--map {path} has the format {found['format']}; accepted is {FORMAT}")
-    try:
-        north_m, east_m, total_nt = (
-            np.asarray(found[name], dtype=np.float64) for name in ("north_m", "east_m", "total_field_nt")
-        )
-        gradient = np.asarray(found.get("vertical_gradient_nt_m", np.zeros(total_nt.shape)), dtype=np.float64)
-        height_m, lat_deg, lon_deg, alt_m = (float(found[name]) for name in _NEEDED[4:])
-    except (TypeError, ValueError) as error:
-        raise PlanError(f"--map {path}: {error}") from None
+    north_m, east_m, total_nt = (
+        _numbers(path, name, found[name]) for name in ("north_m", "east_m", "total_field_nt")
+    )
+    gradient = _numbers(
+        path, "vertical_gradient_nt_m", found.get("vertical_gradient_nt_m", np.zeros(total_nt.shape))
+    )
+    height_m, lat_deg, lon_deg, alt_m = (_number(path, name, found[name]) for name in _NEEDED[4:])
     shape = (north_m.size, east_m.size)
     rising = all(
         lines.ndim == 1 and lines.size >= 2 and bool(np.all(np.diff(lines) > 0.0))
@@ -144,8 +156,15 @@ def load_survey_map(path: Path) -> SurveyMap:
         )
     if not np.any(np.isfinite(total_nt)) or np.any(np.isinf(total_nt)):
         raise PlanError(f"--map {path} has no data: total_field_nt needs finite numbers")
-    if not (math.isfinite(height_m) and abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
-        raise PlanError(f"--map {path}: height {height_m}, home {lat_deg}, {lon_deg} are not a place")
+    if not np.all(np.isfinite(gradient[np.isfinite(total_nt)])):
+        raise PlanError(
+            f"--map {path}: vertical_gradient_nt_m has no number at places where total_field_nt has one; "
+            "leave it out, or fill it"
+        )
+    if not (math.isfinite(height_m + alt_m) and abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+        raise PlanError(
+            f"--map {path}: height {height_m}, home {lat_deg}, {lon_deg}, {alt_m} are not a place"
+        )
     return SurveyMap(
         north_m=north_m,
         east_m=east_m,
@@ -154,3 +173,17 @@ def load_survey_map(path: Path) -> SurveyMap:
         height_m=height_m,
         home=GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m),
     )
+
+
+def _numbers(path: Path, name: str, values: Array) -> Array:
+    """An array of the file as real numbers."""
+    if values.dtype.kind not in "iuf":
+        raise PlanError(f"--map {path}: {name} holds {values.dtype} and no real numbers")
+    return values.astype(np.float64)
+
+
+def _number(path: Path, name: str, values: Array) -> float:
+    """A single number of the file."""
+    if values.size != 1:
+        raise PlanError(f"--map {path}: {name} has the shape {values.shape}; it is to be one number")
+    return float(_numbers(path, name, values).reshape(()))

@@ -12,12 +12,13 @@ from missions.kind import VehicleKind
 from missions.occupancy.detection import Anomaly, AnomalyDetector
 from missions.occupancy.field_watch import FieldWatch, PlacedReading
 from missions.occupancy.noise_check import require_quiet
-from missions.occupancy.options import OccupancyOptions
+from missions.occupancy.options import OccupancyOptions, check_vehicle
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
 from missions.occupancy.steering import Steering, steering
 from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
+from missions.planning.limits import FixedWingLimits
 from missions.telemetry import AirData, Attitude, Position
 from missions.vehicle.adapter import Mode
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
@@ -154,6 +155,9 @@ class SearchTeam:
             vehicle.home.lat_deg, vehicle.home.lon_deg, vehicle.home.alt_m
         )
         limits = await vehicle.limits()
+        if isinstance(limits, FixedWingLimits):
+            limits = replace(limits, wind_m_s=own.planned_wind_m_s)
+        check_vehicle(own, limits)
         layout = self.search.map.layout
         farthest_m = max(
             math.hypot(edge_n_m - north_m, edge_e_m - east_m)

@@ -161,7 +161,7 @@ def test_a_threshold_within_the_noise_is_refused_on_the_ground():
         (["--target", "9000,0"], "outside the searched map"),
         (["--cell", "50"], "too small for an aircraft"),
         (["--threshold", "0.5"], "below 3 standard deviations of the noise"),
-        (["--size", "20000"], "smaller --size"),
+        (["--size", "45000"], "smaller --size"),
     ],
 )
 def test_the_command_line_refuses_with_usage_errors(arguments, words, tmp_path, capsys):
@@ -174,7 +174,7 @@ def test_the_command_line_refuses_with_usage_errors(arguments, words, tmp_path, 
 @pytest.mark.slow
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_three_aircraft_search_in_wind(autopilot, tmp_path):
-    options = OccupancyOptions(vehicles=3)
+    options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0, target_ne_m=(-300.0, 350.0))
     result = fly(
         OccupancyMission(),
         request(

@@ -56,8 +56,8 @@ def test_impossible_values_are_refused_by_name(values, words):
         ({"cell_m": 60.0}, "--cell 60 m is too small .* ask for --cell 120 or more"),
         ({"altitude_m": 110.0, "vehicles": 3, "index": 2}, "--altitude"),
         ({"altitude_m": 5.0}, "--altitude"),
-        ({"width_m": 10_000.0, "cell_m": 500.0}, "reaches"),
-        ({"area_ne_m": (6000.0, 0.0)}, "reaches"),
+        ({"width_m": 45_000.0, "cell_m": 1000.0}, "reaches"),
+        ({"area_ne_m": (25_000.0, 0.0)}, "reaches"),
         ({"speed_m_s": 40.0}, "airspeed 40"),
     ],
 )
