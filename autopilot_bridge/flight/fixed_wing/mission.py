@@ -208,7 +208,7 @@ class MissionTask(PlanTask):
         return circle.done(ctx, self._state, self._place_after(ctx))
 
     def _came_from(self, ctx: FlightContext) -> Array | None:
-        """A circle is left where the aircraft is, on its height; a waypoint circled at for height as any other."""
+        """A circle is left where the aircraft is, on its height; one flown for a height is its waypoint."""
         circle, state, leg = self._circle, self._state, self._leg
         if circle is None:
             return None
