@@ -5,12 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 from missions.errors import PlanError
+from missions.kind import VehicleKind
 from missions.mission import Mission
 from missions.opening import Stage
 from missions.options import MissionOptions
 from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
 from missions.request import RunRequest
-from missions.kind import VehicleKind
 from missions.vehicle.link_view import ADAPTERS
 
 
@@ -62,7 +62,9 @@ def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> Non
 
 
 def _check(mission: Mission[Any], request: RunRequest, options: MissionOptions, limits: Limits) -> None:
-    limits = in_wind(limits, request.planning_wind_m_s)
+    # the widest limits' airspeed is nobody's: what wind is too much, each aircraft's own say
+    if limits is not WIDEST_FIXED_WING_LIMITS:
+        limits = in_wind(limits, request.planning_wind_m_s)
     mission.check(mission.adapted(options, limits), limits)
 
 

@@ -137,7 +137,7 @@ def team(
         heading_deg: the way they point; the row is at a right angle to it, so that runways are side by side.
 
     Raises:
-        ValueError: count is not in 1..250, or doesn't fit the models.
+        ValueError: count is not in 1..250, or doesn't fit the models; a launch of multicopters.
         AirframeError: a model that can't be used.
     """
     if not 1 <= count <= MAX_VEHICLES:
@@ -146,6 +146,12 @@ def team(
     if len(models) != count:
         raise ValueError(f"{len(models)} models for {count} vehicles; accepted: one for all, or {count}")
     kinds = [load_airframe(each).kind for each in models]
+    if launch is not None and AirframeKind.FIXED_WING not in kinds:
+        names = ", ".join(str(name) for name in dict.fromkeys(models))
+        raise ValueError(
+            f"launch {launch!r} is for aircraft, and there is none among {names}; "
+            "leave it out, or choose the model of an aircraft, such as aerosonde"
+        )
     right = (-math.sin(math.radians(heading_deg)), math.cos(math.radians(heading_deg)))
     along_m, vehicles = 0.0, []
     for index, (each, kind) in enumerate(zip(models, kinds, strict=True)):

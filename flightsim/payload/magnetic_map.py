@@ -83,6 +83,11 @@ class MagneticMap:
                 )
         if np.any(np.isinf(self.total_field_nt)) or not np.any(np.isfinite(self.total_field_nt)):
             raise MagneticMapError("a magnetic map without data: total_field_nt needs finite numbers")
+        gradient = self.vertical_gradient_nt_m
+        if gradient is not None and not np.all(np.isfinite(gradient[np.isfinite(self.total_field_nt)])):
+            raise MagneticMapError(
+                "vertical_gradient_nt_m of a magnetic map has no number at places where total_field_nt has one"
+            )
         if not math.isfinite(self.height_m):
             raise MagneticMapError(f"height_m = {self.height_m} of a magnetic map is not finite")
 

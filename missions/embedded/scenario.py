@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.sitl import SitlConfiguration
@@ -27,10 +26,9 @@ from flightsim.payload import (
 )
 from flightsim.payload import TargetMotion as Motion
 from flightsim.random_streams import RandomStreams
-from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
+from missions.scenario import MAX_DISTANCE_M, Scenario, SurveyScenario, TargetMotion, TargetScenario
 
 _MAP_SPACING_M = 50.0
-_REACH_M: Final = 5000.0  # the farthest from home that missions fly
 
 
 def equipped(world: SitlConfiguration, scenario: Scenario) -> SitlConfiguration:
@@ -116,7 +114,7 @@ def _require_here(published: MagneticMap, path: Path, home: Home) -> None:
             for lines, place_m in ((published.north_m, north_m), (published.east_m, east_m))
         )
     )
-    if not outside_m <= _REACH_M:
+    if not outside_m <= MAX_DISTANCE_M:
         raise ValueError(
             f"{path} is the magnetic map of another place: its home is {published.home.lat_deg:.6f},"
             f"{published.home.lon_deg:.6f}, and the vehicles stand at {home.lat_deg:.6f},{home.lon_deg:.6f}, "
