@@ -68,8 +68,9 @@ class Mission(Generic[AnyOptions]):
         return options.for_vehicle(limits)
 
     def check(self, options: AnyOptions, limits: Limits) -> None:
-        """Refuse, with a PlanError, what one vehicle can't fly; before anything is started, and again when its
-        own limits are known.
+        """Refuse, with a PlanError, what one vehicle can't fly.
+
+        Before anything is started, and again when its own limits are known.
         """
 
     def scenario(self, options: AnyOptions, setting: Setting) -> Scenario:

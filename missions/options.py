@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final, Self
+from typing import Any, Final, Self
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.parameter_files import read_untyped_parameter_file
@@ -84,7 +84,8 @@ class MissionOptions:
 
     def unless_chosen(self, **values: float | str) -> Self:
         """The same options, with other values where nobody chose one."""
-        return replace(self, **{name: value for name, value in values.items() if not self.chosen(name)})
+        changes: dict[str, Any] = {name: v for name, v in values.items() if not self.chosen(name)}
+        return replace(self, **changes)
 
     def for_vehicle(self, limits: Limits) -> Self:
         """The same options as one vehicle flies them: what nobody chose suits its kind."""

@@ -16,8 +16,20 @@ def _degrees(name: str, value: float) -> float:
     return math.radians(value)
 
 
+def _place(text: str) -> tuple[float, float]:
+    north, comma, east = text.partition(",")
+    try:
+        place = float(north), float(east)
+    except ValueError:
+        place = math.nan, math.nan
+    if not comma or not all(map(math.isfinite, place)):
+        raise click.UsageError(
+            f"--target {text!r} is not NORTH,EAST in metres from home, for example 500,300"
+        )
+    return place
+
+
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.options import parse_pair
     from missions.orbit.options import OrbitOptions
     from missions.scenario import TargetMotion
 
@@ -30,7 +42,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         direction=1 if given["direction"] == "cw" else -1,
         duration_s=given["duration"],
         airspeed_m_s=given["airspeed"],
-        target_ne_m=parse_pair(given["target"], "--target", ","),
+        target_ne_m=_place(given["target"]),
         target_speed_m_s=given["target_speed"],
         target_heading_rad=_degrees("target-heading", given["target_heading"]),
         target_motion=None if motion is None else TargetMotion(motion),
@@ -47,7 +59,8 @@ COMMAND: Final = MissionCommand(
     names=("orbit",),
     help=(
         "Circle a target on the ground without GPS, by roll commands from what a gimballed camera sees.\n\n"
-        "An aircraft takes off, flies to the entry with GPS, loses it there (MAV_CMD_INJECT_FAILURE), orbits, gets "
+        "An aircraft takes off, flies to the entry with GPS, loses it there (MAV_CMD_INJECT_FAILURE), "
+        "orbits, gets "
         "GPS back and lands."
     ),
     options=(

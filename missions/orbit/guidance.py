@@ -1,13 +1,13 @@
 """Roll commands that lead into a circle around a moving point and keep it there (paper 004, section IV-A).
 
 Everything is relative: p is the horizontal offset to the target, v = -dp/dt the velocity of the aircraft
-against it. The angle from v to p, chi = atan2((v x p)_3, v . p), is +90 deg with the target abeam to the right
-(the paper's formula for it, with norms, loses the sign). Equation 35 asks for
+against it. The angle from v to p, chi = atan2((v x p)_3, v . p), is +90 deg with the target abeam to the
+right (the paper's formula for it, with norms, loses the sign). Equation 35 asks for
 
     chi_d = lambda (pi/2 - atan(k_o (rho - rho_d))),
 
-straight for the target from far away, abeam on the circle. The paper commands phi = phi_ff + k_p e + k_d de/dt,
-e = chi - chi_d, with phi_ff of the circle. Here the same terms are written as a turn rate of v:
+straight for the target from far away, abeam on the circle. The paper commands phi = phi_ff + k_p e + k_d
+de/dt, e = chi - chi_d, with phi_ff of the circle. Here the same terms are written as a turn rate of v:
 
     omega = d(bearing)/dt - d(chi_d)/dt + k e,
 

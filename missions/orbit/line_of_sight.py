@@ -68,8 +68,9 @@ def line_of_sight(
 def line_of_sight_of_gimbal(
     image_x: float, image_y: float, gimbal: GimbalAttitude, q_ned_from_frd: Quaternion
 ) -> LineOfSight:
-    """The same from a gimbal that tells its own attitude against the horizon, as MAVLink has it: the first two
-    rotations of equation 37 in one. The heading is the aircraft's.
+    """The same from a gimbal that tells its own attitude against the horizon, as MAVLink has it.
+
+    It has made the first two rotations of equation 37 one. The heading is the aircraft's.
 
     Args:
         image_x, image_y: normalized image coordinates.

@@ -10,7 +10,7 @@ from typing import Any, Final
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import decode, dialect
 from missions import telemetry
-from missions.errors import MissionError
+from missions.errors import MissionError, PlanError
 from missions.mission import Debriefing, Mission, WorldDefaults
 from missions.orbit.attitude import AutopilotAttitude
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
@@ -49,6 +49,8 @@ class OrbitMission(Mission[OrbitOptions]):
     world_defaults = WorldDefaults(model="aerosonde", wind="4", turbulence="light")
 
     def check(self, options: OrbitOptions, limits: Limits) -> None:
+        for name in options.arguments:
+            raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
         options.check(limits)
 
     def scenario(self, options: OrbitOptions, setting: Setting) -> Scenario:
@@ -83,7 +85,8 @@ class OrbitMission(Mission[OrbitOptions]):
             return ()
         return (
             f"orbit of {summary['radius_m']:g} m for {summary['orbit_s']:.0f} s: mean radius "
-            f"{summary['radius_mean_error_percent']:+.2f} %, standard deviation {summary['radius_std_m']:.1f} m, "
+            f"{summary['radius_mean_error_percent']:+.2f} %, standard deviation "
+            f"{summary['radius_std_m']:.1f} m, "
             f"altitude within {summary['altitude_error_m']:.1f} m",
         )
 
@@ -265,7 +268,8 @@ class OrbitFlight:
                 reached_us.append(self._now_us)
             elif self._now_us - placed_us > 600_000_000:
                 raise MissionError(
-                    f"the entry of the orbit was not reached within 600 s: still {off_m:.0f} m away; {vehicle.heard()}"
+                    f"the entry of the orbit was not reached within 600 s: still {off_m:.0f} m away; "
+                    f"{vehicle.heard()}"
                 )
             elif options.target_speed_m_s and (self._now_us - placed_us) % 20_000_000 < 100_000:
                 await self._circle_for_entry(home, course, radius_m)  # it has moved on
@@ -287,8 +291,7 @@ class OrbitFlight:
             raise MissionError(f"the vehicle disarmed in flight; {self._vehicle.heard()}")
 
     async def _orbit_without_gps(self, looking: "asyncio.Task[None]") -> None:
-        vehicle, options, pilot = self._vehicle, self._options, self._pilot
-        assert pilot is not None
+        vehicle = self._vehicle
         self._begin("entry")
         self._require_air_data()
         try:
@@ -327,7 +330,8 @@ class OrbitFlight:
         airspeed_m_s = self._pilot.airspeed_true_m_s
         if not airspeed_m_s > 0.5 * self._limits.airspeed_min_m_s:
             raise MissionError(
-                f"the vehicle's airspeed is {airspeed_m_s:.1f} m/s in flight (VFR_HUD), so the orbit can't be flown "
+                f"the vehicle's airspeed is {airspeed_m_s:.1f} m/s in flight (VFR_HUD), so the orbit "
+                "can't be flown "
                 f"without GPS; is its airspeed sensor sound? {self._vehicle.heard()}"
             )
 
@@ -375,7 +379,8 @@ class OrbitFlight:
                 notes.marks["orbit_captured_after_s"] = (now_us - entered_us) * 1e-6
             elif now_us - entered_us > _CAPTURE_LIMIT_S * 1e6:
                 raise MissionError(
-                    f"the circle was not reached within {_CAPTURE_LIMIT_S:g} s: believed {command.radius_m:.0f} m from "
+                    f"the circle was not reached within {_CAPTURE_LIMIT_S:g} s: believed "
+                    f"{command.radius_m:.0f} m from "
                     f"the target; {self._vehicle.heard()}"
                 )
             return
@@ -398,7 +403,8 @@ class OrbitFlight:
             await vehicle.command(dialect.MAV_CMD_INJECT_FAILURE, float(_GPS), float(_OFF), 0.0)
         except MissionError as error:
             raise MissionError(
-                f"GPS can't be switched off in flight ({error}); fly with --no-gps-fault to orbit without using it, "
+                f"GPS can't be switched off in flight ({error}); fly with --no-gps-fault to orbit "
+                "without using it, "
                 "or allow it (PX4: SYS_FAILURE_EN 1)"
             ) from error
         vehicle.notes.marks["gps_lost_at_s"] = self._now_us * 1e-6

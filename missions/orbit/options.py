@@ -54,6 +54,7 @@ class OrbitOptions(MissionOptions):
             duration=self.duration_s,
             airspeed=self.airspeed_m_s,
             entry_distance=self.entry_distance_m,
+            lost_limit=self.lost_limit_s,
         )
         if self.direction not in (-1, 1):
             raise PlanError(f"--direction {self.direction} is not cw or ccw")
@@ -63,6 +64,10 @@ class OrbitOptions(MissionOptions):
             raise PlanError(f"--duration {self.duration_s:g} s is not in 1..21600 s")
         if not all(math.isfinite(value) for value in self.target_ne_m):
             raise PlanError("--target is not a place; give NORTH,EAST in metres from home")
+        if not math.isfinite(self.target_ground_m):
+            raise PlanError(
+                f"--target-ground {self.target_ground_m:g} m is not a height; give metres above home"
+            )
         if self.target_motion not in (None, TargetMotion.STATIC) and self.target_speed_m_s == 0.0:
             raise PlanError(f"--target-motion {self.target_motion} needs a --target-speed of more than 0")
         if self.target_motion is TargetMotion.STATIC and self.target_speed_m_s > 0.0:
@@ -102,15 +107,24 @@ class OrbitOptions(MissionOptions):
         airspeed_m_s = self.airspeed(limits)
         limits.check_airspeed(airspeed_m_s)
         limits.check_altitude(self.own_altitude_m)
-        limits.check_reach(math.hypot(*self.target_ne_m) + self.entry_distance_m)
+        reach_m = math.hypot(*self.target_ne_m) + self.entry_distance_m
+        if not reach_m <= limits.reach_m:
+            raise PlanError(
+                f"the entry of the orbit may be {reach_m:.0f} m from home, more than {limits.reach_m:g} m; "
+                "ask for a --target nearer to home, or a smaller --entry-distance"
+            )
         true_m_s = airspeed_m_s * _TRUE_OVER_EQUIVALENT
         least_m = limits.turn_radius_m(true_m_s, drift_m_s=self.target_speed_m_s)
         if self.radius_m < least_m:
             raise PlanError(
-                f"an orbit of radius {self.radius_m:g} m can't be held: at {airspeed_m_s:g} m/s of airspeed, in "
-                f"{limits.wind_m_s:g} m/s of wind and around a target that moves at {self.target_speed_m_s:g} m/s, "
-                f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter}) make a circle of "
-                f"{least_m:.0f} m or more; ask for --radius {10.0 * math.ceil(0.1 * least_m):g}, or a lower --airspeed"
+                f"an orbit of radius {self.radius_m:g} m can't be held: at {airspeed_m_s:g} m/s of "
+                "airspeed, in "
+                f"{limits.wind_m_s:g} m/s of wind and around a target that moves at "
+                f"{self.target_speed_m_s:g} m/s, "
+                f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter}) make "
+                "a circle of "
+                f"{least_m:.0f} m or more; ask for --radius {10.0 * math.ceil(0.1 * least_m):g}, or a "
+                "lower --airspeed"
             )
         if self.height_over_target_m <= 0.0:
             raise PlanError(
@@ -120,16 +134,19 @@ class OrbitOptions(MissionOptions):
         depression = math.atan2(self.height_over_target_m, self.radius_m)
         if depression < LEAST_DEPRESSION_RAD:
             raise PlanError(
-                f"from {self.height_over_target_m:g} m above it, at {self.radius_m:g} m, the target would be seen "
-                f"only {math.degrees(depression):.1f} degrees below the horizon, too flat to tell its distance; "
-                f"{math.degrees(LEAST_DEPRESSION_RAD):g} are needed: ask for a higher --altitude or a smaller --radius"
+                f"from {self.height_over_target_m:g} m above it, at {self.radius_m:g} m, the target "
+                "would be seen "
+                f"only {math.degrees(depression):.1f} degrees below the horizon, too flat to tell its "
+                "distance; "
+                f"{math.degrees(LEAST_DEPRESSION_RAD):g} are needed: ask for a higher --altitude or a "
+                "smaller --radius"
             )
 
     def check_camera(self, limits: FixedWingLimits, pitch_min_rad: float, pitch_max_rad: float) -> None:
         """Refuse an orbit on which the target would be outside what the gimbal can look at.
 
-        On the circle the target is abeam: the bank lifts the horizon on its side, so that against the body it is
-        (depression - bank) down.
+        On the circle the target is abeam: the bank lifts the horizon on its side, so that against the body
+        it is (depression - bank) down.
         """
         true_m_s = self.airspeed(limits) * _TRUE_OVER_EQUIVALENT
         depression = math.atan2(self.height_over_target_m, self.radius_m)
@@ -140,7 +157,8 @@ class OrbitOptions(MissionOptions):
             elevation = bank - depression
             if not pitch_min_rad + _MARGIN_RAD <= elevation <= pitch_max_rad - _MARGIN_RAD:
                 raise PlanError(
-                    f"on the orbit the target would be {math.degrees(elevation):.0f} degrees above the wing's plane, "
+                    f"on the orbit the target would be {math.degrees(elevation):.0f} degrees above the "
+                    "wing's plane, "
                     f"outside what the camera's gimbal reaches ({math.degrees(pitch_min_rad):.0f} to "
                     f"{math.degrees(pitch_max_rad):.0f} degrees); change --radius or --altitude"
                 )

@@ -62,7 +62,8 @@ def draw_orbit(path: Path, title: str, debriefing: Debriefing) -> None:
     if orbit is not None and len(orbit.time_s):
         error = 100.0 * (float(orbit.radius_m.mean()) / options.radius_m - 1.0)
         distance.set_title(
-            f"mean {orbit.radius_m.mean():.1f} m ({error:+.1f} %), standard deviation {orbit.radius_m.std():.1f} m; "
+            f"mean {orbit.radius_m.mean():.1f} m ({error:+.1f} %), standard deviation "
+            f"{orbit.radius_m.std():.1f} m; "
             "GPS off where red",
             fontsize=9,
             color=_INK,

@@ -202,7 +202,8 @@ class RelativeTarget:
         # near the vertical a bearing means little
         noise = np.diag((sigma2 * slant2 / rho**2, sigma2))
         s = h @ self._p @ h.T + noise
-        return innovation, h, s, np.linalg.inv(s)
+        inverse: Array = np.asarray(np.linalg.inv(s), dtype=np.float64)
+        return innovation, h, s, inverse
 
     def _flown_since(self, time_us: int) -> tuple[float, float] | None:
         """Way through the air from a time to now, (north, east) m; None when it is too long ago."""

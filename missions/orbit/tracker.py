@@ -6,7 +6,7 @@ where the gimbal has to look, come out.
 
 import math
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
@@ -32,12 +32,14 @@ class TargetStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackerParameters:
-    """Attributes:
-    target: the filter's.
-    lost_after_s: without an accepted detection the target counts as lost.
+    """What the tracker goes by.
+
+    Attributes:
+        target: the filter's.
+        lost_after_s: without an accepted detection the target counts as lost.
     """
 
-    target: RelativeTargetParameters = RelativeTargetParameters()
+    target: RelativeTargetParameters = field(default_factory=RelativeTargetParameters)
     lost_after_s: float = 3.0
 
     def __post_init__(self) -> None:

@@ -1,9 +1,9 @@
 """Altitude and airspeed by pitch and throttle, for autopilots that want both with a commanded roll (PX4).
 
 Total energy control (Lambregts, AIAA 83-2239): throttle makes the sum of the rates of potential and kinetic
-energy, pitch their difference. Rates are written as climb rates: V dV/dt / g is the climb that an acceleration
-is worth. It runs at the far end of a telemetry link, so it is slow: the time constants are those of PX4's own
-TECS or longer.
+energy, pitch their difference. Rates are written as climb rates: V dV/dt / g is the climb that an
+acceleration is worth. It runs at the far end of a telemetry link, so it is slow: the time constants are
+those of PX4's own TECS or longer.
 """
 
 import math
@@ -54,12 +54,14 @@ class EnergyParameters:
     def __post_init__(self) -> None:
         if not 0.0 <= self.throttle_min < self.throttle_trim < self.throttle_max <= 1.0:
             raise ValueError(
-                f"throttles {self.throttle_min:g}, {self.throttle_trim:g}, {self.throttle_max:g} (least, trim, "
+                f"throttles {self.throttle_min:g}, {self.throttle_trim:g}, {self.throttle_max:g} (least, "
+                "trim, "
                 "most) are not in order within 0..1"
             )
         if not self.pitch_min_rad < self.pitch_trim_rad < self.pitch_max_rad:
             raise ValueError(
-                f"pitch {self.pitch_min_rad:g}, {self.pitch_trim_rad:g}, {self.pitch_max_rad:g} rad (least, trim, "
+                f"pitch {self.pitch_min_rad:g}, {self.pitch_trim_rad:g}, {self.pitch_max_rad:g} rad "
+                "(least, trim, "
                 "most) are not in order"
             )
         for name in (

@@ -2,9 +2,9 @@
 time.
 """
 
+from missions.kind import VehicleKind
 from missions.vehicle.adapter import Mode
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
-from missions.kind import VehicleKind
 from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.vehicle import Vehicle
 

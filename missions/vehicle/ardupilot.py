@@ -8,9 +8,9 @@ from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError
+from missions.kind import VehicleKind
 from missions.planning.limits import Limits, MulticopterLimits
 from missions.vehicle.adapter import Mode, ModeCommand, missing_basics
-from missions.kind import VehicleKind
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Final
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
+from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.vehicle.adapter import Mode
 from missions.vehicle.ardupilot import ArduCopter
-from missions.kind import VehicleKind
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

@@ -1,8 +1,9 @@
 """An aircraft flown by bank angle from a mission; the rest is held by whoever can.
 
-ArduPilot's plane takes the roll alone and holds altitude and airspeed itself. PX4 takes roll, pitch and thrust
-together, so that a total-energy loop of the mission makes the last two, from pressure, airspeed and climb rate:
-no position is needed for either.
+ArduPilot's plane takes the roll alone and holds altitude and airspeed itself. PX4 takes roll, pitch and
+thrust together, so that a total-energy loop of the mission makes the last two, from pressure, airspeed and
+climb
+rate: no position is needed for either.
 """
 
 import math
@@ -63,7 +64,8 @@ class AttitudePilot:
                     total, count = total + 100.0 * message.press_abs, count + 1
         if not count:
             raise VehicleTimeout(
-                f"the vehicle tells no static pressure (SCALED_PRESSURE) within {_GROUND_S:g} s; {vehicle.heard()}"
+                f"the vehicle tells no static pressure (SCALED_PRESSURE) within {_GROUND_S:g} s; "
+                f"{vehicle.heard()}"
             )
         return cls(vehicle, total / count)
 
@@ -133,7 +135,8 @@ class AttitudePilot:
         height_m = self.height_m
         if air is None or attitude is None or not math.isfinite(height_m):
             raise MissionError(
-                "the vehicle tells no airspeed, attitude or pressure (VFR_HUD, ATTITUDE, SCALED_PRESSURE), so "
+                "the vehicle tells no airspeed, attitude or pressure (VFR_HUD, ATTITUDE, "
+                "SCALED_PRESSURE), so "
                 f"altitude can't be held; {self._vehicle.heard()}"
             )
         dt_s = _STEP_S if self._last_us < 0 else min(0.2, max(0.0, (time_us - self._last_us) * 1e-6))

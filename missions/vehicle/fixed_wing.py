@@ -4,21 +4,22 @@ import math
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, cast
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions import telemetry
 from missions.errors import MissionError, PlanError
+from missions.kind import VehicleKind
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import VehicleCommands
-from missions.kind import VehicleKind
 from missions.vehicle.payload import Payload
 
 if TYPE_CHECKING:
     from missions.vehicle.attitude_pilot import AttitudePilot
     from missions.vehicle.heading_flight import HeadingFlight
+    from missions.vehicle.vehicle import Vehicle
 
 _GLIDE_SLOPE_RAD: Final = math.radians(3.5)  # PX4 refuses more than FW_LND_ANG, 5 deg
 _APPROACH_HEIGHT_M: Final = 40.0
@@ -96,10 +97,15 @@ class FixedWingFlight(VehicleCommands):
     _payload: Payload | None = None
 
     @property
+    def _whole(self) -> "Vehicle":
+        """This vehicle with all that it can do."""
+        return cast("Vehicle", self)
+
+    @property
     def payload(self) -> Payload:
         """Camera, gimbal and survey magnetometer of this vehicle (of a multicopter too)."""
         if self._payload is None:
-            self._payload = Payload(self)
+            self._payload = Payload(self._whole)
         return self._payload
 
     def note_runway(self) -> None:
@@ -115,7 +121,7 @@ class FixedWingFlight(VehicleCommands):
         self._require_wings("prepare_piloting")
         if self.pilot is not None:
             self.pilot.close()
-        self.pilot = await AttitudePilot.on_ground(self)
+        self.pilot = await AttitudePilot.on_ground(self._whole)
         return self.pilot
 
     def _require_wings(self, what: str) -> None:
@@ -154,9 +160,10 @@ class FixedWingFlight(VehicleCommands):
         away_m = math.hypot(*frame.ned_from_geodetic(here.lat_deg, here.lon_deg, here.alt_m)[:2])
         if not away_m <= _FARTHEST_M:
             raise PlanError(
-                f"the place {place} is {away_m * 1e-3:.1f} km away; accepted: at most {_FARTHEST_M * 1e-3:g} km"
+                f"the place {place} is {away_m * 1e-3:.1f} km away; accepted: at most "
+                f"{_FARTHEST_M * 1e-3:g} km"
             )
-        await self.adapter.loiter(self, place, radius_m, clockwise)
+        await self.adapter.loiter(self._whole, place, radius_m, clockwise)
         if not wait:
             return
         near_m = 1.5 * (radius_m or 120.0) + 20.0
@@ -179,12 +186,12 @@ class FixedWingFlight(VehicleCommands):
 
     async def change_altitude(self, altitude_m: float) -> None:
         """Go on at another height above home."""
-        await self.adapter.change_altitude(self, altitude_m)
+        await self.adapter.change_altitude(self._whole, altitude_m)
 
     async def change_airspeed(self, airspeed_m_s: float) -> None:
         """Go on at another airspeed."""
         self._require_wings("change_airspeed")
-        await self.adapter.change_airspeed(self, airspeed_m_s)
+        await self.adapter.change_airspeed(self._whole, airspeed_m_s)
 
     # headings and rolls
 
@@ -192,10 +199,12 @@ class FixedWingFlight(VehicleCommands):
     async def heading_flight(
         self, *, altitude_m: float, airspeed_m_s: float | None = None
     ) -> AsyncIterator["HeadingFlight"]:
-        """Fly headings: `async with vehicle.heading_flight(altitude_m=100) as flight: await flight.turn_to(1.57)`.
+        """Fly headings: `async with vehicle.heading_flight(altitude_m=100) as flight`, then
+        `await flight.turn_to(1.57)`.
 
-        Altitude and airspeed are held; `prepare_piloting` was called on the ground. ArduPilot's plane gets commands (GUIDED_CHANGE_HEADING), PX4 a stream
-        of attitudes that hold the heading. At the end the vehicle holds.
+        Altitude and airspeed are held; `prepare_piloting` was called on the ground. ArduPilot's plane gets
+        commands (GUIDED_CHANGE_HEADING), PX4 a stream of attitudes that hold the heading. At the end the
+        vehicle holds.
 
         Args:
             altitude_m: above home.
@@ -204,7 +213,7 @@ class FixedWingFlight(VehicleCommands):
         from missions.vehicle.heading_flight import open_heading_flight
 
         self._require_wings("heading_flight")
-        async with open_heading_flight(self, altitude_m, airspeed_m_s) as flight:
+        async with open_heading_flight(self._whole, altitude_m, airspeed_m_s) as flight:
             yield flight
 
     # coming down
@@ -255,7 +264,7 @@ class FixedWingFlight(VehicleCommands):
         if self.adapter.first_mission_item_is_home:
             items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=approach.place.lat_deg,
                                  y=approach.place.lon_deg, z=approach.place.alt_m), *items]  # fmt: skip
-        await mission_transfer.upload(self, items)
+        await mission_transfer.upload(self._whole, items)
         await self.set_mode(Mode.MISSION)
         if wait:
             await self.wait_disarmed(timeout_s)

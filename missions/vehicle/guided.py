@@ -132,5 +132,6 @@ def _setpoint_of(source: SetpointSource, time_s: float) -> AnySetpoint | None:
     if given is None or isinstance(given, AnySetpoint):
         return given
     raise PlanError(
-        f"follow's source gave a {type(given).__name__} ({given!r}); accepted: a Setpoint, an AttitudeSetpoint or None"
+        f"follow's source gave a {type(given).__name__} ({given!r}); accepted: a Setpoint, an "
+        "AttitudeSetpoint or None"
     )

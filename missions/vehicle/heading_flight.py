@@ -1,4 +1,6 @@
-"""Flying headings: by commands where the autopilot has them (ArduPilot), by a stream of rolls where not (PX4)."""
+"""Flying headings: by commands where the autopilot has them (ArduPilot), by a stream of rolls where not
+(PX4).
+"""
 
 import asyncio
 import math

@@ -15,12 +15,12 @@ from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, decode, dialect
 from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.errors import VehicleTimeout
+from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.notes import FlightNotes
 from missions.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 from missions.vehicle.adapter import Adapter
-from missions.vehicle.arduplane import ArduPlane
 from missions.vehicle.ardupilot import ArduCopter
-from missions.kind import KIND_OF_TYPE, VehicleKind
+from missions.vehicle.arduplane import ArduPlane
 from missions.vehicle.link_watch import LinkWatch
 from missions.vehicle.px4 import Px4
 from missions.vehicle.px4_plane import Px4Plane

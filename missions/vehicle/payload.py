@@ -49,7 +49,8 @@ class GimbalAttitude:
         time_us: vehicle time.
         q: Hamilton quaternion (w x y z) that takes gimbal vectors (x along the line of sight, y right,
             z down) to the reference frame.
-        from_north: the reference frame is NED; otherwise it is the vehicle's level frame, x along its heading.
+        from_north: the reference frame is NED; otherwise it is the vehicle's level frame, x along its
+        heading.
     """
 
     time_us: int
@@ -72,8 +73,8 @@ def detection(m: Any) -> Detection | None:
 def gimbal_attitude(m: Any) -> GimbalAttitude | None:
     """From GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is none.
 
-    Roll and pitch are those against the horizon. Yaw is from north or from the vehicle's heading, as the flags
-    say; in gimbals older than those flags YAW_LOCK stands for north.
+    Roll and pitch are those against the horizon. Yaw is from north or from the vehicle's heading, as the
+    flags say; in gimbals older than those flags YAW_LOCK stands for north.
     """
     w, x, y, z = (float(value) for value in m.q)
     norm = math.sqrt(w * w + x * x + y * y + z * z)

@@ -12,13 +12,13 @@ from autopilot_bridge.mission_plan import MissionItem
 from missions import telemetry
 from missions.connection import Connection
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
+from missions.kind import VehicleKind
 from missions.planning.limits import Limits
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import HEARTBEAT_AGE_US
 from missions.vehicle.fixed_wing import FixedWingFlight
 from missions.vehicle.guided import GuidedSession, SetpointSource
-from missions.kind import VehicleKind
 
 _GROUND: Final = 1
 _ACCEPTED: Final = 0

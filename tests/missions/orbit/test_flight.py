@@ -1,0 +1,116 @@
+"""Whole orbits in embedded worlds, as `flightstack fly orbit` flies them, but shorter."""
+
+import json
+import math
+import struct
+
+import pytest
+
+from autopilot_bridge.mavlink import decode
+from autopilot_bridge.tlog import TlogReader
+from missions.library import find_mission
+from missions.orbit.options import OrbitOptions
+from missions.records import FlightRecords
+from missions.run import EPOCH_UNIX_US
+from missions.scenario import Scenario
+from missions.session import RunRequest, fly
+
+KEYS = {"radius_mean_error_percent", "radius_std_m", "altitude_error_m", "gps_lost_at_s"}
+
+
+def orbit(tmp_path, autopilot="px4", picture=False, name="run", seed=1, **options):
+    return fly(
+        find_mission("orbit"),
+        RunRequest(
+            options=OrbitOptions(**({"duration_s": 60.0} | options)),
+            autopilot=autopilot,
+            model="aerosonde",
+            seed=seed,
+            wind_speed_m_s=4.0,
+            wind_from_deg=40.0,
+            turbulence="light",
+            out=tmp_path / name,
+            picture=picture,
+        ),
+    )
+
+
+def gps_times(folder, start_s, end_s):
+    """Times of the receiver's data that the autopilot has told between two vehicle times."""
+    found = set()
+    for stamp_us, frame in TlogReader(folder / "flight.tlog"):
+        time_s = (stamp_us - EPOCH_UNIX_US) * 1e-6
+        if frame.message_id == 24 and frame.component_id == 1 and start_s < time_s < end_s:
+            found.add(decode(frame).time_usec)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "options"),
+    [
+        ("px4", {}),
+        (
+            "ardupilot",
+            {
+                "direction": -1,
+                "target_speed_m_s": 2.0,
+                "target_heading_rad": 2.0,
+                "entry_bearing_rad": math.radians(315.0),
+                "entry_heading_rad": math.radians(300.0),
+            },
+        ),
+    ],
+    ids=["px4, clockwise, still", "ardupilot, counter-clockwise, moving"],
+)
+def test_the_circle_is_held_without_gps(tmp_path, autopilot, options):
+    result = orbit(tmp_path, autopilot, picture=True, **options)
+    assert result.outcome == "completed", result.reason
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert set(summary) >= KEYS
+    assert abs(summary["radius_mean_error_percent"]) < 2.5
+    assert summary["radius_std_m"] < 5.0
+    assert summary["altitude_error_m"] < 8.0
+    assert summary["orbit_s"] == pytest.approx(60.0, abs=1.0)
+    assert summary["target_losses"] == 0
+    phases = [phase["name"] for phase in summary["vehicles"][0]["phases"]]
+    assert phases[-5:] == ["transit", "entry", "orbit", "gps back", "landing"]
+    lost, back = summary["gps_lost_at_s"], summary["gps_back_at_s"]
+    assert len(gps_times(tmp_path / "run", lost + 2.0, back)) <= 1  # nothing new from the receiver
+    assert len(gps_times(tmp_path / "run", lost - 10.0, lost)) > 10
+    records = FlightRecords.from_tlog(tmp_path / "run" / "flight.tlog")
+    assert len(records.table("HIL_STATE_QUATERNION", 1)) > 1000
+    assert (
+        len(records.table("HIL_STATE_QUATERNION", 1, 1)) == 0
+    )  # truth is the log's, not the autopilot's word
+    data = (tmp_path / "run" / "track.png").read_bytes()
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    width, _ = struct.unpack(">II", data[16:24])
+    assert width > 1000
+    counts = summary["message_counts"]
+    assert counts["LANDING_TARGET"] > 500
+    if autopilot == "px4":  # roll, pitch and thrust; ArduPilot's keeps the last two
+        assert counts["SET_ATTITUDE_TARGET"] > 1000
+    assert summary["autopilot"] == autopilot
+
+
+def test_the_same_seed_flies_the_same_orbit(tmp_path):
+    for name in ("a", "b"):
+        orbit(tmp_path, name=name, duration_s=5.0)
+    logs = [(tmp_path / name / "flight.tlog").read_bytes() for name in ("a", "b")]
+    assert logs[0] == logs[1]
+
+
+def test_a_target_that_is_not_there_ends_the_mission_and_brings_the_aircraft_home(tmp_path, monkeypatch):
+    mission = find_mission("orbit")
+    monkeypatch.setattr(type(mission), "scenario", lambda self, options, setting: Scenario(camera=True))
+    result = orbit(tmp_path, duration_s=60.0, lost_limit_s=8.0)
+    assert result.outcome == "failed"
+    assert "the target was never seen" in result.reason
+    assert result.summary["gps_back_at_s"] is not None
+
+
+def test_without_the_fault_the_orbit_is_the_same_and_gps_stays(tmp_path):
+    result = orbit(tmp_path, gps_fault=False, duration_s=30.0)
+    assert result.outcome == "completed", result.reason
+    assert result.summary["gps_lost_at_s"] is None
+    assert abs(result.summary["radius_mean_error_percent"]) < 2.5

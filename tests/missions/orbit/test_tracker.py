@@ -1,0 +1,119 @@
+"""The tracker: what it knows, loses and finds again; late, missing and wrong inputs."""
+
+import math
+
+import pytest
+
+from missions.orbit.attitude import AutopilotAttitude
+from missions.orbit.tracker import TargetStatus, TargetTracker, TrackerParameters
+from missions.telemetry import Attitude
+from missions.vehicle.payload import Detection, GimbalAttitude
+from tests.missions.orbit.coordinated_turn import PointMass
+
+
+class Rig:
+    """An aircraft in a steady bank around a still target, in 4 m/s of wind, with the tracker on it."""
+
+    def __init__(self, **world):
+        self.aircraft = PointMass(position=(-150.0, 0.0), heading=math.radians(-90.0), gust=0.0, **world)
+        self.attitude = AutopilotAttitude()
+        self.tracker = TargetTracker(self.attitude)
+        self.tracker.start(
+            0, offset_ne_m=(160.0, 5.0), offset_std_m=20.0, drift_ne_m_s=(-4.0, 0.0), drift_std_m_s=1.0
+        )
+
+    def run(self, seconds):
+        end_us = self.aircraft.time_us + round(seconds * 1e6)
+        a, tracker = self.aircraft, self.tracker
+        while a.time_us < end_us:
+            now, gimbal, airspeed, height, detections = a.step(math.radians(23.0))
+            self.attitude.add(now)
+            tracker.gimbal(gimbal)
+            tracker.height(height)
+            for found in detections:
+                tracker.detect(found)
+            tracker.step(a.time_us, airspeed)
+            a.pointed = tracker.pointing(a.time_us, 0.1)
+        return tracker
+
+    @property
+    def error_m(self):
+        true = self.aircraft.target - self.aircraft.p
+        return math.dist(self.tracker.state(self.aircraft.time_us).offset_ne_m, true)
+
+
+def test_expected_seen_lost_and_seen_again():
+    rig = Rig()
+    assert rig.tracker.status is TargetStatus.EXPECTED
+    assert math.isinf(rig.tracker.unseen_s(0))
+    assert rig.run(5.0).status is TargetStatus.SEEN
+    assert rig.error_m < 8.0
+    rig.aircraft.blind = True
+    assert rig.run(2.0).status is TargetStatus.SEEN
+    assert rig.run(4.0).status is TargetStatus.LOST
+    assert rig.tracker.losses == 1
+    assert rig.tracker.unseen_s(rig.aircraft.time_us) == pytest.approx(6.0, abs=0.3)
+    assert rig.error_m < 20.0  # it goes on by what it knows
+    rig.aircraft.blind = False
+    assert rig.run(3.0).status is TargetStatus.SEEN
+    assert rig.error_m < 8.0
+
+
+def test_nothing_is_made_of_images_without_attitude_height_or_gimbal():
+    attitude = AutopilotAttitude()
+    tracker = TargetTracker(attitude)
+    image = Detection(time_us=1_000_000, target=0, image_x=0.0, image_y=0.0)
+    look = GimbalAttitude(time_us=990_000, q=(1.0, 0.0, 0.0, 0.0), from_north=True)
+    here = Attitude(
+        time_us=1_000_000, roll_rad=0.0, pitch_rad=0.0, yaw_rad=0.0, rates_frd_rad_s=(0.0, 0.0, 0.0)
+    )
+    tracker.detect(image)
+    tracker.step(1_050_000, 25.0)  # no attitude at all
+    tracker.start(
+        1_000_000, offset_ne_m=(200.0, 0.0), offset_std_m=20.0, drift_ne_m_s=(0.0, 0.0), drift_std_m_s=1.0
+    )
+    attitude.add(here)
+    tracker.step(1_060_000, 25.0)  # no height
+    tracker.height(100.0)
+    tracker.detect(image)
+    tracker.step(1_070_000, 25.0)  # no gimbal
+    assert tracker.status is TargetStatus.EXPECTED
+    tracker.gimbal(look)
+    tracker.detect(Detection(time_us=9_000_000, target=0, image_x=0.0, image_y=0.0))  # from the future
+    tracker.step(1_080_000, 25.0)
+    assert tracker.status is TargetStatus.EXPECTED
+
+
+def test_a_gimbal_that_fell_silent_is_not_believed():
+    rig = Rig()
+    rig.run(3.0)
+    used = rig.tracker.target.accepted
+    rig.tracker.gimbal = lambda attitude: None
+    rig.run(2.0)
+    assert rig.tracker.target.accepted <= used + 4
+
+
+def test_attitude_is_interpolated_and_gets_old():
+    attitude = AutopilotAttitude()
+
+    def sample(time_us, yaw):
+        return attitude.add(
+            Attitude(
+                time_us=time_us, roll_rad=0.0, pitch_rad=0.0, yaw_rad=yaw, rates_frd_rad_s=(0.0, 0.0, 0.0)
+            )
+        )
+
+    assert attitude.at(0) is None
+    assert sample(1_000_000, 0.1)
+    assert not sample(1_000_000, 0.1)
+    assert sample(1_100_000, 0.3)
+    w, _, _, z = attitude.at(1_050_000)
+    assert 2.0 * math.atan2(z, w) == pytest.approx(0.2, abs=1e-4)
+    assert attitude.at(900_000) is None
+    assert attitude.at(1_500_000) is not None
+    assert attitude.at(1_700_000) is None
+
+
+def test_parameters_are_checked():
+    with pytest.raises(ValueError, match="lost_after_s = 0"):
+        TrackerParameters(lost_after_s=0.0)
