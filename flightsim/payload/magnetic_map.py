@@ -86,7 +86,7 @@ class MagneticMap:
         gradient = self.vertical_gradient_nt_m
         if gradient is not None and not np.all(np.isfinite(gradient[np.isfinite(self.total_field_nt)])):
             raise MagneticMapError(
-                "vertical_gradient_nt_m of a magnetic map has no number at places where total_field_nt has one"
+                "vertical_gradient_nt_m of a magnetic map has no number at places where the total field has"
             )
         if not math.isfinite(self.height_m):
             raise MagneticMapError(f"height_m = {self.height_m} of a magnetic map is not finite")
