@@ -73,7 +73,7 @@ COMMAND: Final = MissionCommand(
             "--size",
             default="100",
             help="Size of the pattern, m: SIDE or WIDTHxHEIGHT (east x north)."
-            + _WINGS.format("1000, or what its turns need"),
+            + _WINGS.format("1000 or more, as its turns need"),
         ),
         option("--amplitude-x", type=float, help="Half the width, m (east), in place of --size."),
         option("--amplitude-y", type=float, help="Half the height, m (north)."),
@@ -83,7 +83,7 @@ COMMAND: Final = MissionCommand(
             "--spacing",
             type=float,
             default=10.0,
-            help="Track spacing of sweeps and squares, m." + _WINGS.format("2.5 turn radii"),
+            help="Track spacing of sweeps and squares, m." + _WINGS.format("what its turns need"),
         ),
         option("--heading", type=float, default=0.0, help="First leg of sweeps and sectors, degrees."),
         option("--altitude", type=float, default=10.0, help="Above home, m." + _WINGS.format("100")),
@@ -100,7 +100,8 @@ COMMAND: Final = MissionCommand(
             "--via",
             type=click.Choice(["waypoints", "setpoints"]),
             default="waypoints",
-            help="How it is flown.",
+            help="By an uploaded mission, or by streamed setpoints."
+            + _WINGS.format("setpoints, which follow the curve more closely"),
         ),
         option(
             "--acceptance",

@@ -132,7 +132,7 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     summary = _summary(mission, request, debriefing, outcome, reason, sim_time_s, wall_s)
     write_summary(folder, summary)
     if request.picture and debriefing.flights:
-        mission.draw(folder / PICTURE_NAME, _title(mission, request, summary), debriefing)
+        mission.draw(folder / PICTURE_NAME, _title(mission, debriefing, summary), debriefing)
     return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
 
 
@@ -306,8 +306,8 @@ def _summary(
     return summary
 
 
-def _title(mission: Mission[Any], request: RunRequest, summary: Mapping[str, Any]) -> str:
-    parts = [mission.title(request.options), summary["autopilot"]]
+def _title(mission: Mission[Any], debriefing: Debriefing, summary: Mapping[str, Any]) -> str:
+    parts = [mission.title(debriefing.options), summary["autopilot"]]
     rms = summary["path_rms_error_m"]
     figures = f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.0f} s"
     if rms is not None:
