@@ -1,0 +1,135 @@
+"""Camera and gimbal beside the autopilot, as MAVSDK's plugins and a mavutil script find and use them.
+
+Both clients share one vehicle, each on a link of its own.
+"""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Callable, Iterator
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from tests.clients.mavutil_client import Client
+from tests.clients.sitl_process import free_port, running_sitl
+
+SPEEDUP = 8.0
+OPTIONS = ("--model", "aerosonde", "--camera", "--target", "3,0")
+CAMERA, GIMBAL = 100, 154
+
+
+@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+def vehicle(request: pytest.FixtureRequest) -> Iterator[tuple[str, int, int]]:
+    """A flavour, and the ports of its two links."""
+    first_port, second_port = free_port(), free_port()
+    links = [f"udpout:127.0.0.1:{first_port}", f"udpout:127.0.0.1:{second_port}"]
+    with running_sitl(request.param, links, speedup=SPEEDUP, options=OPTIONS):
+        yield request.param, first_port, second_port
+
+
+async def use_gimbal(system: Any) -> None:
+    from mavsdk.asyncio.plugins.gimbal import GimbalAsync
+    from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+    from mavsdk.plugins.gimbal import Attitude, ControlMode, GimbalMode, SendMode
+
+    from tests.clients.mavsdk_waiting import first
+
+    gimbal = GimbalAsync(system)
+
+    async def looks(what: str, found: Callable[[Attitude], bool]) -> None:
+        await first(gimbal.subscribe_attitude(), found, what)
+
+    async def has_control(mode: ControlMode) -> None:
+        await first(gimbal.subscribe_control_status(), lambda s: s.control_mode == mode, f"control {mode}")
+
+    found = await first(gimbal.subscribe_gimbal_list(), lambda known: known.gimbals, "gimbal")
+    item = found.gimbals[0]
+    assert (item.vendor_name, item.gimbal_device_id) == ("flightstack", GIMBAL)
+    number = item.gimbal_id
+    await gimbal.take_control(number, ControlMode.PRIMARY)
+    await has_control(ControlMode.PRIMARY)
+    await gimbal.set_angles(number, 0.0, -50.0, 30.0, GimbalMode.YAW_FOLLOW, SendMode.ONCE)
+    await looks(
+        "angles",
+        lambda a: (
+            abs(a.euler_angle_forward.pitch_deg + 50.0) < 1.0
+            and abs(a.euler_angle_forward.yaw_deg - 30.0) < 1.0
+        ),
+    )
+    await gimbal.set_angular_rates(number, 0.0, 0.0, 10.0, GimbalMode.YAW_FOLLOW, SendMode.ONCE)
+    await looks("turning", lambda a: a.euler_angle_forward.yaw_deg > 45.0)
+    here = await first(
+        TelemetryAsync(system).subscribe_position(), lambda p: abs(p.latitude_deg) > 1.0, "position"
+    )
+    # a point 100 m north and 100 m down; the frame that MAVSDK sends says that heights are over home
+    north_deg = 100.0 / math.radians(6_371_000.0)
+    await gimbal.set_roi_location(number, here.latitude_deg + north_deg, here.longitude_deg, -100.0)
+    await looks(
+        "region of interest",
+        lambda a: abs(a.euler_angle_north.pitch_deg + 45.0) < 1.5 and abs(a.euler_angle_north.yaw_deg) < 3.0,
+    )
+    await gimbal.release_control(number)
+    await has_control(ControlMode.NONE)
+
+
+async def use_camera(system: Any) -> None:
+    from mavsdk.asyncio.plugins.camera import CameraAsync
+    from mavsdk.plugins.camera import Mode
+
+    from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
+
+    camera = CameraAsync(system)
+
+    async def pictures(stream: AsyncIterator[Any], count: int) -> list[int]:
+        return [(await first(stream, lambda info: info.is_success, "picture")).index for _ in range(count)]
+
+    found = await first(camera.subscribe_camera_list(), lambda known: known.cameras, "camera")
+    information = found.cameras[0]
+    assert (information.vendor_name, information.component_id) == ("flightstack", CAMERA)
+    assert information.horizontal_resolution_px > 0 and information.focal_length_mm > 0.0
+    number = information.component_id
+    await camera.set_mode(number, Mode.PHOTO)
+    taken = camera.subscribe_capture_info()
+    waiting = asyncio.ensure_future(pictures(taken, 1))
+    await first(camera.subscribe_storage(), lambda update: update.storage.total_storage_mib > 0.0, "storage")
+    await camera.take_photo(number)
+    assert await asyncio.wait_for(waiting, WALL_DEADLINE_S) == [0]
+    await camera.start_photo_interval(number, 0.5)
+    assert await asyncio.wait_for(pictures(taken, 3), WALL_DEADLINE_S) == [1, 2, 3]
+    await camera.stop_photo_interval(number)
+
+
+def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
+    pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
+    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+
+    async def use(url: str) -> None:
+        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+        async with Mavsdk(configuration) as mavsdk:
+            await mavsdk.add_any_connection(url)
+            system = await mavsdk.first_autopilot(timeout_s=20.0)
+            assert system is not None
+            await use_gimbal(system)
+            await use_camera(system)
+
+    _, port, _ = vehicle
+    asyncio.run(use(f"udpin://127.0.0.1:{port}"))
+
+
+def test_mavutil_sees_a_target(vehicle: tuple[str, int, int]) -> None:
+    flavour, _, port = vehicle
+    client = Client(flavour, f"udpin:127.0.0.1:{port}", speedup=SPEEDUP)
+    client.until("gimbal", lambda m: m.get_type() == "HEARTBEAT" and m.get_srcComponent() == GIMBAL)
+    client.link.mav.command_long_send(
+        1, GIMBAL, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0, -6.0, 0.0, 0, 0, 0, 0, GIMBAL
+    )
+    ack = client.until(
+        "gimbal's answer", lambda m: m.get_type() == "COMMAND_ACK" and m.get_srcComponent() == GIMBAL
+    )
+    assert ack.result == mavlink.MAV_RESULT_ACCEPTED
+    # it lies just in front of the nose: flatter than a few degrees, a camera doesn't tell it from the ground
+    seen = client.until("target", lambda m: m.get_type() == "LANDING_TARGET" and abs(m.angle_y) < 0.1)
+    assert (seen.get_srcComponent(), seen.frame) == (CAMERA, mavlink.MAV_FRAME_BODY_FRD)
+    assert abs(seen.angle_x) < math.radians(12.0)
+    client.link.close()
