@@ -22,6 +22,8 @@ MAX_SPEED_M_S: Final = 100.0
 MIN_ACCEPTANCE_M: Final = 0.1
 MAX_ACCEPTANCE_M: Final = 1000.0
 MIN_SIDE_M: Final = 1.0
+_SEPARATION_M: Final = 20.0  # of aircraft with wings
+_LOWEST_LAYER_M: Final = 40.0
 MAX_PHASE_RAD: Final = math.radians(3600.0) + 1e-9
 
 
@@ -165,16 +167,21 @@ class FlightOptions(MissionOptions):
         if isinstance(limits, MulticopterLimits):
             return self
         speed_m_s = self.speed_m_s if self.chosen("speed_m_s") else limits.airspeed_trim_m_s
+        gaps = self.vehicles - 1
+        room_m = limits.altitude_max_m - _LOWEST_LAYER_M
+        separation_m = self.separation_m
+        if not self.chosen("separation_m"):
+            separation_m = min(_SEPARATION_M, room_m / max(1, gaps))
         return self.unless_chosen(
             pattern="L2",
             via=Via.SETPOINTS,
             width_m=WINGS_SIDE_M,
             height_m=WINGS_SIDE_M,
             speed_m_s=speed_m_s,
-            altitude_m=min(100.0, limits.altitude_max_m),
+            altitude_m=max(_LOWEST_LAYER_M, min(100.0, limits.altitude_max_m - gaps * separation_m)),
             spacing_m=spacing_for_turns_m(speed_m_s, limits),
             acceptance_m=min(30.0, max(10.0, speed_m_s)),
-            separation_m=20.0,
+            separation_m=separation_m,
         )
 
 

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from missions.notes import PATTERN, CommandedPath, FlightNotes
+from missions.notes import PATTERN, FlightNotes
 from missions.records import FlightRecords
+from missions.waypoint_passes import waypoint_misses_m
 
 Array = NDArray[np.float64]
 
@@ -116,7 +117,7 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
         window = (phase.start_us, phase.end_us)
         pattern = reference.between(*window)
         error_time, error = pattern.time_s, path_errors_m(commanded.points_ned_m, pattern.pos_ned_m)
-        misses = waypoint_misses_m(commanded, pattern)
+        misses = waypoint_misses_m(commanded, pattern.pos_ned_m)
         if absolute is not None:
             flat = absolute.between(*window).pos_ned_m - np.array([0.0, 0.0, moved[2]])
             absolute_rms = _rms(path_errors_m(commanded.points_ned_m, flat))
@@ -155,34 +156,6 @@ def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
     path, track = np.ascontiguousarray(path_ned_m), np.ascontiguousarray(track_ned_m)
     follow_path(path, track, _BACK_M, _AHEAD_M, errors)
     return errors
-
-
-def waypoint_misses_m(commanded: CommandedPath, track: Track) -> tuple[float, ...]:
-    """How close the track came to each waypoint, in their order; the track between two samples is
-    straight.
-    """
-    points = track.pos_ned_m
-    if len(points) < 2:
-        return ()
-    starts, legs = points[:-1], np.diff(points, axis=0)
-    squared = np.maximum((legs**2).sum(axis=1), 1e-12)
-    misses = []
-    first = 0
-    for waypoint in commanded.waypoints_ned_m:
-        offset = waypoint - starts[first:]
-        along = np.clip(np.einsum("ij,ij->i", offset, legs[first:]) / squared[first:], 0.0, 1.0)
-        distance = np.linalg.norm(offset - along[:, None] * legs[first:], axis=1)
-        within = np.nonzero(distance <= commanded.acceptance_m)[0]
-        if len(within):  # the closest approach of the first pass
-            gap = np.nonzero(np.diff(within) > 1)[0]
-            end = within[gap[0]] if len(gap) else within[-1]
-            best = within[0] + int(distance[within[0] : end + 1].argmin())
-        else:
-            best = int(distance.argmin())
-        misses.append(float(distance[best]))
-        if len(within):
-            first = min(first + best, len(starts) - 1)
-    return tuple(misses)
 
 
 def _rms(values: Array) -> float | None:

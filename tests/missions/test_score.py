@@ -12,7 +12,8 @@ from autopilot_bridge.mavlink import FrameEncoder, dialect
 from missions.notes import PATTERN, CommandedPath, FlightNotes
 from missions.records import FlightRecords
 from missions.run import team_figures, vehicle_summary, versions, write_summary
-from missions.score import Track, path_errors_m, score, waypoint_misses_m
+from missions.score import path_errors_m, score
+from missions.waypoint_passes import waypoint_misses_m
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
 
@@ -49,14 +50,29 @@ def test_waypoint_misses_between_samples_and_in_order():
     there = np.column_stack((n, np.full_like(n, 0.7), np.full_like(n, -10.0)))
     back = there[::-1] + np.array((0.0, 1.0, 0.0))
     pos = np.vstack((there, back))
-    track = Track(time_s=np.arange(len(pos)) * 1.0, pos_ned_m=pos, yaw_rad=np.zeros(len(pos)))
     commanded = CommandedPath(
         origin=HOME,
         points_ned_m=straight_path(),
         waypoints_ned_m=np.array([(12.0, 0.0, -10.0), (50.0, 0.0, -10.0), (12.0, 0.0, -10.0)]),
         acceptance_m=2.0,
     )
-    assert waypoint_misses_m(commanded, track) == pytest.approx((0.7, 0.7, 1.7), abs=1e-6)
+    assert waypoint_misses_m(commanded, pos) == pytest.approx((0.7, 0.7, 1.7), abs=1e-6)
+
+
+def test_a_missed_waypoint_that_is_crossed_later_spoils_no_other():
+    """As at the centre of a figure of eight, when the way in was flown wide."""
+    t = np.linspace(0.0, 2 * math.pi, 400)
+    eight = np.column_stack((100.0 * np.sin(2 * t), 100.0 * np.sin(t), np.full_like(t, -10.0)))
+    track = eight.copy()
+    track[:5] += np.array((0.0, 30.0, 0.0))
+    commanded = CommandedPath(
+        origin=HOME, points_ned_m=eight, waypoints_ned_m=eight[:390:10], acceptance_m=5.0
+    )
+    misses = waypoint_misses_m(commanded, track)
+    assert misses[0] > 5.0
+    assert max(misses[1:]) < 0.1
+    assert waypoint_misses_m(commanded, eight) == pytest.approx(np.zeros(39), abs=1e-6)
+    assert waypoint_misses_m(commanded, eight[:1]) == ()
 
 
 def make_flight(offset_ned=(0.0, 0.0, 0.0), gps_ned=(0.0, 0.0, 0.0), roll_error=0.0, truth=True):

@@ -1,0 +1,78 @@
+"""Which of the waypoints a track has passed, and how close."""
+
+from bisect import bisect_right
+
+import numpy as np
+from numpy.typing import NDArray
+
+from missions.notes import CommandedPath
+
+Array = NDArray[np.float64]
+
+
+def waypoint_misses_m(commanded: CommandedPath, track_ned_m: Array) -> tuple[float, ...]:
+    """How close the track came to each waypoint; between two samples it is straight.
+
+    Waypoints count in their order: of all ways to assign passes (within the acceptance radius) to waypoints,
+    the one that has most of them. So a waypoint that was missed, and that the track happens to cross later,
+    spoils no other. One without a pass has its distance between its neighbours' passes.
+
+    Args:
+        commanded: waypoints and acceptance radius.
+        track_ned_m: (n, 3).
+    """
+    points = track_ned_m
+    if len(points) < 2:
+        return ()
+    legs = np.diff(points, axis=0)
+    squared = np.maximum((legs**2).sum(axis=1), 1e-12)
+
+    def distances(waypoint: Array) -> Array:
+        offset = waypoint - points[:-1]
+        along = np.clip(np.einsum("ij,ij->i", offset, legs) / squared, 0.0, 1.0)
+        nearest: Array = np.linalg.norm(offset - along[:, None] * legs, axis=1)
+        return nearest
+
+    waypoints = commanded.waypoints_ned_m
+    chosen = _passes_in_order([_passes(distances(w), commanded.acceptance_m) for w in waypoints])
+    misses: list[float] = []
+    for k, waypoint in enumerate(waypoints):
+        distance = distances(waypoint)
+        if k in chosen:
+            misses.append(float(distance[chosen[k]]))
+            continue
+        before = max((leg for j, leg in chosen.items() if j < k), default=0)
+        after = min((leg for j, leg in chosen.items() if j > k), default=len(distance) - 1)
+        misses.append(float(distance[before : after + 1].min()))
+    return tuple(misses)
+
+
+def _passes(distance: Array, radius_m: float) -> list[int]:
+    """The track's leg of the closest approach of each pass, in their order."""
+    within = np.nonzero(distance <= radius_m)[0]
+    if not len(within):
+        return []
+    parts = np.split(within, np.nonzero(np.diff(within) > 1)[0] + 1)
+    return [int(part[0] + distance[part].argmin()) for part in parts]
+
+
+def _passes_in_order(passes: list[list[int]]) -> dict[int, int]:
+    """A leg for as many waypoints as possible, legs not decreasing; the early ones where there is a choice.
+
+    The longest chain by patience sorting: `last[n]` is the earliest leg at which a chain of n + 1 can end.
+    """
+    last: list[int] = []
+    ends: list[tuple[int, int]] = []
+    before: dict[tuple[int, int], tuple[int, int] | None] = {}
+    for k, legs in enumerate(passes):
+        for leg in reversed(legs):  # the latest first, so that no chain takes two of one waypoint
+            n = bisect_right(last, leg)
+            before[k, leg] = ends[n - 1] if n else None
+            last[n : n + 1] = [leg]
+            ends[n : n + 1] = [(k, leg)]
+    chosen: dict[int, int] = {}
+    link = ends[-1] if ends else None
+    while link is not None:
+        chosen[link[0]] = link[1]
+        link = before[link]
+    return chosen
