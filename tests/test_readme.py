@@ -14,7 +14,7 @@ from missions.cli import command_line
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^    (flightstack .*?)(?:  +#.*)?$", README, re.MULTILINE)
-MISSION = re.search(r"```python\n(.*?)```", README, re.DOTALL)
+MISSIONS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 def parse(line: str) -> None:
@@ -44,29 +44,27 @@ def test_the_two_lines_set_up_what_they_use() -> None:
     assert tests.endswith("-m pytest")
 
 
-def test_the_mission_flies(tmp_path: Path) -> None:
-    assert MISSION is not None
-    (tmp_path / "square.py").write_text(MISSION[1], encoding="utf-8")
+def fly(mission: str, folder: Path, *arguments: str) -> str:
+    """Fly a mission of the README from a file; what it printed."""
+    (folder / "mission.py").write_text(mission, encoding="utf-8")
+    words = [sys.executable, "-m", "missions", "fly", str(folder / "mission.py"), *arguments]
     done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "missions",
-            "fly",
-            str(tmp_path / "square.py"),
-            "--altitude",
-            "15",
-            "--out",
-            str(tmp_path / "run"),
-        ],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
+        [*words, "--out", str(folder / "run")], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    assert done.stdout.count("battery") == 4
-    assert (tmp_path / "run" / "track.png").stat().st_size > 10_000
+    assert (folder / "run" / "track.png").stat().st_size > 10_000
+    return done.stdout
+
+
+def test_the_mission_flies(tmp_path: Path) -> None:
+    square, _ = MISSIONS
+    assert fly(square, tmp_path, "--altitude", "15").count("battery") == 4
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
+    _, headings = MISSIONS
+    fly(headings, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
 
 
 @pytest.mark.parametrize("link", re.findall(r"\]\(([^)h][^)]*)\)", README))
