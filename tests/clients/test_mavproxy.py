@@ -58,13 +58,13 @@ class Mavproxy:
             time.sleep(0.02)
         raise AssertionError(f"no {text!r} after {self.lines[: self._seen][-1:]} in {self.lines}")
 
-    def types_until(self, line: str, text: str) -> None:
+    def types_until(self, line: str, text: str, wait_s: float = 0.3) -> None:
         """Type the same again and again, until there is such a line."""
         deadline_s = time.monotonic() + WALL_DEADLINE_S
         while time.monotonic() < deadline_s:
             self.type(line)
             with contextlib.suppress(AssertionError):
-                return self.sees(text, 0.3)
+                return self.sees(text, wait_s)
         raise AssertionError(f"no {text!r} whatever was typed: {self.lines}")
 
 
