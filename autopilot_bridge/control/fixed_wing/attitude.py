@@ -30,7 +30,7 @@ _NAV_YAW: Final = 27
 _STEERING_HEADING: Final = 15  # setpoint slot, as in control.fixed_wing_setpoint
 
 _WHEEL_SPEED_SHARE: Final = 0.6  # of the lowest airspeed: below it wheel gains stay as they are (PX4)
-_ROLLING_SPEED_SHARE: Final = 0.7  # of the stall speed: below it the runway carries, and the surfaces give way
+_ROLLING_SPEED_SHARE: Final = 0.7  # of the stall speed: below it the surfaces give way in the take-off roll
 _RATE_LIMIT_RAD_S: Final = 40.0  # no gyro reads more
 _SLIP_MAX_M_S2: Final = 3.0  # lateral acceleration the rudder works against
 

@@ -37,6 +37,9 @@ PITCH_LIMIT_RAD: Final = math.radians(80.0)  # of a pitch angle given past the e
 _MIN_SPEED_M_S: Final = 3.0  # for divisions
 _UNDERSPEED_START: Final = 0.9  # share of the way from stall to lowest airspeed
 _UNDERSPEED_FULL: Final = 0.4
+_POWERLESS_S: Final = 3.0  # so long full throttle may fail to keep the energy up
+_GLIDE_SHARE: Final = 1.1  # of the lowest airspeed at this bank
+_FULL_THROTTLE: Final = 0.95  # of its limit
 _PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change asked for when pitch alone flies the airspeed
 
 
@@ -62,6 +65,20 @@ def _underspeed(p: Array, s: Array, load_factor: float) -> float:
     full = raised * (stall + _UNDERSPEED_FULL * room)
     start = raised * (stall + _UNDERSPEED_START * room)
     return _clip((start - s[c.EAS]) / max(1e-3, start - full), 0.0, 1.0)
+
+
+@kernel
+def _update_powerless(p: Array, s: Array, dt: float, flown: bool) -> float:
+    """How sure it is that full throttle doesn't keep the energy up: a failed motor, or air that sinks.
+
+    Height can't be held then, and the airspeed must be (PX4's uncommanded descent, ArduPilot's bad descent).
+    `flown`: throttle and pitch are the energy control's.
+    """
+    full = s[c.THROTTLE] >= _FULL_THROTTLE * p[c.THROTTLE_MAX]
+    falling = s[c.ENERGY_RATE] < 0.0 and s[c.ENERGY_RATE_SETPOINT] > s[c.ENERGY_RATE]
+    step = dt / _POWERLESS_S if flown and full and falling else -dt / _POWERLESS_S
+    s[c.POWERLESS] = _clip(s[c.POWERLESS] + step, 0.0, 1.0)
+    return s[c.POWERLESS]
 
 
 @kernel
@@ -205,10 +222,14 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     s[c.VEL_SETPOINT + 2] = -wanted_climb
     under = 0.0 if flare else _underspeed(p, s, load_factor)
     s[c.UNDERSPEED] = under
+    energy_flown = powered and known and climb_given and not (pitch_given or throttle_given)
+    powerless = _update_powerless(p, s, dt, energy_flown)
 
     airspeed_min = min(p[c.AIRSPEED_MAX], p[c.AIRSPEED_MIN] * math.sqrt(load_factor))
     airspeed = sp[_AIRSPEED] if math.isfinite(sp[_AIRSPEED]) else p[c.AIRSPEED_TRIM]
     airspeed = max(airspeed, s[c.AIRSPEED_FLOOR])
+    # a glide lasts longest, with room left over the stall, a little above the lowest airspeed
+    airspeed -= powerless * max(0.0, airspeed - _GLIDE_SHARE * airspeed_min)
     airspeed = under * airspeed_min + (1.0 - under) * airspeed
     s[c.AIRSPEED_SETPOINT] = _clip(airspeed, airspeed_min, p[c.AIRSPEED_MAX])
 
@@ -217,7 +238,8 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
         weight = 0.0
     elif throttle_given and not climb_given:
         weight = 2.0
-    weight = 2.0 * under + (1.0 - under) * weight
+    gives_way = max(under, powerless)
+    weight = 2.0 * gives_way + (1.0 - gives_way) * weight
 
     speed = max(_MIN_SPEED_M_S, s[c.EAS] * s[c.EAS_TO_TAS])
     potential_rate = GRAVITY_M_S2 * climb

@@ -120,4 +120,5 @@ UNALLOCATED: Final = 45  # surface command beyond the stops
 WHEEL_INTEGRAL: Final = 48
 VEL_SETPOINT: Final = 49  # NED, m/s; only the vertical one is flown
 AIRSPEED_FLOOR: Final = 52  # equivalent airspeed that the least ground speed asks for, m/s
-STATE_SIZE: Final = 53
+POWERLESS: Final = 53  # 0 the throttle does its work .. 1 the energy falls at full throttle
+STATE_SIZE: Final = 54
