@@ -12,6 +12,7 @@ from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, VehicleSpecification
 from flightsim import truth as t
 from flightsim.environment import Environment
+from flightsim.payload import MagneticField, PayloadParameters
 from missions.connection import Connection
 from missions.vehicle.vehicle import Vehicle
 
@@ -27,11 +28,21 @@ class Flying:
     seed: int = 5
     environment: Environment = field(default_factory=Environment)
     parameters: Mapping[str, float] = field(default_factory=dict)
+    model: str = "iris"
+    payload: PayloadParameters = field(default_factory=PayloadParameters)
+    magnetic_field: MagneticField | None = None
 
     def __post_init__(self) -> None:
-        specification = VehicleSpecification(flavour=self.flavour, parameters=self.parameters)
+        specification = VehicleSpecification(
+            flavour=self.flavour, parameters=self.parameters, model=self.model, payload=self.payload
+        )
         self.sitl = Sitl(
-            SitlConfiguration(vehicles=(specification,), seed=self.seed, environment=self.environment)
+            SitlConfiguration(
+                vehicles=(specification,),
+                seed=self.seed,
+                environment=self.environment,
+                magnetic_field=self.magnetic_field,
+            )
         )
         self.link = self.sitl.connect(0)
 

@@ -17,7 +17,13 @@ def random_bytes(seed: int, size: int) -> bytes:
 
 
 def valid_frames(
-    seed: int, count: int, *, target: int, sender: int = 255, without: Sequence[int] = ()
+    seed: int,
+    count: int,
+    *,
+    target: int,
+    sender: int = 255,
+    without: Sequence[int] = (),
+    components: Sequence[int] = (0, 1, 190),
 ) -> list[bytes]:
     """Frames of all messages of the dialect in turn, with fields from plausible to absurd.
 
@@ -25,17 +31,18 @@ def valid_frames(
         target: system id in every message that has a target.
         sender: system id they come from.
         without: message ids that are left out.
+        components: component ids in messages that have a target.
     """
     rng = random.Random(seed)
     encoder = FrameEncoder(sender, 190)
     known = [item for item in DEFINITIONS.values() if item.message_id not in without]
     return [
-        encoder.encode_payload(item.message_id, _payload(rng, item, target))
+        encoder.encode_payload(item.message_id, _payload(rng, item, target, components))
         for item in (known[k % len(known)] for k in range(count))
     ]
 
 
-def _payload(rng: random.Random, item: MessageDefinition, target: int) -> bytes:
+def _payload(rng: random.Random, item: MessageDefinition, target: int, components: Sequence[int]) -> bytes:
     payload = bytearray(rng.randbytes(item.size))
     if rng.random() < 0.7:
         for field in item.wire_fields:
@@ -46,7 +53,7 @@ def _payload(rng: random.Random, item: MessageDefinition, target: int) -> bytes:
         if field.name in ("target_system", "target") and field.code == "B":
             payload[field.offset] = target
         elif field.name == "target_component":
-            payload[field.offset] = rng.choice((0, 1, 190))
+            payload[field.offset] = rng.choice(components)
     return bytes(payload)
 
 
@@ -61,7 +68,9 @@ def _value(rng: random.Random, code: str) -> float:
     return rng.choice((low, high)) if kind < 0.8 else rng.randint(low, high)
 
 
-def commands(seed: int, count: int, *, target: int, without: Sequence[int]) -> list[bytes]:
+def commands(
+    seed: int, count: int, *, target: int, without: Sequence[int], components: Sequence[int] = (0, 1)
+) -> list[bytes]:
     """COMMAND_LONG and COMMAND_INT with every MAV_CMD there is but some."""
     rng = random.Random(seed)
     encoder = FrameEncoder(255, 190)
@@ -71,10 +80,10 @@ def commands(seed: int, count: int, *, target: int, without: Sequence[int]) -> l
         command = rng.choice(ids)
         p = [_value(rng, "f") for _ in range(7)]
         if rng.random() < 0.5:
-            message = dialect.MAVLink_command_long_message(target, rng.choice((0, 1)), command, 0, *p)
+            message = dialect.MAVLink_command_long_message(target, rng.choice(components), command, 0, *p)
         else:
             message = dialect.MAVLink_command_int_message(
-                target, 1, rng.choice((0, 2, 3, 6, 11, 21, 255)), command, 0, 0, *p[:4],
+                target, components[-1], rng.choice((0, 2, 3, 6, 11, 21, 255)), command, 0, 0, *p[:4],
                 int(_value(rng, "i")), int(_value(rng, "i")), p[6],
             )  # fmt: skip
         frames.append(encoder.encode(message))

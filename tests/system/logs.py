@@ -11,6 +11,8 @@ from autopilot_bridge.tlog import TlogReader
 HEARTBEAT = definition("HEARTBEAT").message_id
 PX4_MODES = {0x04040000: "mission", 0x05040000: "return", 0x03040000: "hold", 0x06040000: "land"}
 ARDUPILOT_MODES = {3: "mission", 6: "return", 17: "hold", 5: "hold", 9: "land", 4: "guided"}
+ARDUPLANE_MODES = {10: "mission", 11: "return", 12: "hold", 13: "takeoff", 15: "guided"}
+FIXED_WING = 1
 
 
 def records(path: Path) -> list[tuple[int, Frame]]:
@@ -42,8 +44,10 @@ def modes(path: Path) -> list[str]:
     names: list[str] = []
     for _, frame in TlogReader(path):
         if frame.message_id == HEARTBEAT and frame.component_id == 1:
-            mode = decode(frame).custom_mode
-            name = PX4_MODES.get(mode) or ARDUPILOT_MODES.get(mode) or str(mode)
+            heartbeat = decode(frame)
+            mode = heartbeat.custom_mode
+            ardupilot = ARDUPLANE_MODES if heartbeat.type == FIXED_WING else ARDUPILOT_MODES
+            name = PX4_MODES.get(mode) or ardupilot.get(mode) or str(mode)
             if names[-1:] != [name]:
                 names.append(name)
     return names
