@@ -1,11 +1,13 @@
 """What is read from JSBSim for the truth vector, and its conversion."""
 
 import math
+from enum import IntEnum
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.crash import DEEPEST_M, FASTEST_M_S, FASTEST_RAD_S, NEAR_M
 from flightsim.kernels import kernel
 from flightsim.rotations import quaternion_from_euler
 
@@ -48,6 +50,7 @@ STATE: Final = (
     "aero/qbar-psf",
 )
 STATE_SIZE: Final = len(STATE)
+GEAR_FORCE_Z: Final = STATE.index("forces/fbz-gear-lbs")
 # a-pilot is at the eye point, which our multicopter has at its centre of gravity; other models have not.
 LOAD_FACTORS: Final = {
     f"accelerations/a-pilot-{axis}-ft_sec2": f"accelerations/N{axis}" for axis in ("x", "y", "z")
@@ -58,9 +61,53 @@ LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * 9.80665
 MOTION_SIZE: Final = STATE.index("atmosphere/P-psf")
 
 
+class Motion(IntEnum):
+    """What `write_truth` makes of JSBSim's values."""
+
+    SOUND = 0
+    IMPOSSIBLE = 1  # not finite, or no motion of any vehicle
+    BROKEN = 2  # on the ground, by a force beyond what the airframe stands, or deep in it
+
+
+_SOUND, _IMPOSSIBLE, _BROKEN = (int(motion) for motion in Motion)
+
+
 @kernel
-def write_truth(raw: Array, accel_scale: Array, extra: NDArray[np.int64], scale: Array, truth: Array) -> bool:
-    """Convert JSBSim's values (order of `STATE`, then the model's own) to truth; False if not finite."""
+def write_truth(
+    raw: Array,
+    accel_scale: Array,
+    extra: NDArray[np.int64],
+    scale: Array,
+    breaks_at_m_s2: float,
+    ground_alt_m: float,
+    truth: Array,
+) -> int:
+    """Convert JSBSim's values (order of `STATE`, then the model's own) to truth, if they are sound.
+
+    Args:
+        raw: the values.
+        accel_scale: (3,) to specific force.
+        extra, scale: where the model's own values go, and their factors.
+        breaks_at_m_s2: largest specific force that a blow on the ground may make.
+        ground_alt_m: above mean sea level.
+        truth: left as it was by values that aren't sound.
+
+    Returns:
+        A `Motion`.
+    """
+    total = 0.0
+    for i in range(raw.shape[0]):
+        total += raw[i]
+    speed = math.sqrt(raw[3] ** 2 + raw[4] ** 2 + raw[5] ** 2) * _FT
+    turn = math.sqrt(raw[9] ** 2 + raw[10] ** 2 + raw[11] ** 2)
+    if not (math.isfinite(total) and speed <= FASTEST_M_S and turn <= FASTEST_RAD_S):
+        return _IMPOSSIBLE
+    force = 0.0
+    for i in range(3):
+        force += (raw[12 + i] * accel_scale[i]) ** 2
+    height_m = raw[2] * _FT - ground_alt_m
+    if height_m < -DEEPEST_M or (height_m < NEAR_M and math.sqrt(force) > breaks_at_m_s2):
+        return _BROKEN
     truth[0] = raw[0]
     truth[1] = raw[1]
     for i in range(2, 6):
@@ -79,10 +126,6 @@ def write_truth(raw: Array, accel_scale: Array, extra: NDArray[np.int64], scale:
     truth[41] = raw[27]
     truth[42] = raw[28] * _PA_PER_PSF
     truth[31] = 0.0 if raw[23] == 0.0 and raw[24] == 0.0 and raw[25] == 0.0 else 1.0
-    total = 0.0
-    for i in range(STATE_SIZE):
-        total += raw[i]
     for i in range(extra.shape[0]):
         truth[extra[i]] = raw[STATE_SIZE + i] * scale[i]
-        total += raw[STATE_SIZE + i]
-    return math.isfinite(total)
+    return _SOUND

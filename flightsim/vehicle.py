@@ -17,6 +17,7 @@ from flightsim.airframe import (
     Role,
     load_airframe,
 )
+from flightsim.crash import BREAKS_AT_M_S2, hits_ground, lay_down, speed_m_s
 from flightsim.environment import CosineGust, Environment, Turbulence
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
@@ -26,11 +27,13 @@ from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.truth_reading import (
     ACCEL_SCALE,
+    GEAR_FORCE_Z,
     LOAD_FACTOR_SCALE,
     LOAD_FACTORS,
     MOTION_SIZE,
     STATE,
     STATE_SIZE,
+    Motion,
     write_truth,
 )
 from flightsim.turbulence import DrydenTurbulence
@@ -43,11 +46,14 @@ _FT: Final = 0.3048
 _FOLLOW_S: Final = 10.0  # in which actuators and engines follow the commands of a start in the air
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
+_TOUCHED_S: Final = 10  # after touching the ground: what goes wrong then began there
 _SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand on a tail wheel
 
 
 class VehicleDivergedError(ArithmeticError):
-    """The simulated state is no longer finite: the commands or the physics rate do not suit the model."""
+    """The simulated motion is no longer possible, and nothing was hit: the commands or the physics rate do not
+    suit the model.
+    """
 
 
 class Vehicle:
@@ -59,11 +65,13 @@ class Vehicle:
         home: origin of the world.
         environment: the air.
         launcher: what holds it and launches it; None for a vehicle without.
+        crash: what it broke on, for people; None: whole. A wreck lies where it is for good.
         physics_rate_hz: steps per second.
         load_warnings: what JSBSim had to say about the model; empty for a clean one.
     """
 
     __slots__ = (
+        "_breaks_at_m_s2",
         "_fdm",
         "_getters_motion",
         "_getters_slow",
@@ -81,10 +89,12 @@ class Vehicle:
         "_slow_steps",
         "_steps",
         "_surfaces",
+        "_touched_step",
         "_truth_extra",
         "_truth_scale",
         "_turbulence",
         "airframe",
+        "crash",
         "environment",
         "home",
         "launcher",
@@ -167,6 +177,7 @@ class Vehicle:
         self._fdm = fdm
         self._run = fdm.run
         self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
+        self._breaks_at_m_s2 = BREAKS_AT_M_S2 if fixed_wing else math.inf
         name = self.airframe.name
         state = [LOAD_FACTORS.get(prop, prop) for prop in STATE] if fixed_wing else STATE
         properties = (*state, *(prop for _, prop in self.airframe.truth))
@@ -187,6 +198,8 @@ class Vehicle:
             for axis in ("north", "east", "down")
         )
         self._steps = 0
+        self._touched_step = -self.physics_rate_hz * _TOUCHED_S
+        self.crash: str | None = None
         self.launcher: Launcher | None = None
         self._turbulence: DrydenTurbulence | None = None
         self._gusts: list[CosineGust] = list(self.environment.gusts)
@@ -212,19 +225,23 @@ class Vehicle:
                 dt_s=1.0 / self.physics_rate_hz,
                 seed_sequence=self._seed_sequence,
             )
-        self._observe()
+        if self._observe() != Motion.SOUND:
+            raise self._diverged()
         self._refresh_magnetic_field()
 
     def step(self, actuators: Array) -> None:
-        """Advance one physics step and write `truth`.
+        """Advance one physics step and write `truth`. Of a wreck only the time goes on.
 
         Args:
             actuators: (MAX_ACTUATORS,) commands, motors 0..1, surfaces -1..1; those the vehicle has not are
                 ignored. They act from this step on: rotors follow in this step, the motion from the next one.
 
         Raises:
-            VehicleDivergedError: the state is no longer finite.
+            VehicleDivergedError: the motion is no longer possible, and nothing was hit.
         """
+        if self.crash is not None:
+            self._steps += 1
+            return
         turbulence = self._turbulence
         if turbulence is not None:
             truth = self.truth
@@ -246,7 +263,9 @@ class Vehicle:
             self.launcher.step()
         self._run()
         self._steps += 1
-        self._observe()
+        motion = self._observe()
+        if motion != Motion.SOUND:
+            self._end(motion, actuators)
         if self._steps % self._magnetic_steps == 0:
             self._refresh_magnetic_field()
 
@@ -333,21 +352,46 @@ class Vehicle:
         hold_motion(self._fdm, False)
         initialise(self._fdm, self.airframe, self.home, self.environment, start, prepare=False)
 
-    def _observe(self) -> None:
+    def _observe(self) -> int:
+        """Write `truth`, if there is any; a `Motion`."""
         raw = self._raw_view
         for i, get in self._getters_motion:
             raw[i] = get()
         if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
             for i, get in self._getters_slow:
                 raw[i] = get()
+            if raw[GEAR_FORCE_Z] != 0.0:
+                self._touched_step = self._steps
         accel_scale = ACCEL_SCALE if self._surfaces is None else LOAD_FACTOR_SCALE
-        if not write_truth(self._raw, accel_scale, self._truth_extra, self._truth_scale, self.truth):
-            raise VehicleDivergedError(
-                f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
-                f"({self._steps / self.physics_rate_hz:.3f} s): its state is not finite"
-            )
+        motion: int = write_truth(
+            self._raw,
+            accel_scale,
+            self._truth_extra,
+            self._truth_scale,
+            self._breaks_at_m_s2,
+            self.home.alt_m,
+            self.truth,
+        )
         if self.launcher is not None and not self.launcher.released:
             self.truth[t.ON_GROUND] = 1.0  # the launcher carries its weight
+        return motion
+
+    def _end(self, motion: int, actuators: Array) -> None:
+        """What can't go on: a crash, or a model that diverged."""
+        ground_alt_m = self.home.alt_m
+        touched = self._steps - self._touched_step < _TOUCHED_S * self.physics_rate_hz
+        sound = bool(np.all(np.isfinite(actuators[: self.actuator_count])))
+        broken = motion == Motion.BROKEN
+        if not (sound and (broken or hits_ground(self.truth, ground_alt_m, touched=touched))):
+            raise self._diverged()
+        self.crash = f"hit the ground at {speed_m_s(self.truth):.0f} m/s"
+        lay_down(self.truth, ground_alt_m)
+
+    def _diverged(self) -> VehicleDivergedError:
+        return VehicleDivergedError(
+            f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
+            f"({self._steps / self.physics_rate_hz:.3f} s): its motion is not possible"
+        )
 
     def _start_due_gust(self) -> None:
         gust = self._gusts[0]

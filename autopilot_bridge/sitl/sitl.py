@@ -52,6 +52,7 @@ class SitlVehicle:
         payload: what it carries, as MAVLink components on a link of their own; None: nothing.
         channels: its open links.
         echoes: frames of its own that came back on a link; they are dropped.
+        crashed: the vehicle is a wreck; clients were told.
     """
 
     def __init__(
@@ -98,6 +99,7 @@ class SitlVehicle:
         )
         self.channels: list[LinkChannel] = []
         self.echoes = 0
+        self.crashed = False
         self._router: Router[LinkChannel] = Router()
         self._loops = LoopGuard()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
@@ -133,6 +135,11 @@ class SitlVehicle:
             self.payload.step(time_us)
         if self._crew is not None and self._crew.watch(time_us):
             self._crew = None
+        if self.vehicle.crash is not None and not self.crashed:
+            self.crashed = True
+            text = self.truth_encoder.encode_text(f"Simulator: {self.vehicle.crash}")
+            for channel in self.channels:
+                channel.send_frame(text)
 
     def open(self, link: Link, *, name: str | None = None, role: str = "onboard") -> LinkChannel:
         """Give the autopilot one more link.

@@ -70,6 +70,12 @@ class TruthEncoder:
         _fill(self._truth, time_us, self._record)
         return self._encoder.encode_payload(_MESSAGE_ID, self._record.tobytes())
 
+    def encode_text(self, text: str) -> bytes:
+        """A STATUSTEXT of the simulator's, for people; severity critical."""
+        return self._encoder.encode(
+            mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_CRITICAL, text[:50].encode("ascii"))
+        )
+
 
 class TargetTruthEncoder:
     """Packs where the ground targets are.

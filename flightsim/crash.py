@@ -1,0 +1,81 @@
+"""When the motion of a vehicle has ended in a crash, and how the wreck lies.
+
+Contact points of a model carry wheels and tips at the loads of landings. A body that hits the ground beyond
+what an airframe stands is not theirs to compute: JSBSim then throws it kilometres high, drives it into the
+ground, or ends at numbers that are none. Here it breaks, and stays where it is.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim import truth as t
+from flightsim.rotations import rotate_inverse
+
+Array = NDArray[np.float64]
+
+BREAKS_AT_M_S2: Final = 1000.0
+"""Specific force, some 100 g, at which an aircraft breaks. A small multicopter bounces with more."""
+FASTEST_M_S: Final = 1500.0
+FASTEST_RAD_S: Final = 500.0
+"""No vehicle moves or turns faster; contact forces that ring without end do."""
+DEEPEST_M: Final = 5.0
+"""Below the ground, of the centre of gravity."""
+NEAR_M: Final = 30.0
+"""Above the ground; what happens higher up is no blow on it."""
+
+_GRAVITY_M_S2: Final = 9.80665
+_GAS_CONSTANT: Final = 287.05287  # of dry air, J/(kg K)
+_MOVING_M_S: Final = 2.0  # what stands doesn't crash
+_WRECK_HEIGHT_M: Final = 1.0  # highest place of the centre of gravity of what lies on the ground
+
+
+def hits_ground(truth: Array, ground_alt_m: float, *, touched: bool) -> bool:
+    """Whether a motion that can't go on ended at the ground: otherwise the model is at fault.
+
+    Args:
+        truth: the last that was sound.
+        ground_alt_m: above mean sea level.
+        touched: the ground was touched a moment ago; it may have been thrown up since.
+    """
+    near = touched or truth[t.ALT_M] - ground_alt_m < NEAR_M
+    return bool(near and speed_m_s(truth) > _MOVING_M_S)
+
+
+def speed_m_s(truth: Array) -> float:
+    """Over ground, and of climb and fall."""
+    return float(np.linalg.norm(truth[t.VEL_NED_M_S]))
+
+
+def lay_down(truth: Array, ground_alt_m: float) -> None:
+    """Make of a vehicle in motion a wreck at rest, in place; its heading and attitude stay.
+
+    Args:
+        truth: the last that was sound.
+        ground_alt_m: above mean sea level.
+    """
+    height_m = min(max(truth[t.ALT_M] - ground_alt_m, 0.0), _WRECK_HEIGHT_M)
+    fallen_m = truth[t.ALT_M] - (ground_alt_m + height_m)
+    scale_height_m = _GAS_CONSTANT * truth[t.TEMPERATURE_K] / _GRAVITY_M_S2
+    truth[t.PRESSURE_PA] *= math.exp(fallen_m / scale_height_m)
+    truth[t.ALT_M] = ground_alt_m + height_m
+    truth[t.HEIGHT_ABOVE_GROUND_M] = height_m
+    truth[t.VEL_NED_M_S] = 0.0
+    truth[t.RATES_FRD_RAD_S] = 0.0
+    force_frd = np.empty(3)
+    rotate_inverse(
+        np.ascontiguousarray(truth[t.Q_NED_FROM_FRD]), np.array([0.0, 0.0, -_GRAVITY_M_S2]), force_frd
+    )
+    truth[t.SPECIFIC_FORCE_FRD_M_S2] = force_frd
+    for still in (
+        t.AIRSPEED_TRUE_M_S,
+        t.BATTERY_CURRENT_A,
+        t.ROTOR_RAD_S,
+        t.ANGLE_OF_ATTACK_RAD,
+        t.SIDESLIP_RAD,
+        t.DYNAMIC_PRESSURE_PA,
+    ):
+        truth[still] = 0.0
+    truth[t.ON_GROUND] = 1.0
