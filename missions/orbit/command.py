@@ -80,7 +80,7 @@ COMMAND: Final = MissionCommand(
         option(
             "--target-motion",
             type=click.Choice(["static", "straight", "circle", "random-walk"]),
-            help="Of the embedded world's target. [default: straight on, or static without speed]",
+            help="How it moves: one that wanders stays within 100 m. [default: straight on, or static]",
         ),
         option("--target-ground", type=float, default=0.0, help="Height of its ground above home, m."),
         option(

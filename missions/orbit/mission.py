@@ -14,10 +14,10 @@ from missions.errors import MissionError, PlanError
 from missions.mission import Debriefing, Mission, WorldDefaults
 from missions.orbit.attitude import AutopilotAttitude
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
-from missions.orbit.options import OrbitOptions
+from missions.orbit.options import WANDERING_M, OrbitOptions
 from missions.orbit.tracker import TargetStatus, TargetTracker
 from missions.planning.limits import FixedWingLimits, Limits
-from missions.scenario import Scenario, Setting, TargetScenario
+from missions.scenario import Scenario, Setting, TargetMotion, TargetScenario
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 from missions.vehicle.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
@@ -55,6 +55,8 @@ class OrbitMission(Mission[OrbitOptions]):
 
     def scenario(self, options: OrbitOptions, setting: Setting) -> Scenario:
         north_m, east_m = options.target_ne_m
+        if options.motion is TargetMotion.CIRCLE:  # begins in the north of its circle
+            north_m -= WANDERING_M
         return Scenario(
             targets=(
                 TargetScenario(
@@ -63,6 +65,7 @@ class OrbitMission(Mission[OrbitOptions]):
                     motion=options.motion,
                     speed_m_s=options.target_speed_m_s,
                     course_rad=options.target_heading_rad,
+                    range_m=WANDERING_M,
                     size_m=4.0,
                 ),
             ),
@@ -216,7 +219,7 @@ class OrbitFlight:
         self._tracker.start(
             now_us,
             offset_ne_m=(north_m - own_north_m, east_m - own_east_m),
-            offset_std_m=_BELIEVED_TO_M,
+            offset_std_m=WANDERING_M if self._options.wandering else _BELIEVED_TO_M,
             drift_ne_m_s=(vn - wind_n, ve - wind_e),
             drift_std_m_s=_DRIFT_STD_M_S,
         )
@@ -224,6 +227,8 @@ class OrbitFlight:
     def _target_ne(self, time_us: int) -> tuple[tuple[float, float], tuple[float, float]]:
         """Place and velocity of the target as it is believed to move, from home."""
         o = self._options
+        if o.wandering:  # somewhere around there
+            return o.target_ne_m, (0.0, 0.0)
         velocity = (
             o.target_speed_m_s * math.cos(o.target_heading_rad),
             o.target_speed_m_s * math.sin(o.target_heading_rad),

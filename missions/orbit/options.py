@@ -2,11 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from missions.errors import PlanError
 from missions.options import MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.scenario import TargetMotion
+
+WANDERING_M: Final = 100.0
+"""How far a target that wanders goes from its place: radius of its circle, half the side of its area."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,7 +25,8 @@ class OrbitOptions(MissionOptions):
         airspeed_m_s: equivalent; None: the aircraft's own.
         target_ne_m: where the target is believed to be when the vehicle is first heard, from home.
         target_speed_m_s, target_heading_rad: how it is believed to move, straight on.
-        target_motion: how it moves in an embedded world; None: straight on with a speed, else not.
+        target_motion: how it moves; None: straight on with a speed, else not. One that wanders (a circle, a
+            random walk) is believed to be within 100 m of its place.
         target_ground_m: of the ground it is on, above home.
         entry_bearing_rad: from the target to where GPS is lost.
         entry_distance_m: between the two.
@@ -79,6 +84,11 @@ class OrbitOptions(MissionOptions):
         if self.target_motion is not None:
             return self.target_motion
         return TargetMotion.STRAIGHT if self.target_speed_m_s > 0.0 else TargetMotion.STATIC
+
+    @property
+    def wandering(self) -> bool:
+        """Whether it is not known where the target goes, only that it stays near."""
+        return self.target_motion in (TargetMotion.CIRCLE, TargetMotion.RANDOM_WALK)
 
     @property
     def height_over_target_m(self) -> float:
