@@ -172,6 +172,7 @@ def test_the_command_line_refuses_with_usage_errors(arguments, words, tmp_path, 
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_three_aircraft_search_in_wind(autopilot, tmp_path):
     options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0, target_ne_m=(-300.0, 350.0))
@@ -197,6 +198,7 @@ def test_three_aircraft_search_in_wind(autopilot, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_quadrotor_and_two_aircraft_search_together(tmp_path):
     options = OccupancyOptions(vehicles=3, width_m=1600.0, height_m=1600.0, target_ne_m=(-500.0, 400.0))
     models = ("aerosonde", "aerosonde", "iris")
