@@ -85,9 +85,10 @@ class MissionOptions:
         return getattr(self, name) != default
 
     def unless_chosen(self, **values: float | str) -> Self:
-        """The same options, with other values where nobody chose one."""
-        changes: dict[str, Any] = {name: v for name, v in values.items() if not self.chosen(name)}
-        return replace(self, **changes)
+        """The same options, with other values where nobody chose one; `given` then tells what was chosen."""
+        given = frozenset(f.name for f in fields(self) if f.name != "given" and self.chosen(f.name))
+        changes: dict[str, Any] = {name: v for name, v in values.items() if name not in given}
+        return replace(self, given=given, **changes)
 
     def for_vehicle(self, limits: Limits) -> Self:
         """The same options as one vehicle flies them: what nobody chose suits its kind."""

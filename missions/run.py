@@ -92,6 +92,7 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
         "error_reference": score.reference,
         "path_rms_error_m": _rounded(score.path_rms_error_m),
         "path_max_error_m": _rounded(score.path_max_error_m),
+        "altitude_rms_error_m": _rounded(score.altitude_rms_error_m),
         "path_rms_error_absolute_m": _rounded(score.path_rms_error_absolute_m),
         "path_rms_error_estimate_m": _rounded(score.path_rms_error_estimate_m),
         "max_attitude_error_deg": _rounded(score.max_attitude_error_deg),

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _BACK_M: Final = 3.0  # how far back along the path the nearest point is looked for
 _AHEAD_M: Final = 15.0
 _IN_FLIGHT_M: Final = 0.5
+_LEVEL_M: Final = 0.01
 _TRUTH_ATTITUDE: Final = ("attitude_quaternion",)
 _TARGET_ATTITUDE: Final = ("q",)
 _EULER_ANGLES: Final = ("roll", "pitch", "yaw")
@@ -66,6 +67,7 @@ class FlightScore:
         truth, estimate: tracks; times strictly increasing.
         error_time_s, error_m: distance to the commanded path along the pattern, of the reference track.
         reference: "truth" or "estimate".
+        altitude_rms_error_m: of the height alone, along a pattern that is level.
         messages_not_finite: messages that were left out because their attitude is no attitude: NaN,
             infinite, or a quaternion of no length.
     """
@@ -83,6 +85,7 @@ class FlightScore:
     max_attitude_error_deg: float | None
     max_attitude_tracking_error_deg: float | None
     waypoint_misses_m: tuple[float, ...]
+    altitude_rms_error_m: float | None = None
     messages_not_finite: int = 0
 
 
@@ -112,11 +115,14 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
     nothing = np.zeros(0)
     error_time, error = nothing, nothing
     misses: tuple[float, ...] = ()
-    absolute_rms = estimate_rms = None
+    absolute_rms = estimate_rms = altitude_rms = None
     if commanded is not None and phase is not None and reference is not None:
         window = (phase.start_us, phase.end_us)
         pattern = reference.between(*window)
         error_time, error = pattern.time_s, path_errors_m(commanded.points_ned_m, pattern.pos_ned_m)
+        down = commanded.points_ned_m[:, 2]
+        if len(down) and np.ptp(down) < _LEVEL_M:
+            altitude_rms = _rms(pattern.pos_ned_m[:, 2] - down[0])
         misses = waypoint_misses_m(commanded, pattern.pos_ned_m)
         if absolute is not None:
             flat = absolute.between(*window).pos_ned_m - np.array([0.0, 0.0, moved[2]])
@@ -138,6 +144,7 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
         max_attitude_error_deg=_attitude_error_deg(truth_table, attitude, reference),
         max_attitude_tracking_error_deg=_tracking_error_deg(target, attitude, reference),
         waypoint_misses_m=misses,
+        altitude_rms_error_m=altitude_rms,
         messages_not_finite=truth_bad + attitude_bad + target_bad,
     )
 

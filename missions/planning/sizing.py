@@ -39,10 +39,9 @@ def legs_side_m(spacing_m: float) -> float:
 
 
 def spacing_within_m(side_m: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Track spacing that parts a side in whole legs with room for the turns; the usual one where none has."""
-    usual_m = spacing_for_turns_m(airspeed_m_s, limits)
-    legs = math.floor(side_m / (usual_m / _ROOM))
-    return side_m / legs if legs >= 1 and side_m / legs < usual_m else usual_m
+    """Track spacing that parts a side evenly, with room for the turns; for a side too short, the usual one."""
+    legs = math.floor(side_m / (_ROOM * leg_needed_m(_SQUARE_RAD, airspeed_m_s, limits)))
+    return side_m / legs if legs >= 1 else spacing_for_turns_m(airspeed_m_s, limits)
 
 
 def _tens(value_m: float) -> float:
