@@ -123,5 +123,7 @@ def _damage(rng: random.Random, frame: bytes) -> bytes:
         case 3:  # a byte lost
             del data[at]
         case _:  # a byte gained
-            data.insert(at, rng.randrange(256))
+            gained = rng.randrange(256)
+            # a second start mark before a whole frame is no damage to it
+            data.insert(at, 0 if at == 1 and gained == data[0] else gained)
     return bytes(data)
