@@ -65,9 +65,10 @@ class Component(ABC):
         self._time_us = time_us
         if time_us < self._next_us:
             return
-        for message_id, due_us in self._due_us.items():
-            if due_us <= time_us:
-                interval_us = self._intervals_us[message_id]
+        # who hears a message may at once ask for others, or for none any more
+        for message_id, due_us in [item for item in self._due_us.items() if item[1] <= time_us]:
+            interval_us = self._intervals_us.get(message_id)
+            if interval_us is not None:
                 self._due_us[message_id] = max(due_us + interval_us, time_us + 1)
                 self.send(self._builders[message_id](time_us))
         self._next_us = min(self._due_us.values(), default=_NEVER_US)

@@ -151,14 +151,10 @@ class GimbalComponent(Component):
         return True
 
     def _steer(self, message: Any) -> None:
-        """GIMBAL_MANAGER_SET_MANUAL_CONTROL: -1..1 of a full turn rate."""
-        rates = [
-            max(-1.0, min(1.0, value)) * _MANUAL_RATE_RAD_S
-            for value in (message.pitch_rate, message.yaw_rate)
-        ]
+        """GIMBAL_MANAGER_SET_MANUAL_CONTROL: -1..1 of a full angle or turn rate; NaN: not given."""
+        rates = [_share(value) * _MANUAL_RATE_RAD_S for value in (message.pitch_rate, message.yaw_rate)]
         angles = [
-            max(-1.0, min(1.0, value)) * limit
-            for value, limit in ((message.pitch, 0.5 * math.pi), (message.yaw, math.pi))
+            _share(value) * limit for value, limit in ((message.pitch, 0.5 * math.pi), (message.yaw, math.pi))
         ]
         self._point(message.flags, angles[0], angles[1], rates[0], rates[1])
 
@@ -335,6 +331,11 @@ class GimbalComponent(Component):
             0,
             *self._limits(),
         )
+
+
+def _share(value: float) -> float:
+    """Within -1..1; NaN stays."""
+    return value if math.isnan(value) else max(-1.0, min(1.0, value))
 
 
 def _yaw(q: list[float]) -> float:

@@ -118,7 +118,7 @@ class ArduPlaneCommands(ArduPilotCommands):
 
     def go_around(self, command: Command, source: Source) -> Result:
         """DO_GO_AROUND: p1 height over home to climb to; none: as the landing says."""
-        height_m = command.p1 if command.p1 > 0.0 else math.nan
+        height_m = command.p1 if 0.0 < command.p1 < math.inf else math.nan
         return Result.ACCEPTED if self.commander.guidance.go_around(height_m).accepted else Result.FAILED
 
     def auxiliary(self, command: Command, source: Source) -> Result:

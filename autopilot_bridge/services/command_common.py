@@ -154,9 +154,6 @@ class CommandHandlers(ABC):
     double_ack: frozenset[int] = frozenset()
     """Commands acknowledged as accepted before they are tried, and once more after."""
 
-    set_mode_ack = True
-    """The SET_MODE message is acknowledged."""
-
     def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
         self.commander = commander
         self.hooks = hooks

@@ -207,6 +207,19 @@ def test_rates_turn_the_gimbal(world):
     assert pointing(world).yaw == pytest.approx(40.0, abs=2.0)
 
 
+def test_sticks_steer_the_gimbal_by_what_they_give(world):
+    world.run(2.0)
+    steer = m.MAVLink_gimbal_manager_set_manual_control_message
+    unset = math.nan
+    world.tell(steer(SYSTEM, GIMBAL_COMPONENT, 0, 0, -0.5, unset, unset, unset))
+    world.run(3.0)
+    look = pointing(world)
+    assert (look.pitch, look.yaw) == pytest.approx((-45.0, 0.0), abs=1.0)
+    world.tell(steer(SYSTEM, GIMBAL_COMPONENT, 0, 0, unset, unset, unset, 0.25))
+    world.run(2.0)
+    assert pointing(world).yaw == pytest.approx(30.0, abs=2.0)
+
+
 def test_who_has_control_points_and_others_do_not(world):
     world.run(2.0)
     configure = m.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
@@ -301,6 +314,24 @@ def test_intervals_can_be_set_and_read(world):
     assert len(world.messages(attitude)) == before
     unknown = world.command(GIMBAL_COMPONENT, m.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 40_000)
     assert unknown == m.MAV_RESULT_UNSUPPORTED
+
+
+def test_a_listener_may_answer_a_stream_at_once():
+    """On a memory link the answer arrives while the streams of this step are still being sent."""
+    world = World()
+    attitude = m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
+    take = world._take
+
+    def answer(data: bytes) -> None:
+        take(data)
+        newest = world.frames[-1]
+        if newest.message_id == m.MAVLINK_MSG_ID_HEARTBEAT and newest.component_id == GIMBAL_COMPONENT:
+            world.command(GIMBAL_COMPONENT, m.MAV_CMD_SET_MESSAGE_INTERVAL, attitude, -1)
+
+    world.station = PayloadStation(world.payload, system_id=SYSTEM, send=answer)
+    world.run(3.0)
+    assert len(world.messages(attitude)) == 0
+    assert len(world.messages(m.MAVLINK_MSG_ID_HEARTBEAT, GIMBAL_COMPONENT)) == 3
 
 
 def test_commands_for_others_and_to_all(world):

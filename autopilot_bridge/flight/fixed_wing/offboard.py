@@ -35,7 +35,6 @@ class OffboardTask(AircraftTask):
         "_acceleration",
         "_attitude",
         "_circle",
-        "_circle_place",
         "_hold",
         "_kept",
         "_path",
@@ -58,7 +57,6 @@ class OffboardTask(AircraftTask):
         self._hold = LoiterTask()
         self._path = GuidedPath()
         self._circle: Circle | None = None
-        self._circle_place = NAN3
         self._kept: tuple[float, float] | None = None  # course, down
 
     def set_trajectory(
