@@ -168,7 +168,7 @@ class Autopilot:
             thrust=lambda: self.controller.thrust,
             missions=stores[MissionType.MISSION],
             fence=stores[MissionType.FENCE],
-            mission_valid=lambda: self.missions.mission_valid(),
+            mission_valid=lambda: self.missions.mission_valid(landed=self.commander.landed),
         )
         self._progress = _Progress(self.commander)
         self._texts = StatusTextService(flavour, self)

@@ -18,6 +18,7 @@ from flightsim import interface
 from flightsim.interface import SensorReadings
 
 NAN: Final = math.nan
+_NO_GPS: Final = 0  # GPS_FIX_TYPE
 
 
 @dataclass(slots=True, kw_only=True)
@@ -58,6 +59,7 @@ class CommonMessages:
 
     servo_unused_us = 0
     servo_disarmed_us = 1000
+    gps_timeout_us = 4_000_000  # ArduPilot's GPS_TIMEOUT_MS
 
     def __init__(self, sources: TelemetrySources) -> None:
         self.sources = sources
@@ -105,15 +107,20 @@ class CommonMessages:
         return (self.sources.unix_epoch_us + self.view.time_us, self.view.time_ms)
 
     def gps_raw_int(self) -> Values | None:
-        """GPS_RAW_INT (24); eph and epv are the dilutions of precision x 100, as both firmwares send."""
+        """GPS_RAW_INT (24); eph and epv are the dilutions of precision x 100, as both firmwares send.
+
+        A receiver that has fallen silent is shown as none at all.
+        """
         gps = self.sources.readings.gps
         if gps.time_us < 0:
             return None
         v = gps.values.tolist()
-        fix_type = int(v[interface.GPS_FIX_TYPE])
+        silent = self.view.time_us - gps.time_us > self.gps_timeout_us
+        fix_type = _NO_GPS if silent else int(v[interface.GPS_FIX_TYPE])
         vn, ve, _ = v[interface.GPS_VEL_NED_M_S]
         if fix_type < 2 or not math.isfinite(v[interface.GPS_LAT_DEG]):
-            satellites = int(v[interface.GPS_SATELLITES]) if math.isfinite(v[interface.GPS_SATELLITES]) else 0
+            counted = not silent and math.isfinite(v[interface.GPS_SATELLITES])
+            satellites = int(v[interface.GPS_SATELLITES]) if counted else 0
             return (gps.time_us, fix_type, 0, 0, 0, UINT16_UNKNOWN, UINT16_UNKNOWN, 0, 0, satellites) + (
                 0,
             ) * 6
