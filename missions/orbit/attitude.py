@@ -3,6 +3,7 @@
 The autopilot's own estimate today; a filter of ours can stand in its place by having the same method.
 """
 
+import math
 from collections import deque
 from typing import Final, Protocol
 
@@ -31,8 +32,10 @@ class AutopilotAttitude:
         self._kept: deque[tuple[int, Quaternion]] = deque(maxlen=_KEPT)
 
     def add(self, attitude: Attitude) -> bool:
-        """Take one message; False when it is older than the newest, or a copy."""
+        """Take one message; False when it is older than the newest, a copy, or no attitude."""
         if self._kept and attitude.time_us <= self._kept[-1][0]:
+            return False
+        if not math.isfinite(attitude.roll_rad + attitude.pitch_rad + attitude.yaw_rad):
             return False
         self._kept.append(
             (attitude.time_us, from_euler(attitude.roll_rad, attitude.pitch_rad, attitude.yaw_rad))

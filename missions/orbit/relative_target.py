@@ -111,12 +111,18 @@ class RelativeTarget:
         drift_ne_m_s: tuple[float, float],
         drift_std_m_s: float,
     ) -> None:
-        """Begin (again) from what somebody else says of the target (equation 33)."""
+        """Begin (again) from what somebody else says of the target (equation 33).
+
+        The way through the air so far is kept: images on their way show the target from there.
+        """
+        if self._known and time_us >= self._time_us:
+            self.move(time_us, self._air)
+        else:
+            self._path.clear()
+            self._path.append((time_us, 0.0, 0.0))
         self._x[:] = (*offset_ne_m, *drift_ne_m_s)
         self._p[:] = np.diag((offset_std_m**2, offset_std_m**2, drift_std_m_s**2, drift_std_m_s**2))
         self._time_us = time_us
-        self._path.clear()
-        self._path.append((time_us, 0.0, 0.0))
         self._known = True
 
     def move(self, time_us: int, air_velocity_ne_m_s: tuple[float, float]) -> None:

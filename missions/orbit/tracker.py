@@ -108,7 +108,7 @@ class TargetTracker:
     # what comes out
 
     def step(self, time_us: int, airspeed_true_m_s: float, climb_m_s: float = 0.0) -> None:
-        """Go on to a time; then look at the images that have come.
+        """Go on to a time; then look at the images that have come. Nothing without attitude and airspeed.
 
         Args:
             time_us: now.
@@ -116,7 +116,7 @@ class TargetTracker:
             climb_m_s: of which so much goes upwards.
         """
         q = self._attitude.at(time_us)
-        if q is None:
+        if q is None or not math.isfinite(airspeed_true_m_s + climb_m_s):
             return
         heading = yaw_of(q)
         level = math.sqrt(max(0.0, airspeed_true_m_s**2 - climb_m_s**2))

@@ -59,6 +59,42 @@ def test_expected_seen_lost_and_seen_again():
     assert rig.error_m < 8.0
 
 
+def test_a_target_is_seen_while_its_expected_place_is_still_renewed():
+    """As with GPS: the place somebody tells is taken anew every step, and images come later than that."""
+    rig = Rig()
+    accepted = 0
+    for _ in range(100):
+        rig.run(0.04)
+        accepted += rig.tracker.status is TargetStatus.SEEN
+        n, e = rig.aircraft.target - rig.aircraft.p
+        rig.tracker.start(
+            rig.aircraft.time_us,
+            offset_ne_m=(float(n) + 8.0, float(e)),
+            offset_std_m=20.0,
+            drift_ne_m_s=(0.0, 0.0),
+            drift_std_m_s=2.0,
+        )
+    assert accepted > 20
+
+
+def test_numbers_that_are_none_leave_the_estimate_as_it_was():
+    rig = Rig()
+    rig.run(3.0)
+    for nothing in (math.nan, math.inf):
+        bad = Attitude(
+            time_us=rig.aircraft.time_us + 1000,
+            roll_rad=0.0,
+            pitch_rad=nothing,
+            yaw_rad=0.0,
+            rates_frd_rad_s=(0.0, 0.0, 0.0),
+        )
+        assert not rig.attitude.add(bad)
+        rig.tracker.step(rig.aircraft.time_us + 2000, nothing)
+        rig.tracker.step(rig.aircraft.time_us + 2000, 25.0, nothing)
+    rig.run(1.0)
+    assert rig.error_m < 8.0
+
+
 def test_nothing_is_made_of_images_without_attitude_height_or_gimbal():
     attitude = AutopilotAttitude()
     tracker = TargetTracker(attitude)
