@@ -9,7 +9,13 @@ from autopilot_bridge.mavlink import DEFINITIONS, Frame, decode, definition
 from autopilot_bridge.tlog import TlogReader
 
 HEARTBEAT = definition("HEARTBEAT").message_id
-PX4_MODES = {0x04040000: "mission", 0x05040000: "return", 0x03040000: "hold", 0x06040000: "land"}
+PX4_MODES = {
+    0x00060000: "offboard",
+    0x04040000: "mission",
+    0x05040000: "return",
+    0x03040000: "hold",
+    0x06040000: "land",
+}
 ARDUPILOT_MODES = {3: "mission", 6: "return", 17: "hold", 5: "hold", 9: "land", 4: "guided"}
 ARDUPLANE_MODES = {10: "mission", 11: "return", 12: "hold", 13: "takeoff", 15: "guided"}
 FIXED_WING = 1
