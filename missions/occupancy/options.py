@@ -131,6 +131,7 @@ class OccupancyOptions(MissionOptions):
             ),
             raise_radius_m=self.raise_radius_m,
             confirmations=self.confirmations,
+            noise_nt=self.noise_nt,
         )
 
     @property

@@ -16,7 +16,6 @@ from missions.occupancy.occupancy_map import Cell, GridLayout, OccupancyMap
 
 Array = NDArray[np.float64]
 
-_NOISE_NT: Final = 0.5  # of a reading, for how much a fit believes it
 _FAR_M: Final = 250.0  # from the peaks: no centre of theirs
 _STEP_M: Final = 5.0  # least stretch of track that is worth an update
 _KEPT_SCORES: Final = 10_000_000  # in snapshots: 80 MB
@@ -34,6 +33,7 @@ class SearchParameters:
         raise_height: by how much at its centre, in mean prior scores.
         confirmations: passes that must see an anomaly at one place before it counts as the target.
         same_place_m: anomalies within this distance are one.
+        noise_nt: standard deviation of a reading; how much the fit of a target's place believes it.
 
     Raises:
         PlanError: a value out of its range.
@@ -44,12 +44,14 @@ class SearchParameters:
     raise_height: float = 4.0
     confirmations: int = 2
     same_place_m: float = 180.0
+    noise_nt: float = 0.5
 
     def __post_init__(self) -> None:
-        for name in ("raise_radius_m", "raise_height", "same_place_m"):
+        for name in ("raise_radius_m", "raise_height", "same_place_m", "noise_nt"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
-                raise PlanError(f"--{name.removesuffix('_m').replace('_', '-')} {value:g} is not more than 0")
+                option = name.removesuffix("_m").removesuffix("_nt").replace("_", "-")
+                raise PlanError(f"--{option} {value:g} is not more than 0")
         if self.confirmations < 1:
             raise PlanError(f"--confirmations {self.confirmations} is not 1 or more")
 
@@ -60,9 +62,11 @@ class Candidate:
 
     Attributes:
         anomalies: (searcher, anomaly), in time.
+        noise_nt: standard deviation of a reading.
     """
 
     anomalies: list[tuple[int, Anomaly]]
+    noise_nt: float = 0.5
 
     @property
     def passes(self) -> int:
@@ -77,7 +81,7 @@ class Candidate:
         north_m, east_m = (weights @ places / weights.sum()).tolist()
         profile = np.array([reading for _, anomaly in self.anomalies for reading in anomaly.profile])
         if len(profile):
-            centre = gaussian_centre(profile[:, 0], profile[:, 1], profile[:, 2], noise_nt=_NOISE_NT)
+            centre = gaussian_centre(profile[:, 0], profile[:, 1], profile[:, 2], noise_nt=self.noise_nt)
             if centre is not None and math.dist(centre, (north_m, east_m)) <= _FAR_M:
                 return centre
         return north_m, east_m
@@ -224,6 +228,6 @@ class Search:
         ]
         if near and min(near)[0] <= self.parameters.same_place_m:
             return self.candidates[min(near)[1]]
-        candidate = Candidate(anomalies=[])
+        candidate = Candidate(anomalies=[], noise_nt=self.parameters.noise_nt)
         self.candidates.append(candidate)
         return candidate

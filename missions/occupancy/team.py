@@ -19,7 +19,7 @@ from missions.occupancy.steering import Steering, steering
 from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
 from missions.planning.limits import FixedWingLimits
-from missions.telemetry import AirData, Attitude, Position
+from missions.telemetry import Attitude, Position
 from missions.vehicle.adapter import Mode
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 
@@ -251,11 +251,12 @@ class SearchTeam:
         )
 
     def _motion(self, vehicle: "Vehicle") -> Motion:
-        place, attitude, air = vehicle.latest(Position), vehicle.latest(Attitude), vehicle.latest(AirData)
+        place, attitude = vehicle.latest(Position), vehicle.latest(Attitude)
         if place is None or attitude is None:
             raise MissionError(f"the vehicle tells no position or attitude; {vehicle.heard()}")
         wings = vehicle.kind is VehicleKind.FIXED_WING
         wind = vehicle.wind_ne_m_s() if wings else None
+        airspeed_m_s = vehicle.pilot.airspeed_true_m_s if vehicle.pilot is not None else math.nan
         north_m, east_m, _ = self._frame.ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
         return Motion(
             time_us=place.time_us,
@@ -263,7 +264,7 @@ class SearchTeam:
             east_m=east_m,
             vel_ne_m_s=place.vel_ned_m_s[:2],
             yaw_rad=attitude.yaw_rad,
-            airspeed_m_s=air.airspeed_m_s if wings and air is not None else 0.0,
+            airspeed_m_s=airspeed_m_s if wings and math.isfinite(airspeed_m_s) else 0.0,
             wind_ne_m_s=(0.0, 0.0) if wind is None else wind,
         )
 

@@ -91,7 +91,7 @@ def test_missing_file_is_refused_by_name(tmp_path):
         ({"total_field_nt": np.zeros((3, 3))}, "does not fit"),
         ({"north_m": np.linspace(700.0, -500.0, 13)}, "does not fit"),
         ({"home_lat_deg": 95.0}, "not a place"),
-        ({"height_m": "high"}, "could not convert"),
+        ({"height_m": "high"}, "height_m holds"),
     ],
 )
 def test_damaged_contents_are_refused_by_name(tmp_path, change, told):
