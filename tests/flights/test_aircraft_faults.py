@@ -37,7 +37,8 @@ class Watch:
         return bool(flight.truth[t.ON_GROUND] > 0.0)
 
     def check_controlled(self) -> None:
-        assert min(self.airspeeds_m_s) > 1.1 * STALL_M_S
+        assert min(self.airspeeds_m_s) > 1.05 * STALL_M_S  # in the worst of the gusts
+        assert np.percentile(self.airspeeds_m_s, 5) > 1.15 * STALL_M_S
         assert max(self.incidences_deg) < 20.0  # the wing stalls beyond
         assert max(self.rolls_deg) < 60.0
         assert self.flight.actuators_finite

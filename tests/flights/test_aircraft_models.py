@@ -77,6 +77,7 @@ def test_a_glider_is_launched_and_circles_down(flavour: str) -> None:
         heights.append(flight.height_over_home_m)
 
     flight.fly(30.0, watch)
-    assert np.max(np.abs(np.array(radii) - radius_m)) < 0.05 * radius_m
+    # a wing of 12 m that rolls slowly, two turns after its release
+    assert np.max(np.abs(np.array(radii) - radius_m)) < 0.1 * radius_m
     assert np.mean(speeds) == pytest.approx(parameters.airspeed_trim_m_s, rel=0.05)
     assert 0.3 < (heights[0] - heights[-1]) / 30.0 < 2.5
