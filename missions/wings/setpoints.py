@@ -20,18 +20,21 @@ from missions.wings.place import PlaceOnPath
 _LEAD_S: Final = 0.3  # the bend is commanded so long before it: the time a bank takes
 _ENTRY_S: Final = 0.8  # from the decision to leave the circle to the first setpoint that is flown
 _BANK_SHARE: Final = 0.95
+_QUICKEST_RAD_S: Final = 0.6
+_STREAM_S: Final = 0.05  # age of a position, and of a setpoint
 
 
 async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     """From the ground back to the ground."""
     notes, clock, options = vehicle.notes, vehicle.clock, flight.options
     notes.commanded = flight.commanded(vehicle, [], options.acceptance_m)
+    gains = await _gains(vehicle, flight)
     notes.begin("takeoff", clock.time_us)
     await vehicle.takeoff(options.own_altitude_m)
     notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
     notes.begin("transit", clock.time_us)
     await _to_the_start(vehicle, flight)
-    stream = _Stream(vehicle, flight)
+    stream = _Stream(vehicle, flight, gains)
     if vehicle.adapter.roll_alone:
         await vehicle.change_altitude(options.own_altitude_m)
         await vehicle.follow(stream.roll, options.rate_hz)
@@ -63,17 +66,28 @@ async def _to_the_start(vehicle: Vehicle, flight: PatternFlight) -> None:
     )
 
 
+async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
+    """For banks: as quick as the aircraft's own guidance is tuned, which knows how fast it rolls."""
+    bank_max_rad = _BANK_SHARE * flight.limits.bank_max_rad
+    if not vehicle.adapter.roll_alone:
+        return PathRollParameters(bank_max_rad=bank_max_rad)
+    period_s = max(1.0, await vehicle.parameter_or("NAVL1_PERIOD", 17.0))
+    roll_s = min(3.0, max(0.1, await vehicle.parameter_or("RLL2SRV_TCONST", 0.5)))
+    return PathRollParameters(
+        frequency_rad_s=min(_QUICKEST_RAD_S, math.tau / period_s),
+        lead_s=roll_s + _STREAM_S,
+        bank_max_rad=bank_max_rad,
+    )
+
+
 class _Stream:
     """Setpoints by where the aircraft is along the route; tells the pattern's beginning and end."""
 
-    def __init__(self, vehicle: Vehicle, flight: PatternFlight) -> None:
+    def __init__(self, vehicle: Vehicle, flight: PatternFlight, gains: PathRollParameters) -> None:
         self._vehicle = vehicle
         self._flight = flight
         self._place = PlaceOnPath(vehicle, flight.route, float(flight.route.arc_m[0]))
-        self._law = PathRoll(
-            flight.route,
-            PathRollParameters(bank_max_rad=_BANK_SHARE * flight.limits.bank_max_rad),
-        )
+        self._law = PathRoll(flight.route, gains)
 
     def _go_on(self) -> bool:
         """Find the place; False behind the pattern's end."""
