@@ -17,7 +17,6 @@ from missions.wings.flight import PatternFlight
 from missions.wings.guidance import PathRoll, PathRollParameters
 from missions.wings.place import PlaceOnPath
 
-_LEAD_S: Final = 0.3  # the bend is commanded so long before it: the time a bank takes
 _ENTRY_S: Final = 0.8  # from the decision to leave the circle to the first setpoint that is flown
 _BANK_SHARE: Final = 0.95
 _QUICKEST_RAD_S: Final = 0.6
@@ -67,10 +66,11 @@ async def _to_the_start(vehicle: Vehicle, flight: PatternFlight) -> None:
 
 
 async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
-    """For banks: as quick as the aircraft's own guidance is tuned, which knows how fast it rolls."""
+    """How long before it a bend is commanded; for banks, as quick as the aircraft's own guidance is tuned."""
     bank_max_rad = _BANK_SHARE * flight.limits.bank_max_rad
     if not vehicle.adapter.roll_alone:
-        return PathRollParameters(bank_max_rad=bank_max_rad)
+        roll_s = min(3.0, max(0.1, await vehicle.parameter_or("FW_R_TC", 0.4)))
+        return PathRollParameters(lead_s=roll_s, bank_max_rad=bank_max_rad)
     period_s = max(1.0, await vehicle.parameter_or("NAVL1_PERIOD", 17.0))
     roll_s = min(3.0, max(0.1, await vehicle.parameter_or("RLL2SRV_TCONST", 0.5)))
     return PathRollParameters(
@@ -88,6 +88,7 @@ class _Stream:
         self._flight = flight
         self._place = PlaceOnPath(vehicle, flight.route, float(flight.route.arc_m[0]))
         self._law = PathRoll(flight.route, gains)
+        self._lead_s = gains.lead_s
 
     def _go_on(self) -> bool:
         """Find the place; False behind the pattern's end."""
@@ -111,7 +112,7 @@ class _Stream:
         place, route = self._place, self._flight.route
         speed = place.ground_speed_m_s
         (north, east), course, _ = route.at(place.arc_m)
-        _, _, bend = route.at(place.arc_m + _LEAD_S * speed)
+        _, _, bend = route.at(place.arc_m + self._lead_s * speed)
         push = speed * speed * bend
         return Setpoint(
             position_ned_m=(north, east, -self._flight.options.own_altitude_m),
