@@ -71,13 +71,11 @@ def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
 
 def _ned(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
     """Positions of a table; flat within some kilometres to a few centimetres."""
-    frame = LocalFrame(origin)
-    north, _, _ = frame.ned_from_geodetic(origin.lat_deg + 0.01, origin.lon_deg, origin.alt_m)
-    _, east, _ = frame.ned_from_geodetic(origin.lat_deg, origin.lon_deg + 0.01, origin.alt_m)
+    per_lat, per_lon = LocalFrame(origin).metres_per_degree
     return np.column_stack(
         (
-            (table["lat"] * 1e-7 - origin.lat_deg) * (north * 100.0),
-            (table["lon"] * 1e-7 - origin.lon_deg) * (east * 100.0),
+            (table["lat"] * 1e-7 - origin.lat_deg) * per_lat,
+            (table["lon"] * 1e-7 - origin.lon_deg) * per_lon,
             origin.alt_m - table["alt"] * 1e-3,
         )
     )
