@@ -24,3 +24,8 @@ class HeadingController:
         error = math.remainder(wanted_rad - heading_rad, math.tau)
         bank = math.atan(self.gain_per_s * error * max(3.0, airspeed_m_s) / GRAVITY_M_S2)
         return max(-self.bank_max_rad, min(self.bank_max_rad, bank))
+
+
+def heading_deg(heading_rad: float) -> float:
+    """A heading as commands carry it: 0 up to, and without, 360 degrees, in single precision too."""
+    return round(math.degrees(heading_rad), 3) % 360.0

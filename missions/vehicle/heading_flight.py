@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from autopilot_bridge.mavlink import dialect
 from missions import telemetry
 from missions.errors import PlanError
-from missions.piloting.heading import HeadingController
+from missions.piloting.heading import HeadingController, heading_deg
 from missions.vehicle.adapter import Mode
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
@@ -54,7 +54,7 @@ class HeadingFlight:
             await vehicle.command_int(
                 dialect.MAV_CMD_GUIDED_CHANGE_HEADING,
                 dialect.MAV_FRAME_GLOBAL,
-                (_HEADING, math.degrees(self.heading_rad) % 360.0, _TURN_M_S2, 0.0),
+                (_HEADING, heading_deg(self.heading_rad), _TURN_M_S2, 0.0),
                 0,
                 0,
                 0.0,

@@ -1,6 +1,7 @@
 """Altitude and airspeed by pitch and throttle, headings by bank, heights from pressure."""
 
 import math
+import struct
 
 import pytest
 from hypothesis import given
@@ -14,6 +15,7 @@ from missions.piloting import (
     air_density_ratio,
 )
 from missions.piloting.energy import EnergyState
+from missions.piloting.heading import heading_deg
 from missions.piloting.pressure_height import pressure_altitude_m
 
 G = 9.80665
@@ -148,3 +150,16 @@ def test_a_heading_is_reached_as_a_coordinated_turn():
         roll = controller.roll_rad(heading_rad=heading, wanted_rad=2.5, airspeed_m_s=25.0)
         heading += 0.02 * G / 25.0 * math.tan(roll)
     assert heading == pytest.approx(2.5, abs=0.01)
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, -0.0, -1e-17, -1e-9, -1e-7, 1e-9, math.tau, -math.tau])
+def test_north_is_0_degrees_never_360(heading_rad):
+    """ArduPlane denies a GUIDED_CHANGE_HEADING of 360 degrees; -1e-9 rad in single precision would be that."""
+    assert heading_deg(heading_rad) == pytest.approx(0.0, abs=1e-3)
+
+
+@given(heading=st.floats(-10.0, 10.0))
+def test_headings_travel_as_0_to_360_degrees(heading):
+    (on_wire,) = struct.unpack("<f", struct.pack("<f", heading_deg(heading)))
+    assert 0.0 <= on_wire < 360.0
+    assert math.remainder(math.radians(on_wire) - heading, math.tau) == pytest.approx(0.0, abs=2e-5)
