@@ -154,7 +154,7 @@ def test_a_heading_is_reached_as_a_coordinated_turn():
 
 @pytest.mark.parametrize("heading_rad", [0.0, -0.0, -1e-17, -1e-9, -1e-7, 1e-9, math.tau, -math.tau])
 def test_north_is_0_degrees_never_360(heading_rad):
-    """ArduPlane denies a GUIDED_CHANGE_HEADING of 360 degrees; -1e-9 rad in single precision would be that."""
+    """ArduPlane denies a GUIDED_CHANGE_HEADING of 360 degrees, which -1e-9 rad is in single precision."""
     assert heading_deg(heading_rad) == pytest.approx(0.0, abs=1e-3)
 
 
