@@ -34,6 +34,7 @@ from missions.run import (
     versions,
     write_summary,
 )
+from missions.together import together
 from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -170,7 +171,7 @@ async def _fly(
         flight.clock = stage.clocks[0]
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
-            await _all([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])
+            await together([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])
             await _fly_all(mission, flight.vehicles, request)
         finally:
             for vehicle in flight.vehicles:
@@ -204,7 +205,7 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         options.append(own)
         vehicle.notes.options = own
     if not mission.together:
-        await _all(
+        await together(
             [
                 _fly_one(mission.fly(vehicle, own), vehicle, request)
                 for vehicle, own in zip(vehicles, options, strict=True)
@@ -227,19 +228,6 @@ async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request:
                 "End a mission with return_to_launch() or land()"
             )
         vehicle.notes.progress = 1.0
-
-
-async def _all(coroutines: Sequence[Any]) -> None:
-    """Run together; the first failure ends the others, and is the one that is told."""
-    try:
-        async with asyncio.TaskGroup() as group:
-            for coroutine in coroutines:
-                group.create_task(coroutine)
-    except* (MissionError, PlanError, BridgeError) as errors:
-        first: BaseException = errors
-        while isinstance(first, BaseExceptionGroup):
-            first = first.exceptions[0]
-        raise first from None
 
 
 async def _report(flight: Flight, on_progress: ProgressListener | None) -> None:

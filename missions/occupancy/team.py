@@ -1,12 +1,10 @@
 """One flight of a team that searches together: every vehicle from the ground back to the ground."""
 
-import asyncio
 import math
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
-from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.occupancy.detection import Anomaly, AnomalyDetector
@@ -20,6 +18,7 @@ from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
 from missions.planning.limits import FixedWingLimits
 from missions.telemetry import Attitude, Position
+from missions.together import together
 from missions.vehicle.adapter import Mode
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 
@@ -112,7 +111,7 @@ class SearchTeam:
 
     async def fly(self) -> None:
         """Fly all of them."""
-        await _together([self._fly_one(index) for index in range(len(self._vehicles))])
+        await together([self._fly_one(index) for index in range(len(self._vehicles))])
 
     async def _fly_one(self, index: int) -> None:
         vehicle, own, traffic = self._vehicles[index], self._options[index], self._traffic
@@ -277,16 +276,3 @@ def start_place(options: OccupancyOptions) -> tuple[float, float]:
         north_m + _RING * options.height_m * math.cos(angle_rad),
         east_m + _RING * options.width_m * math.sin(angle_rad),
     )
-
-
-async def _together(coroutines: Sequence[Coroutine[Any, Any, None]]) -> None:
-    """Run them all; the first failure ends the others, and is the one that is told."""
-    try:
-        async with asyncio.TaskGroup() as group:
-            for coroutine in coroutines:
-                group.create_task(coroutine)
-    except* (MissionError, PlanError, BridgeError) as errors:
-        first: BaseException = errors
-        while isinstance(first, BaseExceptionGroup):
-            first = first.exceptions[0]
-        raise first from None
