@@ -51,8 +51,8 @@ _SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand o
 
 
 class VehicleDivergedError(ArithmeticError):
-    """The simulated motion is no longer possible, and nothing was hit: the commands or the physics rate do not
-    suit the model.
+    """The simulated motion is no longer possible, and nothing was hit: the commands or the physics rate do
+    not suit the model.
     """
 
 

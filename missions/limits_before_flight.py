@@ -32,8 +32,8 @@ def check_request(mission: Mission[Any], request: RunRequest) -> None:
     """
     if not request.connect and len(request.models) != request.options.vehicles:
         raise PlanError(
-            f"{len(request.models)} models for {request.options.vehicles} vehicles; give one for all, or one for "
-            "each"
+            f"{len(request.models)} models for {request.options.vehicles} vehicles; "
+            "give one for all, or one for each"
         )
     for index in range(request.options.vehicles):
         own = vehicle_options(request.options, index)
@@ -78,7 +78,7 @@ def _kind(model: str) -> VehicleKind:
 
 
 def _kind_limits(request: RunRequest, model: str) -> Limits:
-    """By the firmware's defaults and the parameters that were given; an aircraft's own come with the aircraft."""
+    """By the firmware's defaults and the parameters given; an aircraft's own come with the aircraft."""
     kind = _kind(model)
     if (request.autopilot, kind) not in ADAPTERS:
         return WIDEST_LIMITS

@@ -293,7 +293,10 @@ def test_a_source_of_something_else_is_told_what_it_gave(flown, flavour, good_s)
     async def script(vehicle, autopilot):
         await vehicle.takeoff(10.0)
         good = Setpoint(position_ned_m=(0.0, 0.0, -10.0))
-        expected = r"follow's source gave a tuple \(\(0, 0, -10\)\); accepted: a Setpoint, an AttitudeSetpoint or None"
+        expected = (
+            r"follow's source gave a tuple \(\(0, 0, -10\)\); "
+            "accepted: a Setpoint, an AttitudeSetpoint or None"
+        )
         with pytest.raises(PlanError, match=expected):
             await vehicle.follow(lambda t: good if t < good_s else (0, 0, -10))
 
