@@ -25,10 +25,11 @@ DEEPEST_M: Final = 5.0
 """Below the ground, of the centre of gravity."""
 NEAR_M: Final = 30.0
 """Above the ground; what happens higher up is no blow on it."""
+MOVING_M_S: Final = 2.0
+"""What stands doesn't crash: contact springs that ring at a slow physics rate are no blow either."""
 
 _GRAVITY_M_S2: Final = 9.80665
 _GAS_CONSTANT: Final = 287.05287  # of dry air, J/(kg K)
-_MOVING_M_S: Final = 2.0  # what stands doesn't crash
 _WRECK_HEIGHT_M: Final = 1.0  # highest place of the centre of gravity of what lies on the ground
 
 
@@ -41,7 +42,7 @@ def hits_ground(truth: Array, ground_alt_m: float, *, touched: bool) -> bool:
         touched: the ground was touched a moment ago; it may have been thrown up since.
     """
     near = touched or truth[t.ALT_M] - ground_alt_m < NEAR_M
-    return bool(near and speed_m_s(truth) > _MOVING_M_S)
+    return bool(near and speed_m_s(truth) > MOVING_M_S)
 
 
 def speed_m_s(truth: Array) -> float:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.crash import DEEPEST_M, FASTEST_M_S, FASTEST_RAD_S, NEAR_M
+from flightsim.crash import DEEPEST_M, FASTEST_M_S, FASTEST_RAD_S, MOVING_M_S, NEAR_M
 from flightsim.kernels import kernel
 from flightsim.rotations import quaternion_from_euler
 
@@ -106,7 +106,8 @@ def write_truth(
     for i in range(3):
         force += (raw[12 + i] * accel_scale[i]) ** 2
     height_m = raw[2] * _FT - ground_alt_m
-    if height_m < -DEEPEST_M or (height_m < NEAR_M and math.sqrt(force) > breaks_at_m_s2):
+    blow = height_m < NEAR_M and speed > MOVING_M_S and math.sqrt(force) > breaks_at_m_s2
+    if blow or height_m < -DEEPEST_M:
         return _BROKEN
     truth[0] = raw[0]
     truth[1] = raw[1]
