@@ -172,7 +172,8 @@ class AirAiding:
         row = solution.row_at(pitot.sample_us - round(p.airspeed_lag_s * 1e6), time_us) if alive else -1
         fast = not at_rest and speed > p.airspeed_threshold_m_s
         todo = 0
-        if row >= 0 and not at_rest and max(speed, measured) > p.airspeed_threshold_m_s:
+        # standing in a wind, the pitot tube is right and the wind not known yet: judged in flight only
+        if row >= 0 and not at_rest and (self.flying or fast):
             todo |= a.JUDGE_AIRSPEED
             if self._check.passed and measured > p.airspeed_threshold_m_s:
                 todo |= a.HAS_AIRSPEED
