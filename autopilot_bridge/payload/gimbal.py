@@ -192,7 +192,7 @@ class GimbalComponent(Component):
     # control
 
     def _on_configure(self, message: Any, sender: Sender) -> int | None:
-        """DO_GIMBAL_MANAGER_CONFIGURE: who is in control. -1 leaves it, -2 takes it when nobody has it, -3
+        """DO_GIMBAL_MANAGER_CONFIGURE: who is in control. -1 leaves it, -2 takes it, -3
         gives it up.
         """
         primary = self._wanted(message.param1, message.param2, self.primary, sender)
@@ -208,7 +208,7 @@ class GimbalComponent(Component):
         if -1 in ids:
             return now
         if -2 in ids:
-            return sender if now in (_NOBODY, sender) else None
+            return sender
         if -3 in ids:
             return _NOBODY if now == sender else now
         return ids if all(0 <= value <= 255 for value in ids) else None

@@ -235,10 +235,13 @@ def test_who_has_control_points_and_others_do_not(world):
     assert pointing(world).pitch == pytest.approx(0.0, abs=1.0)
     status = world.messages(m.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS)[-1]
     assert (status.primary_control_sysid, status.primary_control_compid) == (255, 190)
-    assert world.command(GIMBAL_COMPONENT, configure, -2, -2, sender=other) == m.MAV_RESULT_DENIED
-    assert world.command(GIMBAL_COMPONENT, configure, -3, -3) == m.MAV_RESULT_ACCEPTED
-    assert world.command(GIMBAL_COMPONENT, configure, -2, -2, sender=other) == m.MAV_RESULT_ACCEPTED
+    assert world.command(GIMBAL_COMPONENT, configure, -2, -2, -1, -1, sender=other) == m.MAV_RESULT_ACCEPTED
     assert world.command(GIMBAL_COMPONENT, pitchyaw, -30.0, sender=other) == m.MAV_RESULT_ACCEPTED
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == m.MAV_RESULT_DENIED
+    assert world.command(GIMBAL_COMPONENT, configure, -3, -3, -1, -1) == m.MAV_RESULT_ACCEPTED  # not its own
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == m.MAV_RESULT_DENIED
+    assert world.command(GIMBAL_COMPONENT, configure, -3, -3, -1, -1, sender=other) == m.MAV_RESULT_ACCEPTED
+    assert world.command(GIMBAL_COMPONENT, pitchyaw, -10.0) == m.MAV_RESULT_ACCEPTED
 
 
 def test_region_of_interest_is_looked_at(world):
