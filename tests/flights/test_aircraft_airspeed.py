@@ -1,4 +1,4 @@
-"""The pitot tube of an aircraft that stands in the wind: what it reads before the wind is known is no fault."""
+"""The pitot tube of an aircraft that stands in the wind: what it reads before the wind is known is right."""
 
 import pytest
 
