@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
 from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, stall_speed
+from autopilot_bridge.control.fixed_wing.vertical_speed import pitch_for_climb
 from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -162,6 +163,14 @@ def _fly_pitch(sp: Array, p: Array, s: Array, dt: float, speed: float, under: fl
 
 
 @kernel
+def _fly_climb_by_pitch(nav: Array, sp: Array, p: Array, s: Array, dt: float, climb: float) -> None:
+    """PITCH_SETPOINT that flies a climb rate whatever becomes of the airspeed."""
+    lowest = sp[_PITCH_MIN] if math.isfinite(sp[_PITCH_MIN]) else p[c.PITCH_MIN]
+    highest = sp[_PITCH_MAX] if math.isfinite(sp[_PITCH_MAX]) else p[c.PITCH_MAX]
+    s[c.PITCH_SETPOINT] = pitch_for_climb(nav, p, s, dt, climb, lowest, max(lowest, highest))
+
+
+@kernel
 def _fly_throttle(sp: Array, p: Array, s: Array, dt: float, under: float) -> None:
     """THROTTLE that flies the rate of the total energy."""
     lowest, highest = p[c.THROTTLE_MIN], p[c.THROTTLE_MAX]
@@ -262,7 +271,12 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
 
     if pitch_given:
         s[c.PITCH_SETPOINT] = _clip(sp[_PITCH], -PITCH_LIMIT_RAD, PITCH_LIMIT_RAD)
+    elif flare and known and p[c.LIFT_ANGLE] > 0.0:
+        _fly_climb_by_pitch(nav, sp, p, s, dt, wanted_climb)
     else:
+        if s[c.CLIMB_FLOWN] != 0.0:
+            s[c.CLIMB_FLOWN] = 0.0
+            s[c.PITCH_INTEGRAL] = 0.0
         _fly_pitch(sp, p, s, dt, speed, under)
     if throttle_given:
         s[c.THROTTLE] = _clip(sp[_THROTTLE], 0.0, 1.0)

@@ -12,7 +12,6 @@ from autopilot_bridge.flight.fixed_wing.state import AircraftState
 _CALM_M_S: Final = 1.0  # less wind doesn't choose the direction
 _RUNWAY_NEAR_HOME_M: Final = 300.0
 _SHALLOW: Final = 0.5  # of the landing angle: a leg shallower than this is flown level until the slope
-_FLARE_SPEED_SHARE: Final = 0.93  # mean speed of the flare over that of the approach
 _SHORTEST_LEG_M: Final = 30.0
 
 
@@ -59,7 +58,7 @@ class Approach:
         if before <= flare_sink_m_s * 1.001:
             return 0.0
         time_s = flare_time(flare_height_m, flare_height_m, before, flare_sink_m_s)
-        return _FLARE_SPEED_SHARE * ground_speed_m_s * time_s - flare_height_m / self.slope
+        return ground_speed_m_s * time_s - flare_height_m / self.slope
 
 
 def approach_along_leg(

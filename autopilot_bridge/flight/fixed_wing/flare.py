@@ -1,8 +1,10 @@
-"""The last seconds before the wheels touch: sink taken back, throttle off, nose onto the runway.
+"""The last seconds before the wheels touch: sink taken back, airspeed held, nose onto the runway.
 
 The flare is a path in height over the distance to go: from the slope's sink to that of the touch, falling
 linearly with the height. Height errors are flown out along it, so that turbulence moves the touch little;
-without a position the sink follows the height alone.
+without a position the sink follows the height alone. The pitch has nothing to do with the airspeed here
+(`control.fixed_wing.vertical_speed`), so the throttle holds it until the wheels touch: with the throttle
+closed a head wind that dies at the last moment would let the aircraft fall.
 """
 
 import math
@@ -13,7 +15,6 @@ from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
-_SPEED_SHARE: Final = 0.93  # mean speed of what is left of the flare over the present one
 _ALIGN_M: Final = 1.0  # over the ground the crab angle is taken out
 _TOUCH_M: Final = 0.15
 _STILL_M_S: Final = 0.25
@@ -21,13 +22,15 @@ _STILL_S: Final = 0.6
 _SHORTEST_S: Final = 1.0
 _LONG_S: Final = 6.0  # a flare that lasts this long has reached a ground that lies higher than believed
 _PITCH_BLEND_S: Final = 1.0
-_LEAD_S: Final = 0.5  # the pitch needs so long to follow
-_HEIGHT_GAIN_1_S: Final = 0.8
-_SINK_GAIN: Final = 2.0  # on the error of the sink, since the loss of speed takes from the response
-_SINK_CORRECTION_M_S: Final = 1.2
-_POWER_BELOW_M: Final = 0.5  # so far under the path the place is out of reach without power
+_PITCH_FREE_M: Final = 1.0  # over the ground a gust may still ask for a lower nose than the flare's
+_LEAD_S: Final = 0.3  # the pitch needs so long to follow
+_HEIGHT_GAIN_1_S: Final = 1.6
 _FIRMEST_M_S: Final = 0.6  # over the sink of the touch, at the ground; more higher up:
 _FIRMER_1_S: Final = 0.5
+_SOFTEST: Final = 0.5  # of the sink of the touch: so low over the path
+_AIRSPEED_SHARE: Final = 0.9  # of the approach's airspeed, held in the flare
+_POWER_SHARE: Final = 0.6  # of the trim throttle flies the glide slope about
+_POWER_GAIN: Final = 3.0  # throttle per share of the airspeed that is missing
 
 
 def flare_time(height_m: float, start_m: float, before_m_s: float, after_m_s: float) -> float:
@@ -47,6 +50,15 @@ def flare_height(time_s: float, start_m: float, before_m_s: float, after_m_s: fl
     return start_m * after_m_s / change * math.expm1(change * time_s / start_m)
 
 
+def power(state: AircraftState, airspeed_m_s: float, parameters: FixedWingFlightParameters) -> float:
+    """Throttle that holds an airspeed close to the ground; idle without an engine or an airspeed."""
+    p = parameters
+    if not (p.trim_throttle > 0.0 and state.airspeed_m_s == state.airspeed_m_s):
+        return p.throttle_idle
+    missing = (airspeed_m_s - state.airspeed_m_s) / airspeed_m_s
+    return min(1.0, max(p.throttle_idle, _POWER_SHARE * p.trim_throttle + _POWER_GAIN * missing))
+
+
 class Flare:
     """Flies the flare.
 
@@ -54,7 +66,7 @@ class Flare:
         aligning: low enough to point the nose along the runway.
     """
 
-    __slots__ = ("_below_m", "_height_m", "_pitch_rad", "_sink_m_s", "_still_s", "_time_s", "aligning")
+    __slots__ = ("_height_m", "_pitch_rad", "_sink_m_s", "_still_s", "_time_s", "aligning")
 
     def __init__(self) -> None:
         self.reset()
@@ -62,7 +74,7 @@ class Flare:
     def reset(self) -> None:
         """No flare yet."""
         self.aligning = False
-        self._time_s = self._still_s = self._below_m = 0.0
+        self._time_s = self._still_s = 0.0
         self._height_m = 1.0
         self._sink_m_s = self._pitch_rad = 0.0
 
@@ -71,24 +83,50 @@ class Flare:
     ) -> None:
         """Flare from here; `height_m` and `sink_m_s` are those the path was planned with."""
         self.reset()
+        self._plan(height_m, sink_m_s, parameters)
+        self._pitch_rad = state.pitch_rad
+
+    def _plan(self, height_m: float, sink_m_s: float, parameters: FixedWingFlightParameters) -> None:
         self._height_m = max(height_m, 0.1)
         self._sink_m_s = max(sink_m_s, parameters.flare_sink_m_s)
-        self._pitch_rad = state.pitch_rad
 
     def _sink(self, state: AircraftState, height_m: float, to_go_m: float, after_m_s: float) -> float:
         """Sink to fly."""
         start, before = self._height_m, self._sink_m_s
         ahead = max(0.0, height_m - _LEAD_S * state.vel_down_m_s)
         if to_go_m == to_go_m:
-            speed = _SPEED_SHARE * max(state.ground_speed_m_s, 1.0)
+            speed = max(state.ground_speed_m_s, 1.0)
             time = max(0.0, to_go_m / speed - _LEAD_S)
-            path = min(flare_height(time, start, before, after_m_s), start)
-            sink = after_m_s + (before - after_m_s) * path / start + _HEIGHT_GAIN_1_S * (ahead - path)
-            self._below_m = path - ahead
+            whole = flare_time(start, start, before, after_m_s)
+            path = flare_height(min(time, whole), start, before, after_m_s)
+            sink = after_m_s + (before - after_m_s) * path / start
+            path += before * max(0.0, time - whole)
+            sink += _HEIGHT_GAIN_1_S * (ahead - path)
         else:
-            self._below_m = 0.0
             sink = after_m_s + (before - after_m_s) * min(1.0, ahead / start)
-        return min(after_m_s + _FIRMEST_M_S + _FIRMER_1_S * ahead, max(0.5 * after_m_s, sink))
+        return min(after_m_s + _FIRMEST_M_S + _FIRMER_1_S * ahead, max(_SOFTEST * after_m_s, sink))
+
+    def fly_slope(
+        self,
+        state: AircraftState,
+        height_m: float,
+        to_go_m: float,
+        slope: tuple[float, float],
+        parameters: FixedWingFlightParameters,
+        command: FlightCommand,
+    ) -> None:
+        """Fill the longitudinal part of a command on the last of the glide slope, above the flare.
+
+        Args:
+            height_m: over the ground.
+            to_go_m: along the runway to the place of the touch.
+            slope: height of the flare that follows, m; sink of the glide slope, m/s.
+        """
+        p = parameters
+        self._plan(*slope, p)
+        command.down_m = math.nan
+        command.height_rate_m_s = -self._sink(state, height_m, to_go_m, p.flare_sink_m_s)
+        command.throttle = power(state, p.landing_airspeed_m_s, p)
 
     def fly(
         self,
@@ -108,13 +146,10 @@ class Flare:
         p = parameters
         self._time_s += ctx.dt_s
         sink = self._sink(state, height_m, to_go_m, p.flare_sink_m_s)
-        correction = _SINK_GAIN * (sink - state.vel_down_m_s)
-        sink += min(_SINK_CORRECTION_M_S, max(-_SINK_CORRECTION_M_S, correction))
-        command.height_rate_m_s = -max(0.0, sink)
-        if self._below_m < _POWER_BELOW_M:
-            command.throttle = p.throttle_idle
+        command.height_rate_m_s = -sink
+        command.throttle = power(state, _AIRSPEED_SHARE * p.landing_airspeed_m_s, p)
         # the limits of the pitch close in gradually: no jerk of the elevator
-        part = min(1.0, self._time_s / _PITCH_BLEND_S)
+        part = min(1.0, self._time_s / _PITCH_BLEND_S, max(0.0, 1.0 - height_m / _PITCH_FREE_M))
         low = min(self._pitch_rad, p.flare_pitch_min_rad)
         high = max(self._pitch_rad, p.flare_pitch_max_rad)
         command.pitch_min_rad = low + (p.flare_pitch_min_rad - low) * part

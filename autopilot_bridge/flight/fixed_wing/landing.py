@@ -26,12 +26,12 @@ _TOO_HIGH_M: Final = 25.0  # over its entry: circle down first
 _BLIND_M: Final = 30.0  # over the ground: without a position straight on, to the ground
 _FREE_BANK_M: Final = 15.0  # over the ground the bank is no longer limited for the wing tips
 _LOW_M: Final = 2.0
+_SHORT_FINAL_M: Final = 12.0  # over the ground: from here on pitch flies the path, throttle the airspeed
 _MISSED_M: Final = 40.0  # beyond the place, too high: go around
 _SLOPE_GAIN: Final = 0.4
 _DIVE_FREE_M: Final = 25.0  # over the ground the nose may go down as far as anywhere; lower, ever less
 _DIVE_LOW_RAD: Final = math.radians(-1.0)
 _LATEST_FLARE: Final = 0.6  # of the flare's time, before the ground at the present sink
-_TOUCH_EARLY_S: Final = 0.5  # the wheels touch so long before the path of the flare ends: the sink lags
 _STANDING_M_S: Final = 1.5
 _BRAKE_AFTER_S: Final = 1.5
 _NOSE_DOWN_S: Final = 1.0
@@ -261,7 +261,7 @@ class LandTask(AircraftTask):
         flare_height = max(p.flare_height_m, p.flare_time_s * sink)
         if ctx.position_valid:
             self._line.follow(state, self._path.of(ctx), command)
-            past_place = self._line.along_m(state) - _TOUCH_EARLY_S * state.ground_speed_m_s
+            past_place = self._line.along_m(state)
             shift = approach.flare_shift_m(state.ground_speed_m_s, flare_height, p.flare_sink_m_s)
             slope_down = approach.down_m + (past_place + shift) * approach.slope
             command.down_m = max(approach.entry_down_m, slope_down)
@@ -269,6 +269,8 @@ class LandTask(AircraftTask):
                 # the slope is held more tightly than heights elsewhere (PX4: FW_LND_THRTC_SC)
                 command.down_m += _SLOPE_GAIN * (slope_down - state.down_m)
                 command.height_rate_m_s = -sink
+            if height < _SHORT_FINAL_M and p.trim_throttle > 0.0 and state.airspeed_m_s == state.airspeed_m_s:
+                self._flare.fly_slope(state, height, -past_place, (flare_height, sink), p, command)
         else:
             command.heading_rad = approach.course_rad
             command.height_rate_m_s = -sink
@@ -289,7 +291,7 @@ class LandTask(AircraftTask):
         self._limit_bank(p, height)
         to_go = math.nan
         if ctx.position_valid:
-            to_go = _TOUCH_EARLY_S * state.ground_speed_m_s - self._line.along_m(state)
+            to_go = -self._line.along_m(state)
         touched = self._flare.fly(ctx, state, height, to_go, p, command)
         if self._flare.aligning:
             command.steering_heading_rad = approach.course_rad

@@ -134,7 +134,7 @@ class FixedWingFlightParameters:
     landing_loiter_altitude_m: float = 40.0  # where a landing without an approach begins its slope
     flare_height_m: float = 1.5  # above ground, at least: FW_LND_FLALT | LAND_FLARE_ALT
     flare_time_s: float = 2.0  # before the ground at the present sink: FW_LND_FL_TIME | LAND_FLARE_SEC
-    flare_sink_m_s: float = 0.4  # FW_LND_FL_SINK | TECS_LAND_SINK
+    flare_sink_m_s: float = 0.6  # FW_LND_FL_SINK | TECS_LAND_SINK
     flare_pitch_min_rad: float = math.radians(1.0)  # FW_LND_FL_PMIN | LAND_PITCH_DEG
     flare_pitch_max_rad: float = math.radians(12.0)  # FW_LND_FL_PMAX | LAND_PITCH_DEG
     ground_bank_max_rad: float = math.radians(
