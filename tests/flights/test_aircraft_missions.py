@@ -60,7 +60,9 @@ def mission(case: Case, turbulence: Turbulence = Turbulence.MODERATE) -> Mission
     ids=lambda case: f"{case.flavour}-{case.launch or 'runway'}",
 )
 def test_mission_in_moderate_turbulence(case: Case) -> None:
-    mission(case)
+    figures = mission(case)
+    assert abs(figures.touch_along_m) < 20.0, figures
+    assert figures.touch_sink_m_s < 2.0, figures
 
 
 @pytest.mark.slow
@@ -84,23 +86,34 @@ def test_more_missions(case: Case) -> None:
 def test_lands_on_the_point(flavour: str) -> None:
     corners = (*RECTANGLE[:2], (-600.0, -600.0))
     figures = mission(Case(flavour, None, corners, 30.0, 2), Turbulence.LIGHT)
-    assert abs(figures.touch_along_m) < 20.0, figures
-    assert figures.touch_sink_m_s < 2.0, figures
+    assert abs(figures.touch_along_m) < 12.0, figures
+    assert figures.touch_sink_m_s < 1.5, figures
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wind_from_deg", [0.0, 60.0, -60.0])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_landings(flavour: str, wind_from_deg: float) -> None:
-    """Gusts at the touch are luck: half of the landings are well within what is asked, none far from it."""
     flown = [
         mission(Case(flavour, None, tuple(RECTANGLE), wind_from_deg, seed), Turbulence.LIGHT)
         for seed in range(4)
     ]
     away_m = [abs(figures.touch_along_m) for figures in flown]
     sinks_m_s = [figures.touch_sink_m_s for figures in flown]
-    assert np.median(away_m) < 15.0 and max(away_m) < 30.0, flown
-    assert np.median(sinks_m_s) < 1.8 and max(sinks_m_s) < 2.5, flown
+    assert np.median(away_m) < 10.0 and max(away_m) < 20.0, flown
+    assert np.median(sinks_m_s) < 1.3 and max(sinks_m_s) < 2.0, flown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wind_from_deg", [0.0, 60.0, -60.0])
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_landings_in_moderate_turbulence(flavour: str, wind_from_deg: float) -> None:
+    """The worst gust at the touch is luck: one landing of four may be beyond what is asked."""
+    flown = [mission(Case(flavour, None, tuple(RECTANGLE), wind_from_deg, seed)) for seed in range(4)]
+    away_m = [abs(figures.touch_along_m) for figures in flown]
+    sinks_m_s = [figures.touch_sink_m_s for figures in flown]
+    assert np.median(away_m) < 12.0 and sorted(away_m)[-2] < 20.0, flown
+    assert np.median(sinks_m_s) < 1.6 and sorted(sinks_m_s)[-2] < 2.0, flown
 
 
 def test_cold_day() -> None:
