@@ -26,6 +26,7 @@ from autopilot_bridge.tlog import TlogWriter
 from flightsim.airframe import AirframeKind, load_airframe
 
 PHYSICS_RATE_HZ = 250
+NO_LANDING_NEEDED = {"MIS_TKO_LAND_REQ": 0.0}  # else PX4 refuses an aircraft this mission without end
 TEAMS = {AirframeKind.MULTICOPTER: (1, 2, 4, 8), AirframeKind.FIXED_WING: (1, 3)}
 
 
@@ -55,8 +56,12 @@ class Flight:
     """A team in the air with a client on each vehicle, everything logged."""
 
     def __init__(self, vehicles: int, model: str, flavour: str, log: Path) -> None:
+        endless = flavour == "px4" and load_airframe(model).kind is AirframeKind.FIXED_WING
+        parameters = NO_LANDING_NEEDED if endless else {}
         self.sitl = Sitl(
-            SitlConfiguration(vehicles=team(vehicles, model=model, flavour=flavour, parameters={}), seed=1)
+            SitlConfiguration(
+                vehicles=team(vehicles, model=model, flavour=flavour, parameters=parameters), seed=1
+            )
         )
         self.log = TlogWriter(log)
         self.links = self.sitl.record(self.log)
