@@ -18,7 +18,7 @@ from missions.planning.sizing import WINGS_SIDE_M, spacing_for_turns_m
 MAX_PERIODS: Final = 1000.0
 MAX_SEARCH_TIME_S: Final = 24 * 3600.0
 MIN_SPEED_M_S: Final = 0.1
-MAX_SPEED_M_S: Final = 100.0
+MAX_SPEED_M_S: Final = 150.0
 MIN_ACCEPTANCE_M: Final = 0.1
 MAX_ACCEPTANCE_M: Final = 1000.0
 MIN_SIDE_M: Final = 1.0

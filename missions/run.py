@@ -100,7 +100,7 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
         "messages_not_finite": score.messages_not_finite,
         "progress": _rounded(notes.progress),
         "phases": [
-            {"name": p.name, "start_s": p.start_us * 1e-6, "end_s": p.end_us * 1e-6} for p in notes.phases
+            {"name": p.name, "start_s": p.start_us / 1e6, "end_s": p.end_us / 1e6} for p in notes.phases
         ],
     }
     if notes.commanded is not None:

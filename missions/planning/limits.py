@@ -154,6 +154,7 @@ WIDEST_FIXED_WING_LIMITS: Final = FixedWingLimits(
     airspeed_trim_m_s=20.0,
     airspeed_max_m_s=150.0,
     bank_max_rad=math.radians(80.0),
+    bank_parameter="more than its autopilot will allow",
     altitude_max_m=3000.0,
 )
 """The same for a fixed wing."""

@@ -46,8 +46,10 @@ class PlaceOnPath:
         """
         vehicle = self._vehicle
         p = vehicle.latest(telemetry.Position)
-        if p is None or not vehicle.armed:
+        if p is None:
             raise MissionError(f"the vehicle tells no position in flight; {vehicle.heard()}")
+        if not vehicle.armed:
+            raise MissionError(f"the vehicle disarmed before the pattern was flown; {vehicle.heard()}")
         north, east, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
         late_s = min(_OLDEST_S, max(0.0, (vehicle.clock.time_us - p.time_us) * 1e-6))
         self.vel_north_m_s, self.vel_east_m_s = p.vel_ned_m_s[0], p.vel_ned_m_s[1]
