@@ -1,71 +1,16 @@
 """MAVProxy, headless, as a ground station of the ardupilot flavour: its everyday commands."""
 
-import contextlib
-import shutil
 import socket
-import subprocess
-import sys
-import threading
-import time
 from pathlib import Path
 
 import pytest
 
+from tests.clients.mavproxy_process import Mavproxy
 from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
 
-WALL_DEADLINE_S = 25.0
 HOME_DEG = (-35.3632621, 149.1652374)
-
-
-class Mavproxy:
-    """A MAVProxy process that is typed into."""
-
-    def __init__(self, master: str, folder: Path) -> None:
-        program = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
-        command = [program, "--master", master, "--streamrate", "10"]
-        self.process = subprocess.Popen(
-            command,
-            cwd=folder,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            bufsize=1,
-        )
-        self.lines: list[str] = []
-        self._seen = 0
-        threading.Thread(target=self._read, daemon=True).start()
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
-
-    def type(self, line: str) -> None:
-        assert self.process.stdin is not None
-        self.process.stdin.write(line + "\n")
-
-    def sees(self, text: str, wait_s: float = WALL_DEADLINE_S) -> None:
-        """Wait for a line that comes after those seen before."""
-        deadline_s = time.monotonic() + wait_s
-        while time.monotonic() < deadline_s:
-            for index in range(self._seen, len(self.lines)):
-                if text in self.lines[index]:
-                    self._seen = index + 1
-                    return
-            time.sleep(0.02)
-        raise AssertionError(f"no {text!r} after {self.lines[: self._seen][-1:]} in {self.lines}")
-
-    def types_until(self, line: str, text: str, wait_s: float = 0.3) -> None:
-        """Type the same again and again, until there is such a line."""
-        deadline_s = time.monotonic() + WALL_DEADLINE_S
-        while time.monotonic() < deadline_s:
-            self.type(line)
-            with contextlib.suppress(AssertionError):
-                return self.sees(text, wait_s)
-        raise AssertionError(f"no {text!r} whatever was typed: {self.lines}")
 
 
 def waypoints(folder: Path) -> Path:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.clients.mavproxy_process import Mavproxy
 from tests.clients.runway import Runway
 from tests.clients.sitl_process import free_port, running_sitl
-from tests.clients.test_mavproxy import Mavproxy
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
 
