@@ -40,7 +40,7 @@ FLY = {
     "lissajous --speed inf": ("--speed inf",),
     "lissajous --speed 0": ("--speed 0", "more than 0"),
     "lissajous --speed -1": ("--speed -1", "more than 0"),
-    "lissajous --speed 0.01": ("--speed 0.01 m/s", "0.1..100 m/s"),
+    "lissajous --speed 0.01": ("--speed 0.01 m/s", "0.1..150 m/s"),
     "lissajous --speed 30": ("speed 30 m/s", "..12 m/s"),
     "lissajous --autopilot ardupilot --speed 11": ("speed 11 m/s", "..10 m/s"),
     "lissajous --period 60": ("--period needs --via setpoints",),
