@@ -3,13 +3,14 @@
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
 
-@njit(cache=True)
+@kernel
 def follow_path(path: Array, track: Array, back_m: float, ahead_m: float, errors: Array) -> None:
     """errors[k] = distance of track[k] from the path (m, 3), near the place found for track[k - 1].
 
@@ -49,7 +50,7 @@ def follow_path(path: Array, track: Array, back_m: float, ahead_m: float, errors
         last_error = best
 
 
-@njit(cache=True)
+@kernel
 def _leg_length(path: Array, leg: int) -> float:
     dx = path[leg + 1, 0] - path[leg, 0]
     dy = path[leg + 1, 1] - path[leg, 1]
