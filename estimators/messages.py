@@ -1,8 +1,8 @@
 """Messages as estimators read them: light named tuples of wire values, the same from a link and from a log.
 
 pymavlink's message objects cost some ten microseconds each; these cost a tenth, and a log makes them from
-columns. Values are as on the wire (degE7, mG, millimetres, ... of the definition files): who uses one converts
-it.
+columns. Values are as on the wire (degE7, mG, millimetres, ... of the definition files): who uses
+one converts it.
 """
 
 import keyword
@@ -16,7 +16,8 @@ from autopilot_bridge.mavlink import DEFINITIONS, Frame, MessageDefinition
 Message = Any
 """A named tuple made by `message_class`.
 
-It has the fields of the definition (a trailing underscore where the name is a Python keyword) and before them:
+It has the fields of the definition (with a trailing underscore where the name is a Python keyword) and before
+them:
 
 Attributes:
     src_system, src_component: who sent it.
