@@ -7,7 +7,7 @@ from pathlib import Path
 from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.links import Link
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, parse_home, team
-from autopilot_bridge.sitl.configuration import FIXED_EPOCH_UNIX_US, HOMES
+from autopilot_bridge.sitl.configuration import HOMES
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
@@ -66,8 +66,6 @@ class EmbeddedSitl:
         loop: run the mission on it (`autopilot_bridge.clock.run`).
         links: the missions' ends, one per vehicle.
     """
-
-    log_epoch_unix_us = FIXED_EPOCH_UNIX_US
 
     def __init__(self, configuration: EmbeddedConfiguration) -> None:
         flavour = configuration.flavour

@@ -22,9 +22,9 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from missions.atmosphere import GRAVITY_M_S2
 from missions.orbit.relative_target import RelativeState
 
-GRAVITY_M_S2: Final = 9.80665
 _LEAST_SPEED_M_S: Final = 1.0
 _LEAST_COS_CRAB: Final = 0.3
 
@@ -70,14 +70,12 @@ class OrbitCommand:
         radius_m: estimated distance to the target.
         radius_error_m: more than the radius asked for is positive.
         chi_error_rad: e.
-        relative_speed_m_s: of the aircraft against the target.
     """
 
     roll_rad: float
     radius_m: float
     radius_error_m: float
     chi_error_rad: float
-    relative_speed_m_s: float
 
 
 def bearing_off_velocity_rad(velocity_ne_m_s: tuple[float, float], offset_ne_m: tuple[float, float]) -> float:
@@ -127,7 +125,6 @@ class OrbitGuidance:
             radius_m=rho,
             radius_error_m=rho - p.radius_m,
             chi_error_rad=error,
-            relative_speed_m_s=speed,
         )
 
     def _limited(self, wanted_rad: float, roll_rad: float, time_us: int) -> float:

@@ -8,7 +8,7 @@ is used, so that a turning aircraft doesn't turn the frame.
 import math
 from dataclasses import dataclass
 
-from missions.orbit.rotation import Quaternion, Vector, conjugate, from_euler, rotate, yaw_of
+from missions.rotation import Quaternion, Vector, conjugate, from_euler, rotate, yaw_of
 from missions.vehicle.payload import GimbalAttitude
 
 
@@ -37,11 +37,6 @@ def gimbal_from_camera(image_x: float, image_y: float) -> Vector:
     return (1.0, image_x, image_y)
 
 
-def body_from_gimbal(azimuth_rad: float, elevation_rad: float) -> Quaternion:
-    """Equation 39: the rotation that takes gimbal vectors to the body; elevation is positive up."""
-    return from_euler(0.0, elevation_rad, azimuth_rad)
-
-
 def gimbal_angles(line_frd: Vector) -> tuple[float, float]:
     """(azimuth, elevation), rad, that point a two-axis gimbal along a vector of the body frame:
     atan2(l_y, l_x) and -asin(l_z) (section V-C).
@@ -51,26 +46,13 @@ def gimbal_angles(line_frd: Vector) -> tuple[float, float]:
     return math.atan2(y, x), -math.asin(max(-1.0, min(1.0, z / length)))
 
 
-def line_of_sight(
-    image_x: float, image_y: float, q_body_from_gimbal: Quaternion, q_ned_from_frd: Quaternion
-) -> LineOfSight:
-    """Direction of a detection, from the gimbal's angles against the body (equation 37).
-
-    Args:
-        image_x, image_y: normalized image coordinates.
-        q_body_from_gimbal: equation 39.
-        q_ned_from_frd: attitude of the aircraft.
-    """
-    line_frd = rotate(q_body_from_gimbal, gimbal_from_camera(image_x, image_y))
-    return LineOfSight.along(rotate(q_ned_from_frd, line_frd))
-
-
 def line_of_sight_of_gimbal(
     image_x: float, image_y: float, gimbal: GimbalAttitude, q_ned_from_frd: Quaternion
 ) -> LineOfSight:
-    """The same from a gimbal that tells its own attitude against the horizon, as MAVLink has it.
+    """Direction of a detection (equation 37) from a gimbal that tells its own attitude against the horizon,
+    as MAVLink has it.
 
-    It has made the first two rotations of equation 37 one. The heading is the aircraft's.
+    Its quaternion is the first two rotations of the equation in one. The heading is the aircraft's.
 
     Args:
         image_x, image_y: normalized image coordinates.
@@ -81,16 +63,6 @@ def line_of_sight_of_gimbal(
     if not gimbal.from_north:
         line = rotate(from_euler(0.0, 0.0, yaw_of(q_ned_from_frd)), line)
     return LineOfSight.along(line)
-
-
-def horizontal_offset_m(line: LineOfSight, height_m: float) -> tuple[float, float] | None:
-    """Equation 40: (north, east) m from the aircraft to where the line meets flat ground `height_m` below
-    it; None for a line that does not.
-    """
-    if line.depression_rad <= 0.0 or height_m <= 0.0:
-        return None
-    distance_m = height_m / math.tan(line.depression_rad)
-    return distance_m * math.cos(line.bearing_rad), distance_m * math.sin(line.bearing_rad)
 
 
 def pointing_angles(offset_ned_m: Vector, q_ned_from_frd: Quaternion) -> tuple[float, float]:

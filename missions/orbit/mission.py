@@ -423,6 +423,7 @@ class OrbitFlight:
             notes.marks["radius_estimate_mean_m"] = mean
         notes.marks["target_losses"] = float(self._tracker.losses)
         notes.marks["detections_used"] = float(self._tracker.target.accepted)
+        notes.marks["detections_rejected"] = float(self._tracker.target.rejected)
         if "gps_lost_at_s" not in notes.marks:
             return
         await vehicle.command(dialect.MAV_CMD_INJECT_FAILURE, float(_GPS), float(_SOUND), 0.0)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from missions.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.options import MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
@@ -163,7 +164,7 @@ class OrbitOptions(MissionOptions):
         slower = max(5.0, true_m_s - limits.wind_m_s - self.target_speed_m_s)
         faster = true_m_s + limits.wind_m_s + self.target_speed_m_s
         for speed in (slower, faster):
-            bank = math.atan(speed**2 / (_GRAVITY_M_S2 * self.radius_m))
+            bank = math.atan(speed**2 / (GRAVITY_M_S2 * self.radius_m))
             elevation = bank - depression
             if not pitch_min_rad + _MARGIN_RAD <= elevation <= pitch_max_rad - _MARGIN_RAD:
                 raise PlanError(
@@ -177,4 +178,3 @@ class OrbitOptions(MissionOptions):
 LEAST_DEPRESSION_RAD = math.radians(8.0)
 _MARGIN_RAD = math.radians(3.0)
 _TRUE_OVER_EQUIVALENT = 1.03  # at 600 m above the sea
-_GRAVITY_M_S2 = 9.80665

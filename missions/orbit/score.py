@@ -107,6 +107,9 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
         "orbit_s": None,
         "radius_estimate_mean_m": _rounded(marks.get("radius_estimate_mean_m")),
         "detections_used": None if "detections_used" not in marks else int(marks["detections_used"]),
+        "detections_rejected": (
+            None if "detections_rejected" not in marks else int(marks["detections_rejected"])
+        ),
         "target_losses": None if "target_losses" not in marks else int(marks["target_losses"]),
     }
     truth = orbit_truth(debriefing.records, notes.system_id)

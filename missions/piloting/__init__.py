@@ -5,12 +5,11 @@ Sans-IO: numbers in, commands out.
 
 from missions.piloting.energy import EnergyController, EnergyParameters
 from missions.piloting.heading import HeadingController
-from missions.piloting.pressure_height import PressureHeight, air_density_ratio
+from missions.piloting.pressure_height import PressureHeight
 
 __all__ = [
     "EnergyController",
     "EnergyParameters",
     "HeadingController",
     "PressureHeight",
-    "air_density_ratio",
 ]

@@ -10,7 +10,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-GRAVITY_M_S2: Final = 9.80665
+from missions.atmosphere import GRAVITY_M_S2
+
 _ACCELERATION_FILTER_S: Final = 1.0
 
 

@@ -2,9 +2,8 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
-GRAVITY_M_S2: Final = 9.80665
+from missions.atmosphere import GRAVITY_M_S2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,21 +3,9 @@
 import math
 from typing import Final
 
-_SEA_LEVEL_K: Final = 288.15  # ISO 2533 standard atmosphere
-_SEA_LEVEL_PA: Final = 101_325.0
-_LAPSE_K_M: Final = 0.0065
-_EXPONENT: Final = 9.80665 / (287.05287 * _LAPSE_K_M)
+from missions.atmosphere import pressure_altitude_m
+
 _FILTER_S: Final = 0.3
-
-
-def pressure_altitude_m(static_pa: float) -> float:
-    """Altitude in the standard atmosphere with this pressure."""
-    return _SEA_LEVEL_K / _LAPSE_K_M * (1.0 - (static_pa / _SEA_LEVEL_PA) ** (1.0 / _EXPONENT))
-
-
-def air_density_ratio(static_pa: float) -> float:
-    """Density of the standard atmosphere where it has this pressure, over that at sea level."""
-    return float((static_pa / _SEA_LEVEL_PA) ** (1.0 - 1.0 / _EXPONENT))
 
 
 class PressureHeight:

@@ -4,10 +4,10 @@ import math
 from dataclasses import dataclass, fields
 from typing import Final
 
+from missions.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 
-GRAVITY_M_S2: Final = 9.80665
 TURN_MARGIN: Final = 1.2  # of the radius, for gusts and for the time a bank takes
 
 

@@ -11,9 +11,10 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from missions import telemetry
+from missions.atmosphere import air_density_ratio
 from missions.errors import MissionError, VehicleTimeout
 from missions.piloting.energy import EnergyController, EnergyParameters, EnergyState
-from missions.piloting.pressure_height import PressureHeight, air_density_ratio
+from missions.piloting.pressure_height import PressureHeight
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 
 if TYPE_CHECKING:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
 from missions.errors import PlanError
+from missions.rotation import from_euler
 from missions.vehicle.setpoint import Vector
 
 _IGNORE_RATES: Final = 0x07
@@ -38,11 +39,6 @@ class AttitudeSetpoint:
             raise PlanError(f"a thrust of {self.thrust} is not in 0..1")
 
     @property
-    def complete(self) -> bool:
-        """Whether nothing is left to the autopilot."""
-        return self.pitch_rad is not None and self.thrust is not None
-
-    @property
     def type_mask(self) -> int:
         """ATTITUDE_TARGET_TYPEMASK: what to ignore.
 
@@ -56,19 +52,12 @@ class AttitudeSetpoint:
 
     def message(self, time_us: int, system_id: int, offset_ned_m: Vector = (0.0, 0.0, 0.0)) -> Any:
         """The message. An attitude has no place, so the offset of the local frame changes nothing."""
-        halves = (0.5 * self.roll_rad, 0.5 * (self.pitch_rad or 0.0), 0.5 * self.yaw_rad)
-        (cr, cp, cy), (sr, sp, sy) = (tuple(map(f, halves)) for f in (math.cos, math.sin))
         return dialect.MAVLink_set_attitude_target_message(
             time_us // 1000 & 0xFFFFFFFF,
             system_id,
             1,
             self.type_mask,
-            [
-                cr * cp * cy + sr * sp * sy,
-                sr * cp * cy - cr * sp * sy,
-                cr * sp * cy + sr * cp * sy,
-                cr * cp * sy - sr * sp * cy,
-            ],
+            list(from_euler(self.roll_rad, self.pitch_rad or 0.0, self.yaw_rad)),
             0.0,
             0.0,
             0.0,

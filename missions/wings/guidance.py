@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from missions.atmosphere import GRAVITY_M_S2
 from missions.planning.flyable import FlyablePath
-from missions.planning.limits import GRAVITY_M_S2
 from missions.wings.place import PlaceOnPath
 
 _LEAST_COS_CRAB: Final = 0.5

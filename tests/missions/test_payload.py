@@ -63,7 +63,6 @@ def test_a_quaternion_that_is_none_makes_no_attitude(q):
 def test_roll_alone_travels_as_ardupilots_plane_takes_it():
     setpoint = AttitudeSetpoint(roll_rad=0.4)
     assert setpoint.type_mask == 0xC6
-    assert not setpoint.complete
 
 
 def test_roll_and_pitch_leave_the_throttle():
@@ -77,7 +76,6 @@ def test_a_complete_attitude_ignores_the_rates_only():
     w, x, y, z = message.q
     assert math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)) == pytest.approx(0.4)
     assert math.asin(2 * (w * y - z * x)) == pytest.approx(0.1)
-    assert setpoint.complete
 
 
 @pytest.mark.parametrize(

@@ -12,27 +12,11 @@ from missions.piloting import (
     EnergyParameters,
     HeadingController,
     PressureHeight,
-    air_density_ratio,
 )
 from missions.piloting.energy import EnergyState
 from missions.piloting.heading import heading_deg
-from missions.piloting.pressure_height import pressure_altitude_m
 
 G = 9.80665
-
-# ISO 2533: geopotential altitude m, pressure Pa, density kg/m^3
-STANDARD_ATMOSPHERE = [
-    (0.0, 101_325.0, 1.22500),
-    (500.0, 95_461.2, 1.16727),
-    (1000.0, 89_874.6, 1.11164),
-    (2000.0, 79_495.2, 1.00649),
-]
-
-
-@pytest.mark.parametrize(("altitude", "pressure", "density"), STANDARD_ATMOSPHERE)
-def test_pressure_altitude_and_density_are_those_of_the_standard(altitude, pressure, density):
-    assert pressure_altitude_m(pressure) == pytest.approx(altitude, abs=0.15)
-    assert air_density_ratio(pressure) == pytest.approx(density / 1.225, rel=2e-4)
 
 
 def test_height_counts_from_the_ground_it_was_taken_on():

@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from missions.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.library import MISSIONS
 from missions.options import FlightOptions, Via
 from missions.patterns import Polyline, named_lissajous, parallel_sweep, sector
 from missions.planning.corners import Corner
 from missions.planning.flyable import flyable_path
-from missions.planning.limits import GRAVITY_M_S2, FixedWingLimits
+from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import check_turns, roll_in_m
 from missions.wings.entry import Entry, with_leads
 from missions.wings.guidance import PathRoll, PathRollParameters

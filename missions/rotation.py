@@ -45,12 +45,6 @@ def yaw_of(q: Quaternion) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-def roll_of(q: Quaternion) -> float:
-    """Bank angle of `q_ned_from_frd`."""
-    w, x, y, z = q
-    return math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-
-
 def between(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
     """From `a` (share 0) to `b` (share 1), along the chord and normalized: exact enough for 50 ms."""
     sign = 1.0 if sum(p * q for p, q in zip(a, b, strict=True)) >= 0.0 else -1.0
