@@ -302,6 +302,7 @@ class OrbitFlight:
         try:
             await self._lose_gps()
             self._with_gps = False
+            self._tracker.count_anew()  # on the way here the target may well have been out of sight
             async with vehicle.guided(_TICK_HZ) as guided:
                 entered_us = self._now_us
                 begun = not vehicle.adapter.roll_alone

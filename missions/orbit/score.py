@@ -89,6 +89,7 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
     radius_max_error_m: largest difference from the radius asked for.
     altitude_error_m: largest difference of the true height above the start from the altitude asked for.
     orbit_s: how long.
+    target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
     """
     if not debriefing.flights or not isinstance(debriefing.options, OrbitOptions):
         return {}

@@ -92,6 +92,11 @@ class TargetTracker:
             drift_std_m_s=drift_std_m_s,
         )
 
+    def count_anew(self) -> None:
+        """Begin the counts of losses and detections at nothing."""
+        self.losses = 0
+        self.target.accepted = self.target.rejected = 0
+
     def height(self, height_m: float) -> None:
         """Height of the aircraft over the target's ground."""
         self._height_m = height_m

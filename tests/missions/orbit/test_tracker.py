@@ -57,6 +57,9 @@ def test_expected_seen_lost_and_seen_again():
     rig.aircraft.blind = False
     assert rig.run(3.0).status is TargetStatus.SEEN
     assert rig.error_m < 8.0
+    rig.tracker.count_anew()  # what was lost on the way is not the orbit's
+    assert rig.run(1.0).losses == 0
+    assert 0 < rig.tracker.target.accepted <= 30
 
 
 def test_a_target_is_seen_while_its_expected_place_is_still_renewed():
