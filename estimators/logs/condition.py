@@ -20,8 +20,8 @@ from estimators.messages import field_name
 __all__ = ["Condition", "ConditionError"]
 
 _ACCEPTED: Final = (
-    "accepted: MESSAGE.field, MESSAGE.field[index], numbers, 'texts', + - * / % & |, comparisons, and, or, not, "
-    "abs(), ()"
+    "accepted: MESSAGE.field, MESSAGE.field[index], numbers, 'texts', + - * / % & |, comparisons, and, or, "
+    "not, abs(), ()"
 )
 _MAX_LENGTH: Final = 1000
 _MAX_DEPTH: Final = 50
