@@ -1,0 +1,1 @@
+"""Monte Carlo studies: the papers' experiments that need no vehicle."""
