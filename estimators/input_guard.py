@@ -45,9 +45,9 @@ class InputGuard:
 
         Returns:
             None for a sample to use: newer than the one before it in its stream, or as new with other values
-            (messages without a time of their own), so a time difference of zero is possible. NOT_FINITE, LATE,
-            REPEATED: leave it out. TIME_JUMP: forget what was and start with this sample; the guard already
-            has.
+            (messages without a time of their own), so a time difference of zero is possible. NOT_FINITE, LATE
+            or REPEATED for one to leave out. TIME_JUMP: forget what was and start with this sample, as the
+            guard already has.
         """
         if not isfinite(sum(values)):  # one sum sees any NaN or infinity among them
             return Outcome.NOT_FINITE
