@@ -268,7 +268,5 @@ def course_variance(state: Array, covariance: Array) -> float:
     if square < 1e-12:
         return math.inf
     return (
-        vx * vx * covariance[VY, VY]
-        + vy * vy * covariance[VX, VX]
-        - 2.0 * vx * vy * covariance[VX, VY]
+        vx * vx * covariance[VY, VY] + vy * vy * covariance[VX, VX] - 2.0 * vx * vy * covariance[VX, VY]
     ) / (square * square)

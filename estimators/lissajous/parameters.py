@@ -1,0 +1,123 @@
+"""What the Lissajous estimator is told: the pattern, how far to trust it, and what is measured."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Final
+
+__all__ = ["Form", "LissajousParameters", "Source"]
+
+
+class Form(StrEnum):
+    """The three estimators of the paper's Table IV."""
+
+    MEASUREMENT = "measurement"
+    """What was measured, as it came (N)."""
+    KALMAN = "kalman"
+    """Kalman filter that takes the frequencies for certain (K)."""
+    PROPOSED = "proposed"
+    """Kalman filter that allows for their uncertainty (P)."""
+
+
+class Source(StrEnum):
+    """Which message says where the vehicle is."""
+
+    GPS = "gps"
+    """GPS_RAW_INT: the receiver's own fixes, which no filter has smoothed."""
+    GLOBAL = "global"
+    """GLOBAL_POSITION_INT: the autopilot's estimate."""
+    LOCAL = "local"
+    """LOCAL_POSITION_NED: the autopilot's estimate, in its local frame."""
+
+
+_SIGMAS: Final = {Source.GPS: (0.3, 0.1), Source.GLOBAL: (0.15, 0.08), Source.LOCAL: (0.15, 0.08)}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LissajousParameters:
+    """Parameters of `LissajousEstimator`. The defaults are those of `fly lissajous --pattern L3 --period 120`.
+
+    Attributes:
+        form: which of the paper's three estimators.
+        frequency: take the frequencies for states and correct them in flight (an extended Kalman filter of six
+            states; the paper's future work). Goes with `form=proposed` only.
+        source: the message that is the measurement.
+        omega_x_rad_s, omega_y_rad_s: nominal frequencies along the pattern's axes.
+        epsilon_rad_s: variance of a frequency over the frequency itself (the paper's epsilon), so the standard
+            deviation is sqrt(epsilon omega).
+        orientation_rad: of the pattern's x axis, clockwise from north; its y axis is another right angle
+            clockwise. A quarter turn: x east, as `fly lissajous` means it.
+        centre_lat_deg, centre_lon_deg: of the pattern; not numbers: the vehicle's home (HOME_POSITION).
+        centre_north_m, centre_east_m: of the pattern from that place.
+        position_sigma_m, velocity_sigma_m_s: one sigma per axis of the measurement; 0: by the source, 0.3 m
+            and 0.1 m/s for gps, 0.15 m and 0.08 m/s for the autopilot's estimates.
+        position_delay_s: age of a measurement at the time that it carries.
+        acceleration_psd_m2_s3: spectral density of the acceleration that the motion model lacks.
+        frequency_walk_rad2_s3: variance that a frequency gains per second, where it is a state.
+        max_gap_s: a longer silence starts the estimator anew.
+        history_s: how far back states are kept, for what is known late.
+    """
+
+    form: Form = Form.PROPOSED
+    frequency: bool = False
+    source: Source = Source.GPS
+    omega_x_rad_s: float = 3.0 * math.tau / 120.0
+    omega_y_rad_s: float = 4.0 * math.tau / 120.0
+    epsilon_rad_s: float = 1e-4
+    orientation_rad: float = 0.5 * math.pi
+    centre_lat_deg: float = math.nan
+    centre_lon_deg: float = math.nan
+    centre_north_m: float = 0.0
+    centre_east_m: float = 0.0
+    position_sigma_m: float = 0.0
+    velocity_sigma_m_s: float = 0.0
+    position_delay_s: float = 0.0
+    acceleration_psd_m2_s3: float = 0.02
+    frequency_walk_rad2_s3: float = 1e-8
+    max_gap_s: float = 5.0
+    history_s: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name, kind in (("form", Form), ("source", Source)):
+            value = getattr(self, name)
+            if value not in tuple(kind):
+                raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}")
+            object.__setattr__(self, name, kind(value))
+        for name in ("omega_x_rad_s", "omega_y_rad_s", "max_gap_s", "history_s"):
+            _require(name, getattr(self, name), above_zero=True)
+        for name in (
+            "epsilon_rad_s",
+            "position_sigma_m",
+            "velocity_sigma_m_s",
+            "acceleration_psd_m2_s3",
+            "frequency_walk_rad2_s3",
+        ):
+            _require(name, getattr(self, name), above_zero=False)
+        for name in ("orientation_rad", "centre_north_m", "centre_east_m", "position_delay_s"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"{name} {getattr(self, name)} is not a finite number")
+        if self.frequency and self.form is not Form.PROPOSED:
+            raise ValueError(f"frequency with form={self.form}: correcting frequencies needs form=proposed")
+        if math.isnan(self.centre_lat_deg) != math.isnan(self.centre_lon_deg):
+            raise ValueError("centre_lat_deg and centre_lon_deg go together; give both or neither")
+        if abs(self.centre_lat_deg) > 90.0 or abs(self.centre_lon_deg) > 180.0:
+            raise ValueError(
+                f"centre {self.centre_lat_deg:g},{self.centre_lon_deg:g} deg is not in -90..90, -180..180"
+            )
+
+    @property
+    def sigmas(self) -> tuple[float, float]:
+        """One sigma of position (m) and velocity (m/s), each axis."""
+        position_m, velocity_m_s = _SIGMAS[self.source]
+        return self.position_sigma_m or position_m, self.velocity_sigma_m_s or velocity_m_s
+
+    @property
+    def has_centre(self) -> bool:
+        """Whether the pattern's centre is given by its coordinates."""
+        return not math.isnan(self.centre_lat_deg)
+
+
+def _require(name: str, value: float, *, above_zero: bool) -> None:
+    if not (math.isfinite(value) and (value > 0.0 if above_zero else value >= 0.0)):
+        accepted = "a number above 0" if above_zero else "0 or a number above it"
+        raise ValueError(f"{name} {value:g} is not accepted: {accepted} is")

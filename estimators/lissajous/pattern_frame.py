@@ -1,0 +1,96 @@
+"""The pattern's frame on the ground, and one vehicle's track in it."""
+
+import math
+
+import numpy as np
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from estimators.lissajous.model import Array
+from estimators.lissajous.motion_filter import MotionFilter
+from estimators.lissajous.parameters import LissajousParameters
+from estimators.lissajous.positions import Fix
+
+__all__ = ["PatternFrame", "Track"]
+
+
+class PatternFrame:
+    """Where the pattern is: its centre, and its axes against north.
+
+    Args:
+        parameters: of the estimator.
+        home: where the vehicle started, for a centre that is not given by its coordinates.
+    """
+
+    __slots__ = ("_cos", "_sin", "frame", "orientation_rad")
+
+    def __init__(self, parameters: LissajousParameters, home: GeodeticPosition) -> None:
+        p = parameters
+        place = home
+        if p.has_centre:
+            place = GeodeticPosition(lat_deg=p.centre_lat_deg, lon_deg=p.centre_lon_deg, alt_m=home.alt_m)
+        lat_deg, lon_deg, alt_m = LocalFrame(place).geodetic_from_ned(p.centre_north_m, p.centre_east_m, 0.0)
+        self.frame = LocalFrame(GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m))
+        self.orientation_rad = p.orientation_rad
+        self._cos, self._sin = math.cos(p.orientation_rad), math.sin(p.orientation_rad)
+
+    def along(self, north: float, east: float) -> tuple[float, float]:
+        """(x, y) of a vector in north and east."""
+        return self._cos * north + self._sin * east, -self._sin * north + self._cos * east
+
+    def north_east(self, x: float, y: float) -> tuple[float, float]:
+        """(north, east) of a vector along the pattern's axes."""
+        return self._cos * x - self._sin * y, self._sin * x + self._cos * y
+
+    def place(self, fix: Fix) -> tuple[float, float]:
+        """(x, y) of a place, m from the centre."""
+        north_m, east_m, _ = self.frame.ned_from_geodetic(fix.lat_deg, fix.lon_deg, fix.alt_m)
+        return self.along(north_m, east_m)
+
+    def velocity(self, fix: Fix) -> tuple[float, float]:
+        """(x, y) of a velocity, m/s."""
+        return self.along(fix.north_m_s, fix.east_m_s)
+
+    def motion_ned(self, state: Array, covariance: Array) -> tuple[Array, Array]:
+        """State (north, its rate, east, its rate) and its covariance, from those along the pattern's axes."""
+        c, s = self._cos, self._sin
+        turn = np.array([[c, 0.0, -s, 0.0], [0.0, c, 0.0, -s], [s, 0.0, c, 0.0], [0.0, s, 0.0, c]])
+        return turn @ state[:4], turn @ covariance[:4, :4] @ turn.T
+
+
+class Track:
+    """One vehicle's filter in a pattern's frame that may be told again (home is set anew on arming).
+
+    Attributes:
+        filter: its motion.
+        pattern: the frame; None before home or centre is known.
+    """
+
+    __slots__ = ("_delay_us", "filter", "parameters", "pattern")
+
+    def __init__(self, parameters: LissajousParameters) -> None:
+        self.parameters = parameters
+        self.filter = MotionFilter(parameters)
+        self.pattern: PatternFrame | None = None
+        self._delay_us = round(1e6 * parameters.position_delay_s)
+
+    def place_pattern(self, home: GeodeticPosition) -> None:
+        """Say where home is, or that it has moved: what is known is taken over into the new frame."""
+        pattern = PatternFrame(self.parameters, home)
+        if self.pattern is not None:
+            origin = pattern.frame.origin
+            if origin == self.pattern.frame.origin:
+                return
+            north_m, east_m, _ = self.pattern.frame.ned_from_geodetic(
+                origin.lat_deg, origin.lon_deg, origin.alt_m
+            )
+            self.filter.move_origin(*self.pattern.along(north_m, east_m))
+        self.pattern = pattern
+
+    def take(self, time_us: int, fix: Fix) -> bool:
+        """Use a position; False while the pattern's place is not known."""
+        if self.pattern is None:
+            return False
+        x, y = self.pattern.place(fix)
+        vx, vy = self.pattern.velocity(fix)
+        self.filter.take(time_us - self._delay_us, x, vx, y, vy)
+        return True
