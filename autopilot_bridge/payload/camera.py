@@ -183,7 +183,7 @@ def _landing_target(detection: Detection) -> Any:
         mavlink.MAV_FRAME_BODY_FRD,
         detection.angle_x_rad,
         detection.angle_y_rad,
-        0.0,
+        detection.distance_m,
         detection.size_rad,
         detection.size_rad,
         0.0,

@@ -13,7 +13,7 @@ from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.estimate import LissajousEstimate
 from estimators.lissajous.model import MOTION, course, course_variance
 from estimators.lissajous.parameters import Form, LissajousParameters
-from estimators.lissajous.pattern_frame import Track
+from estimators.lissajous.pattern_frame import PatternFrame, Track
 from estimators.lissajous.positions import PositionReader, values_of
 from estimators.messages import Message
 
@@ -75,7 +75,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
             if not self._reader.hear_home(message):
                 return Outcome.IMPLAUSIBLE
             if self._reader.home is not None:
-                self.track.place_pattern(self._reader.home)
+                self.track.place_pattern(PatternFrame(self.parameters, self._reader.home))
             return Outcome.USED
         values = values_of(self.parameters.source, message)
         refused = self._guard.check(time_us, name, values)

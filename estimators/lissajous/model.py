@@ -1,4 +1,4 @@
-"""The Lissajous motion model and its filter as compiled kernels: live estimator and Monte Carlo study run these.
+"""The Lissajous motion model and its filter as kernels, for the live estimator and the study alike.
 
 Source: Steckenrider, Leamy, Furukawa 2020 (SSRR), section III. The state is (x, x', y, y') relative to the
 pattern's centre; with the frequencies in it, (x, x', y, y', w_x, w_y). Where the paper's equations have slips
@@ -98,7 +98,7 @@ def move(state: Array, axes: Array) -> None:
 
 @kernel
 def frequency_jacobian(state: Array, axes: Array, out: Array) -> None:
-    """Derivatives (2, 2) of the predicted state by its axis' frequency: rows x, y; position, velocity (24)."""
+    """Derivatives (2, 2) of the predicted state by the frequency: x, y; position, velocity (24)."""
     for i in range(2):
         position, velocity = state[2 * i], state[2 * i + 1]
         out[i, 0] = axes[i, POSITION_BY_POSITION] * position + axes[i, POSITION_BY_VELOCITY] * velocity

@@ -35,16 +35,16 @@ _SIGMAS: Final = {Source.GPS: (0.3, 0.1), Source.GLOBAL: (0.15, 0.08), Source.LO
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LissajousParameters:
-    """Parameters of `LissajousEstimator`. The defaults are those of `fly lissajous --pattern L3 --period 120`.
+    """Parameters of `LissajousEstimator`; the frequencies are of `fly lissajous --pattern L3 --period 120`.
 
     Attributes:
         form: which of the paper's three estimators.
-        frequency: take the frequencies for states and correct them in flight (an extended Kalman filter of six
-            states; the paper's future work). Goes with `form=proposed` only.
+        frequency: take the frequencies for states and correct them in flight (an extended Kalman filter of
+            six states; the paper's future work). Goes with `form=proposed` only.
         source: the message that is the measurement.
         omega_x_rad_s, omega_y_rad_s: nominal frequencies along the pattern's axes.
-        epsilon_rad_s: variance of a frequency over the frequency itself (the paper's epsilon), so the standard
-            deviation is sqrt(epsilon omega).
+        epsilon_rad_s: variance of a frequency over the frequency itself (the paper's epsilon), so the
+            standard deviation is sqrt(epsilon omega).
         orientation_rad: of the pattern's x axis, clockwise from north; its y axis is another right angle
             clockwise. A quarter turn: x east, as `fly lissajous` means it.
         centre_lat_deg, centre_lon_deg: of the pattern; not numbers: the vehicle's home (HOME_POSITION).

@@ -50,6 +50,17 @@ class PatternFrame:
         """(x, y) of a velocity, m/s."""
         return self.along(fix.north_m_s, fix.east_m_s)
 
+    def origin_of(self, other: "PatternFrame") -> tuple[float, float]:
+        """(x, y) of another pattern's centre, of the same orientation."""
+        o = other.frame.origin
+        north_m, east_m, _ = self.frame.ned_from_geodetic(o.lat_deg, o.lon_deg, o.alt_m)
+        return self.along(north_m, east_m)
+
+    def geodetic(self, x: float, y: float) -> GeodeticPosition:
+        """A place on the pattern's level."""
+        lat_deg, lon_deg, alt_m = self.frame.geodetic_from_ned(*self.north_east(x, y), 0.0)
+        return GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
+
     def motion_ned(self, state: Array, covariance: Array) -> tuple[Array, Array]:
         """State (north, its rate, east, its rate) and its covariance, from those along the pattern's axes."""
         c, s = self._cos, self._sin
@@ -73,17 +84,10 @@ class Track:
         self.pattern: PatternFrame | None = None
         self._delay_us = round(1e6 * parameters.position_delay_s)
 
-    def place_pattern(self, home: GeodeticPosition) -> None:
-        """Say where home is, or that it has moved: what is known is taken over into the new frame."""
-        pattern = PatternFrame(self.parameters, home)
+    def place_pattern(self, pattern: PatternFrame) -> None:
+        """Say where the pattern is, or that it has moved: what is known is taken over into the new frame."""
         if self.pattern is not None:
-            origin = pattern.frame.origin
-            if origin == self.pattern.frame.origin:
-                return
-            north_m, east_m, _ = self.pattern.frame.ned_from_geodetic(
-                origin.lat_deg, origin.lon_deg, origin.alt_m
-            )
-            self.filter.move_origin(*self.pattern.along(north_m, east_m))
+            self.filter.move_origin(*self.pattern.origin_of(pattern))
         self.pattern = pattern
 
     def take(self, time_us: int, fix: Fix) -> bool:

@@ -1,0 +1,7 @@
+"""A target's place, fused from what a team of drones sees of it (seed 000)."""
+
+from estimators.target_fusion.estimate import TargetEstimate
+from estimators.target_fusion.estimator import TargetFusionEstimator
+from estimators.target_fusion.parameters import Heading, Mount, Range, TargetFusionParameters
+
+__all__ = ["Heading", "Mount", "Range", "TargetEstimate", "TargetFusionEstimator", "TargetFusionParameters"]

@@ -37,6 +37,8 @@ class CameraParameters:
         latency_s: from exposure to the detections; rounded to physics steps.
         pixel_noise_px: one sigma of a detection's place, each axis.
         size_noise: one sigma of a detection's size, as a share of it.
+        tag_range: tell the distance of tagged targets from their apparent size, as AprilTag detectors do. The
+            size is then as good as the pixels: the mean of four corners' sides has `pixel_noise_px` / sqrt(2).
         detection: how likely a target in the image is detected.
         max_range_m: haze and resolution end there.
         min_depression_rad: targets seen flatter than this below the horizon are lost in the background.
@@ -51,6 +53,7 @@ class CameraParameters:
     latency_s: float = 0.1
     pixel_noise_px: float = 1.0
     size_noise: float = 0.1
+    tag_range: bool = False
     detection: DetectionModel = field(default_factory=ResolutionDetection)
     max_range_m: float = 2000.0
     min_depression_rad: float = math.radians(3.0)
@@ -233,8 +236,19 @@ class Camera:
         found = []
         for i in visible[uniforms[visible] < probability].tolist():
             u_px, v_px, size_rad = view[i, : k.SIZE_RAD + 1].tolist()
-            found.append(self._detection(time_us, u_px, v_px, size_rad, int(targets.tag_ids[i])))
+            tag, distance_m = int(targets.tag_ids[i]), 0.0
+            if self.parameters.tag_range and tag != NO_TAG:
+                size_rad, distance_m = self._tag_range(
+                    float(view[i, k.SIZE_PX]), float(targets.sizes_m[i]), float(normals[i, 2])
+                )
+            found.append(self._detection(time_us, u_px, v_px, size_rad, tag, distance_m))
         return found
+
+    def _tag_range(self, size_px: float, size_m: float, normal: float) -> tuple[float, float]:
+        """Apparent size and distance of a tag, from its corners with their noise."""
+        noise_px = self.parameters.pixel_noise_px / math.sqrt(2.0) * normal
+        size_rad = max(0.1 * size_px, size_px + noise_px) / self._focal_px
+        return size_rad, 0.5 * size_m / math.tan(0.5 * size_rad)
 
     def _false_detections(self, time_us: int) -> list[Detection]:
         p = self.parameters
@@ -255,9 +269,15 @@ class Camera:
         ]
 
     def _detection(
-        self, time_us: int, u_px: float, v_px: float, size_rad: float, target_id: int
+        self,
+        time_us: int,
+        u_px: float,
+        v_px: float,
+        size_rad: float,
+        target_id: int,
+        distance_m: float = 0.0,
     ) -> Detection:
         u0_px, v0_px = self.parameters.model.centre_px
         angle_x_rad = math.atan2(u_px - u0_px, self._focal_px)
         angle_y_rad = math.atan2(v_px - v0_px, self._focal_px)
-        return Detection(time_us, u_px, v_px, angle_x_rad, angle_y_rad, size_rad, target_id)
+        return Detection(time_us, u_px, v_px, angle_x_rad, angle_y_rad, size_rad, target_id, distance_m)

@@ -25,6 +25,7 @@ class Detection:
             plane: LANDING_TARGET's, whose tangents are the normalised image coordinates.
         size_rad: angular size.
         target_id: the tag's number; -1 for what carries no tag and for false detections.
+        distance_m: by the apparent size of a tag whose true size is known; 0: not measured.
     """
 
     time_us: int
@@ -34,6 +35,7 @@ class Detection:
     angle_y_rad: float
     size_rad: float
     target_id: int = NO_TAG
+    distance_m: float = 0.0
 
     @property
     def normalised(self) -> tuple[float, float]:

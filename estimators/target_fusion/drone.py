@@ -1,0 +1,231 @@
+"""One drone of the team: where it was, how it was turned, and what it saw and could not place yet."""
+
+import math
+from collections import deque
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from estimators.input_guard import InputGuard
+from estimators.interface import Outcome
+from estimators.lissajous.model import Array, course, course_variance
+from estimators.lissajous.pattern_frame import Track
+from estimators.lissajous.positions import PositionReader, values_of
+from estimators.messages import Message
+from estimators.target_fusion.orientation import (
+    Orientations,
+    Quaternion,
+    from_euler,
+    product,
+    yaw_of,
+)
+from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
+from estimators.target_fusion.sight import Detection, place_in_level_frame
+from estimators.target_fusion.transform import ground_target
+
+__all__ = ["Drone"]
+
+_REACH_US: Final = 300_000
+_REMEMBERED: Final = 64
+_AHEAD_US: Final = 1_000_000
+_IN_VEHICLE_FRAME: Final = 32  # GIMBAL_DEVICE_FLAGS
+_IN_EARTH_FRAME: Final = 64
+_YAW_LOCK: Final = 16
+
+
+class Drone:
+    """What the base station knows of one drone.
+
+    Args:
+        system_id: its own.
+        parameters: of the estimator.
+
+    Attributes:
+        track: its motion, in the pattern's frame.
+        reader: its position messages.
+        pending: detections that wait for newer positions or attitudes, oldest first.
+        newest_us: newest time of any message of it.
+    """
+
+    def __init__(self, system_id: int, parameters: TargetFusionParameters) -> None:
+        p = self.parameters = parameters
+        self.system_id = system_id
+        self.track = Track(p)
+        self.reader = PositionReader(p.source)
+        self.guard = InputGuard(max_gap_us=round(1e6 * p.max_gap_s))
+        self.pending: deque[Detection] = deque(maxlen=_REMEMBERED)
+        self._heard: deque[Detection] = deque(maxlen=_REMEMBERED)
+        self.newest_us = 0
+        self._history_us = round(1e6 * p.history_s)
+        self._attitudes = Orientations(self._history_us, _REACH_US)
+        self._gimbal = Orientations(self._history_us, _REACH_US)
+        self._fixed = from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad)
+        self._height_m = math.nan
+        self._wait_us = round(1e6 * p.wait_s)
+        self._belief: Array = np.zeros(5)
+
+    def forget(self) -> None:
+        """Start anew: its time has jumped."""
+        self.track.filter.reset()
+        self._attitudes.clear()
+        self._gimbal.clear()
+        self.pending.clear()
+        self._heard.clear()
+        self.newest_us = 0
+
+    def hear_position(self, time_us: int, message: Message) -> Outcome:
+        """Take a position message."""
+        refused = self._admit(time_us, message, values_of(self.parameters.source, message), leads=True)
+        if refused not in (None, Outcome.TIME_JUMP):
+            return refused
+        fix = self.reader.read(message)
+        if fix is None or not self.track.take(time_us, fix):
+            return refused or Outcome.WAITING
+        if self.reader.home is not None:
+            self._height_m = fix.alt_m - self.reader.home.alt_m
+        return refused or Outcome.USED
+
+    def hear_home(self, message: Message) -> GeodeticPosition | None:
+        """Take a HOME_POSITION; None when it is no place."""
+        return self.reader.home if self.reader.hear_home(message) else None
+
+    def hear_attitude(self, time_us: int, message: Message) -> Outcome:
+        """Take an ATTITUDE."""
+        angles = (message.roll, message.pitch, message.yaw)
+        refused = self._admit(time_us, message, angles)
+        if refused not in (None, Outcome.TIME_JUMP):
+            return refused
+        self._attitudes.add(time_us, from_euler(*angles))
+        return refused or Outcome.USED
+
+    def hear_gimbal(self, time_us: int, message: Message) -> Outcome:
+        """Take a GIMBAL_DEVICE_ATTITUDE_STATUS: kept against the vehicle's nose, whichever way it is told."""
+        refused = self._admit(time_us, message, tuple(message.q))
+        if refused not in (None, Outcome.TIME_JUMP):
+            return refused
+        norm = math.sqrt(sum(value * value for value in message.q))
+        if not 0.5 < norm < 2.0:
+            return Outcome.IMPLAUSIBLE
+        w, x, y, z = (value / norm for value in message.q)
+        q: Quaternion = (w, x, y, z)
+        flags = message.flags
+        if flags & _IN_EARTH_FRAME or (not flags & _IN_VEHICLE_FRAME and flags & _YAW_LOCK):
+            nose_rad = self._nose(time_us, message)
+            if nose_rad is None:
+                return Outcome.WAITING
+            q = _turned_back(q, nose_rad)
+        self._gimbal.add(time_us, q)
+        return refused or Outcome.USED
+
+    def _nose(self, time_us: int, message: Message) -> float | None:
+        """Yaw of the vehicle as the gimbal knows it, else as the autopilot does."""
+        if math.isfinite(message.delta_yaw) and message.delta_yaw != 0.0:
+            return float(message.delta_yaw)
+        attitude = self._attitudes.at(time_us)
+        return None if attitude is None else yaw_of(attitude)
+
+    def hear_detection(self, time_us: int, message: Message) -> Outcome:
+        """Take a LANDING_TARGET of the camera; it is placed when all that is needed has come."""
+        values = (message.angle_x, message.angle_y, message.distance, message.size_x, message.size_y)
+        if not math.isfinite(sum(values)):
+            return Outcome.NOT_FINITE
+        if not (abs(message.angle_x) < 0.5 * math.pi and abs(message.angle_y) < 0.5 * math.pi):
+            return Outcome.IMPLAUSIBLE
+        if not self.newest_us:
+            return Outcome.WAITING
+        if time_us - self.newest_us > _AHEAD_US:
+            return Outcome.IMPLAUSIBLE
+        if self.newest_us - time_us > self._history_us:
+            return Outcome.LATE
+        detection = Detection(
+            time_us,
+            self.system_id,
+            int(message.target_num),
+            message.angle_x,
+            message.angle_y,
+            message.distance,
+            0.5 * (message.size_x + message.size_y),
+        )
+        if detection in self._heard:
+            return Outcome.REPEATED
+        self._heard.append(detection)
+        self.pending.append(detection)
+        return Outcome.USED
+
+    def _admit(
+        self, time_us: int, message: Message, values: tuple[float, ...], leads: bool = False
+    ) -> Outcome | None:
+        """The guard's word; a jump of time forgets what was."""
+        refused = self.guard.check(time_us, type(message).name, values, leads=leads)
+        if refused is Outcome.TIME_JUMP:
+            self.forget()
+        if refused in (None, Outcome.TIME_JUMP):
+            self.newest_us = max(self.newest_us, time_us)
+        return refused
+
+    # placing
+
+    def placed(self, detection: Detection) -> Array | None:
+        """A detection on the ground, (x, y, xx, xy, yy) in the pattern's frame (equations 31 to 34).
+
+        None when there was no position or attitude near its time, or its line of sight has no length.
+        """
+        p = self.parameters
+        known = self.track.filter.at(detection.time_us)
+        pattern = self.track.pattern
+        q = self._camera_at(detection.time_us)
+        if known is None or pattern is None or q is None:
+            return None
+        seen = place_in_level_frame(detection, q, self._height_m, p)
+        if seen is None:
+            return None
+        state, covariance = known
+        if p.heading is Heading.COURSE:
+            heading_rad = course(state)
+            variance = course_variance(state, covariance) + p.yaw_sigma_rad**2
+        else:
+            attitude = self._attitudes.at(detection.time_us)
+            if attitude is None:
+                return None
+            heading_rad = yaw_of(attitude) - pattern.orientation_rad
+            variance = p.yaw_sigma_rad**2
+        if not math.isfinite(variance):
+            return None
+        ground_target(
+            float(state[0]),
+            float(state[2]),
+            float(covariance[0, 0]),
+            float(covariance[0, 2]),
+            float(covariance[2, 2]),
+            heading_rad,
+            variance,
+            seen.place_m,
+            seen.covariance_m2,
+            self._belief,
+        )
+        return self._belief
+
+    def ready(self, detection: Detection) -> bool:
+        """Whether a detection can be placed as well as it ever will be, or has waited long enough."""
+        if self.newest_us - detection.time_us >= self._wait_us:
+            return True
+        t = detection.time_us
+        turned_known = self._gimbal if self.parameters.mount is Mount.GIMBAL else self._attitudes
+        if not (turned_known.covers(t) and self.track.filter.covers(t)):
+            return False
+        return self.parameters.heading is Heading.COURSE or self._attitudes.covers(t)
+
+    def _camera_at(self, time_us: int) -> Quaternion | None:
+        """The camera against the level frame along the nose."""
+        if self.parameters.mount is Mount.GIMBAL:
+            return self._gimbal.at(time_us)
+        attitude = self._attitudes.at(time_us)
+        if attitude is None:
+            return None
+        return _turned_back(product(attitude, self._fixed), yaw_of(attitude))
+
+
+def _turned_back(q: Quaternion, yaw_rad: float) -> Quaternion:
+    """A rotation against north, against a nose that points to `yaw_rad`."""
+    return product((math.cos(0.5 * yaw_rad), 0.0, 0.0, -math.sin(0.5 * yaw_rad)), q)

@@ -1,0 +1,251 @@
+"""The estimator `target-fusion`: a target's place from what all drones of a team see of it.
+
+Source: Steckenrider, Leamy, Furukawa 2020 (SSRR), section III-C; docs/lissajous_estimation.md.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar, Final
+
+import numpy as np
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink import MAVLinkMessage, dialect
+from estimators.interface import Estimator, Need, Outcome
+from estimators.lissajous.model import Array
+from estimators.lissajous.pattern_frame import PatternFrame
+from estimators.lissajous.positions import MESSAGES
+from estimators.messages import Message
+from estimators.target_fusion.belief import TargetBelief
+from estimators.target_fusion.drone import Drone
+from estimators.target_fusion.estimate import TargetEstimate
+from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
+
+__all__ = ["TargetFusionEstimator"]
+
+_AUTOPILOT: Final = 1
+_ATTITUDE_HZ: Final = 10.0
+_GIMBAL_HZ: Final = 5.0
+_POSITION_HZ: Final = 2.0
+_POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
+
+
+class TargetFusionEstimator(Estimator[TargetFusionParameters]):
+    """The base station: hears all drones, keeps each one's motion, and fuses their detections.
+
+    Attributes:
+        drones: by system id.
+        beliefs: by the number on the target's tag; 255: all that have none.
+    """
+
+    NAME: ClassVar[str] = "target-fusion"
+    PARAMETERS = TargetFusionParameters
+    TEAM: ClassVar[bool] = True
+
+    def __init__(self, parameters: TargetFusionParameters | None = None) -> None:
+        super().__init__(parameters)
+        self._handlers: dict[str, Callable[[int, Drone, Message], Outcome]] = {
+            MESSAGES[self.parameters.source]: self._on_position,
+            "HOME_POSITION": self._on_home,
+            "ATTITUDE": lambda t, drone, m: drone.hear_attitude(t, m),
+            "GIMBAL_DEVICE_ATTITUDE_STATUS": lambda t, drone, m: drone.hear_gimbal(t, m),
+            "LANDING_TARGET": lambda t, drone, m: drone.hear_detection(t, m),
+        }
+        self.drones: dict[int, Drone] = {}
+        self.beliefs: dict[int, TargetBelief] = {}
+        self._pattern: PatternFrame | None = None
+        self._estimates: tuple[TargetEstimate, ...] = ()
+        self._fused = 0
+        self._unplaced = 0
+
+    @property
+    def needs(self) -> tuple[Need, ...]:
+        """What every drone of the team must tell."""
+        p = self.parameters
+        gimbal = p.mount is Mount.GIMBAL
+        found = [
+            Need(
+                messages=(MESSAGES[p.source],),
+                rate_hz=_POSITION_HZ,
+                wanted_rate_hz=10.0,
+                purpose="position and velocity over ground",
+            ),
+            Need(messages=("HOME_POSITION",), rate_hz=0.0, purpose="home, the centre of the pattern"),
+            Need(messages=("LANDING_TARGET",), rate_hz=0.0, purpose="detections of the target"),
+        ]
+        if gimbal:
+            found.append(
+                Need(
+                    messages=("GIMBAL_DEVICE_ATTITUDE_STATUS",),
+                    rate_hz=_GIMBAL_HZ,
+                    wanted_rate_hz=20.0,
+                    purpose="attitude of the camera",
+                )
+            )
+        if not gimbal or p.heading is Heading.YAW:
+            found.append(
+                Need(
+                    messages=("ATTITUDE",),
+                    rate_hz=_ATTITUDE_HZ,
+                    wanted_rate_hz=50.0,
+                    purpose="yaw of the vehicle" if gimbal else "attitude of the camera",
+                )
+            )
+        return tuple(found)
+
+    def handle(self, time_us: int, message: Message) -> Outcome:
+        """Take one message of any drone."""
+        outcome = self._handle(time_us, message)
+        self.counters[outcome] += 1
+        return outcome
+
+    def _handle(self, time_us: int, message: Message) -> Outcome:
+        name = type(message).name
+        handler = self._handlers.get(name)
+        if handler is None:
+            return Outcome.IGNORED
+        from_payload = name in ("LANDING_TARGET", "GIMBAL_DEVICE_ATTITUDE_STATUS")
+        if not from_payload and message.src_component != _AUTOPILOT:
+            return Outcome.IGNORED
+        drone = self.drones.get(message.src_system)
+        if drone is None:
+            drone = self.drones[message.src_system] = Drone(message.src_system, self.parameters)
+            if self._pattern is not None:
+                drone.track.place_pattern(self._pattern)
+        outcome = handler(time_us, drone, message)
+        updated, detected = self._place_pending(drone)
+        if updated:
+            self._estimates = tuple(updated.values())
+            return outcome if outcome is Outcome.TIME_JUMP else Outcome.UPDATED
+        return detected if name == "LANDING_TARGET" and detected is not None else outcome
+
+    def _on_position(self, time_us: int, drone: Drone, message: Message) -> Outcome:
+        return drone.hear_position(time_us, message)
+
+    def _on_home(self, time_us: int, drone: Drone, message: Message) -> Outcome:
+        home = drone.hear_home(message)
+        if home is None:
+            return Outcome.IMPLAUSIBLE
+        p = self.parameters
+        if drone.system_id == p.centre_vehicle or (p.has_centre and self._pattern is None):
+            self._place_pattern(home)
+        return Outcome.USED
+
+    def _place_pattern(self, home: GeodeticPosition) -> None:
+        pattern = PatternFrame(self.parameters, home)
+        if self._pattern is not None:
+            if pattern.frame.origin == self._pattern.frame.origin:
+                return
+            for belief in self.beliefs.values():
+                belief.move_origin(*self._pattern.origin_of(pattern))
+        self._pattern = pattern
+        for drone in self.drones.values():
+            drone.track.place_pattern(pattern)
+
+    def _place_pending(self, drone: Drone) -> tuple[dict[int, TargetEstimate], Outcome | None]:
+        """Fuse the detections whose time has come; estimates by target, and what became of the last."""
+        updated: dict[int, TargetEstimate] = {}
+        last = None
+        while drone.pending and drone.ready(drone.pending[0]):
+            detection = drone.pending.popleft()
+            seen = drone.placed(detection)
+            if seen is None:
+                self._unplaced += 1
+                last = Outcome.WAITING
+                continue
+            belief = self.beliefs.get(detection.target)
+            if belief is None:
+                belief = self.beliefs[detection.target] = self._new_belief()
+            last = belief.take(detection.time_us, seen)
+            if last is Outcome.UPDATED:
+                self._fused += 1
+                updated[detection.target] = self._told(belief, detection.target, drone.system_id)
+        return updated, last
+
+    def _new_belief(self) -> TargetBelief:
+        p = self.parameters
+        return TargetBelief(
+            walk_m2_s=p.walk_m_sqrt_s**2,
+            gate=p.gate,
+            confirmations=p.confirmations,
+            max_delay_us=round(1e6 * p.max_delay_s),
+        )
+
+    def _told(self, belief: TargetBelief, target: int, vehicle: int) -> TargetEstimate:
+        return self._estimate(belief.values, belief.time_us, target, vehicle)
+
+    def _estimate(self, values: Array, time_us: int, target: int, vehicle: int) -> TargetEstimate:
+        pattern = self._pattern
+        assert pattern is not None  # nothing is placed without
+        x, y, xx, xy, yy = values.tolist()
+        north_m, east_m = pattern.north_east(x, y)
+        (c, s), (_, _) = pattern.north_east(1.0, 0.0), pattern.north_east(0.0, 1.0)
+        place = pattern.geodetic(x, y)
+        return TargetEstimate(
+            time_us=time_us,
+            target=target,
+            vehicle=vehicle,
+            lat_deg=place.lat_deg,
+            lon_deg=place.lon_deg,
+            alt_m=place.alt_m,
+            north_m=north_m,
+            east_m=east_m,
+            north_variance_m2=c * c * xx - 2.0 * c * s * xy + s * s * yy,
+            north_east_covariance_m2=c * s * (xx - yy) + (c * c - s * s) * xy,
+            east_variance_m2=s * s * xx + 2.0 * c * s * xy + c * c * yy,
+        )
+
+    def target_at(self, time_us: int, target: int = 255) -> TargetEstimate | None:
+        """Where a target is believed to be at a time, with the variance that has grown since it was last
+        seen; None for one that was never seen.
+        """
+        belief = self.beliefs.get(target)
+        if belief is None or not belief.confirmed:
+            return None
+        return self._estimate(belief.at(time_us), max(time_us, belief.time_us), target, 0)
+
+    def reset(self) -> None:
+        """Forget all but parameters and counters."""
+        self.drones.clear()
+        self.beliefs.clear()
+        self._pattern = None
+        self._estimates = ()
+        self._fused = 0
+        self._unplaced = 0
+
+    @property
+    def estimates(self) -> Sequence[TargetEstimate]:
+        """The targets that the newest detections have moved."""
+        return self._estimates
+
+    def publish(self) -> Sequence[MAVLinkMessage]:
+        """FOLLOW_TARGET for each: place, and in `position_cov` its one sigma, horizontal per axis."""
+        messages = []
+        for e in self._estimates:
+            sigma_m = float(np.sqrt(0.5 * (e.north_variance_m2 + e.east_variance_m2)))
+            messages.append(
+                dialect.MAVLink_follow_target_message(
+                    e.time_us // 1000,
+                    _POSITION_KNOWN,
+                    round(e.lat_deg * 1e7),
+                    round(e.lon_deg * 1e7),
+                    e.alt_m,
+                    [0.0] * 3,
+                    [0.0] * 3,
+                    [1.0, 0.0, 0.0, 0.0],
+                    [0.0] * 3,
+                    [sigma_m, 0.0, 0.0],
+                    0,
+                )
+            )
+        return messages
+
+    def remarks(self) -> Mapping[str, float | str]:
+        """How many detections were fused, lay outside the gate, or could not be placed."""
+        return {
+            "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),
+            "drones": float(len(self.drones)),
+            "targets": float(sum(belief.confirmed for belief in self.beliefs.values())),
+            "detections_fused": float(self._fused),
+            "detections_outside_the_gate": float(sum(belief.gated for belief in self.beliefs.values())),
+            "detections_not_placed": float(self._unplaced),
+        }

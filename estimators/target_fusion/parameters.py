@@ -1,0 +1,121 @@
+"""What the target fusion is told beside the drones' own motion: camera, range, and the target's."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from estimators.lissajous.parameters import LissajousParameters
+
+__all__ = ["Heading", "Mount", "Range", "TargetFusionParameters"]
+
+
+class Heading(StrEnum):
+    """Which way a drone's nose points."""
+
+    COURSE = "course"
+    """Along its estimated velocity, with that velocity's uncertainty (the paper): the nose leads the way."""
+    YAW = "yaw"
+    """As the autopilot's ATTITUDE says."""
+
+
+class Mount(StrEnum):
+    """How the camera is carried."""
+
+    GIMBAL = "gimbal"
+    """On a gimbal that tells its attitude (GIMBAL_DEVICE_ATTITUDE_STATUS)."""
+    FIXED = "fixed"
+    """Fixed to the body; ATTITUDE tells roll and pitch."""
+
+
+class Range(StrEnum):
+    """Where the distance of a target comes from."""
+
+    AUTO = "auto"
+    """LANDING_TARGET's distance, else by the size if that is known, else by the height."""
+    MESSAGE = "message"
+    SIZE = "size"
+    """From the apparent size and `target_size_m`."""
+    HEIGHT = "height"
+    """From the height above home and level ground."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TargetFusionParameters(LissajousParameters):
+    """Parameters of `TargetFusionEstimator`; those of `LissajousParameters` are for every drone.
+
+    Attributes:
+        centre_vehicle: whose home the pattern's centre is counted from, unless it is given by coordinates.
+        heading: which way a drone's nose points.
+        mount: how the camera is carried.
+        mount_roll_rad, mount_pitch_rad, mount_yaw_rad: of a fixed camera against the body; -pi/2: down.
+        distance: where the range comes from.
+        target_size_m: true size of the target, for `distance=size`; 0: not known.
+        bearing_sigma_rad: one sigma of a direction across the line of sight, camera and gimbal together.
+        tilt_sigma_rad: one sigma of the camera's pitch against the horizon.
+        size_sigma_rad: one sigma of an apparent size: what pixel noise makes of it.
+        range_sigma: one sigma of a distance that comes without an apparent size, as a share of it.
+        height_sigma_m: one sigma of the height above the target.
+        yaw_sigma_rad: one sigma of ATTITUDE's yaw, and with `heading=course` of the nose from the course.
+        walk_m_sqrt_s: one sigma per axis that a target may wander in a second, growing with the square root
+            of time: what a stale estimate loses.
+        gate: largest squared Mahalanobis distance of a detection that belongs to the target; 13.8 lets
+            one good detection in a thousand go.
+        confirmations: detections that agree before there is a target, or another place for it.
+        wait_s: how long a detection waits for what is needed to place it.
+        max_delay_s: detections older than the estimate by more are left out.
+    """
+
+    centre_vehicle: int = 1
+    heading: Heading = Heading.COURSE
+    mount: Mount = Mount.GIMBAL
+    mount_roll_rad: float = 0.0
+    mount_pitch_rad: float = -0.5 * math.pi
+    mount_yaw_rad: float = 0.0
+    distance: Range = Range.AUTO
+    target_size_m: float = 0.0
+    bearing_sigma_rad: float = 0.003
+    tilt_sigma_rad: float = 0.003
+    size_sigma_rad: float = 0.00064
+    range_sigma: float = 0.05
+    height_sigma_m: float = 1.0
+    yaw_sigma_rad: float = 0.02
+    walk_m_sqrt_s: float = 1.0
+    gate: float = 13.8
+    confirmations: int = 3
+    wait_s: float = 0.5
+    max_delay_s: float = 2.0
+
+    def __post_init__(self) -> None:
+        # zero-argument super() does not reach the base of a dataclass with slots
+        LissajousParameters.__post_init__(self)
+        for name, kind in (("heading", Heading), ("mount", Mount), ("distance", Range)):
+            value = getattr(self, name)
+            if value not in tuple(kind):
+                raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}")
+            object.__setattr__(self, name, kind(value))
+        if not 1 <= self.centre_vehicle <= 255:
+            raise ValueError(f"centre_vehicle {self.centre_vehicle} is not a system id, 1..255")
+        if self.confirmations < 1:
+            raise ValueError(f"confirmations {self.confirmations} is not accepted: 1 or more is")
+        for name in (
+            "bearing_sigma_rad",
+            "tilt_sigma_rad",
+            "size_sigma_rad",
+            "range_sigma",
+            "gate",
+            "wait_s",
+        ):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} {value:g} is not accepted: a number above 0 is")
+        for name in ("target_size_m", "height_sigma_m", "yaw_sigma_rad", "walk_m_sqrt_s", "max_delay_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} {value:g} is not accepted: 0 or a number above it is")
+        for name in ("mount_roll_rad", "mount_pitch_rad", "mount_yaw_rad"):
+            if not math.isfinite(getattr(self, name)):
+                raise ValueError(f"{name} {getattr(self, name)} is not a finite number")
+        if self.distance is Range.SIZE and not self.target_size_m:
+            raise ValueError("distance=size needs target_size_m, the true size of the target")
+        if self.wait_s > self.history_s:
+            raise ValueError(f"wait_s {self.wait_s:g} is more than history_s {self.history_s:g}")
