@@ -58,6 +58,7 @@ class Connection:
         clock: vehicle time; a `TelemetryClock` is fed from the vehicle's timestamps.
         recorder: gets every frame of both directions.
         identity: own system and component id.
+        vehicle_system_id: of the vehicle whose time the clock tells; None: of the first autopilot heard.
 
     Attributes:
         parsers: one for each of the newest peers; their counters account for every byte ever received.
@@ -70,6 +71,7 @@ class Connection:
         recorder: Recorder | None = None,
         *,
         identity: tuple[int, int] = GROUND_STATION,
+        vehicle_system_id: int | None = None,
     ) -> None:
         self.clock = clock
         self.parsers = PeerParsers()
@@ -80,7 +82,7 @@ class Connection:
         self._newest = NewestFrames()
         self._listeners: dict[int, list[Listener]] = {}
         self._observed = clock if isinstance(clock, TelemetryClock) else None
-        self._clock_source: int | None = None
+        self._clock_source = vehicle_system_id
         self._tasks: list[asyncio.Task[None]] = []
         self._watched: list[int] = []
         self._closed = False
@@ -150,7 +152,7 @@ class Connection:
                     listener(frame)
 
     def _observe(self, frame: Frame) -> int:
-        """Set the clock by the first autopilot heard on this connection."""
+        """Set the clock by the vehicle's autopilot."""
         assert self._observed is not None
         if frame.component_id == AUTOPILOT_COMPONENT:
             if self._clock_source is None:
@@ -210,6 +212,11 @@ class Connection:
     ) -> MAVLinkMessage | None:
         """Newest message of a name from one component, or None."""
         return self._newest.latest((system_id, component_id), definition(name).message_id)
+
+    @property
+    def autopilots_heard(self) -> list[int]:
+        """System ids of the autopilots heard on this link, in rising order."""
+        return sorted(s for s, component in self._newest.components if component == AUTOPILOT_COMPONENT)
 
     def keep(self, system_id: int) -> None:
         """Never forget this system's autopilot, however many others are heard."""

@@ -80,6 +80,11 @@ class NewestFrames:
         """Number of components."""
         return len(self._frames)
 
+    @property
+    def components(self) -> list[ComponentId]:
+        """Those that were heard and are not forgotten."""
+        return list(self._frames)
+
     def keep(self, component: ComponentId) -> None:
         """Never forget this component."""
         self._kept.add(component)

@@ -129,15 +129,19 @@ def position(m: Any) -> Position:
     )
 
 
-def local_position(m: Any) -> LocalPosition:
-    """From LOCAL_POSITION_NED."""
+def local_position(m: Any) -> LocalPosition | None:
+    """From LOCAL_POSITION_NED; None when it is no position."""
+    if not math.isfinite(m.x + m.y + m.z + m.vx + m.vy + m.vz):
+        return None
     return LocalPosition(
         time_us=m.time_boot_ms * 1000, pos_ned_m=(m.x, m.y, m.z), vel_ned_m_s=(m.vx, m.vy, m.vz)
     )
 
 
-def attitude(m: Any) -> Attitude:
-    """From ATTITUDE."""
+def attitude(m: Any) -> Attitude | None:
+    """From ATTITUDE; None when its angles are none."""
+    if not math.isfinite(m.roll + m.pitch + m.yaw):
+        return None
     return Attitude(
         time_us=m.time_boot_ms * 1000,
         roll_rad=m.roll,
@@ -147,8 +151,10 @@ def attitude(m: Any) -> Attitude:
     )
 
 
-def air_data(m: Any) -> AirData:
-    """From VFR_HUD."""
+def air_data(m: Any) -> AirData | None:
+    """From VFR_HUD; None when airspeed or climb rate is no number."""
+    if not math.isfinite(m.airspeed + m.climb):
+        return None
     return AirData(airspeed_m_s=m.airspeed, climb_m_s=m.climb, throttle=0.01 * m.throttle)
 
 
@@ -198,7 +204,7 @@ SOURCES: Final[Mapping[type, tuple[str, Callable[[Any], Any]]]] = MappingProxyTy
         MissionProgress: ("MISSION_CURRENT", progress),
     }
 )
-"""Which message each kind of telemetry is made from, and how."""
+"""Which message each kind of telemetry is made from, and how; a message of no use makes None."""
 
 
 class StatusTextAssembler:

@@ -11,6 +11,8 @@ from missions.errors import MissionError, PlanError
 async def together(coroutines: Iterable[Coroutine[Any, Any, None]]) -> None:
     """Run them all; the first failure ends the others, and is the one that is told.
 
+    What else failed before it had ended is not lost: it hangs on the error as notes (PEP 678).
+
     Raises:
         MissionError, PlanError, BridgeError: what the first failure was.
     """
@@ -19,7 +21,14 @@ async def together(coroutines: Iterable[Coroutine[Any, Any, None]]) -> None:
             for coroutine in coroutines:
                 group.create_task(coroutine)
     except* (MissionError, PlanError, BridgeError) as errors:
-        first: BaseException = errors
-        while isinstance(first, BaseExceptionGroup):
-            first = first.exceptions[0]
+        first, *others = _single(errors)
+        for other in others:
+            first.add_note(f"also failed: {other}")
         raise first from None
+
+
+def _single(error: BaseException) -> list[BaseException]:
+    """The errors of a group, and of the groups in it."""
+    if isinstance(error, BaseExceptionGroup):
+        return [single for part in error.exceptions for single in _single(part)]
+    return [error]

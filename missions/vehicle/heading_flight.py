@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import dialect
 from missions import telemetry
-from missions.errors import PlanError
+from missions.errors import MissionError, PlanError
 from missions.piloting.heading import HeadingController, heading_deg
 from missions.vehicle.adapter import Mode
 from missions.vehicle.attitude_pilot import AttitudePilot
@@ -88,9 +88,11 @@ class HeadingFlight:
 
     def setpoint(self, _time_s: float) -> AttitudeSetpoint | None:
         """What is streamed to PX4."""
-        attitude = self._vehicle.latest(telemetry.Attitude)
-        if self._ended or attitude is None:
+        if self._ended:
             return None
+        attitude = self._vehicle.latest(telemetry.Attitude)
+        if attitude is None:
+            raise MissionError(f"the vehicle tells no attitude (ATTITUDE); {self._vehicle.heard()}")
         airspeed = self._pilot.airspeed_true_m_s
         roll = self._controller.roll_rad(
             heading_rad=attitude.yaw_rad,

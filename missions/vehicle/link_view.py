@@ -28,6 +28,7 @@ from missions.vehicle.px4_plane import Px4Plane
 T = TypeVar("T")
 
 _TEXTS_KEPT: Final = 50
+_SOUND_FOR_US: Final = 1_000_000
 ADAPTERS: Final[Mapping[tuple[str, VehicleKind], Callable[[], Adapter]]] = MappingProxyType(
     {
         ("px4", VehicleKind.MULTICOPTER): Px4,
@@ -67,6 +68,7 @@ class VehicleView:
         self._last_ack: Any = None
         self._modes_asked: set[int] = set()  # custom modes asked for since the present `goto` began
         self._heard_us: int | None = None
+        self._sound: dict[type, tuple[Any, int]] = {}  # newest telemetry of use, and when it was looked at
         self.first_heard_us = 0
         self._assembler = StatusTextAssembler()
         self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
@@ -143,12 +145,20 @@ class VehicleView:
         """Newest telemetry of a kind, as `latest(Position)`; None before the first.
 
         Kinds: `Position`, `LocalPosition`, `Attitude`, `AirData`, `Pressure`, `Battery`, `Gps`,
-        `MissionProgress`.
+        `MissionProgress`. A message whose numbers are none (NaN, infinite) is passed over: for a second the
+        one before it stands, then nothing is known.
         """
         name, convert = SOURCES[kind]
         message = self.message(name)
-        value: T | None = None if message is None else convert(message)
-        return value
+        if message is None:
+            return None
+        value: T | None = convert(message)
+        now_us = self.clock.time_us
+        if value is not None:
+            self._sound[kind] = (value, now_us)
+            return value
+        before = self._sound.get(kind)
+        return before[0] if before is not None and now_us - before[1] <= _SOUND_FOR_US else None
 
     def home_or_none(self) -> GeodeticPosition | None:
         """Home as the vehicle reports it, when it has."""
@@ -177,7 +187,9 @@ class VehicleView:
         name, convert = SOURCES[kind]
         with self.messages(name) as stream:
             async for message in stream:
-                yield convert(message)
+                value = convert(message)
+                if value is not None:
+                    yield value
 
     def messages(self, *names: str) -> MessageStream:
         """Stream of the autopilot's messages by name."""

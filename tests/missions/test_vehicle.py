@@ -6,11 +6,24 @@ import math
 
 import pytest
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.clock import LoopClock, TelemetryClock, run
+from autopilot_bridge.links import memory_pair
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mission_plan import MissionItem
+from missions.connection import Connection
 from missions.errors import CommandRejected, MissionError, VehicleTimeout
-from missions.telemetry import Attitude, Battery, LocalPosition, Position, StatusTextAssembler
-from missions.vehicle import Mode, Setpoint
+from missions.telemetry import (
+    Attitude,
+    Battery,
+    LocalPosition,
+    Position,
+    StatusTextAssembler,
+    air_data,
+    attitude,
+    local_position,
+)
+from missions.together import together
+from missions.vehicle import Mode, Setpoint, Vehicle
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
@@ -369,3 +382,91 @@ def test_few_unfinished_texts_are_kept():
         assembler.add(chunk("A" * 50, identity, 0))
     assert len(assembler._parts) == 8
     assert assembler.add(chunk("end", 999, 1)).text == "A" * 50 + "end"
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_none_make_no_telemetry(nothing):
+    for angles in ((nothing, 0.0, 0.0), (0.0, nothing, 0.0), (0.0, 0.0, nothing)):
+        assert attitude(dialect.MAVLink_attitude_message(0, *angles, 0.0, 0.0, 0.0)) is None
+    assert air_data(dialect.MAVLink_vfr_hud_message(nothing, 0.0, 0, 0, 0.0, 0.0)) is None
+    assert air_data(dialect.MAVLink_vfr_hud_message(20.0, 0.0, 0, 0, 0.0, nothing)) is None
+    assert local_position(dialect.MAVLink_local_position_ned_message(0, nothing, 0, 0, 0, 0, 0)) is None
+
+
+def test_an_attitude_that_is_none_is_passed_over_and_then_not_known(flown):
+    async def script(vehicle, autopilot):
+        await vehicle.set_message_rate("ATTITUDE", 25.0)
+        await vehicle.clock.sleep(1.0)
+        before = vehicle.latest(Attitude)
+        autopilot.yaw = math.nan
+        await vehicle.clock.sleep(0.5)
+        stands = vehicle.latest(Attitude)
+        await vehicle.clock.sleep(1.5)
+        gone = vehicle.latest(Attitude)
+        autopilot.yaw = 0.25
+        await vehicle.clock.sleep(0.5)
+        return before, stands, gone, vehicle.latest(Attitude)
+
+    before, stands, gone, again = flown(script)
+    assert math.isfinite(before.yaw_rad)
+    assert stands == before
+    assert gone is None
+    assert again.yaw_rad == pytest.approx(0.25)
+
+
+class TwoOnALink:
+    """Two autopilots that share a link, the second with another clock."""
+
+    def __init__(self, sitl):
+        self.sitl = sitl
+        theirs, ours = memory_pair("mission", "vehicles")
+        self.link = theirs
+        for autopilot in sitl.autopilots:
+            autopilot.link = ours
+        ours.on_receive = self.receive
+
+    def receive(self, data):
+        for autopilot in self.sitl.autopilots:
+            autopilot.receive(data)
+
+
+def test_one_of_several_vehicles_on_a_link_is_chosen_by_its_id(make_sitl):
+    sitl = make_sitl("px4", 2)
+    both_of_them = TwoOnALink(sitl)
+
+    async def main():
+        async with Connection(both_of_them.link, LoopClock(), vehicle_system_id=2) as connection:
+            vehicle = Vehicle(connection, 2)
+            await vehicle.wait_ready()
+            home = vehicle.home
+            return vehicle.system_id, home.lon_deg, connection.autopilots_heard
+
+    system_id, lon_deg, heard = run(main(), sitl.loop)
+    assert system_id == 2
+    assert lon_deg == pytest.approx(sitl.autopilots[1].home.lon_deg, abs=2e-7)
+    assert heard == [1, 2]
+
+
+def test_the_clock_of_a_connection_is_that_of_its_vehicle():
+    clock = TelemetryClock()
+    theirs, ours = memory_pair("mission", "vehicles")
+    connection = Connection(theirs, clock, vehicle_system_id=2)
+
+    async def main():
+        connection.start()
+        for system_id, time_ms in ((1, 500_000), (2, 1_000), (1, 500_100)):
+            message = dialect.MAVLink_attitude_message(time_ms, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            ours.send(FrameEncoder(system_id, 1).encode(message))
+        await connection.close()
+
+    asyncio.run(main())
+    assert clock.vehicle_time_us == 1_000_000
+
+
+def test_what_else_failed_side_by_side_hangs_on_the_first_error():
+    async def fails(text):
+        raise MissionError(text)
+
+    with pytest.raises(MissionError, match="first") as caught:
+        asyncio.run(together([fails("first"), fails("second")]))
+    assert caught.value.__notes__ == ["also failed: second"]
