@@ -48,6 +48,8 @@ class FlightNotes:
         progress: 0..1 of the pattern.
         system_id, autopilot, kind: of the vehicle.
         options: as the vehicle flies them.
+        left: how the vehicle was left when the flight failed or was interrupted; "": it was not.
+        warnings: what the user should know, each once.
         marks: moments and figures that the mission gives a name to, for its own score.
     """
 
@@ -58,8 +60,15 @@ class FlightNotes:
     autopilot: str = ""
     kind: str = ""
     options: MissionOptions | None = None
+    left: str = ""
+    warnings: list[str] = field(default_factory=list)
     marks: dict[str, float] = field(default_factory=dict)
     _open: tuple[str, int] | None = None
+
+    def warn(self, text: str) -> None:
+        """Have the user told something when the flight is over; once, however often it is said."""
+        if text not in self.warnings:
+            self.warnings.append(text)
 
     @property
     def current(self) -> str:

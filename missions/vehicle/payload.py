@@ -20,6 +20,8 @@ GIMBAL_COMPONENT: Final = 154
 SURVEY_MAGNETOMETER_COMPONENT: Final = 158
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 
+_CONTROL_TOLD_US: Final = 3_000_000  # the gimbal manager tells by then who has the control
+
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 _IN_EARTH_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
 _YAW_LOCK: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_LOCK
@@ -98,6 +100,7 @@ class Payload:
 
     def __init__(self, vehicle: "Vehicle") -> None:
         self._vehicle = vehicle
+        self._control_since_us: int | None = None  # when control of the gimbal was asked for
 
     # listening
 
@@ -199,6 +202,7 @@ class Payload:
     def take_gimbal_control(self) -> None:
         """Become the primary control of the gimbal."""
         connection = self._vehicle.connection
+        self._control_since_us = self._vehicle.clock.time_us
         self._command(
             dialect.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
             float(connection.system_id),
@@ -206,6 +210,30 @@ class Payload:
             -1.0,
             -1.0,
         )
+
+    def gimbal_taken_by(self) -> tuple[int, int] | None:
+        """(system, component) of somebody else who has the primary control of the gimbal; None: nobody, or it
+        is not told.
+
+        By GIMBAL_MANAGER_STATUS. The gimbal takes no notice then of what this mission sends it.
+        """
+        vehicle = self._vehicle
+        m = vehicle.connection.latest("GIMBAL_MANAGER_STATUS", vehicle.system_id, GIMBAL_COMPONENT)
+        if m is None or not m.primary_control_sysid:
+            return None
+        other = (int(m.primary_control_sysid), int(m.primary_control_compid))
+        return None if other == (vehicle.connection.system_id, vehicle.connection.component_id) else other
+
+    def _warn_when_taken(self) -> None:
+        since_us = self._control_since_us
+        if since_us is None or self._vehicle.clock.time_us - since_us < _CONTROL_TOLD_US:
+            return
+        other = self.gimbal_taken_by()
+        if other is not None:
+            self._vehicle.notes.warn(
+                f"the gimbal is controlled by system {other[0]}, component {other[1]}: it takes no notice of "
+                "this mission's pointing"
+            )
 
     def set_gimbal_rate(self, rate_hz: float) -> None:
         """Have the gimbal report its attitude at a rate."""
@@ -253,6 +281,7 @@ class Payload:
 
     def _set_pitchyaw(self, pitch: float, yaw: float, pitch_rate: float, yaw_rate: float) -> None:
         vehicle = self._vehicle
+        self._warn_when_taken()
         vehicle.send(
             dialect.MAVLink_gimbal_manager_set_pitchyaw_message(
                 vehicle.system_id, GIMBAL_COMPONENT, _IN_VEHICLE_FRAME, 0, pitch, yaw, pitch_rate, yaw_rate
