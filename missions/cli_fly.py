@@ -1,23 +1,21 @@
 """`flightstack fly`: a mission from one command."""
 
 import importlib
-import math
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from missions.cli_fly_report import ProgressLine, tell
 from missions.cli_types import SPEEDUP
 
 if TYPE_CHECKING:
     from missions.mission import Mission
     from missions.mission_command import MissionCommand
-    from missions.session import Flight, RunResult
-
-_FAILED, _INTERRUPTED = 1, 130
 
 _PATTERNS: Final = "missions.pattern_command"
+_OWN: Final = "missions.own_command"
 _COMMANDS: Final = {
     "lissajous": _PATTERNS,
     "sector": _PATTERNS,
@@ -40,40 +38,6 @@ _EMBEDDED_ONLY: Final = (
 )
 
 
-class _Line:
-    """The progress line on a terminal; nothing in a pipe."""
-
-    def __init__(self) -> None:
-        self._shown = False
-        self._last_wall_s = -math.inf
-
-    def __call__(self, flight: "Flight") -> None:
-        from autopilot_bridge.clock.pacing import wall_time_s
-        from missions.telemetry import Position
-
-        now_s = wall_time_s()
-        if now_s - self._last_wall_s < 0.1 or flight.clock is None:
-            return
-        self._last_wall_s = now_s
-        time_s = flight.clock.time_us * 1e-6
-        factor = time_s / max(now_s - flight.started_wall_s, 1e-3)
-        heard = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
-        mode, height, progress = "waiting", "", 0.0
-        if heard:
-            mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in heard))
-            positions = [vehicle.latest(Position) for vehicle in heard]
-            height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
-            progress = sum(vehicle.notes.progress for vehicle in heard) / len(heard)
-        text = f"{time_s:8.1f} s  x{factor:<6.1f} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
-        click.echo(f"\r{text:<72}", nl=False, err=True)
-        self._shown = True
-
-    def end(self) -> None:
-        """Leave the line."""
-        if self._shown:
-            click.echo("", err=True)
-
-
 def _command_of(module: str) -> "MissionCommand":
     command: MissionCommand = importlib.import_module(module).COMMAND
     return command
@@ -85,7 +49,7 @@ class FlyCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         named = next((a for a in args if a in _COMMANDS or a.endswith(".py")), None)
         if named is not None:
-            ctx.meta["mission command"] = _command_of(_COMMANDS.get(named, _PATTERNS))
+            ctx.meta["mission command"] = _command_of(_COMMANDS.get(named, _OWN))
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
@@ -130,6 +94,13 @@ def _owners(option_name: str) -> list[str]:
     "--connect", multiple=True, metavar="URL", help="A vehicle elsewhere: udpin:0.0.0.0:14550, serial:..."
 )
 @click.option(
+    "--system-id",
+    multiple=True,
+    type=click.IntRange(1, 255),
+    metavar="ID",
+    help="Of the vehicle, where several are on its link; one for each --connect. [default: the first heard]",
+)
+@click.option(
     "--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", help="Of the embedded SITL."
 )
 @click.option(
@@ -147,14 +118,21 @@ def _owners(option_name: str) -> list[str]:
 @click.option("--home", help="lat,lon,alt[,heading] of the embedded SITL. [default: the firmware's own]")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
 @click.option(
-    "--wind", metavar="SPEED[@FROM]", help="m/s, and degrees it comes from. [default: 0; orbit: 4 from north]"
+    "--wind",
+    metavar="SPEED[@FROM]",
+    help="Wind of the day in the embedded SITL, m/s, and degrees it comes from; turns are planned for it, "
+    "unless --expect-wind says otherwise. [default: 0; orbit: 4 from north; occupancy: 5 from west]",
 )
 @click.option(
     "--turbulence",
     type=click.Choice(["none", "light", "moderate", "severe"]),
-    help="[default: none; orbit: light]",
+    help="[default: none; orbit, occupancy: light]",
 )
-@click.option("--expect-wind", type=float, help="Wind to plan turns for, m/s. [default: --wind; elsewhere 5]")
+@click.option(
+    "--expect-wind",
+    type=float,
+    help="Forecast: wind to plan turns for, m/s. [default: --wind where it is given, else 5]",
+)
 @click.option("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
 @click.option(
     "--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params)."
@@ -162,6 +140,12 @@ def _owners(option_name: str) -> list[str]:
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
 @click.option(
     "--on-failure", type=click.Choice(["return", "land", "hold"]), default="return", help="Or on Ctrl-C."
+)
+@click.option(
+    "--max-error",
+    type=float,
+    metavar="M",
+    help="Fail when the path error exceeds it anywhere in a pattern, m.",
 )
 @click.option(
     "--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS."
@@ -221,7 +205,12 @@ def _models(
     given: tuple[str, ...], mission: "Mission[Any]", vehicles: int | None, connections: int
 ) -> list[str]:
     """A model for each vehicle."""
-    models = [name for text in given for name in text.split(",") if name] or [mission.world_defaults.model]
+    models = [name.strip() for text in given for name in text.split(",")]
+    if not all(models):
+        raise click.UsageError(
+            f"--model {','.join(given)!r} has a place without a name; give NAME, or NAME,NAME,... for a team"
+        )
+    models = models or [mission.world_defaults.model]
     count = vehicles or max(1, connections, len(models))
     return models * count if len(models) == 1 else models
 
@@ -242,7 +231,14 @@ def _fly(given: dict[str, Any]) -> int:
     options = declared.build(given, common)
     world = mission.world_defaults
     wind_speed_m_s, wind_from_deg = parse_wind(world.wind if given["wind"] is None else given["wind"])
-    check_positive(expect_wind=given["expect_wind"] or None)
+    check_positive(expect_wind=given["expect_wind"] or None, max_error=given["max_error"])
+    if given["system_id"] and len(given["system_id"]) != len(given["connect"]):
+        raise click.UsageError(
+            f"{len(given['system_id'])} --system-id for {len(given['connect'])} --connect; give one for each"
+        )
+    forecast_m_s = given["expect_wind"]
+    if forecast_m_s is None and given["wind"] is not None:
+        forecast_m_s = wind_speed_m_s
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
         raise click.UsageError(
@@ -258,13 +254,14 @@ def _fly(given: dict[str, Any]) -> int:
     from missions.session import fly as fly_mission
     from missions.vehicle.adapter import Mode
 
-    line = _Line()
+    line = ProgressLine()
     try:
         result = fly_mission(
             mission,
             RunRequest(
                 options=options,
                 connect=given["connect"],
+                system_ids=given["system_id"],
                 autopilot=given["autopilot"],
                 model=models,
                 launch=given["launch"],
@@ -273,13 +270,14 @@ def _fly(given: dict[str, Any]) -> int:
                 wind_speed_m_s=wind_speed_m_s,
                 wind_from_deg=wind_from_deg,
                 turbulence=given["turbulence"] or world.turbulence,
-                expected_wind_m_s=given["expect_wind"],
+                expected_wind_m_s=forecast_m_s,
                 home=given["home"],
                 parameters=parameters,
                 out=given["out"],
                 picture=not given["no_picture"],
                 identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
                 on_failure=Mode(given["on_failure"]),
+                max_error_m=given["max_error"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),
             ),
             line if terminal else None,
@@ -288,34 +286,4 @@ def _fly(given: dict[str, Any]) -> int:
         raise click.UsageError(str(error)) from error
     finally:
         line.end()
-    return _tell(result, mission)
-
-
-def _tell(result: "RunResult", mission: "Mission[Any]") -> int:
-    summary = result.summary
-    if result.outcome == "interrupted":
-        click.echo(f"flightstack: interrupted; the log is in {result.folder}", err=True)
-        return _INTERRUPTED
-    if result.outcome == "failed":
-        click.echo(f"flightstack: mission {summary['mission']} failed: {result.reason}", err=True)
-        click.echo(f"failed: see {result.folder}")
-        return _FAILED
-    click.echo(
-        f"{result.outcome}: {summary['mission']} with {summary['autopilot']}, "
-        f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, "
-        f"{summary['speedup']:.0f} times real time"
-    )
-    if summary["path_rms_error_m"] is not None:
-        reference = summary["vehicles"][0]["error_reference"]
-        click.echo(
-            f"path error {summary['path_rms_error_m']:.2f} m RMS, "
-            f"{summary['path_max_error_m']:.2f} m at most ({reference})"
-        )
-    for block in summary["vehicles"]:
-        if "waypoints" in block:
-            w = block["waypoints"]
-            click.echo(f"waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}")
-    for told in mission.said(summary):
-        click.echo(told)
-    click.echo(f"run: {result.folder}")
-    return 0
+    return tell(result, mission)

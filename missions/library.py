@@ -28,7 +28,13 @@ from missions.patterns import (
 )
 from missions.patterns.lissajous import reduced_ratio
 from missions.planning.limits import FixedWingLimits, Limits
-from missions.planning.sizing import curve_side_m, legs_side_m, sector_side_m, spacing_within_m
+from missions.planning.sizing import (
+    curve_side_m,
+    legs_side_m,
+    sector_side_m,
+    spacing_for_turns_m,
+    spacing_within_m,
+)
 from missions.vehicle.vehicle import Vehicle
 
 CurveMaker = Callable[[FlightOptions], Curve]
@@ -208,11 +214,26 @@ def _sweep_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOption
     """A sweep makes its spacing smaller until it parts the side: the one is chosen by the other."""
     if options.chosen("width_m") or options.chosen("height_m"):
         short_m = min(options.width_m, options.height_m)
+        # tracks as long as they are apart, and half their distance beyond at either end
+        _require_room(options, max(options.width_m, options.height_m), 2.0, limits)
         return options.unless_chosen(spacing_m=spacing_within_m(short_m, options.speed_m_s, limits))
     return _square_size(options, limits)
 
 
-def _square_size(options: FlightOptions, _limits: FixedWingLimits) -> FlightOptions:
+def _require_room(options: FlightOptions, side_m: float, spacings: float, limits: FixedWingLimits) -> None:
+    """Refuse a chosen side that has no room for the track spacing the aircraft's turns need."""
+    spacing_m = spacing_for_turns_m(options.speed_m_s, limits)
+    if not options.chosen("spacing_m") and side_m < spacings * spacing_m:
+        raise PlanError(
+            f"--size {side_m:g} m has no room for the aircraft's turns: at {options.speed_m_s:g} m/s in "
+            f"{limits.wind_m_s:g} m/s of wind tracks must be {spacing_m:g} m apart; ask for "
+            f"--size {spacings * spacing_m:g} or more, or less --speed"
+        )
+
+
+def _square_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOptions:
+    if options.chosen("width_m") or options.chosen("height_m"):
+        _require_room(options, min(options.width_m, options.height_m), 1.0, limits)
     side_m = legs_side_m(options.spacing_m)
     return options.unless_chosen(width_m=side_m, height_m=side_m)
 

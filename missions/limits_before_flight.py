@@ -1,5 +1,6 @@
-"""What can be refused before a vehicle was heard."""
+"""What can be refused before a vehicle was heard, and options as one vehicle flies them."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,10 +14,10 @@ from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, Fi
 from missions.request import RunRequest
 from missions.vehicle.link_view import ADAPTERS
 
-
-def in_wind(limits: Limits, wind_m_s: float) -> Limits:
-    """Limits of a vehicle in a wind."""
-    return replace(limits, wind_m_s=wind_m_s) if isinstance(limits, FixedWingLimits) else limits
+_WIDEST: Mapping[VehicleKind, Limits] = {
+    VehicleKind.MULTICOPTER: WIDEST_LIMITS,
+    VehicleKind.FIXED_WING: WIDEST_FIXED_WING_LIMITS,
+}
 
 
 def vehicle_options(options: MissionOptions, index: int) -> MissionOptions:
@@ -24,8 +25,33 @@ def vehicle_options(options: MissionOptions, index: int) -> MissionOptions:
     return replace(options, index=index)
 
 
+def adapted(
+    mission: Mission[Any], options: MissionOptions, limits: Limits, ground_alt_m: float
+) -> tuple[MissionOptions, Limits]:
+    """The options as one vehicle flies them, and its limits where it then flies.
+
+    Args:
+        mission: what is flown.
+        options: of this vehicle.
+        limits: of this vehicle.
+        ground_alt_m: of its home, above mean sea level.
+    """
+    if not isinstance(limits, FixedWingLimits):
+        return mission.adapted(options, limits), limits
+    limits = _at(limits, ground_alt_m + options.own_altitude_m)
+    limits = _at(limits, ground_alt_m + mission.adapted(options, limits).own_altitude_m)
+    return mission.adapted(options, limits), limits
+
+
+def _at(limits: FixedWingLimits, alt_m: float) -> FixedWingLimits:
+    return replace(limits, air_altitude_m=alt_m if math.isfinite(alt_m) else 0.0)
+
+
 def check_request(mission: Mission[Any], request: RunRequest) -> None:
     """Refuse what no vehicle of the kind could fly, before anything is started.
+
+    What is refused for any aircraft is refused with the limits of the one that was asked for, so that the
+    advice is right the first time.
 
     Raises:
         PlanError: says what, and which option to change.
@@ -37,35 +63,76 @@ def check_request(mission: Mission[Any], request: RunRequest) -> None:
         )
     for index in range(request.options.vehicles):
         own = vehicle_options(request.options, index)
-        if not request.connect:
-            _check(mission, request, own, _kind_limits(request, request.models[index]))
+        if request.connect:
+            _check_any(mission, request, own)
             continue
-        try:  # of a vehicle elsewhere even the kind is not known yet
-            _check(mission, request, own, WIDEST_LIMITS)
-        except PlanError as refusal:
-            try:
-                _check(mission, request, own, WIDEST_FIXED_WING_LIMITS)
-            except PlanError:
-                raise refusal from None
+        limits = _kind_limits(request, request.models[index])
+        try:
+            mission.check(mission.adapted(own, limits), limits)
+        except PlanError:
+            if isinstance(limits, FixedWingLimits):
+                _check_aircraft(mission, request, index)
+            raise
 
 
 def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> None:
-    """The same for aircraft, with the parameters that came with each embedded one."""
-    if stage.parameters is None:
+    """Refuse what the vehicles of an embedded world can't fly: their parameters and their place are known."""
+    if stage.parameters is None or stage.home is None:
         return
     for index, model in enumerate(request.models):
-        if _kind(model) is not VehicleKind.FIXED_WING:
-            continue
-        adapter = ADAPTERS[request.autopilot, VehicleKind.FIXED_WING]()
+        adapter = ADAPTERS[request.autopilot, _kind(model)]()
         limits = adapter.limits(stage.parameters(index, list(adapter.limiting_parameters)))
-        _check(mission, request, vehicle_options(request.options, index), limits)
+        mission.check_place(
+            _check_with(mission, request, index, limits, stage.home.alt_m), limits, stage.home
+        )
 
 
-def _check(mission: Mission[Any], request: RunRequest, options: MissionOptions, limits: Limits) -> None:
-    # the widest limits' airspeed is nobody's: what wind is too much, each aircraft's own say
-    if limits is not WIDEST_FIXED_WING_LIMITS:
-        limits = in_wind(limits, request.planning_wind_m_s)
-    mission.check(mission.adapted(options, limits), limits)
+def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> None:
+    """Refuse with the limits of one embedded aircraft alone, without the world that the mission needs."""
+    from missions.embedded import EmbeddedConfiguration, open_embedded
+
+    try:
+        sitl = open_embedded(
+            EmbeddedConfiguration(
+                model=request.models[index],
+                flavour=request.autopilot,
+                parameters=request.parameters,
+                home=request.home,
+            )
+        )
+    except ValueError as error:
+        raise PlanError(str(error)) from error
+    adapter = ADAPTERS[request.autopilot, VehicleKind.FIXED_WING]()
+    limits = adapter.limits(sitl.parameters(0, list(adapter.limiting_parameters)))
+    ground_alt_m = sitl.home.alt_m
+    sitl.close()
+    sitl.loop.close()
+    _check_with(mission, request, index, limits, ground_alt_m)
+
+
+def _check_with(
+    mission: Mission[Any], request: RunRequest, index: int, limits: Limits, ground_alt_m: float
+) -> MissionOptions:
+    """Check one vehicle with its own limits; gives its options."""
+    if isinstance(limits, FixedWingLimits):
+        limits = replace(limits, wind_m_s=request.planning_wind_m_s)
+    own, limits = adapted(mission, vehicle_options(request.options, index), limits, ground_alt_m)
+    mission.check(own, limits)
+    return own
+
+
+def _check_any(mission: Mission[Any], request: RunRequest, options: MissionOptions) -> None:
+    """Of a vehicle elsewhere even the kind is not known yet: refuse what none could fly."""
+    refusals = []
+    for kind in mission.kinds:
+        limits = _WIDEST[kind]
+        try:  # the widest limits' airspeed is nobody's: what wind is too much, each aircraft's own say
+            mission.check(mission.adapted(options, limits), limits)
+        except PlanError as refusal:
+            refusals.append(refusal)
+        else:
+            return
+    raise PlanError(f"{refusals[0]} (that is for any vehicle; the limits of this one may ask for more)")
 
 
 def _kind(model: str) -> VehicleKind:
@@ -80,10 +147,10 @@ def _kind(model: str) -> VehicleKind:
 def _kind_limits(request: RunRequest, model: str) -> Limits:
     """By the firmware's defaults and the parameters given; an aircraft's own come with the aircraft."""
     kind = _kind(model)
-    if (request.autopilot, kind) not in ADAPTERS:
-        return WIDEST_LIMITS
     if kind is VehicleKind.FIXED_WING:
         return WIDEST_FIXED_WING_LIMITS
+    if (request.autopilot, kind) not in ADAPTERS:
+        return WIDEST_LIMITS
     adapter = ADAPTERS[request.autopilot, kind]()
     given: Mapping[str, float] = request.parameters
     names: Sequence[str] = list(adapter.limiting_parameters)

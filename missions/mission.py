@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from missions.errors import PlanError
+from missions.kind import VehicleKind
 from missions.options import MissionOptions
 from missions.planning.limits import Limits
 from missions.scenario import Scenario, Setting
@@ -12,6 +13,7 @@ from missions.scenario import Scenario, Setting
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from autopilot_bridge.geodesy import GeodeticPosition
     from missions.notes import FlightNotes
     from missions.records import FlightRecords
     from missions.score import FlightScore
@@ -56,11 +58,13 @@ class Mission(Generic[AnyOptions]):
     Attributes:
         name: for people and file names.
         world_defaults: the world it is flown in.
+        kinds: of vehicles that can fly it, the usual one first.
         together: the vehicles of a team are flown by one `fly_team`, not each by a `fly`.
     """
 
     name: str = "mission"
     world_defaults = WorldDefaults()
+    kinds: tuple[VehicleKind, ...] = (VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING)
     together = False
 
     def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:
@@ -71,6 +75,12 @@ class Mission(Generic[AnyOptions]):
         """Refuse, with a PlanError, what one vehicle can't fly.
 
         Before anything is started, and again when its own limits are known.
+        """
+
+    def check_place(self, options: AnyOptions, limits: Limits, home: "GeodeticPosition") -> None:
+        """Refuse, with a PlanError, what one vehicle can't fly from its home; before it takes off.
+
+        Called for embedded vehicles, whose home is known; for others the mission itself does it.
         """
 
     def scenario(self, options: AnyOptions, setting: Setting) -> Scenario:

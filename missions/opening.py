@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
+from autopilot_bridge.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.mission import Mission
 from missions.request import RunRequest
@@ -28,6 +29,7 @@ class Stage:
         time_us: vehicle time.
         on_truth: have frames of truth delivered.
         parameters: those of one vehicle (index, names), without asking it; None: it must be asked.
+        home: of an embedded world; None: the vehicles tell theirs.
         close: when all is done.
     """
 
@@ -38,6 +40,7 @@ class Stage:
     time_us: Callable[[], int]
     on_truth: Callable[[Callable[[int, bytes], None]], None]
     parameters: Callable[[int, Sequence[str]], dict[str, float]] | None
+    home: GeodeticPosition | None
     close: Callable[[], None]
 
 
@@ -77,6 +80,7 @@ def open_world(mission: Mission[Any], request: RunRequest, folder: Path) -> Stag
         time_us=lambda: sitl.time_us,
         on_truth=sitl.on_truth,
         parameters=sitl.parameters,
+        home=sitl.home,
         close=sitl.close,
     )
 
@@ -115,5 +119,6 @@ def open_vehicles(request: RunRequest) -> Stage:
         time_us=lambda: max(clock.time_us for clock in clocks),
         on_truth=lambda _listener: None,
         parameters=None,
+        home=None,
         close=close,
     )

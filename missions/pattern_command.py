@@ -1,4 +1,4 @@
-"""The search patterns on the command line; a mission file of a user's own takes the same options."""
+"""The search patterns on the command line."""
 
 import math
 from collections.abc import Mapping

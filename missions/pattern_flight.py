@@ -44,6 +44,7 @@ def check_pattern(curve: Curve, options: FlightOptions, limits: Limits) -> None:
     if isinstance(limits, FixedWingLimits):
         check_wings(curve, options, limits)
     else:
+        limits.check_separation(options.separation_m, options.vehicles)
         plan_pattern(curve, options, limits)
 
 
@@ -88,7 +89,7 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
         PlanError: the vehicle's parameters don't allow the pattern.
         MissionError: the flight went wrong.
     """
-    limits = await vehicle.limits()
+    limits = await vehicle.limits(options.own_altitude_m)
     if isinstance(limits, FixedWingLimits):
         await fly_pattern_with_wings(vehicle, options, curve, limits)
         return

@@ -3,14 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
 
 from missions.connection import GROUND_STATION
 from missions.options import FlightOptions, MissionOptions
+from missions.planning.limits import FORECAST_WIND_M_S
 from missions.vehicle.adapter import Mode
-
-ELSEWHERE_WIND_M_S: Final = 5.0
-"""Wind to plan turns for where nobody knows it: a fresh day."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,20 +17,24 @@ class RunRequest:
     Attributes:
         options: what the mission is to do.
         connect: connection strings, one per vehicle; empty: an embedded SITL.
+        system_ids: of the vehicles, one per connection; empty: the first heard on each.
         autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, turbulence, home: of the embedded SITL.
         model: its vehicle: of all of a team, or one for each.
         launch: how its aircraft get into the air: "runway", "catapult", "hand"; None: as described with them.
-        expected_wind_m_s: to plan turns for; None: the embedded SITL's, or 5 m/s for vehicles elsewhere.
+        expected_wind_m_s: forecast, to plan turns for; None: 5 m/s. What blows in an embedded SITL is not
+            looked at: a mission plans the same for vehicles there and elsewhere.
         parameters: autopilot parameters to set before the flight.
         out: run folder; None: the next `runs/<mission>-<n>`.
         picture: whether to draw `track.png`.
         identity: MAVLink system and component id of the mission.
         on_failure: what the vehicle is told when the mission fails or is interrupted.
+        max_error_m: a check: the run has failed when the path error exceeds it; None: no check.
         command: the command line, for the summary.
     """
 
     options: MissionOptions = field(default_factory=FlightOptions)
     connect: Sequence[str] = ()
+    system_ids: Sequence[int] = ()
     autopilot: str = "px4"
     model: str | Sequence[str] = "iris"
     launch: str | None = None
@@ -49,6 +50,7 @@ class RunRequest:
     picture: bool = True
     identity: tuple[int, int] = GROUND_STATION
     on_failure: Mode = Mode.RETURN
+    max_error_m: float | None = None
     command: str = ""
 
     @property
@@ -61,6 +63,4 @@ class RunRequest:
     @property
     def planning_wind_m_s(self) -> float:
         """Wind that turns are planned for."""
-        if self.expected_wind_m_s is not None:
-            return self.expected_wind_m_s
-        return ELSEWHERE_WIND_M_S if self.connect else self.wind_speed_m_s
+        return FORECAST_WIND_M_S if self.expected_wind_m_s is None else self.expected_wind_m_s

@@ -83,6 +83,31 @@ def _rounded(value: float | None, digits: int = 4) -> float | None:
     return None if value is None or not math.isfinite(value) else round(value, digits)
 
 
+WITHIN: Final = "within the acceptance radius"
+POOR: Final = "poor"
+
+
+def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
+    """How a commanded path was followed: everywhere within the acceptance radius, or not; None: not measured.
+
+    The radius within which a waypoint counts as reached is what the user gave away: who is farther off the
+    path than that has not flown it, though the vehicle may have gone on to its end.
+    """
+    if notes.commanded is None or score.path_max_error_m is None:
+        return None
+    return WITHIN if score.path_max_error_m <= notes.commanded.acceptance_m else POOR
+
+
+def how_left(blocks: Sequence[Mapping[str, Any]]) -> str:
+    """What was done with the vehicles of a flight that was broken off; "" if nothing had to be."""
+    told = [(block["system_id"], block["left"]) for block in blocks if block["left"]]
+    if not told:
+        return ""
+    if len(blocks) == 1:
+        return f"the vehicle {told[0][1]}"
+    return ", ".join(f"vehicle {system_id} {left}" for system_id, left in told)
+
+
 def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
     """The figures of one vehicle's flight."""
     block: dict[str, Any] = {
@@ -97,6 +122,10 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
         "path_rms_error_estimate_m": _rounded(score.path_rms_error_estimate_m),
         "max_attitude_error_deg": _rounded(score.max_attitude_error_deg),
         "max_attitude_tracking_error_deg": _rounded(score.max_attitude_tracking_error_deg),
+        "acceptance_m": None if notes.commanded is None else round(notes.commanded.acceptance_m, 3),
+        "tracking": tracking(notes, score),
+        "left": notes.left,
+        "warnings": list(notes.warnings),
         "messages_not_finite": score.messages_not_finite,
         "progress": _rounded(notes.progress),
         "phases": [

@@ -17,7 +17,7 @@ from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.tlog import TlogWriter
 from missions.connection import Connection
 from missions.errors import MissionError, PlanError
-from missions.limits_before_flight import check_request, check_stage, in_wind, vehicle_options
+from missions.limits_before_flight import adapted, check_request, check_stage, vehicle_options
 from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
 from missions.opening import Stage, open_vehicles, open_world
@@ -29,6 +29,7 @@ from missions.run import (
     PICTURE_NAME,
     RUNS,
     create_run_folder,
+    how_left,
     team_figures,
     vehicle_summary,
     versions,
@@ -121,16 +122,22 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
             try:
                 run(_fly(mission, request, stage, recorder, flight, on_progress), stage.loop)
             except KeyboardInterrupt:
-                outcome, reason = INTERRUPTED, "interrupted"
+                outcome, reason = INTERRUPTED, INTERRUPTED
             except (MissionError, PlanError, BridgeError) as error:
-                outcome, reason = FAILED, str(error)
+                outcome, reason = FAILED, "; ".join((str(error), *getattr(error, "__notes__", ())))
     finally:
         stage.close()
         stage.loop.close()
     sim_time_s = max(0, stage.time_us() - flight.started_us) * 1e-6
     wall_s = wall_time_s() - flight.started_wall_s
     debriefing = _debrief(mission, request, recorder.records, flight)
-    summary = _summary(mission, request, debriefing, outcome, reason, sim_time_s, wall_s)
+    blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
+    if outcome == COMPLETED:
+        reason = _missed_check(request, blocks)
+        outcome = FAILED if reason else COMPLETED
+    elif outcome == INTERRUPTED and how_left(blocks):
+        reason = f"{INTERRUPTED}; {how_left(blocks)}"
+    summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
     write_summary(folder, summary)
     if request.picture and debriefing.flights:
         mission.draw(folder / PICTURE_NAME, _title(mission, debriefing, summary), debriefing)
@@ -164,10 +171,13 @@ async def _fly(
     on_progress: ProgressListener | None,
 ) -> None:
     async with AsyncExitStack() as stack:
-        for link, clock in zip(stage.links, stage.clocks, strict=True):
-            connection = Connection(link, clock, recorder, identity=request.identity)
+        system_ids: Sequence[int | None] = request.system_ids or [None] * len(stage.links)
+        for link, clock, system_id in zip(stage.links, stage.clocks, system_ids, strict=True):
+            connection = Connection(
+                link, clock, recorder, identity=request.identity, vehicle_system_id=system_id
+            )
             await stack.enter_async_context(connection)
-            flight.vehicles.append(Vehicle(connection))
+            flight.vehicles.append(Vehicle(connection, system_id))
         flight.clock = stage.clocks[0]
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
@@ -181,11 +191,17 @@ async def _fly(
 
 
 async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
+    wanted = request.system_ids[flight.vehicles.index(vehicle)] if request.system_ids else None
     try:
         await vehicle.wait_heartbeat()
     except MissionError as error:
         where = f" on {', '.join(request.connect)}" if request.connect else ""
-        raise MissionError(f"no vehicle was heard{where}: {error}; is it on, and sending there?") from error
+        which = "" if wanted is None else f" with system id {wanted}"
+        others = ", ".join(map(str, vehicle.connection.autopilots_heard))
+        heard = f" (heard: vehicle {others})" if others else ""
+        raise MissionError(
+            f"no vehicle{which} was heard{where}{heard}: {error}; is it on, and sending there?"
+        ) from error
     vehicle.notes.system_id = vehicle.system_id
     vehicle.notes.autopilot = vehicle.autopilot
     vehicle.notes.kind = str(vehicle.kind)
@@ -200,8 +216,10 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
     centre = vehicles[0].home if len(vehicles) > 1 else request.options.centre
     options: list[MissionOptions] = []
     for index, vehicle in enumerate(vehicles):
-        limits = in_wind(await vehicle.limits(), request.planning_wind_m_s)
-        own = mission.adapted(replace(vehicle_options(request.options, index), centre=centre), limits)
+        vehicle.forecast_wind_m_s = request.planning_wind_m_s
+        limits, home = await vehicle.limits(), vehicle.home
+        asked = replace(vehicle_options(request.options, index), centre=centre)
+        own, _ = adapted(mission, asked, limits, home.alt_m)
         options.append(own)
         vehicle.notes.options = own
     if not mission.together:
@@ -247,16 +265,33 @@ def _debrief(
     return Debriefing(records=records, flights=flights, options=options)
 
 
+def _missed_check(request: RunRequest, blocks: list[dict[str, Any]]) -> str:
+    """The check that a completed flight has missed, in words; "" if none."""
+    most_m = request.max_error_m
+    for block in blocks:
+        error_m = block["path_max_error_m"]
+        if most_m is None:
+            break
+        if error_m is None:
+            return f"vehicle {block['system_id']} flew no path whose error --max-error could limit"
+        if error_m > most_m:
+            return (
+                f"the path error of vehicle {block['system_id']} was {error_m:.2f} m at most, more than "
+                f"--max-error {most_m:g} m"
+            )
+    return ""
+
+
 def _summary(
     mission: Mission[Any],
     request: RunRequest,
     debriefing: Debriefing,
+    blocks: list[dict[str, Any]],
     outcome: str,
     reason: str,
     sim_time_s: float,
     wall_time: float,
 ) -> dict[str, Any]:
-    blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     notes = [n for n, _ in debriefing.flights]
     options = {
         key: str(value) if isinstance(value, StrEnum) else value
@@ -285,6 +320,7 @@ def _summary(
         "connect": list(request.connect),
         "command": request.command,
     }
+    summary["planned_wind_m_s"] = request.planning_wind_m_s
     if not remote:
         summary["wind"] = {
             "speed_m_s": request.wind_speed_m_s,

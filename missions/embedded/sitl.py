@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from autopilot_bridge.clock import VirtualTimeLoop
+from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.links import Link
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, parse_home, team
 from autopilot_bridge.sitl.configuration import HOMES
@@ -107,6 +108,12 @@ class EmbeddedSitl:
         """Parameters of a vehicle's autopilot, as it would tell them; those it doesn't have are left out."""
         store = self.sitl.vehicles[index].autopilot.parameters
         return {name: store.get(name) for name in names if name in store}
+
+    @property
+    def home(self) -> GeodeticPosition:
+        """Where the vehicles stand."""
+        place = self.sitl.configuration.place
+        return GeodeticPosition(lat_deg=place.lat_deg, lon_deg=place.lon_deg, alt_m=place.alt_m)
 
     @property
     def time_us(self) -> int:

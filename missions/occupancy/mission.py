@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from autopilot_bridge.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.mission import Debriefing, Mission, WorldDefaults
-from missions.occupancy.options import OccupancyOptions, check_vehicle
+from missions.occupancy.options import OccupancyOptions, check_reach, check_vehicle
 from missions.occupancy.survey_map import load_survey_map
 from missions.occupancy.team import SearchTeam
 from missions.planning.limits import Limits
@@ -79,6 +80,10 @@ class OccupancyMission(Mission[OccupancyOptions]):
                 east_m=layout.east_m,
                 what=f"the searched area (--size {options.width_m:g}x{options.height_m:g})",
             )
+
+    def check_place(self, options: OccupancyOptions, limits: Limits, home: GeodeticPosition) -> None:
+        if options.map_file is not None:  # one that is made is made around home
+            check_reach(options, limits, load_survey_map(Path(options.map_file)).frame(), home)
 
     def scenario(self, options: OccupancyOptions, setting: Setting) -> Scenario:
         """A magnetic map with a target in it; both from the seed where nobody gave them."""

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters
 from missions.occupancy.detection import DetectionModel
@@ -40,7 +41,6 @@ class OccupancyOptions(MissionOptions):
         raise_radius_m: scores are raised within this distance of an anomaly.
         search_time_s: the search is given up after this time.
         speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: by the vehicle.
-        planned_wind_m_s: wind that the turns of an aircraft are planned for.
         map_file: published magnetic map; None: the embedded world makes one from its seed.
         target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle what
             the result is compared with.
@@ -63,7 +63,6 @@ class OccupancyOptions(MissionOptions):
     raise_radius_m: float = 300.0
     search_time_s: float = 900.0
     speed_m_s: float | None = None
-    planned_wind_m_s: float = 0.0
     map_file: str | None = None
     target_ne_m: tuple[float, float] | None = None
     amplitude_nt: float = 30.0
@@ -143,15 +142,14 @@ class OccupancyOptions(MissionOptions):
     def for_vehicle(self, limits: Limits) -> "OccupancyOptions":
         """The same options with the habits and the speed of a kind of vehicle, where nobody chose them."""
         if isinstance(limits, FixedWingLimits):
-            penalty, speed_m_s, wind_m_s = _PENALTY_OF_WINGS, limits.airspeed_trim_m_s, limits.wind_m_s
+            penalty, speed_m_s = _PENALTY_OF_WINGS, limits.airspeed_trim_m_s
         else:
-            penalty, wind_m_s = _PENALTY_OF_MULTICOPTERS, 0.0
+            penalty = _PENALTY_OF_MULTICOPTERS
             speed_m_s = min(_MULTICOPTER_M_S, _SHARE_OF_SPEED * limits.speed_m_s)
         return replace(
             self,
             heading_penalty=penalty if self.heading_penalty is None else self.heading_penalty,
             speed_m_s=speed_m_s if self.speed_m_s is None else self.speed_m_s,
-            planned_wind_m_s=wind_m_s,
         )
 
 
@@ -165,6 +163,7 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
     Raises:
         PlanError: it names the option to change.
     """
+    limits.check_separation(options.separation_m, options.vehicles)
     limits.check_altitude(options.own_altitude_m)
     north_m, east_m = options.area_ne_m
     reach_m = math.hypot(abs(north_m) + 0.5 * options.height_m, abs(east_m) + 0.5 * options.width_m)
@@ -188,4 +187,31 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
             f"{radius_m:.0f} m at {speed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind: the cells beside it "
             f"are out of reach; ask for --cell {larger_m:g} or more, a larger --neighbourhood, or less "
             "--speed"
+        )
+
+
+def check_reach(options: OccupancyOptions, limits: Limits, frame: LocalFrame, home: GeodeticPosition) -> None:
+    """Refuse an area too far from where a vehicle stands.
+
+    Args:
+        options: of the vehicle.
+        limits: of the vehicle.
+        frame: of the map.
+        home: of the vehicle.
+
+    Raises:
+        PlanError: says how far it is, and what to change.
+    """
+    north_m, east_m, _ = frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
+    layout = options.layout
+    farthest_m = max(
+        math.hypot(edge_n_m - north_m, edge_e_m - east_m)
+        for edge_n_m in (layout.south_m, layout.north_m)
+        for edge_e_m in (layout.west_m, layout.east_m)
+    )
+    if not farthest_m <= limits.reach_m:
+        raise PlanError(
+            f"the searched area reaches {farthest_m:.0f} m from the vehicle's home, which is at north "
+            f"{north_m:.0f} m, east {east_m:.0f} m of the map's home; accepted: up to {limits.reach_m:g} m. "
+            "Choose --area, a smaller --size, or the map of this place"
         )

@@ -5,18 +5,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
-from missions.errors import MissionError, PlanError
+from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.occupancy.detection import Anomaly, AnomalyDetector
 from missions.occupancy.field_watch import FieldWatch, PlacedReading
 from missions.occupancy.noise_check import require_quiet
-from missions.occupancy.options import OccupancyOptions, check_vehicle
+from missions.occupancy.options import OccupancyOptions, check_reach, check_vehicle
 from missions.occupancy.pilot import Motion, Pilot
 from missions.occupancy.search import Search
 from missions.occupancy.steering import Steering, steering
 from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
-from missions.planning.limits import FixedWingLimits
 from missions.telemetry import Attitude, Position
 from missions.together import together
 from missions.vehicle.adapter import Mode
@@ -150,25 +149,9 @@ class SearchTeam:
 
     async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
         """What can only be refused when the vehicle is heard, and still stands on the ground."""
-        north_m, east_m, _ = self._frame.ned_from_geodetic(
-            vehicle.home.lat_deg, vehicle.home.lon_deg, vehicle.home.alt_m
-        )
-        limits = await vehicle.limits()
-        if isinstance(limits, FixedWingLimits):
-            limits = replace(limits, wind_m_s=own.planned_wind_m_s)
+        limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
-        layout = self.search.map.layout
-        farthest_m = max(
-            math.hypot(edge_n_m - north_m, edge_e_m - east_m)
-            for edge_n_m in (layout.south_m, layout.north_m)
-            for edge_e_m in (layout.west_m, layout.east_m)
-        )
-        if not farthest_m <= limits.reach_m:
-            raise PlanError(
-                f"the searched area reaches {farthest_m:.0f} m from vehicle {vehicle.system_id}, which "
-                f"stands at north {north_m:.0f} m, east {east_m:.0f} m of the map's home; accepted: up to "
-                f"{limits.reach_m:g} m. Choose --area, a smaller --size, or the map of this place"
-            )
+        check_reach(own, limits, self._frame, vehicle.home)
         await vehicle.payload.require(SURVEY_MAGNETOMETER_COMPONENT)
         await require_quiet(vehicle, threshold_nt=own.threshold_nt)
         if vehicle.kind is VehicleKind.FIXED_WING:

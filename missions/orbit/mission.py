@@ -5,12 +5,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from statistics import fmean, pstdev
 from typing import Any, Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import decode, dialect
 from missions import telemetry
 from missions.errors import MissionError, PlanError
+from missions.kind import VehicleKind
 from missions.mission import Debriefing, Mission, WorldDefaults
 from missions.orbit.attitude import AutopilotAttitude
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
@@ -46,6 +48,7 @@ class OrbitMission(Mission[OrbitOptions]):
     """`flightstack fly orbit`: paper 004, section IV."""
 
     name = "orbit"
+    kinds = (VehicleKind.FIXED_WING,)
     world_defaults = WorldDefaults(model="aerosonde", wind="4", turbulence="light")
 
     def check(self, options: OrbitOptions, limits: Limits) -> None:
@@ -73,7 +76,7 @@ class OrbitMission(Mission[OrbitOptions]):
         )
 
     async def fly(self, vehicle: Vehicle, options: OrbitOptions) -> None:
-        limits = await vehicle.limits()
+        limits = await vehicle.limits(options.own_altitude_m)
         options.check(limits)
         assert isinstance(limits, FixedWingLimits)
         await OrbitFlight(vehicle, options, limits).fly()
@@ -84,13 +87,20 @@ class OrbitMission(Mission[OrbitOptions]):
         return orbit_figures(debriefing)
 
     def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        if summary["radius_mean_error_percent"] is None:
+        if summary.get("orbit_s") is None:
             return ()
+        circle = f"orbit of {summary['radius_m']:g} m for {summary['orbit_s']:.0f} s"
+        if summary["radius_mean_error_percent"] is not None:
+            return (
+                f"{circle}: mean radius {summary['radius_mean_error_percent']:+.2f} %, standard deviation "
+                f"{summary['radius_std_m']:.1f} m, altitude within {summary['altitude_error_m']:.1f} m",
+            )
         return (
-            f"orbit of {summary['radius_m']:g} m for {summary['orbit_s']:.0f} s: mean radius "
-            f"{summary['radius_mean_error_percent']:+.2f} %, standard deviation "
-            f"{summary['radius_std_m']:.1f} m, "
-            f"altitude within {summary['altitude_error_m']:.1f} m",
+            f"{circle}, as the mission believes: mean radius {summary['radius_estimate_mean_m']:.1f} m, "
+            f"standard deviation {summary['radius_estimate_std_m']:.1f} m, altitude by pressure within "
+            f"{summary['altitude_estimate_error_m']:.1f} m; target lost {summary['target_losses']} times, "
+            f"{summary['detections_used']} detections used",
+            "where aircraft and target truly were, a vehicle elsewhere does not tell",
         )
 
     def title(self, options: OrbitOptions) -> str:
@@ -123,6 +133,7 @@ class OrbitFlight:
         self._near_us: int | None = None
         self._command: OrbitCommand | None = None
         self._radii: list[float] = []
+        self._height_error_m = 0.0
 
     @property
     def _now_us(self) -> int:
@@ -172,7 +183,9 @@ class OrbitFlight:
 
         def on_attitude(frame: Any) -> None:
             if frame.system_id == own and frame.component_id == 1:
-                self._attitude.add(telemetry.attitude(decode(frame)))
+                attitude = telemetry.attitude(decode(frame))
+                if attitude is not None:
+                    self._attitude.add(attitude)
 
         return [
             vehicle.connection.listen("ATTITUDE", on_attitude),
@@ -253,9 +266,8 @@ class OrbitFlight:
         while not reached_us:
             _raise_if_ended(looking)
             await vehicle.clock.sleep(0.1)
-            p, attitude = vehicle.latest(telemetry.Position), vehicle.latest(telemetry.Attitude)
-            assert p is not None and attitude is not None
             self._require_flying()
+            p, attitude = await vehicle.position(), self._told_attitude()
             (target_n, target_e), _ = self._target_ne(self._now_us)
             n, e, _ = LocalFrame(home).ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
             away_m = math.hypot(n - target_n, e - target_e)
@@ -290,6 +302,12 @@ class OrbitFlight:
         )
         place = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
         await self._vehicle.loiter(place, radius_m=radius_m, clockwise=True, wait=False)
+
+    def _told_attitude(self) -> telemetry.Attitude:
+        attitude = self._vehicle.latest(telemetry.Attitude)
+        if attitude is None:
+            raise MissionError(f"the vehicle tells no attitude (ATTITUDE); {self._vehicle.heard()}")
+        return attitude
 
     def _require_flying(self) -> None:
         if not self._vehicle.armed:
@@ -359,8 +377,8 @@ class OrbitFlight:
     def _fly_on(self, entered_us: int) -> AttitudeSetpoint:
         """The command of now, and what it says of the flight."""
         now_us, options, tracker = self._now_us, self._options, self._tracker
-        attitude = self._vehicle.latest(telemetry.Attitude)
-        assert attitude is not None and self._pilot is not None
+        attitude = self._told_attitude()
+        assert self._pilot is not None
         unseen_s = tracker.unseen_s(now_us)
         if min(unseen_s, (now_us - entered_us) * 1e-6) > options.lost_limit_s:
             seen = "never seen" if math.isinf(unseen_s) else f"lost {unseen_s:.0f} s ago"
@@ -391,7 +409,11 @@ class OrbitFlight:
                 )
             return
         if not self._done():
+            assert self._pilot is not None
             self._radii.append(command.radius_m)
+            self._height_error_m = max(
+                self._height_error_m, abs(self._pilot.height_m - options.own_altitude_m)
+            )
         notes.progress = min(1.0, (now_us - self._captured_us) * 1e-6 / options.duration_s)
 
     def _done(self) -> bool:
@@ -420,8 +442,9 @@ class OrbitFlight:
         vehicle, self._with_gps = self._vehicle, True
         notes = vehicle.notes
         if self._radii:
-            mean = sum(self._radii) / len(self._radii)
-            notes.marks["radius_estimate_mean_m"] = mean
+            notes.marks["radius_estimate_mean_m"] = fmean(self._radii)
+            notes.marks["radius_estimate_std_m"] = pstdev(self._radii)
+            notes.marks["altitude_estimate_error_m"] = self._height_error_m
         notes.marks["target_losses"] = float(self._tracker.losses)
         notes.marks["detections_used"] = float(self._tracker.target.accepted)
         notes.marks["detections_rejected"] = float(self._tracker.target.rejected)

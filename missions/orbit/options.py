@@ -117,6 +117,7 @@ class OrbitOptions(MissionOptions):
             raise PlanError("orbit is flown by aircraft with wings; choose --model aerosonde, or another one")
         airspeed_m_s = self.airspeed(limits)
         limits.check_airspeed(airspeed_m_s)
+        limits.check_separation(self.separation_m, self.vehicles)
         limits.check_altitude(self.own_altitude_m)
         reach_m = math.hypot(*self.target_ne_m) + self.entry_distance_m
         if not reach_m <= limits.reach_m:
@@ -124,8 +125,7 @@ class OrbitOptions(MissionOptions):
                 f"the entry of the orbit may be {reach_m:.0f} m from home, more than {limits.reach_m:g} m; "
                 "ask for a --target nearer to home, or a smaller --entry-distance"
             )
-        true_m_s = airspeed_m_s * _TRUE_OVER_EQUIVALENT
-        least_m = limits.turn_radius_m(true_m_s, drift_m_s=self.target_speed_m_s)
+        least_m = limits.turn_radius_m(airspeed_m_s, drift_m_s=self.target_speed_m_s)
         if self.radius_m < least_m:
             raise PlanError(
                 f"an orbit of radius {self.radius_m:g} m can't be held: at {airspeed_m_s:g} m/s of "
@@ -159,7 +159,7 @@ class OrbitOptions(MissionOptions):
         On the circle the target is abeam: the bank lifts the horizon on its side, so that against the body
         it is (depression - bank) down.
         """
-        true_m_s = self.airspeed(limits) * _TRUE_OVER_EQUIVALENT
+        true_m_s = limits.true_airspeed_m_s(self.airspeed(limits))
         depression = math.atan2(self.height_over_target_m, self.radius_m)
         slower = max(5.0, true_m_s - limits.wind_m_s - self.target_speed_m_s)
         faster = true_m_s + limits.wind_m_s + self.target_speed_m_s
@@ -177,4 +177,3 @@ class OrbitOptions(MissionOptions):
 
 LEAST_DEPRESSION_RAD = math.radians(8.0)
 _MARGIN_RAD = math.radians(3.0)
-_TRUE_OVER_EQUIVALENT = 1.03  # at 600 m above the sea

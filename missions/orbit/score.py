@@ -89,6 +89,8 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
     radius_max_error_m: largest difference from the radius asked for.
     altitude_error_m: largest difference of the true height above the start from the altitude asked for.
     orbit_s: how long.
+    radius_estimate_..., altitude_estimate_error_m: the same as the mission believed in flight, by its filter
+        and by pressure.
     target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
     """
     if not debriefing.flights or not isinstance(debriefing.options, OrbitOptions):
@@ -107,6 +109,8 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
         "orbit_captured_after_s": _rounded(marks.get("orbit_captured_after_s")),
         "orbit_s": None,
         "radius_estimate_mean_m": _rounded(marks.get("radius_estimate_mean_m")),
+        "radius_estimate_std_m": _rounded(marks.get("radius_estimate_std_m")),
+        "altitude_estimate_error_m": _rounded(marks.get("altitude_estimate_error_m")),
         "detections_used": None if "detections_used" not in marks else int(marks["detections_used"]),
         "detections_rejected": (
             None if "detections_rejected" not in marks else int(marks["detections_rejected"])
@@ -115,10 +119,11 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
     }
     truth = orbit_truth(debriefing.records, notes.system_id)
     window = _window(notes)
-    if truth is None or window is None:
+    if window is None:
         return figures
-    orbit = truth.during(*window)
-    if not len(orbit.time_s):
+    figures["orbit_s"] = _rounded((window[1] - window[0]) * 1e-6)
+    orbit = None if truth is None else truth.during(*window)
+    if orbit is None or not len(orbit.time_s):
         return figures
     error = orbit.radius_m - options.radius_m
     height = -orbit.aircraft_ned_m[:, 2] - options.altitude_m
@@ -128,7 +133,6 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
         "radius_max_error_m": _rounded(float(np.abs(error).max())),
         "altitude_error_m": _rounded(float(np.abs(height).max())),
         "altitude_rms_error_m": _rounded(math.sqrt(float(np.mean(height**2)))),
-        "orbit_s": _rounded(float(orbit.time_s[-1] - orbit.time_s[0])),
     }
     return figures
 

@@ -4,11 +4,13 @@ import math
 from dataclasses import dataclass, fields
 from typing import Final
 
-from missions.atmosphere import GRAVITY_M_S2
+from missions.atmosphere import GRAVITY_M_S2, true_over_equivalent_airspeed
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 
 TURN_MARGIN: Final = 1.2  # of the radius, for gusts and for the time a bank takes
+FORECAST_WIND_M_S: Final = 5.0
+"""Wind that turns are planned for when nobody has given a forecast: a fresh day."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,16 +20,21 @@ class _Limits:
     Attributes:
         altitude_min_m, altitude_max_m: above home. 120 m is the ceiling of the open category (EU 2019/947).
         reach_m: farthest from home a pattern may go.
+        separation_min_m: least between the layers of a team: both keep their height with an error, and a
+            multicopter's wake is worst right below it.
     """
 
     altitude_min_m: float = 1.5
     altitude_max_m: float = 120.0
     reach_m: float = 5000.0
+    separation_min_m: float = 2.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
             if not isinstance(value, float) or (value == 0.0 and field.name == "wind_m_s"):
+                continue
+            if field.name == "air_altitude_m" and math.isfinite(value):
                 continue
             if not (math.isfinite(value) and value > 0.0):
                 raise PlanError(
@@ -40,6 +47,14 @@ class _Limits:
             raise PlanError(
                 f"altitude {altitude_m:g} m is not in {self.altitude_min_m:g}..{self.altitude_max_m:g} m "
                 "above home; change --altitude"
+            )
+
+    def check_separation(self, separation_m: float, vehicles: int) -> None:
+        """Refuse layers of a team that are too thin for its vehicles."""
+        if vehicles > 1 and not separation_m >= self.separation_min_m:
+            raise PlanError(
+                f"layers of {separation_m:.3g} m are too thin for a team of {vehicles} with such a vehicle; "
+                f"ask for --separation {self.separation_min_m:g} or more, or fewer --vehicles"
             )
 
     def check_reach(self, distance_m: float) -> None:
@@ -100,17 +115,20 @@ class FixedWingLimits(_Limits):
         airspeed_min_m_s, airspeed_trim_m_s, airspeed_max_m_s: equivalent airspeed.
         bank_max_rad: steepest bank of its autopilot.
         bank_parameter: what that is called there, for messages.
-        wind_m_s: steady wind to plan turns for.
+        wind_m_s: steady wind to plan turns for: a forecast.
+        air_altitude_m: above mean sea level, where it flies: in thin air it flies faster and turns wider.
     """
 
     altitude_min_m: float = 20.0
     reach_m: float = 20_000.0
+    separation_min_m: float = 10.0  # a height is held to some 4 m in gusts
     airspeed_min_m_s: float = 10.0
     airspeed_trim_m_s: float = 15.0
     airspeed_max_m_s: float = 20.0
     bank_max_rad: float = math.radians(50.0)
     bank_parameter: str = "bank limit"
     wind_m_s: float = 0.0
+    air_altitude_m: float = 0.0
 
     @property
     def kind(self) -> VehicleKind:
@@ -130,16 +148,21 @@ class FixedWingLimits(_Limits):
                 "fly faster, or wait for less wind"
             )
 
+    def true_airspeed_m_s(self, airspeed_m_s: float) -> float:
+        """True airspeed, where it flies, of an equivalent airspeed."""
+        return airspeed_m_s * true_over_equivalent_airspeed(self.air_altitude_m)
+
     def turn_radius_m(self, airspeed_m_s: float, *, drift_m_s: float = 0.0) -> float:
         """Tightest circle over ground that can be held all the way round, with margin.
 
-        The wind blows along somewhere on the circle: (V + w)^2 / (g tan(bank)), times 1.2.
+        The wind blows along somewhere on the circle: (V + w)^2 / (g tan(bank)), times 1.2, with the true
+        airspeed V.
 
         Args:
-            airspeed_m_s: true airspeed.
+            airspeed_m_s: equivalent airspeed.
             drift_m_s: speed of what the circle is around, against the ground.
         """
-        fastest = airspeed_m_s + self.wind_m_s + drift_m_s
+        fastest = self.true_airspeed_m_s(airspeed_m_s) + self.wind_m_s + drift_m_s
         return TURN_MARGIN * fastest**2 / (GRAVITY_M_S2 * math.tan(self.bank_max_rad))
 
 

@@ -13,6 +13,7 @@ from missions.planning.limits import FixedWingLimits
 
 _SAMPLES: Final = 20_000
 _ROLL_S: Final = 1.0  # to roll from level into the steepest turn, with the time the roll takes to begin
+_SAME: Final = 1e-3
 _SHARPEST_RAD: Final = math.radians(170.0)
 
 
@@ -24,7 +25,7 @@ def smallest_radius_m(curve: Curve) -> float:
 
 def roll_in_m(airspeed_m_s: float, limits: FixedWingLimits) -> float:
     """Distance flown over ground while rolling into a turn, at most."""
-    return (airspeed_m_s + limits.wind_m_s) * _ROLL_S
+    return (limits.true_airspeed_m_s(airspeed_m_s) + limits.wind_m_s) * _ROLL_S
 
 
 def leg_needed_m(turn_rad: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
@@ -33,10 +34,24 @@ def leg_needed_m(turn_rad: float, airspeed_m_s: float, limits: FixedWingLimits) 
     return 2.0 * corner_reach_m(turn_rad, radius_m, roll_in_m(airspeed_m_s, limits))
 
 
-def check_turns(curve: Curve, airspeed_m_s: float, limits: FixedWingLimits) -> float:
+def check_turns(
+    curve: Curve,
+    airspeed_m_s: float,
+    limits: FixedWingLimits,
+    *,
+    size_m: tuple[float, float] | None = None,
+    spacing_m: float | None = None,
+) -> float:
     """Refuse a curve that is too tight; gives the turn radius it was checked for.
 
     A polyline's corners are turned as `planning.corners` has it: each takes a part of both its legs.
+
+    Args:
+        curve: to be flown.
+        airspeed_m_s: equivalent.
+        limits: of the aircraft.
+        size_m, spacing_m: width and height, and track spacing, that the curve was made for: a refusal then
+            tells those that would do.
 
     Raises:
         PlanError: says how tight it is, and what to change.
@@ -47,20 +62,27 @@ def check_turns(curve: Curve, airspeed_m_s: float, limits: FixedWingLimits) -> f
         f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter})"
     )
     if isinstance(curve, Polyline):
-        _check_corners(curve, radius_m, roll_in_m(airspeed_m_s, limits), needs)
+        short = _shortest_leg(curve, radius_m, roll_in_m(airspeed_m_s, limits))
+        if short[0] > 1.0:
+            between_tracks = spacing_m is not None and abs(short[1] - spacing_m) < _SAME * spacing_m
+            change = f"ask for --spacing {_tens(short[0] * short[1]):g}" if between_tracks else ""
+            raise PlanError(
+                f"a leg of {short[1]:.0f} m is too short to turn at both its ends: the aircraft needs "
+                f"{needs}; {change or _larger(short[0], size_m)}, or lower --speed"
+            )
         return radius_m
     tightest_m = smallest_radius_m(curve)
     if tightest_m < radius_m:
         factor = radius_m / tightest_m
         raise PlanError(
             f"the pattern bends with a radius of {tightest_m:.0f} m at its tightest, and the aircraft needs "
-            f"{needs}; make --size {_scaled(factor)} times larger, choose a simpler --ratio or --pattern, or "
-            "lower --speed"
+            f"{needs}; {_larger(factor, size_m)}, choose a simpler --ratio or --pattern, or lower --speed"
         )
     return radius_m
 
 
-def _check_corners(curve: Polyline, radius_m: float, ramp_m: float, needs: str) -> None:
+def _shortest_leg(curve: Polyline, radius_m: float, ramp_m: float) -> tuple[float, float]:
+    """(needed over present length, present length m) of the leg that is shortest for its turns."""
     vertices = curve.vertices_m
     lengths = curve.leg_lengths_m
     taken = [0.0] * len(lengths)
@@ -75,12 +97,18 @@ def _check_corners(curve: Polyline, radius_m: float, ramp_m: float, needs: str) 
         part = corner_reach_m(turn, radius_m, ramp_m)
         taken[k - 1] += part
         taken[k] += part
-    short = max((part / length, length) for part, length in zip(taken, lengths, strict=True))
-    if short[0] > 1.0:
-        raise PlanError(
-            f"a leg of {short[1]:.0f} m is too short to turn at both its ends: the aircraft needs {needs}; "
-            f"make --spacing (or --size, for sectors) {_scaled(short[0])} times larger, or lower --speed"
-        )
+    return max((part / length, length) for part, length in zip(taken, lengths, strict=True))
+
+
+def _larger(factor: float, size_m: tuple[float, float] | None) -> str:
+    if size_m is None:
+        return f"make --size {_scaled(factor)} times larger"
+    width_m, height_m = (_tens(factor * side_m) for side_m in size_m)
+    return f"ask for --size {width_m:g}" + ("" if width_m == height_m else f"x{height_m:g}")
+
+
+def _tens(value_m: float) -> float:
+    return 10.0 * math.ceil(0.1 * value_m)
 
 
 def _scaled(factor: float) -> str:

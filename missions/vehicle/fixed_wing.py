@@ -12,6 +12,7 @@ from autopilot_bridge.mission_plan import MissionItem
 from missions import telemetry
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
+from missions.planning.limits import FORECAST_WIND_M_S
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.payload import Payload
@@ -90,6 +91,9 @@ class FixedWingFlight(VehicleCommands):
 
     runway_heading_rad: float | None = None
     """Heading on the ground before the last takeoff: along the runway."""
+
+    forecast_wind_m_s: float = FORECAST_WIND_M_S
+    """Wind that turns are planned for; what the user expects of the day, not what blows."""
 
     pilot: "AttitudePilot | None" = None
     """What flies it by attitude; see `prepare_piloting`."""

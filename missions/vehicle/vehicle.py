@@ -4,6 +4,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence, Set
 from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
 from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
@@ -13,7 +14,7 @@ from missions import telemetry
 from missions.connection import Connection
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.kind import VehicleKind
-from missions.planning.limits import Limits
+from missions.planning.limits import FixedWingLimits, Limits
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import HEARTBEAT_AGE_US
@@ -61,14 +62,27 @@ class Vehicle(FixedWingFlight):
             timeout_s=timeout_s,
         )
 
-    async def limits(self) -> Limits:
-        """What the vehicle's parameters allow a planner."""
+    async def limits(self, altitude_m: float = 0.0) -> Limits:
+        """What the vehicle's parameters allow a planner.
+
+        Args:
+            altitude_m: above home, what will be flown at. An aircraft turns wider in thin air, and in the
+                wind of `forecast_wind_m_s`.
+        """
         adapter = self.adapter
-        return adapter.limits(
+        limits = adapter.limits(
             {
                 name: await self.parameter_or(name, default)
                 for name, default in adapter.limiting_parameters.items()
             }
+        )
+        if not isinstance(limits, FixedWingLimits):
+            return limits
+        home = self.home_or_none()
+        return replace(
+            limits,
+            wind_m_s=self.forecast_wind_m_s,
+            air_altitude_m=altitude_m + (0.0 if home is None else home.alt_m),
         )
 
     # flying
@@ -419,10 +433,13 @@ class Vehicle(FixedWingFlight):
                 await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
         # a disarmed vehicle too: in the mission's mode it would fly off when it is armed again
         for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
+            self.notes.left = f"was told to {mode}, and did not answer"
             try:
                 await self.set_mode(mode, 5.0)
             except LinkClosed:  # the vehicle may still hear us: what it was told first shall stand
                 return
             except MissionError:
                 continue
+            self.notes.left = f"was told to {mode}"
             return
+        self.notes.left = "refused to return, to land and to hold"

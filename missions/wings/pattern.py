@@ -31,10 +31,17 @@ def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -
             "--period is for vehicles that can fly slowly in bends; choose --speed for an aircraft"
         )
     limits.check_airspeed(options.speed_m_s)
+    limits.check_separation(options.separation_m, options.vehicles)
     limits.check_altitude(options.own_altitude_m)
     coarse = curve.points(np.linspace(0.0, curve.end, _REACH_SAMPLES))
     limits.check_reach(float(np.hypot(*coarse.T).max()))
-    return check_turns(curve, options.speed_m_s, limits)
+    return check_turns(
+        curve,
+        options.speed_m_s,
+        limits,
+        size_m=(options.width_m, options.height_m),
+        spacing_m=options.spacing_m,
+    )
 
 
 async def fly_pattern_with_wings(
@@ -53,7 +60,7 @@ async def fly_pattern_with_wings(
         options=options,
         limits=limits,
         path=path,
-        route=with_leads(path, options.speed_m_s + limits.wind_m_s),
+        route=with_leads(path, limits.true_airspeed_m_s(options.speed_m_s) + limits.wind_m_s),
         turn_radius_m=radius_m,
     )
     vehicle.note_runway()

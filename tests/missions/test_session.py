@@ -9,6 +9,7 @@ import subprocess
 import sys
 import types
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 from pymavlink import mavutil
@@ -279,6 +280,58 @@ def test_a_failed_flight_exits_1_with_one_line(embedded, tmp_path, capsys, monke
     assert len(err.splitlines()) == 1
     assert "no heartbeat of a PX4 or ArduPilot autopilot within 15 s; nothing was heard" in err
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["outcome"] == "failed"
+
+
+def lissajous_off_by(monkeypatch, offset_m):
+    """Every commanded pattern is drawn some way off from what is flown."""
+    monkeypatch.setattr("missions.score.path_errors_m", lambda path, track: np.full(len(track), offset_m))
+
+
+@pytest.mark.parametrize(("offset_m", "word"), [(1.9, "within the acceptance radius"), (2.1, "poor")])
+def test_poor_tracking_is_told(embedded, tmp_path, capsys, monkeypatch, offset_m, word):
+    lissajous_off_by(monkeypatch, offset_m)
+    code, out, _err = command_line(
+        capsys, "fly", "lissajous", "--size", "40", "--via", "setpoints", "--out", str(tmp_path / "run"),
+        "--no-picture",
+    )  # fmt: skip
+    assert code == 0  # it was flown; how well, nobody has set a bound to
+    block = json.loads((tmp_path / "run" / "summary.json").read_text())["vehicles"][0]
+    assert (block["tracking"], block["acceptance_m"]) == (word, 2.0)
+    told = "poor tracking: vehicle 1 was 2.1 m off the path at most, more than the acceptance radius of 2 m"
+    assert (told in out) == (word == "poor")
+
+
+@pytest.mark.parametrize(("bound", "code"), [("1.5", 1), ("2", 0)])
+def test_a_bound_of_the_path_error_is_a_check(embedded, tmp_path, capsys, monkeypatch, bound, code):
+    lissajous_off_by(monkeypatch, 1.9)
+    given = command_line(
+        capsys, "fly", "lissajous", "--size", "40", "--via", "setpoints", "--out", str(tmp_path / "run"),
+        "--no-picture", "--max-error", bound,
+    )  # fmt: skip
+    assert given[0] == code
+    assert ("was 1.90 m at most, more than --max-error 1.5 m" in given[2]) == (code == 1)
+    outcome = json.loads((tmp_path / "run" / "summary.json").read_text())["outcome"]
+    assert outcome == ("failed" if code else "completed")
+
+
+def test_a_bound_of_a_path_error_that_nobody_measures_is_no_success(embedded, tmp_path, capsys):
+    script = tmp_path / "idle.py"
+    script.write_text("async def fly(vehicle, options):\n    await vehicle.clock.sleep(1.0)\n")
+    code, _out, err = command_line(
+        capsys, "fly", str(script), "--max-error", "1", "--out", str(tmp_path / "run"), "--no-picture"
+    )
+    assert code == 1
+    assert "flew no path whose error --max-error could limit" in err
+
+
+def test_warnings_are_told_once(embedded, tmp_path, capsys):
+    script = tmp_path / "wary.py"
+    script.write_text(
+        "async def fly(vehicle, options):\n    for _ in range(3):\n        vehicle.notes.warn('low sun')\n"
+    )
+    code, _out, err = command_line(capsys, "fly", str(script), "--out", str(tmp_path / "run"), "--no-picture")
+    assert code == 0
+    assert err.splitlines() == ["warning: vehicle 1: low sun"]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,9 @@ the guidance along a path, flown by a point mass in wind.
 """
 
 import math
+import re
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +15,9 @@ from hypothesis import strategies as st
 from missions.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.library import MISSIONS
+from missions.occupancy.options import OccupancyOptions
 from missions.options import FlightOptions, Via
+from missions.orbit.options import OrbitOptions
 from missions.patterns import Polyline, named_lissajous, parallel_sweep, sector
 from missions.planning.corners import Corner
 from missions.planning.flyable import flyable_path
@@ -149,9 +154,9 @@ def test_what_is_chosen_stays() -> None:
 @pytest.mark.parametrize(
     ("name", "chosen", "said"),
     [
-        ("lissajous", {"width_m": 300.0, "height_m": 300.0}, "--size .* larger.*--speed"),
+        ("lissajous", {"width_m": 300.0, "height_m": 300.0}, "--size [0-9]+, .*--speed"),
         ("parallel-sweep", {"spacing_m": 60.0}, "--spacing"),
-        ("sector", {"width_m": 200.0, "height_m": 200.0}, "--size, for sectors"),
+        ("sector", {"width_m": 200.0, "height_m": 200.0}, "--size [0-9]+, or lower --speed"),
         ("lissajous", {"speed_m_s": 60.0}, "35 m/s"),
         ("lissajous", {"altitude_m": 400.0}, "--altitude"),
         ("parallel-sweep", {"periods": 2.0}, "straight back"),
@@ -218,3 +223,59 @@ def test_banks_follow_a_path_in_wind(wind: tuple[float, float], offset_m: float)
 def test_gains_that_cannot_be_are_refused() -> None:
     with pytest.raises(ValueError, match="damping"):
         PathRollParameters(damping=0.0)
+
+
+def test_an_equivalent_airspeed_is_faster_and_turns_wider_in_thin_air() -> None:
+    """Densities of ISO 2533: 1.225 kg/m^3 at sea level, 1.15587 at 600 m."""
+    low = FixedWingLimits(wind_m_s=0.0, bank_max_rad=math.radians(45.0))
+    high = replace(low, air_altitude_m=600.0)
+    assert high.true_airspeed_m_s(25.0) == pytest.approx(25.0 * math.sqrt(1.225 / 1.15587), rel=1e-4)
+    assert low.turn_radius_m(25.0) == pytest.approx(1.2 * 25.0**2 / GRAVITY_M_S2)
+    assert high.turn_radius_m(25.0) == pytest.approx(low.turn_radius_m(25.0) * 1.225 / 1.15587, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "chosen"),
+    [
+        ("lissajous", {"width_m": 50.0, "height_m": 50.0}),
+        ("lissajous", {"width_m": 120.0, "height_m": 120.0, "pattern": "L2"}),
+        ("lissajous", {"width_m": 300.0, "height_m": 150.0, "ratio": (3.0, 4.0)}),
+        ("parallel-sweep", {"width_m": 50.0, "height_m": 50.0}),
+        ("parallel-sweep", {"width_m": 300.0, "height_m": 120.0}),
+        ("parallel-sweep", {"spacing_m": 50.0}),
+        ("expanding-square", {"width_m": 60.0, "height_m": 60.0}),
+        ("expanding-square", {"spacing_m": 60.0}),
+        ("sector", {"width_m": 50.0, "height_m": 50.0}),
+    ],
+)
+def test_one_refusal_tells_what_will_be_flown(name: str, chosen: dict[str, Any]) -> None:
+    """Whoever follows the advice is not refused again."""
+    limits = FixedWingLimits(
+        airspeed_trim_m_s=25.0, airspeed_max_m_s=35.0, bank_max_rad=math.radians(45.0), wind_m_s=5.0
+    )
+    with pytest.raises(PlanError) as refusal:
+        flown(name, limits, **chosen)
+    asked = re.search(r"--(size|spacing) ([0-9.]+)(?:x([0-9.]+))?(?: or more)?,", str(refusal.value))
+    assert asked is not None, refusal.value
+    if asked[1] == "spacing":
+        flown(name, limits, **(chosen | {"spacing_m": float(asked[2])}))
+        return
+    wide_m, high_m = float(asked[2]), float(asked[3] or asked[2])
+    flown(name, limits, **(chosen | {"width_m": wide_m, "height_m": high_m}))
+
+
+@pytest.mark.parametrize("name", ["lissajous", "orbit", "occupancy"])
+def test_a_teams_layers_are_no_thinner_than_a_height_is_held(name: str) -> None:
+    limits = FixedWingLimits(
+        airspeed_trim_m_s=25.0, airspeed_max_m_s=35.0, bank_max_rad=math.radians(45.0), wind_m_s=5.0
+    )
+    mission = MISSIONS[name]
+    kind = {"lissajous": FlightOptions, "orbit": OrbitOptions, "occupancy": OccupancyOptions}[name]
+    for separation_m, thin in ((9.0, True), (10.0, False)):
+        options = mission.adapted(kind(separation_m=separation_m, vehicles=2), limits)
+        if not thin:
+            mission.check(options, limits)
+            continue
+        with pytest.raises(PlanError, match=r"layers of 9 m are too thin.*--separation 10"):
+            mission.check(options, limits)
+        mission.check(mission.adapted(kind(separation_m=separation_m), limits), limits)  # alone

@@ -17,6 +17,7 @@ WINGS = FixedWingLimits(
     bank_max_rad=math.radians(45.0),
     bank_parameter="FW_R_LIM",
     wind_m_s=4.0,
+    air_altitude_m=600.0,
 )
 
 
@@ -45,7 +46,7 @@ def test_the_defaults_can_be_flown_and_hovering_is_no_orbit():
 
 def test_the_smallest_radius_is_that_of_the_fastest_place_on_the_circle():
     """1.2 (V + w + v)^2 / (g tan(bank)), with true airspeed."""
-    fastest = 25.0 * 1.03 + 4.0 + 2.0
+    fastest = 25.0 * math.sqrt(1.225 / 1.15587) + 4.0 + 2.0  # density of ISO 2533 at 600 m
     least = 1.2 * fastest**2 / (9.80665 * math.tan(math.radians(45.0)))
     OrbitOptions(radius_m=least + 0.1, target_speed_m_s=2.0).check(WINGS)
     with pytest.raises(PlanError, match="can't be held"):

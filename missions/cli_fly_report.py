@@ -1,0 +1,94 @@
+"""What `flightstack fly` shows: a line of progress on a terminal, and at the end how the run went."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from missions.mission import Mission
+    from missions.session import Flight, RunResult
+
+_FAILED, _INTERRUPTED = 1, 130
+
+
+class ProgressLine:
+    """The progress line on a terminal; nothing in a pipe."""
+
+    def __init__(self) -> None:
+        self._shown = False
+        self._last_wall_s = -math.inf
+
+    def __call__(self, flight: "Flight") -> None:
+        from autopilot_bridge.clock.pacing import wall_time_s
+        from missions.telemetry import Position
+
+        now_s = wall_time_s()
+        if now_s - self._last_wall_s < 0.1 or flight.clock is None:
+            return
+        self._last_wall_s = now_s
+        time_s = flight.clock.time_us * 1e-6
+        factor = time_s / max(now_s - flight.started_wall_s, 1e-3)
+        heard = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
+        mode, height, progress = "waiting", "", 0.0
+        if heard:
+            mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in heard))
+            positions = [vehicle.latest(Position) for vehicle in heard]
+            height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
+            progress = sum(vehicle.notes.progress for vehicle in heard) / len(heard)
+        text = f"{time_s:8.1f} s  x{factor:<6.1f} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
+        click.echo(f"\r{text:<72}", nl=False, err=True)
+        self._shown = True
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._shown:
+            click.echo("", err=True)
+
+
+def tell(result: "RunResult", mission: "Mission[Any]") -> int:
+    """Say how a run went; gives the exit code."""
+    from missions.run import POOR
+
+    summary = result.summary
+    if result.outcome == "interrupted":
+        click.echo(f"flightstack: {result.reason}; the log is in {result.folder}", err=True)
+        return _INTERRUPTED
+    if result.outcome == "failed":
+        _warn(summary)
+        click.echo(f"flightstack: mission {summary['mission']} failed: {result.reason}", err=True)
+        click.echo(f"failed: see {result.folder}")
+        return _FAILED
+    _warn(summary)
+    click.echo(
+        f"{result.outcome}: {summary['mission']} with {summary['autopilot']}, "
+        f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, "
+        f"{summary['speedup']:.0f} times real time"
+    )
+    if summary["path_rms_error_m"] is not None:
+        reference = summary["vehicles"][0]["error_reference"]
+        click.echo(
+            f"path error {summary['path_rms_error_m']:.2f} m RMS, "
+            f"{summary['path_max_error_m']:.2f} m at most ({reference})"
+        )
+    for block in summary["vehicles"]:
+        if "waypoints" in block:
+            w = block["waypoints"]
+            click.echo(f"waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}")
+    for told in mission.said(summary):
+        click.echo(told)
+    for block in summary["vehicles"]:
+        if block["tracking"] == POOR:
+            click.echo(
+                f"poor tracking: vehicle {block['system_id']} was {block['path_max_error_m']:.1f} m off the "
+                f"path at most, more than the acceptance radius of {block['acceptance_m']:g} m"
+            )
+    click.echo(f"run: {result.folder}")
+    return 0
+
+
+def _warn(summary: Mapping[str, Any]) -> None:
+    for block in summary["vehicles"]:
+        for warning in block["warnings"]:
+            click.echo(f"warning: vehicle {block['system_id']}: {warning}", err=True)

@@ -1,0 +1,41 @@
+"""A mission file of a user's own on the command line: what it finds in its `options`."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+from missions.mission_command import Given, MissionCommand, option
+
+
+def _build(given: Given, common: Mapping[str, Any]) -> Any:
+    from missions.options import FlightOptions
+
+    return FlightOptions(
+        **common,
+        altitude_m=given["altitude"],
+        speed_m_s=given["speed"],
+        rate_hz=given["rate"],
+        separation_m=given["separation"],
+    )
+
+
+COMMAND: Final = MissionCommand(
+    names=("a mission of your own",),
+    help=(
+        "Fly a mission of your own: a Python file with `async def fly(vehicle, options)`.\n\n"
+        "It finds these in its `options` (altitude_m, speed_m_s, rate_hz, ...), and what --arg NAME=VALUE "
+        "gives in `options.arguments`; what of it it goes by is its own affair."
+    ),
+    options=(
+        option("--altitude", type=float, default=10.0, help="Above home, m. Aircraft: 100."),
+        option(
+            "--speed", type=float, default=5.0, help="Ground speed, m/s; of an aircraft, airspeed: its own."
+        ),
+        option("--rate", type=float, default=25.0, help="Setpoints per second."),
+        option(
+            "--separation", type=float, default=4.0, help="Between the altitudes of a team, m. Aircraft: 20."
+        ),
+    ),
+    build=_build,
+    fields=MappingProxyType({"rate": ("rate_hz",)}),
+)
