@@ -1,0 +1,86 @@
+"""Airspeed as messages tell it: which of them, and true from equivalent airspeed."""
+
+from math import isfinite, sqrt
+from typing import Final
+
+from estimators.attitude.parameters import AirspeedSource
+
+__all__ = ["AirData", "pressure_pa", "true_over_equivalent"]
+
+SEA_LEVEL_PA: Final = 101_325.0
+SEA_LEVEL_DENSITY_KG_M3: Final = 1.225
+_DENSITY_EXPONENT: Final = 1.0 - 1.0 / 5.25588
+"""Density by pressure in the troposphere of the standard atmosphere (ISO 2533)."""
+_HECTOPASCAL_MAX: Final = 1200.0
+_LEAST_PA: Final = 20_000.0
+_AIRSPEED_MAX_M_S: Final = 400.0
+_HPA: Final = 100.0
+
+
+def pressure_pa(value: float) -> float | None:
+    """Static pressure of a field in hectopascal; PX4 fills HIGHRES_IMU's with pascal. None: not a pressure."""
+    pascal = value * _HPA if value <= _HECTOPASCAL_MAX else value
+    return pascal if _LEAST_PA <= pascal <= 1.2 * SEA_LEVEL_PA else None
+
+
+def true_over_equivalent(static_pa: float) -> float:
+    """True by equivalent airspeed in the standard atmosphere."""
+    return float((static_pa / SEA_LEVEL_PA) ** (-0.5 * _DENSITY_EXPONENT))
+
+
+class AirData:
+    """Picks the airspeed among the messages that tell one.
+
+    Args:
+        source: which; AUTO: the first, in the order of `AirspeedSource`, that was heard lately.
+        age_max_us: what "lately" is.
+    """
+
+    def __init__(self, source: AirspeedSource, age_max_us: int) -> None:
+        self._source = source
+        self._age_max_us = age_max_us
+        self._heard_us: dict[AirspeedSource, int] = {}
+        self._ratio = 1.0
+
+    @property
+    def ratio(self) -> float:
+        """True by equivalent airspeed now."""
+        return self._ratio
+
+    def static_pressure(self, value: float) -> None:
+        """Take a static pressure in hectopascal."""
+        pascal = pressure_pa(value)
+        if pascal is not None:
+            self._ratio = true_over_equivalent(pascal)
+
+    def airspeed(self, time_us: int, source: AirspeedSource, equivalent_m_s: float) -> float | None:
+        """True airspeed, m/s; None when another source is used, or the value is none."""
+        if not (isfinite(equivalent_m_s) and 0.0 < equivalent_m_s <= _AIRSPEED_MAX_M_S):
+            return None
+        self._heard_us[source] = time_us
+        if source is not self._source and not (
+            self._source is AirspeedSource.AUTO and self._best(time_us, source)
+        ):
+            return None
+        return equivalent_m_s * self._ratio
+
+    def by_pressure(self, time_us: int, difference_hpa: float) -> float | None:
+        """The same from a differential pressure in hectopascal."""
+        if not (isfinite(difference_hpa) and difference_hpa > 0.0):
+            return None
+        equivalent = sqrt(2.0 * difference_hpa * _HPA / SEA_LEVEL_DENSITY_KG_M3)
+        return self.airspeed(time_us, AirspeedSource.PRESSURE, equivalent)
+
+    def _best(self, time_us: int, source: AirspeedSource) -> bool:
+        for better in (AirspeedSource.VFR_HUD, AirspeedSource.AIRSPEED):
+            if better is source:
+                return True
+            heard_us = self._heard_us.get(better)
+            if heard_us is not None and time_us - heard_us <= self._age_max_us:
+                return False
+        return True
+
+    def reset(self) -> None:
+        """Forget everything."""
+        self._heard_us.clear()
+        self._ratio = 1.0

@@ -1,0 +1,220 @@
+"""Parameters of the attitude filter. The defaults serve every vehicle and log; see docs/attitude.md."""
+
+from dataclasses import dataclass, fields
+from enum import StrEnum
+from math import isfinite
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["AirspeedSource", "AttitudeParameters", "ImuSource", "VehicleKind"]
+
+
+class VehicleKind(StrEnum):
+    """Which form of the filter runs."""
+
+    AUTO = "auto"
+    """By the type in the autopilot's HEARTBEAT."""
+    FIXED_WING = "fixed_wing"
+    MULTIROTOR = "multirotor"
+
+
+class ImuSource(StrEnum):
+    """Whose angular rate and specific force are used."""
+
+    AUTO = "auto"
+    """The first of the others, in their order, that comes fast enough."""
+    HIGHRES_IMU = "HIGHRES_IMU"
+    RAW_IMU = "RAW_IMU"
+    SCALED_IMU = "SCALED_IMU"
+    SCALED_IMU2 = "SCALED_IMU2"
+    SCALED_IMU3 = "SCALED_IMU3"
+
+
+class AirspeedSource(StrEnum):
+    """Whose airspeed is used."""
+
+    AUTO = "auto"
+    """The first of the others, in their order, that has been heard lately."""
+    VFR_HUD = "VFR_HUD"
+    AIRSPEED = "AIRSPEED"
+    PRESSURE = "pressure"
+    """Differential pressure in SCALED_PRESSURE or HIGHRES_IMU."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AttitudeParameters:
+    """Gains, models and uncertainty of the attitude filter.
+
+    Attributes:
+        vehicle: which form.
+        imu: which inertial message.
+        imu_instance: its `id`, where the message has one (HIGHRES_IMU, RAW_IMU).
+        airspeed: which airspeed.
+        gain_1_s: k_p, of the accelerometer on attitude.
+        bias_gain_1_s2: k_I, of the accelerometer on the gyro bias.
+        rest_bias_time_s: of the mean by which the gyro bias is found while the vehicle is at rest and disarmed.
+        reference_tolerance_m_s2: by how much the reference's length may differ from g to count for half.
+        gap_max_s: longer silence of the inertial sensor starts the filter anew.
+        airspeed_age_max_s: an older airspeed is not used.
+        airspeed_min_m_s: below, there is no lift to speak of: angle of attack and sideslip are zero.
+        longitudinal: whether the change of airspeed is taken into account (the paper: unaccelerated flight).
+        speed_gain_1_s: of the airspeed on its filter, which makes that change.
+        attack: whether the angle of attack is estimated; otherwise it is zero.
+        lift_1_m: k_L / m; None: learned in flight.
+        lift_slope_1_m_rad: lift slope over mass and square of airspeed; None: `lift_slope_ratio_1_rad` k_L / m.
+        lift_slope_ratio_1_rad: of lift slope to mean lift, where the slope is not given.
+        lift_time_s: of the mean by which k_L is learned.
+        climb_time_s: of the mean by which the rate of climb corrects the angle of attack.
+        thrust_m_s2: k_M / m, thrust acceleration at full throttle.
+        thrust_loss_1_m: k_T / m, its loss per square of airspeed.
+        throttle_trim: in place of the throttle where none is heard, 0..1.
+        side_force_ratio_1_rad: of side force per sideslip to mean lift; infinite: no sideslip.
+        side_force_time_s: smoothing of the side force.
+        drag_1_s: first guess of a multirotor's drag acceleration per speed.
+        drag_velocity_gain_1_s: of the velocity by drag on the velocity filter.
+        drag_learning_m_s: spread of the velocity by drag, for learning the drag coefficient; infinite: don't.
+        gyro_noise_rad_rts: angular random walk, rad/s/sqrt(Hz).
+        gyro_bias_walk_rad_s_rts: random walk of the gyro bias, rad/s per square root of a second.
+        gyro_bias_start_rad_s: its spread before anything is known.
+        rest_error_rad: standard error of the reference at rest.
+        flight_error_rad: the same in steady flight.
+        manoeuvre_error: the same per load that manoeuvres make (1 g: this many rad).
+        reference_time_s: how long errors of the reference last.
+    """
+
+    vehicle: VehicleKind = VehicleKind.AUTO
+    imu: ImuSource = ImuSource.AUTO
+    imu_instance: int = 0
+    airspeed: AirspeedSource = AirspeedSource.AUTO
+    gain_1_s: float = 0.3
+    bias_gain_1_s2: float = 0.003
+    rest_bias_time_s: float = 1.0
+    reference_tolerance_m_s2: float = 1.5
+    gap_max_s: float = 2.0
+    airspeed_age_max_s: float = 3.0
+    airspeed_min_m_s: float = 6.0
+    longitudinal: bool = True
+    speed_gain_1_s: float = 1.0
+    attack: bool = True
+    lift_1_m: float | None = None
+    lift_slope_1_m_rad: float | None = None
+    lift_slope_ratio_1_rad: float = 10.0
+    lift_time_s: float = 10.0
+    climb_time_s: float = 20.0
+    thrust_m_s2: float = 0.0
+    thrust_loss_1_m: float = 0.0
+    throttle_trim: float = 0.5
+    side_force_ratio_1_rad: float = 3.0
+    side_force_time_s: float = 1.0
+    drag_1_s: float = 0.5
+    drag_velocity_gain_1_s: float = 0.5
+    drag_learning_m_s: float = 1.0
+    gyro_noise_rad_rts: float = 1e-3
+    gyro_bias_walk_rad_s_rts: float = 1e-5
+    gyro_bias_start_rad_s: float = 0.01
+    rest_error_rad: float = 0.01
+    flight_error_rad: float = 0.03
+    manoeuvre_error: float = 0.08
+    reference_time_s: float = 3.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vehicle", _choice(VehicleKind, "vehicle", self.vehicle))
+        object.__setattr__(self, "imu", _choice(ImuSource, "imu", self.imu))
+        object.__setattr__(self, "airspeed", _choice(AirspeedSource, "airspeed", self.airspeed))
+        for name, (low, high) in _RANGES.items():
+            value = getattr(self, name)
+            if value is None:
+                continue
+            if not low <= value <= high or (name not in _MAY_BE_INFINITE and not isfinite(value)):
+                raise ValueError(f"{name} {value:g} is not in {low:g}..{high:g}")
+
+
+_RANGES: Final[dict[str, tuple[float, float]]] = {
+    "imu_instance": (0, 255),
+    "gain_1_s": (0.0, 50.0),
+    "bias_gain_1_s2": (0.0, 10.0),
+    "rest_bias_time_s": (0.1, 1e4),
+    "reference_tolerance_m_s2": (0.01, float("inf")),
+    "gap_max_s": (0.05, 60.0),
+    "airspeed_age_max_s": (0.1, 60.0),
+    "airspeed_min_m_s": (1.0, 100.0),
+    "speed_gain_1_s": (0.01, 20.0),
+    "lift_1_m": (1e-6, 100.0),
+    "lift_slope_1_m_rad": (1e-6, 1e3),
+    "lift_slope_ratio_1_rad": (1.0, 200.0),
+    "lift_time_s": (0.5, 1e4),
+    "climb_time_s": (0.5, float("inf")),
+    "thrust_m_s2": (0.0, 100.0),
+    "thrust_loss_1_m": (0.0, 10.0),
+    "throttle_trim": (0.0, 1.0),
+    "side_force_ratio_1_rad": (0.1, float("inf")),
+    "side_force_time_s": (0.01, 100.0),
+    "drag_1_s": (0.05, 5.0),
+    "drag_velocity_gain_1_s": (0.01, 20.0),
+    "drag_learning_m_s": (0.01, float("inf")),
+    "gyro_noise_rad_rts": (0.0, 1.0),
+    "gyro_bias_walk_rad_s_rts": (0.0, 0.1),
+    "gyro_bias_start_rad_s": (0.0, 1.0),
+    "rest_error_rad": (0.0, 1.0),
+    "flight_error_rad": (0.0, 1.0),
+    "manoeuvre_error": (0.0, 1.0),
+    "reference_time_s": (0.01, 100.0),
+}
+_MAY_BE_INFINITE: Final = frozenset(name for name, (_, high) in _RANGES.items() if not isfinite(high))
+
+
+def _choice(kind: type[StrEnum], name: str, value: str) -> StrEnum:
+    try:
+        return kind(value)
+    except ValueError:
+        raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}") from None
+
+
+# Order of the coefficients as the compiled step takes them: every number among the parameters by its name.
+NUMBERS: Final = tuple(
+    field.name
+    for field in fields(AttitudeParameters)
+    if field.name not in ("vehicle", "imu", "imu_instance", "airspeed")
+)
+
+
+def coefficients(parameters: AttitudeParameters) -> NDArray[np.float64]:
+    """The parameters as the compiled step takes them: in the order of `NUMBERS`, None as zero."""
+    values = (getattr(parameters, name) for name in NUMBERS)
+    return np.array([0.0 if value is None else float(value) for value in values])
+
+
+def _index(name: str) -> int:
+    return NUMBERS.index(name)
+
+
+GAIN: Final = _index("gain_1_s")
+BIAS_GAIN: Final = _index("bias_gain_1_s2")
+REST_BIAS_TIME: Final = _index("rest_bias_time_s")
+TOLERANCE: Final = _index("reference_tolerance_m_s2")
+AIRSPEED_MIN: Final = _index("airspeed_min_m_s")
+LONGITUDINAL: Final = _index("longitudinal")
+SPEED_GAIN: Final = _index("speed_gain_1_s")
+ATTACK: Final = _index("attack")
+LIFT_GIVEN: Final = _index("lift_1_m")
+LIFT_SLOPE_GIVEN: Final = _index("lift_slope_1_m_rad")
+LIFT_SLOPE_RATIO: Final = _index("lift_slope_ratio_1_rad")
+LIFT_TIME: Final = _index("lift_time_s")
+CLIMB_TIME: Final = _index("climb_time_s")
+THRUST: Final = _index("thrust_m_s2")
+THRUST_LOSS: Final = _index("thrust_loss_1_m")
+THROTTLE_TRIM: Final = _index("throttle_trim")
+SIDE_FORCE_RATIO: Final = _index("side_force_ratio_1_rad")
+SIDE_FORCE_TIME: Final = _index("side_force_time_s")
+DRAG: Final = _index("drag_1_s")
+DRAG_VELOCITY_GAIN: Final = _index("drag_velocity_gain_1_s")
+DRAG_LEARNING: Final = _index("drag_learning_m_s")
+GYRO_NOISE: Final = _index("gyro_noise_rad_rts")
+GYRO_BIAS_WALK: Final = _index("gyro_bias_walk_rad_s_rts")
+GYRO_BIAS_START: Final = _index("gyro_bias_start_rad_s")
+REST_ERROR: Final = _index("rest_error_rad")
+FLIGHT_ERROR: Final = _index("flight_error_rad")
+MANOEUVRE_ERROR: Final = _index("manoeuvre_error")
+REFERENCE_TIME: Final = _index("reference_time_s")

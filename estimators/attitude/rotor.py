@@ -1,0 +1,79 @@
+"""Multirotor: where down is, from the drag of its rotors and body (compiled).
+
+An accelerometer of a multirotor that accelerates does not feel the tilt: thrust is along the body's down axis at any
+attitude. What it feels across that axis is drag, in proportion to the speed against the air. That is a speedometer:
+its speed is held against the one integrated from attitude and force (docs/attitude.md, section 5).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.attitude import layout as at
+from estimators.attitude import parameters as par
+from estimators.attitude.tilt import GRAVITY_M_S2
+from flightsim.kernels import kernel
+
+Array = NDArray[np.float64]
+
+_SMOOTHING_S = 0.2
+_LEARN_AFTER_S = 5.0
+_DRAG_TIME_MIN_S = 0.3
+_DRAG_TIME_MAX_S = 10.0
+_DRAG_TIME_WALK_S2_S = 1e-4
+_DRAG_TIME_SPREAD = 0.5
+"""Standard deviation of the first guess, as a part of it."""
+_SPEED_MAX_M_S = 40.0
+_LEVEL_LEAST = 0.5
+
+
+@kernel
+def start(x: Array, p: Array) -> None:
+    """Nothing known but the first guess of the drag."""
+    x[at.DRAG_TIME] = 1.0 / p[par.DRAG]
+    x[at.DRAG_TIME_VARIANCE] = (_DRAG_TIME_SPREAD / p[par.DRAG]) ** 2
+
+
+@kernel
+def reference(
+    x: Array, p: Array, dt: float, wx: float, wy: float, wz: float, ax: float, ay: float, az: float
+) -> None:
+    """Velocity against the air, and the reference for down; arguments as of the fixed wing's."""
+    down_x, down_y, down_z = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
+    vx, vy = x[at.VELOCITY], x[at.VELOCITY + 1]
+    climb = 0.0 if math.isnan(x[at.CLIMB]) else x[at.CLIMB]
+    vz = -(climb + down_x * vx + down_y * vy) / max(_LEVEL_LEAST, down_z)
+    vz = min(_SPEED_MAX_M_S, max(-_SPEED_MAX_M_S, vz))
+    pull_x = p[par.DRAG_VELOCITY_GAIN] * (-x[at.DRAG_TIME] * ax - vx)
+    pull_y = p[par.DRAG_VELOCITY_GAIN] * (-x[at.DRAG_TIME] * ay - vy)
+    vx += dt * (ax + GRAVITY_M_S2 * down_x - (wy * vz - wz * vy) + pull_x)
+    vy += dt * (ay + GRAVITY_M_S2 * down_y - (wz * vx - wx * vz) + pull_y)
+    x[at.VELOCITY] = min(_SPEED_MAX_M_S, max(-_SPEED_MAX_M_S, vx))
+    x[at.VELOCITY + 1] = min(_SPEED_MAX_M_S, max(-_SPEED_MAX_M_S, vy))
+    x[at.VELOCITY + 2] = vz
+    # g down = v' + w x v - a with the filter's own v': what it predicts, and the pull of the drag.
+    x[at.REFERENCE] = GRAVITY_M_S2 * down_x + pull_x
+    x[at.REFERENCE + 1] = GRAVITY_M_S2 * down_y + pull_y
+    x[at.REFERENCE + 2] = GRAVITY_M_S2 * down_z
+    _learn_drag(x, p, dt, ax, ay)
+
+
+@kernel
+def _learn_drag(x: Array, p: Array, dt: float, ax: float, ay: float) -> None:
+    """Recursive least squares of velocity = -time * force, weighted down where the two disagree."""
+    slow = min(1.0, dt / _SMOOTHING_S)
+    x[at.SIDEWAYS] += slow * (ax - x[at.SIDEWAYS])
+    x[at.SIDEWAYS + 1] += slow * (ay - x[at.SIDEWAYS + 1])
+    spread = p[par.DRAG_LEARNING]
+    if x[at.AGE] < _LEARN_AFTER_S or math.isinf(spread):
+        return
+    fx, fy = x[at.SIDEWAYS], x[at.SIDEWAYS + 1]
+    rx = -x[at.DRAG_TIME] * fx - x[at.VELOCITY]
+    ry = -x[at.DRAG_TIME] * fy - x[at.VELOCITY + 1]
+    information = dt / (spread * spread + rx * rx + ry * ry)  # of errors that last one second
+    variance = x[at.DRAG_TIME_VARIANCE]
+    shrink = 1.0 + variance * information * (fx * fx + fy * fy)
+    time = x[at.DRAG_TIME] + variance * information * (fx * rx + fy * ry) / shrink
+    x[at.DRAG_TIME] = min(_DRAG_TIME_MAX_S, max(_DRAG_TIME_MIN_S, time))
+    x[at.DRAG_TIME_VARIANCE] = min(1.0, variance / shrink + dt * _DRAG_TIME_WALK_S2_S)

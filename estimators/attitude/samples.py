@@ -1,0 +1,55 @@
+"""Inertial messages in SI units, and their quirks.
+
+RAW_IMU is what SCALED_IMU is on ArduPilot (milli-g, mrad/s); PX4 sends none of the scaled messages and HIGHRES_IMU in
+SI units. ArduPilot sends SCALED_IMU3 with zeros where there is no third sensor.
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Final
+
+from estimators.attitude.parameters import ImuSource
+from estimators.messages import Message
+
+__all__ = ["SAMPLES", "Sample", "fields_given"]
+
+Sample = tuple[float, float, float, float, float, float]
+"""Angular rate in rad/s, specific force in m/s^2, FRD."""
+
+STANDARD_GRAVITY_M_S2: Final = 9.80665
+_MILLI_G: Final = 1e-3 * STANDARD_GRAVITY_M_S2
+_MILLI: Final = 1e-3
+_INERTIAL_FIELDS: Final = 0b111111
+
+
+def _si(m: Message) -> Sample:
+    return m.xgyro, m.ygyro, m.zgyro, m.xacc, m.yacc, m.zacc
+
+
+def _milli(m: Message) -> Sample:
+    return (
+        m.xgyro * _MILLI,
+        m.ygyro * _MILLI,
+        m.zgyro * _MILLI,
+        m.xacc * _MILLI_G,
+        m.yacc * _MILLI_G,
+        m.zacc * _MILLI_G,
+    )
+
+
+SAMPLES: Final[Mapping[str, Callable[[Message], Sample]]] = MappingProxyType(
+    {
+        ImuSource.HIGHRES_IMU.value: _si,
+        ImuSource.RAW_IMU.value: _milli,
+        ImuSource.SCALED_IMU.value: _milli,
+        ImuSource.SCALED_IMU2.value: _milli,
+        ImuSource.SCALED_IMU3.value: _milli,
+    }
+)
+"""Sample of a message by its name; best first."""
+
+
+def fields_given(message: Message) -> bool:
+    """Whether a HIGHRES_IMU has new rates and forces; a sender that marks nothing is believed."""
+    marked = message.fields_updated & _INERTIAL_FIELDS
+    return bool(marked == _INERTIAL_FIELDS or message.fields_updated == 0)

@@ -1,0 +1,73 @@
+"""How far off roll and pitch may be: covariance of the filter as it is, with its fixed gains (compiled).
+
+About one axis the error is `(tilt, bias, reference)`: the tilt and gyro-bias errors, and the error of the reference
+direction, which lasts (first-order Gauss-Markov) because manoeuvres and gusts do. The filter moves it by
+
+    tilt'      = (1 - k) tilt - dt bias + k reference
+    bias'      = bias + l (tilt - reference)
+    reference' = f reference + noise
+
+and the covariance by the same matrix; there is no claim of optimality. Six places hold the upper triangle:
+tilt-tilt, tilt-bias, tilt-reference, bias-bias, bias-reference, reference-reference.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.attitude import parameters as par
+from flightsim.kernels import kernel
+
+Array = NDArray[np.float64]
+
+_REST_RATE_NOISE_RAD_S = 5e-5
+"""What the bias is worth after a mean at rest."""
+
+
+@kernel
+def start(x: Array, at: int, p: Array) -> None:
+    """Level to within the reference, bias unknown."""
+    error = p[par.FLIGHT_ERROR] ** 2
+    x[at], x[at + 1], x[at + 2] = error, 0.0, error
+    x[at + 3], x[at + 4], x[at + 5] = p[par.GYRO_BIAS_START] ** 2, 0.0, error
+
+
+@kernel
+def propagate(x: Array, at: int, p: Array, dt: float, gain: float, weight: float, error: float) -> None:
+    """One step.
+
+    Args:
+        x: state.
+        at: place of the six.
+        p: coefficients.
+        dt: s.
+        gain: k, of the reference on the tilt in this step.
+        weight: of the reference, 0..1.
+        error: standard error of the reference now, rad.
+    """
+    tt, tb, tr, bb, br, rr = x[at], x[at + 1], x[at + 2], x[at + 3], x[at + 4], x[at + 5]
+    keep, learn = 1.0 - gain, p[par.BIAS_GAIN] * weight * dt
+    f = math.exp(-dt / p[par.REFERENCE_TIME])
+    # Rows of the transition: T = (keep, -dt, gain), B = (learn, 1, -learn), R = (0, 0, f).
+    t_t, t_b, t_r = (
+        keep * tt - dt * tb + gain * tr,
+        keep * tb - dt * bb + gain * br,
+        keep * tr - dt * br + gain * rr,
+    )
+    b_t, b_b, b_r = learn * tt + tb - learn * tr, learn * tb + bb - learn * br, learn * tr + br - learn * rr
+    x[at] = keep * t_t - dt * t_b + gain * t_r + p[par.GYRO_NOISE] ** 2 * dt
+    x[at + 1] = learn * t_t + t_b - learn * t_r
+    x[at + 2] = f * t_r
+    x[at + 3] = learn * b_t + b_b - learn * b_r + p[par.GYRO_BIAS_WALK] ** 2 * dt
+    x[at + 4] = f * b_r
+    x[at + 5] = f * f * rr + (1.0 - f * f) * error * error
+
+
+@kernel
+def rest(x: Array, at: int, gain: float) -> None:
+    """The bias was moved towards the rate at rest by a gain."""
+    keep = 1.0 - gain
+    x[at + 1] *= keep
+    x[at + 3] = keep * keep * x[at + 3] + (1.0 - keep * keep) * _REST_RATE_NOISE_RAD_S**2
+    x[at + 4] *= keep
