@@ -1,0 +1,183 @@
+"""Which messages a log may hold: a dialect of pymavlink's by name, or a user's own definition file."""
+
+import importlib
+import pkgutil
+import re
+import struct
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import pymavlink.dialects.v20
+
+from autopilot_bridge.mavlink import DEFINITIONS, MessageDefinition, WireField
+from estimators.logs.errors import LogError
+from estimators.logs.xml_definitions import FieldText, MessageText, read_definitions
+from estimators.messages import message_class
+
+DEFAULT_DIALECT: Final = "all"
+
+_CODES: Final = {
+    "char": "s",
+    "uint8_t": "B",
+    "int8_t": "b",
+    "uint16_t": "H",
+    "int16_t": "h",
+    "uint32_t": "I",
+    "int32_t": "i",
+    "uint64_t": "Q",
+    "int64_t": "q",
+    "float": "f",
+    "double": "d",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A message of a dialect.
+
+    Attributes:
+        definition: layout on the wire.
+        units: of the fields that have one, as in the definition files.
+        instance_field: the field that tells which of several like devices speaks; None for most messages.
+        made: class of its messages, see `estimators.messages`.
+    """
+
+    definition: MessageDefinition
+    units: Mapping[str, str]
+    instance_field: str | None
+    made: Any
+
+    @property
+    def name(self) -> str:
+        """Name of the message."""
+        return self.definition.name
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """Messages by id.
+
+    Attributes:
+        name: name of pymavlink's dialect, or the path of the definition file.
+        messages: descriptions by message id, in the order of the ids.
+    """
+
+    name: str
+    messages: Mapping[int, Description]
+
+    def find(self, name: str) -> Description:
+        """The description of a message by its name, in any case.
+
+        Raises:
+            LogError: the dialect has no such message.
+        """
+        wanted = name.strip().upper()
+        for item in self.messages.values():
+            if item.name == wanted:
+                return item
+        raise LogError(
+            f"no message {name!r} in dialect '{self.name}'; give a name such as ATTITUDE, or another dialect"
+        )
+
+
+def dialect_names() -> tuple[str, ...]:
+    """Dialects that pymavlink has."""
+    return tuple(sorted(item.name for item in pkgutil.iter_modules(pymavlink.dialects.v20.__path__)))
+
+
+def load_dialect(name: str | Path | None = None) -> Dialect:
+    """A dialect.
+
+    Args:
+        name: one of `dialect_names`, or the path of an XML definition file, whose includes are read too; None:
+            every message of MAVLink's public definitions.
+
+    Raises:
+        LogError: there is no such dialect, or the file can't be read or is not a definition file.
+    """
+    text = DEFAULT_DIALECT if name is None else str(name)
+    if isinstance(name, Path) or re.search(r"[/\\]|\.xml$", text, re.IGNORECASE):
+        return Dialect(text, _described(_from_text(item) for item in read_definitions(Path(text))))
+    if text not in dialect_names():
+        raise LogError(
+            f"no MAVLink dialect {text!r}; accepted: {', '.join(dialect_names())}, "
+            "or the path of an .xml definition file"
+        )
+    return _pymavlink_dialect(text)
+
+
+@cache
+def _pymavlink_dialect(name: str) -> Dialect:
+    module = importlib.import_module(f"pymavlink.dialects.v20.{name}")
+    return Dialect(name, _described(_from_class(item) for item in module.mavlink_map.values()))
+
+
+def _described(
+    items: Iterable[tuple[MessageDefinition, Mapping[str, str], str | None]],
+) -> Mapping[int, Description]:
+    found = {}
+    for made, units, instance_field in sorted(items, key=lambda item: item[0].message_id):
+        known = DEFINITIONS.get(made.message_id)
+        # The same layout is the same message: one class of messages then serves links and logs.
+        same = known if known is not None and _layout(known) == _layout(made) else made
+        found[made.message_id] = Description(
+            same, MappingProxyType(dict(units)), instance_field, message_class(same)
+        )
+    return MappingProxyType(found)
+
+
+def _layout(found: MessageDefinition) -> tuple[object, ...]:
+    return found.name, found.crc_extra, found.field_names, found.wire_fields
+
+
+def _from_class(made: Any) -> tuple[MessageDefinition, Mapping[str, str], str | None]:
+    types = dict(zip(made.fieldnames, made.fieldtypes, strict=True))
+    fields = tuple(
+        FieldText(name, types[name], length)
+        for name, length in zip(made.ordered_fieldnames, made.array_lengths, strict=True)
+    )
+    definition = _define(made.id, made.msgname, made.crc_extra, tuple(made.fieldnames), fields, made)
+    return definition, made.fieldunits_by_name, made.instance_field
+
+
+def _from_text(item: MessageText) -> tuple[MessageDefinition, Mapping[str, str], str | None]:
+    names = tuple(field.name for field in item.fields)
+    definition = _define(item.message_id, item.name, item.crc_extra, names, item.wire_order, None)
+    units = {field.name: field.units for field in item.fields if field.units}
+    return definition, units, next((field.name for field in item.fields if field.instance), None)
+
+
+def _define(
+    message_id: int,
+    name: str,
+    crc_extra: int,
+    field_names: tuple[str, ...],
+    ordered: Iterable[FieldText],
+    made: Any,
+) -> MessageDefinition:
+    fields: list[WireField] = []
+    formats = "<"
+    offset = 0
+    for field in ordered:
+        code = _CODES[field.type]
+        size = struct.calcsize(f"<{field.length or 1}{code}")
+        fields.append(WireField(field.name, field.type, field.length, offset, size, code))
+        formats += f"{field.length or 1}{code}" if field.length or code == "s" else code
+        offset += size
+    offsets = {field.name: field.offset for field in fields}
+    return MessageDefinition(
+        message_id=message_id,
+        name=name,
+        crc_extra=crc_extra,
+        message_class=made,
+        field_names=field_names,
+        wire_fields=tuple(fields),
+        wire=struct.Struct(formats),
+        size=offset,
+        target_system_offset=offsets.get("target_system"),
+        target_component_offset=offsets.get("target_component"),
+    )

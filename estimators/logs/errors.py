@@ -1,0 +1,7 @@
+"""The error of logs: a file that can't be read, or something asked of a log that is not in it."""
+
+from autopilot_bridge.errors import TlogError
+
+
+class LogError(TlogError):
+    """A log can't be opened, or does not hold what was asked for; the message names it and what to do."""

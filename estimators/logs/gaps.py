@@ -1,0 +1,159 @@
+"""What lies between the valid frames of a log: every byte of it gets a reason.
+
+A whole record (time stamp and something of the shape of a frame) that is followed by another, or by the end of the
+gap, is one reason: its message is unknown, its flags are unsupported, or its checksum is wrong. What is left is junk,
+or, behind the last whole record of a file, the torn record of a writer that was killed.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
+from estimators.logs.scan import FrameIndex, MessageTable
+from flightsim.kernels import kernel
+
+_UNKNOWN, _UNSUPPORTED, _BAD_CRC = range(3)
+# Figures that the kernel counts.
+(
+    _N_UNKNOWN,
+    _N_UNSUPPORTED,
+    _N_BAD_CRC,
+    _B_UNKNOWN,
+    _B_UNSUPPORTED,
+    _B_BAD_CRC,
+    _B_STAMPS,
+    _B_JUNK,
+    _B_TORN,
+) = range(9)
+_FIGURES: Final = 9
+_OVERHEAD_V1: Final = 8
+_OVERHEAD_V2: Final = 12
+_SIGNATURE: Final = 13
+_PAGE: Final = 256
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GapFigures:
+    """What the gaps hold.
+
+    Attributes:
+        unknown, unsupported, bad_crc: records that are not valid, by reason.
+        unknown_bytes, unsupported_bytes, bad_crc_bytes: bytes of what has the shape of a frame in them.
+        stamp_bytes: time stamps, those of the valid frames behind the gaps included.
+        junk_bytes: what has no shape.
+        torn_bytes: the record that the file ends in.
+        unknown_starts: where the frames of unknown messages begin (int64).
+    """
+
+    unknown: int
+    unsupported: int
+    bad_crc: int
+    unknown_bytes: int
+    unsupported_bytes: int
+    bad_crc_bytes: int
+    stamp_bytes: int
+    junk_bytes: int
+    torn_bytes: int
+    unknown_starts: NDArray[np.int64]
+
+
+def sort_gaps(data: NDArray[np.uint8], index: FrameIndex, table: MessageTable) -> GapFigures:
+    """Tell apart what lies between the frames of an index."""
+    figures = np.zeros(_FIGURES, dtype=np.int64)
+    starts = np.empty(0, dtype=np.int64)
+    _sort_gaps(data, index.lead, index.gaps, table.pages, table.rows, figures, starts)
+    if figures[_N_UNKNOWN]:
+        starts = np.empty(figures[_N_UNKNOWN], dtype=np.int64)
+        figures[:] = 0
+        _sort_gaps(data, index.lead, index.gaps, table.pages, table.rows, figures, starts)
+    clean = len(index.starts) - np.count_nonzero(
+        index.gaps[:, 1] < len(data)
+    )  # frames without a gap before them
+    return GapFigures(
+        unknown=int(figures[_N_UNKNOWN]),
+        unsupported=int(figures[_N_UNSUPPORTED]),
+        bad_crc=int(figures[_N_BAD_CRC]),
+        unknown_bytes=int(figures[_B_UNKNOWN]),
+        unsupported_bytes=int(figures[_B_UNSUPPORTED]),
+        bad_crc_bytes=int(figures[_B_BAD_CRC]),
+        stamp_bytes=int(figures[_B_STAMPS]) + int(clean) * index.lead,
+        junk_bytes=int(figures[_B_JUNK]),
+        torn_bytes=int(figures[_B_TORN]),
+        unknown_starts=starts,
+    )
+
+
+@kernel
+def _shape(
+    data: NDArray[np.uint8], at: int, pages: NDArray[np.int16], rows: NDArray[np.int16]
+) -> tuple[int, int]:
+    """End of what has the shape of a frame, and why it is none; end -1: no shape, -2: the file ends first."""
+    size = len(data)
+    if at >= size:
+        return -2, -1
+    if data[at] == MAGIC_V2:
+        if at + 3 > size:
+            return -2, -1
+        flags = data[at + 2]
+        end = at + _OVERHEAD_V2 + np.int64(data[at + 1]) + (_SIGNATURE if flags & 1 else 0)
+        if end > size:
+            return -2, -1
+        if flags > 1:
+            return end, _UNSUPPORTED
+        page = np.int64(data[at + 8]) | np.int64(data[at + 9]) << 8
+        return end, (_BAD_CRC if rows[pages[page], data[at + 7]] >= 0 else _UNKNOWN)
+    if data[at] == MAGIC_V1:
+        if at + 2 > size:
+            return -2, -1
+        end = at + _OVERHEAD_V1 + np.int64(data[at + 1])
+        if end > size:
+            return -2, -1
+        return end, (_BAD_CRC if rows[pages[0], data[at + 5]] >= 0 else _UNKNOWN)
+    return -1, -1
+
+
+@kernel
+def _sort_gaps(
+    data: NDArray[np.uint8],
+    lead: int,
+    gaps: NDArray[np.int64],
+    pages: NDArray[np.int16],
+    rows: NDArray[np.int16],
+    figures: NDArray[np.int64],
+    unknown_starts: NDArray[np.int64],
+) -> None:
+    size = len(data)
+    for gap in range(len(gaps)):
+        at = gaps[gap, 0]
+        limit = gaps[gap, 1]
+        if limit < size and limit - at >= lead:
+            limit -= lead  # the stamp of the valid frame behind the gap
+            figures[_B_STAMPS] += lead
+        elif limit < size:
+            figures[_B_JUNK] += limit - at
+            continue
+        aligned = True
+        while at < limit:
+            start = at + lead
+            end, reason = _shape(data, start, pages, rows)
+            if 0 <= end <= limit and (
+                end == limit
+                or (end + lead < limit and (data[end + lead] == MAGIC_V1 or data[end + lead] == MAGIC_V2))
+            ):
+                if reason == _UNKNOWN and len(unknown_starts):
+                    unknown_starts[figures[_N_UNKNOWN]] = start
+                figures[_N_UNKNOWN + reason] += 1
+                figures[_B_UNKNOWN + reason] += end - start
+                figures[_B_STAMPS] += lead
+                at = end
+                aligned = True
+            elif end == -2 and aligned and limit == size:
+                figures[_B_TORN] += size - at
+                at = size
+            else:
+                figures[_B_JUNK] += 1
+                at += 1
+                aligned = False

@@ -1,0 +1,380 @@
+"""A flight log as columns, whatever the format of its file."""
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Protocol
+from weakref import WeakValueDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.logs.errors import LogError
+from estimators.logs.iterate import Selection, messages_in_order
+from estimators.logs.report import LogReport, make_report
+from estimators.logs.source import LogSource, Stream
+from estimators.logs.table import Table
+from estimators.messages import Message
+
+_LONG_GAP_US: Final = 1_000_000
+_LONG_GAP_INTERVALS: Final = 10.0
+
+Ids = int | Collection[int] | None
+"""One id, several, or any."""
+
+
+class MessageCondition(Protocol):
+    """A condition on messages; `estimators.logs.condition.Condition` is one."""
+
+    def mask(self, order: NDArray[np.int64], find: Callable[[str], list[Any]]) -> NDArray[np.bool_]:
+        """Which of the messages at these positions it holds for; `find` gives tables by message name."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Key:
+    """A message of a component, and how often it is in the log."""
+
+    name: str
+    system_id: int
+    component_id: int
+    count: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Boot:
+    """One boot of a system.
+
+    Attributes:
+        system_id: the system.
+        number: 0 is the first in the log.
+        first, last: positions of the first message in it and of the last.
+        start_us, end_us: vehicle time of the first message that has one, and the newest.
+    """
+
+    system_id: int
+    number: int
+    first: int
+    last: int
+    start_us: int
+    end_us: int
+
+
+class Log:
+    """A log, opened by `estimators.logs.open_log`.
+
+    Attributes:
+        source: its file.
+    """
+
+    def __init__(self, source: LogSource) -> None:
+        self.source = source
+        self._tables: WeakValueDictionary[tuple[Any, ...], Table] = WeakValueDictionary()
+
+    def __repr__(self) -> str:
+        return f"Log({str(self.path)!r}, {self.format}, {len(self)} messages)"
+
+    def __len__(self) -> int:
+        """Messages in all."""
+        return self.source.count
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+        return self.source.path
+
+    @property
+    def size_bytes(self) -> int:
+        """Size of the file."""
+        return self.source.size_bytes
+
+    @property
+    def format(self) -> str:
+        """ "tlog", "raw MAVLink", "bin" or "ulg"."""
+        return self.source.format
+
+    @cached_property
+    def keys(self) -> tuple[Key, ...]:
+        """What there is, sorted by system, component and name."""
+        found = (
+            Key(name=s.name, system_id=s.system_id, component_id=s.component_id, count=len(s.order))
+            for s in self.source.streams
+        )
+        return tuple(sorted(found, key=lambda key: (key.system_id, key.component_id, key.name)))
+
+    @cached_property
+    def systems(self) -> tuple[int, ...]:
+        """System ids heard, ascending."""
+        return tuple(sorted({stream.system_id for stream in self.source.streams}))
+
+    @cached_property
+    def boots(self) -> tuple[Boot, ...]:
+        """Boots of all systems, by system and number."""
+        times = self.source.time_us
+        found = []
+        for system_id in self.systems:
+            orders = [s.order for s in self.source.streams if s.system_id == system_id]
+            starts = self.source.boot_starts.get(system_id, np.empty(0, dtype=np.int64)).tolist()
+            edges = [0, *starts, self.source.count]
+            for number, (begin, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+                first, last, start_us, end_us = end, begin, 0, 0
+                for order in orders:
+                    low, high = np.searchsorted(order, (begin, end))
+                    if low == high:
+                        continue
+                    first, last = min(first, int(order[low])), max(last, int(order[high - 1]))
+                    span = times[order[low:high]]
+                    span = span[span > 0]
+                    if len(span):
+                        start_us = min(start_us or int(span.min()), int(span.min()))
+                        end_us = max(end_us, int(span.max()))
+                if first < end:
+                    found.append(
+                        Boot(
+                            system_id=system_id,
+                            number=number,
+                            first=first,
+                            last=last,
+                            start_us=start_us,
+                            end_us=end_us,
+                        )
+                    )
+        return tuple(found)
+
+    @cached_property
+    def _recorded_us(self) -> tuple[int, int]:
+        """First and last time of a record."""
+        ends = self.source.log_time_us(np.array([0, self.source.count - 1], dtype=np.int64))
+        return int(ends[0]), int(ends[1])
+
+    @property
+    def start_unix_us(self) -> int | None:
+        """Unix time of the first record; None when the file does not say."""
+        return self._recorded_us[0] or None
+
+    @property
+    def duration_s(self) -> float:
+        """From the first record to the last; where the file has no times, as long as the longest-heard system."""
+        first, last = self._recorded_us
+        if last > first:
+            return (last - first) * 1e-6
+        by_system: dict[int, int] = {}
+        for boot in self.boots:
+            by_system[boot.system_id] = by_system.get(boot.system_id, 0) + boot.end_us - boot.start_us
+        return max(by_system.values(), default=0) * 1e-6
+
+    def has(
+        self, name: str, *, system_id: Ids = None, component_id: Ids = None, boot: int | None = None
+    ) -> bool:
+        """Whether there is a message of that name, from those asked for."""
+        return any(len(self._rows(stream, boot)) for stream in self._find((name,), system_id, component_id))
+
+    def rate_hz(
+        self, name: str, *, system_id: Ids = None, component_id: Ids = None, boot: int | None = None
+    ) -> float:
+        """Mean rate of a message while it was sent, on vehicle time; gaps are left out.
+
+        Of several components that send it the highest; 0 when there is none, or one message only.
+        """
+        rates = (
+            self.stream_rate_hz(stream, self._rows(stream, boot))
+            for stream in self._find((name,), system_id, component_id)
+        )
+        return max(rates, default=0.0)
+
+    def stream_rate_hz(self, stream: Stream, rows: NDArray[np.int64] | slice = slice(None)) -> float:
+        """Mean rate of one stream while it was sent."""
+        order = stream.order[rows]
+        if len(order) < 2:
+            return 0.0
+        times = self.source.time_us[order]
+        if times[0] == times[-1]:  # no clock that runs: systems without an autopilot
+            times = self.source.log_time_us(order)
+        steps = np.diff(times)
+        steps = steps[steps >= 0]
+        if not len(steps):
+            return 0.0
+        limit = max(_LONG_GAP_US, _LONG_GAP_INTERVALS * float(np.median(steps)))
+        steps = steps[steps <= limit]
+        total = int(steps.sum())
+        return len(steps) / (total * 1e-6) if total else 0.0
+
+    def table(
+        self,
+        name: str,
+        *,
+        system_id: int | None = None,
+        component_id: int | None = None,
+        instance: int | str | None = None,
+        boot: int | None = None,
+    ) -> Table:
+        """Columns of one message of one component.
+
+        Args:
+            name: "ATTITUDE", in any case.
+            system_id, component_id: who sent it; None will do if just one did.
+            instance: value of the message's instance field (id of a battery, name of a value); None: all.
+            boot: number of the system's boot; None: all.
+
+        Raises:
+            LogError: there is no such message, or several components sent it.
+        """
+        found = self._find((name,), system_id, component_id)
+        if not found:
+            raise self._missing(name, system_id, component_id)
+        if len(found) > 1:
+            senders = ", ".join(f"{stream.system_id}/{stream.component_id}" for stream in found)
+            raise LogError(
+                f"{self.path}: {found[0].name} comes from {senders} (system/component); "
+                "give system_id and component_id"
+            )
+        return self.stream_table(found[0], instance=instance, boot=boot)
+
+    def tables(
+        self, name: str, *, system_id: Ids = None, component_id: Ids = None, boot: int | None = None
+    ) -> list[Table]:
+        """Tables of a message, one for each component that sent it; empty when none did."""
+        found = (
+            self.stream_table(stream, boot=boot) for stream in self._find((name,), system_id, component_id)
+        )
+        return [table for table in found if len(table)]
+
+    def stream_table(
+        self, stream: Stream, *, instance: int | str | None = None, boot: int | None = None
+    ) -> Table:
+        """Columns of one stream; see `table`."""
+        key = (id(stream), instance, boot)
+        table = self._tables.get(key)
+        if table is None:
+            table = self._tables[key] = self._decode(stream, instance, boot)
+        return table
+
+    def select(
+        self,
+        names: str | Iterable[str] | None = None,
+        *,
+        system_id: Ids = None,
+        component_id: Ids = None,
+        boot: int | None = None,
+        condition: MessageCondition | Callable[[Table], NDArray[np.bool_]] | None = None,
+    ) -> list[Selection]:
+        """Streams, and which rows of each, that `messages` would give.
+
+        Raises:
+            LogError: a name is none of the dialect.
+        """
+        selections: list[Selection] = []
+        for stream in self._find(_names(names), system_id, component_id):
+            rows = self._rows(stream, boot)
+            if condition is not None and len(rows):
+                if hasattr(condition, "mask"):
+                    order = stream.order[rows].astype(np.int64)
+                    kept = condition.mask(order, lambda name, stream=stream: self._tables_for(stream, name))
+                else:
+                    kept = condition(self.stream_table(stream).select(rows))
+                rows = rows[np.asarray(kept, dtype=np.bool_)]
+            if len(rows):
+                selections.append((stream, rows))
+        return selections
+
+    def messages(
+        self,
+        names: str | Iterable[str] | None = None,
+        *,
+        system_id: Ids = None,
+        component_id: Ids = None,
+        boot: int | None = None,
+        condition: MessageCondition | Callable[[Table], NDArray[np.bool_]] | None = None,
+    ) -> Iterator[tuple[int, Message]]:
+        """(vehicle time in microseconds, message) in the order of the file.
+
+        Args:
+            names: of messages; None: all. Names that are not in the log give nothing.
+            system_id, component_id: who sent them; None: anyone.
+            boot: number of the system's boot; None: all.
+            condition: which of them, by their values: an object with `mask`, or a function that makes a mask
+                of a table.
+
+        Raises:
+            LogError: a name is none of the dialect.
+        """
+        selections = self.select(
+            names, system_id=system_id, component_id=component_id, boot=boot, condition=condition
+        )
+        return messages_in_order(self.source, selections)
+
+    def report(self) -> LogReport:
+        """What is in the log, and what is not: bytes by reason, loss, gaps, rates, modes, flights."""
+        return make_report(self)
+
+    def _find(self, names: Iterable[str] | None, system_id: Ids, component_id: Ids) -> list[Stream]:
+        wanted = None if names is None else {self.source.dialect.find(name).name for name in names}
+        return [
+            stream
+            for stream in self.source.streams
+            if (wanted is None or stream.name in wanted)
+            and _is_in(stream.system_id, system_id)
+            and _is_in(stream.component_id, component_id)
+        ]
+
+    def _tables_for(self, stream: Stream, name: str) -> list[Table]:
+        """What a condition on messages of a stream may read of its vehicle."""
+        return [self.stream_table(found) for found in self._find((name,), stream.system_id, None)]
+
+    def _rows(self, stream: Stream, boot: int | None) -> NDArray[np.int64]:
+        if boot is None:
+            return np.arange(len(stream.order))
+        starts = self.source.boot_starts.get(stream.system_id, np.empty(0, dtype=np.int64))
+        edges = np.concatenate(([0], starts, [self.source.count]))
+        if not 0 <= boot < len(edges) - 1:
+            return np.arange(0)
+        return np.arange(*np.searchsorted(stream.order, edges[boot : boot + 2]))
+
+    def _decode(self, stream: Stream, instance: int | str | None, boot: int | None) -> Table:
+        rows = self._rows(stream, boot)
+        chosen: slice | NDArray[np.int64] = slice(None) if boot is None else rows
+        columns: Mapping[str, NDArray[Any]] = self.source.columns(stream, chosen)
+        table = Table(
+            self.source,
+            stream.description,
+            system_id=stream.system_id,
+            component_id=stream.component_id,
+            order=stream.order[chosen].astype(np.int64),
+            columns=columns,
+            instance=instance,
+            boot=boot,
+        )
+        return table if instance is None else self._of_instance(table, instance)
+
+    def _of_instance(self, table: Table, instance: int | str) -> Table:
+        field = table.description.instance_field
+        if field is None:
+            raise LogError(f"{table.name} has no instances; leave instance out")
+        values = table[field]
+        wanted = instance.encode() if values.dtype.kind == "S" and isinstance(instance, str) else instance
+        rows = np.flatnonzero(values == wanted)
+        if not len(rows):
+            there = ", ".join(str(item) for item in np.unique(values).tolist())
+            raise LogError(f"{self.path}: no {table.name} with {field} {instance!r}; there is {there}")
+        return table.select(rows)
+
+    def _missing(self, name: str, system_id: int | None, component_id: int | None) -> LogError:
+        senders = [f"{s.system_id}/{s.component_id}" for s in self._find((name,), None, None)]
+        if senders:
+            asked = f"{system_id if system_id is not None else '*'}/{component_id if component_id is not None else '*'}"
+            return LogError(
+                f"{self.path}: no {name.upper()} from {asked}; it comes from {', '.join(senders)}"
+            )
+        names = sorted({stream.name for stream in self.source.streams})
+        return LogError(f"{self.path} has no {name.upper()}; it has {', '.join(names)}")
+
+
+def _names(names: str | Iterable[str] | None) -> Sequence[str] | None:
+    if names is None:
+        return None
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _is_in(number: int, wanted: Ids) -> bool:
+    return wanted is None or (number == wanted if isinstance(wanted, int) else number in wanted)

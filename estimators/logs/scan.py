@@ -1,0 +1,313 @@
+"""Where the frames of a telemetry log are: one compiled pass over the bytes.
+
+A frame is valid when the dialect knows its message, it has no incompatibility flag but "signed", it lies in the file
+whole, and its checksum is right. Behind each frame the next is first looked for where it belongs, behind a time stamp
+of 8 bytes (`lead`; 0 in captures without stamps); if none is there, it is the first valid one that begins anywhere
+behind the last. So no damage hides a frame that begins outside of a valid one, and a stamp that
+happens to look like the beginning of a frame hides none either. What lies between is told apart afterwards
+(`gaps`).
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
+from estimators.logs.crc import checksum
+from estimators.logs.dialect import Dialect
+from flightsim.kernels import kernel
+
+STAMP_SIZE: Final = 8
+"""Bytes of the time before each frame."""
+
+MAX_LATE: Final = 16
+"""Frames: a larger step back in the sequence is a sender that started anew; as `FrameParser` has it."""
+
+_PAGE: Final = 256
+_CAPACITY: Final = 1 << 20
+_OVERHEAD_V1: Final = 8
+_OVERHEAD_V2: Final = 12
+_SIGNATURE: Final = 13
+_HASH: Final = 0x9E3779B97F4A7C15  # Knuth's multiplicative hash
+# Columns of `sources`, one row per system and component.
+FRAMES, LOST, LATE, LAST = range(4)
+# What `progress` holds from call to call.
+_AT, _FOUND, _GAPS, _STREAMS, _V1, _SIGNED, _UNSTAMPED, _FRAME_BYTES = range(8)
+_SAMPLE_BYTES: Final = 1 << 18
+
+
+@dataclass(frozen=True, slots=True)
+class MessageTable:
+    """The dialect for compiled code: messages are numbered in the order of their ids.
+
+    Attributes:
+        pages, rows: number of a message: rows[pages[id // 256], id % 256]; -1 when there is none.
+        extras: CRC_EXTRA of each.
+        ids: message id of each.
+    """
+
+    pages: NDArray[np.int16]
+    rows: NDArray[np.int16]
+    extras: NDArray[np.uint8]
+    ids: NDArray[np.int64]
+
+
+def message_table(dialect: Dialect) -> MessageTable:
+    """Lookup of a dialect's messages."""
+    ids = np.array(sorted(dialect.messages), dtype=np.int64)
+    used = np.unique(ids // _PAGE)
+    pages = np.zeros((1 << 24) // _PAGE, dtype=np.int16)
+    pages[used] = np.arange(1, len(used) + 1)
+    rows = np.full((len(used) + 1, _PAGE), -1, dtype=np.int16)
+    rows[pages[ids // _PAGE], ids % _PAGE] = np.arange(len(ids))
+    extras = np.array([dialect.messages[int(key)].definition.crc_extra for key in ids], dtype=np.uint8)
+    return MessageTable(pages, rows, extras, ids)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameIndex:
+    """All valid frames of a log, in the order of the file.
+
+    Attributes:
+        lead: bytes before each frame that belong to it: 8 (time stamp) or 0.
+        starts: where each frame begins (int64).
+        streams: which stream each belongs to (int32): message, system and component.
+        stream_keys: shape (streams, 3): message number of the `MessageTable`, system id, component id; in the
+            order of their first frames.
+        gaps: shape (gaps, 2): from the end of a frame (or of nothing) to the beginning of the next (or the end of
+            the file), wherever these are not exactly `lead` bytes.
+        sources: by system and component (row = system * 256 + component): frames, lost, late, last sequence.
+        frames_v1, frames_signed: how many are in MAVLink 1, and with a signature.
+        unstamped: frames with fewer than 8 bytes before them, though the log has stamps.
+        frame_bytes: bytes in frames.
+    """
+
+    lead: int
+    starts: NDArray[np.int64]
+    streams: NDArray[np.int32]
+    stream_keys: NDArray[np.int64]
+    gaps: NDArray[np.int64]
+    sources: NDArray[np.int64]
+    frames_v1: int
+    frames_signed: int
+    unstamped: int
+    frame_bytes: int
+
+
+def scan(data: NDArray[np.uint8], table: MessageTable) -> FrameIndex:
+    """Find every valid frame."""
+    return _scan(data, table, _find_lead(data, table))
+
+
+def _find_lead(data: NDArray[np.uint8], table: MessageTable) -> int:
+    """8 when most frames at the beginning of the file stand behind a gap as long as a time stamp, otherwise 0."""
+    size = _SAMPLE_BYTES
+    while True:
+        sample = data[:size]
+        found = _scan(sample, table, 0)
+        if len(found.starts) > 1 or size >= len(data):
+            break
+        size *= 8
+    if len(found.starts) < 2:
+        return 0 if len(found.starts) == 1 and found.starts[0] < STAMP_SIZE else STAMP_SIZE
+    gaps = found.gaps[(found.gaps[:, 0] > 0) & (found.gaps[:, 1] < len(sample))]
+    stamped = int(np.count_nonzero(gaps[:, 1] - gaps[:, 0] >= STAMP_SIZE))
+    return STAMP_SIZE if 2 * stamped >= len(found.starts) - 1 else 0
+
+
+def _scan(data: NDArray[np.uint8], table: MessageTable, lead: int) -> FrameIndex:
+    progress = np.zeros(8, dtype=np.int64)
+    sources = np.zeros((256 * 256, 4), dtype=np.int64)
+    keys = np.zeros((1024, 3), dtype=np.int64)
+    slots = np.full(4 * len(keys), -1, dtype=np.int32)
+    capacity = min(_CAPACITY, len(data) // (_OVERHEAD_V1 + lead) + 2)
+    starts: list[NDArray[np.int64]] = []
+    streams: list[NDArray[np.int32]] = []
+    gaps: list[NDArray[np.int64]] = []
+    while progress[_AT] < len(data):
+        starts.append(np.empty(capacity, dtype=np.int64))
+        streams.append(np.empty(capacity, dtype=np.int32))
+        gaps.append(np.empty((capacity, 2), dtype=np.int64))
+        progress[_FOUND] = progress[_GAPS] = 0
+        _scan_some(
+            *(data, lead, table.pages, table.rows, table.extras, starts[-1], streams[-1], gaps[-1]),
+            *(keys, slots, sources, progress),
+        )
+        starts[-1] = starts[-1][: progress[_FOUND]].copy()
+        streams[-1] = streams[-1][: progress[_FOUND]].copy()
+        gaps[-1] = gaps[-1][: progress[_GAPS]].copy()
+        if 2 * (progress[_STREAMS] + 1) > len(keys):
+            keys, slots = _grown(keys, int(progress[_STREAMS]))
+    return FrameIndex(
+        lead=lead,
+        starts=_joined(starts, np.empty(0, dtype=np.int64)),
+        streams=_joined(streams, np.empty(0, dtype=np.int32)),
+        stream_keys=keys[: progress[_STREAMS]].copy(),
+        gaps=_joined(gaps, np.empty((0, 2), dtype=np.int64)),
+        sources=sources,
+        frames_v1=int(progress[_V1]),
+        frames_signed=int(progress[_SIGNED]),
+        unstamped=int(progress[_UNSTAMPED]),
+        frame_bytes=int(progress[_FRAME_BYTES]),
+    )
+
+
+def _joined(parts: list[NDArray[Any]], empty: NDArray[Any]) -> NDArray[Any]:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts) if parts else empty
+
+
+def _grown(keys: NDArray[np.int64], used: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Twice the room for streams, the hash table made anew."""
+    larger = np.zeros((2 * len(keys), 3), dtype=np.int64)
+    larger[:used] = keys[:used]
+    slots = np.full(4 * len(larger), -1, dtype=np.int32)
+    for number in range(used):
+        _insert(larger, slots, number)
+    return larger, slots
+
+
+@kernel
+def _slot(message: int, sender: int, size: int) -> int:
+    code = np.uint64(message) * np.uint64(65536) + np.uint64(sender)
+    return np.int64(((code * np.uint64(_HASH)) >> np.uint64(32)) & np.uint64(size - 1))
+
+
+@kernel
+def _insert(keys: NDArray[np.int64], slots: NDArray[np.int32], number: int) -> None:
+    at = _slot(keys[number, 0], keys[number, 1] * 256 + keys[number, 2], len(slots))
+    while slots[at] >= 0:
+        at = (at + 1) & (len(slots) - 1)
+    slots[at] = number
+
+
+@kernel
+def valid_frame(
+    data: NDArray[np.uint8],
+    at: int,
+    pages: NDArray[np.int16],
+    rows: NDArray[np.int16],
+    extras: NDArray[np.uint8],
+) -> tuple[int, int]:
+    """End of the valid frame that begins at `at`, and the number of its message; (-1, -1) if none does."""
+    size = len(data)
+    magic = data[at]
+    if magic == MAGIC_V2:
+        if at + _OVERHEAD_V2 > size:
+            return -1, -1
+        flags = data[at + 2]
+        if flags > 1:
+            return -1, -1
+        crc_at = at + 10 + np.int64(data[at + 1])
+        end = crc_at + 2 + (_SIGNATURE if flags else 0)
+        if end > size:
+            return -1, -1
+        page = np.int64(data[at + 8]) | np.int64(data[at + 9]) << 8
+        message = np.int64(rows[pages[page], data[at + 7]])
+    elif magic == MAGIC_V1:
+        if at + _OVERHEAD_V1 > size:
+            return -1, -1
+        crc_at = at + 6 + np.int64(data[at + 1])
+        end = crc_at + 2
+        if end > size:
+            return -1, -1
+        message = np.int64(rows[pages[0], data[at + 5]])
+    else:
+        return -1, -1
+    if message < 0:
+        return -1, -1
+    if checksum(data, at + 1, crc_at, extras[message]) != (
+        np.int64(data[crc_at]) | np.int64(data[crc_at + 1]) << 8
+    ):
+        return -1, -1
+    return end, message
+
+
+@kernel
+def _scan_some(
+    data: NDArray[np.uint8],
+    lead: int,
+    pages: NDArray[np.int16],
+    rows: NDArray[np.int16],
+    extras: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    streams: NDArray[np.int32],
+    gaps: NDArray[np.int64],
+    keys: NDArray[np.int64],
+    slots: NDArray[np.int32],
+    sources: NDArray[np.int64],
+    progress: NDArray[np.int64],
+) -> None:
+    """Go on from `progress` until the file ends, the arrays are full, or the table of streams is half full."""
+    size = len(data)
+    at = progress[_AT]
+    found = 0
+    gap_count = 0
+    stream_count = progress[_STREAMS]
+    mask = len(slots) - 1
+    while at < size and found < len(starts) and gap_count < len(gaps) and 2 * stream_count < len(keys):
+        start = at + lead
+        end = np.int64(-1)
+        message = np.int64(-1)
+        if start < size:
+            end, message = valid_frame(data, start, pages, rows, extras)
+        if end < 0:
+            start = at
+            while start < size:
+                byte = data[start]
+                if byte == MAGIC_V1 or byte == MAGIC_V2:
+                    end, message = valid_frame(data, start, pages, rows, extras)
+                    if end >= 0:
+                        break
+                start += 1
+            if start - at != lead or end < 0:
+                gaps[gap_count, 0] = at
+                gaps[gap_count, 1] = start
+                gap_count += 1
+            if end < 0:
+                at = size
+                break
+            if start - at < lead:
+                progress[_UNSTAMPED] += 1
+        if data[start] == MAGIC_V2:
+            sequence = np.int64(data[start + 4])
+            sender = np.int64(data[start + 5]) * 256 + np.int64(data[start + 6])
+            progress[_SIGNED] += data[start + 2] & 1
+        else:
+            sequence = np.int64(data[start + 2])
+            sender = np.int64(data[start + 3]) * 256 + np.int64(data[start + 4])
+            progress[_V1] += 1
+        progress[_FRAME_BYTES] += end - start
+        slot = _slot(message, sender, mask + 1)
+        stream = slots[slot]
+        while stream >= 0 and (
+            keys[stream, 0] != message or keys[stream, 1] * 256 + keys[stream, 2] != sender
+        ):
+            slot = (slot + 1) & mask
+            stream = slots[slot]
+        if stream < 0:
+            stream = np.int32(stream_count)
+            slots[slot] = stream
+            keys[stream, 0] = message
+            keys[stream, 1] = sender >> 8
+            keys[stream, 2] = sender & 0xFF
+            stream_count += 1
+        source = sources[sender]
+        if source[FRAMES] == 0:
+            source[LAST] = (sequence - 1) & 0xFF
+        source[FRAMES] += 1
+        missed = (sequence - source[LAST] - 1) & 0xFF
+        if missed < 256 - MAX_LATE:
+            source[LOST] += missed
+            source[LAST] = sequence
+        else:
+            source[LATE] += 1
+        starts[found] = start
+        streams[found] = stream
+        found += 1
+        at = end
+    progress[_AT] = at
+    progress[_FOUND] = found
+    progress[_GAPS] = gap_count
+    progress[_STREAMS] = stream_count

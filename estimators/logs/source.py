@@ -1,0 +1,137 @@
+"""What a file format must offer to be opened as a `Log`."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.logs.columns import Columns
+from estimators.logs.dialect import Description, Dialect
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stream:
+    """All messages of one kind from one component.
+
+    Attributes:
+        description: of the message.
+        system_id, component_id: who sent it.
+        order: positions of the messages in the log, ascending; int32 or int64.
+    """
+
+    description: Description
+    system_id: int
+    component_id: int
+    order: NDArray[np.int32] | NDArray[np.int64]
+
+    @property
+    def name(self) -> str:
+        """Name of the message."""
+        return self.description.name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnknownMessage:
+    """Frames of a message that the dialect does not know.
+
+    Attributes:
+        message_id: its number.
+        system_id, component_id: who sent it.
+        count: frames.
+        frame_bytes: bytes in them; their checksums can't be verified.
+    """
+
+    message_id: int
+    system_id: int
+    component_id: int
+    count: int
+    frame_bytes: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SourceLoss:
+    """What was heard from one component, by its sequence numbers.
+
+    Attributes:
+        system_id, component_id: the component.
+        frames: good frames.
+        lost: frames missing from the sequence, those that came late taken off.
+        late: frames that came after a later one, or twice.
+    """
+
+    system_id: int
+    component_id: int
+    frames: int
+    lost: int
+    late: int
+
+
+class LogSource(ABC):
+    """A file's messages. Messages are numbered in the order of the file; no method makes an object per message.
+
+    Attributes:
+        path: the file.
+        size_bytes: its size.
+        format: "tlog", "raw MAVLink", "bin", "ulg".
+        dialect: definitions of the messages, whose wire units the columns have.
+        streams: every kind of message of every component that has at least one, in the order of their first.
+        count: messages in all.
+    """
+
+    path: Path
+    size_bytes: int
+    format: str
+    dialect: Dialect
+    streams: Sequence[Stream]
+    count: int
+
+    @property
+    @abstractmethod
+    def time_us(self) -> NDArray[np.int64]:
+        """Vehicle time of every message, (count,); see `estimators.vehicle_time`."""
+
+    @property
+    @abstractmethod
+    def boot_starts(self) -> Mapping[int, NDArray[np.int64]]:
+        """By system id: positions of the messages that begin its second, third, ... boot."""
+
+    @abstractmethod
+    def log_time_us(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Unix microseconds at which the messages at these positions were recorded; 0 where not known."""
+
+    @abstractmethod
+    def columns(self, stream: Stream, rows: slice | NDArray[np.int64]) -> Columns:
+        """Fields of some messages of a stream, in the order of the wire, in wire units.
+
+        Args:
+            stream: one of `streams`.
+            rows: which of its messages, by their number in the stream.
+        """
+
+    @property
+    @abstractmethod
+    def bytes_by_kind(self) -> Mapping[str, int]:
+        """Where every byte of the file went; the sum is `size_bytes`."""
+
+    @property
+    def drops(self) -> Mapping[str, int]:
+        """How often something was dropped, by reason."""
+        return {}
+
+    @property
+    def remarks(self) -> Mapping[str, int | str]:
+        """Further figures for the report."""
+        return {}
+
+    @property
+    def losses(self) -> Sequence[SourceLoss]:
+        """Loss by sequence numbers; empty for formats without."""
+        return ()
+
+    @property
+    def unknown(self) -> Sequence[UnknownMessage]:
+        """Messages that the dialect does not know."""
+        return ()

@@ -1,0 +1,331 @@
+"""Telemetry logs (.tlog) and raw captures of MAVLink streams."""
+
+import mmap
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, MAGIC_V2
+from estimators.logs.columns import Columns, decode_columns
+from estimators.logs.dialect import Description, Dialect
+from estimators.logs.errors import LogError
+from estimators.logs.gaps import GapFigures, sort_gaps
+from estimators.logs.scan import FRAMES, LATE, LOST, STAMP_SIZE, FrameIndex, message_table, scan
+from estimators.logs.source import LogSource, SourceLoss, Stream, UnknownMessage
+from estimators.vehicle_time import UNIX_TIME_US, stamp_field, vehicle_times
+from flightsim.kernels import kernel
+
+_FAR_FUTURE_US: Final = 1 << 62
+_STAMP_SAMPLE: Final = 4096
+_MILLISECOND_US: Final = 1000
+
+
+class TlogSource(LogSource):
+    """A mapped telemetry log and the index of its frames.
+
+    The file must not be shortened while it is open; a log that is still being written is read up to where it ended
+    when it was opened.
+
+    Args:
+        path: the file.
+        data: its bytes.
+        dialect: messages to look for.
+
+    Raises:
+        LogError: there is no valid frame in it.
+    """
+
+    def __init__(self, path: Path, data: NDArray[np.uint8], dialect: Dialect) -> None:
+        self.path = path
+        self.size_bytes = len(data)
+        self.dialect = dialect
+        self.data = data
+        self._table = message_table(dialect)
+        self.index: FrameIndex = scan(data, self._table)
+        self.count = len(self.index.starts)
+        if not self.count:
+            raise LogError(
+                f"{path}: no valid MAVLink frame of dialect '{dialect.name}' in {len(data)} bytes; "
+                "give a telemetry log, or the dialect that it was recorded with"
+            )
+        self.format = "tlog" if self.index.lead else "raw MAVLink"
+        described = list(dialect.messages.values())
+        self._descriptions: list[Description] = [
+            described[key] for key in self.index.stream_keys[:, 0].tolist()
+        ]
+        self.streams: Sequence[Stream] = self._make_streams()
+
+    def _make_streams(self) -> tuple[Stream, ...]:
+        keys = self.index.stream_keys
+        counts = np.bincount(self.index.streams, minlength=len(keys))
+        grouped = np.empty(self.count, dtype=np.int32 if self.count < 1 << 31 else np.int64)
+        ends = np.cumsum(counts)
+        _group(self.index.streams, (ends - counts).astype(np.int64), grouped)
+        return tuple(
+            Stream(description, int(system_id), int(component_id), grouped[end - count : end])
+            for description, (_, system_id, component_id), count, end in zip(
+                self._descriptions, keys.tolist(), counts.tolist(), ends.tolist(), strict=True
+            )
+        )
+
+    @cached_property
+    def _times(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Vehicle times, and the positions at which boots begin."""
+        layout = np.zeros((len(self._descriptions), 3), dtype=np.int64)  # offset, size, unit; size 0: none
+        for row, description in zip(layout, self._descriptions, strict=True):
+            definition = description.definition
+            found = stamp_field(definition.name, definition.field_names)
+            for field in definition.wire_fields:
+                if found is not None and field.name == found[0] and field.code in "IQ" and not field.length:
+                    row[:] = field.offset, field.size, found[1]
+        times = np.empty(self.count, dtype=np.int64)
+        _own_stamps(self.data, self.index.starts, self.index.streams, layout, times)
+        keys = self.index.stream_keys
+        begins = vehicle_times(
+            times, self.index.streams, np.ascontiguousarray(keys[:, 1]), np.ascontiguousarray(keys[:, 2])
+        )
+        times.flags.writeable = False
+        return times, begins
+
+    @property
+    def time_us(self) -> NDArray[np.int64]:
+        """Vehicle time of every frame."""
+        return self._times[0]
+
+    @cached_property
+    def boot_starts(self) -> Mapping[int, NDArray[np.int64]]:
+        """By system id: frames that begin its second, third, ... boot."""
+        begins = self._times[1]
+        systems = self.index.stream_keys[self.index.streams[begins], 1]
+        return {int(system): begins[systems == system] for system in np.unique(systems)}
+
+    def log_time_us(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Times of the records; a frame without one of its own has that of the frame before."""
+        times = np.zeros(len(order), dtype=np.int64)
+        if self.index.lead:
+            _log_times(self.data, self.index.starts, np.asarray(order, np.int64), self._little_endian, times)
+        return times
+
+    @cached_property
+    def _little_endian(self) -> bool:
+        """Old ground stations wrote their stamps that way; as big-endian numbers they lie far in the future."""
+        sample = np.arange(min(self.count, _STAMP_SAMPLE))
+        times = np.zeros(len(sample), dtype=np.int64)
+        _log_times(self.data, self.index.starts, sample, False, times)
+        swapped = np.zeros(len(sample), dtype=np.int64)
+        _log_times(self.data, self.index.starts, sample, True, swapped)
+        plausible = 4 * UNIX_TIME_US
+        return bool(np.count_nonzero(swapped < plausible) > np.count_nonzero(times < plausible))
+
+    def columns(self, stream: Stream, rows: slice | NDArray[np.int64]) -> Columns:
+        """Fields of some messages of a stream."""
+        return decode_columns(self.data, self.index.starts[stream.order[rows]], stream.description.definition)
+
+    def frame_spans(self, order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """First byte, and the one behind the last, of frames in the file; the time stamp lies before them."""
+        starts = self.index.starts[order]
+        ends = np.empty_like(starts)
+        _frame_ends(self.data, starts, ends)
+        return starts, ends
+
+    def frame(self, position: int) -> bytes:
+        """The raw frame at a position."""
+        starts, ends = self.frame_spans(np.array([position]))
+        return self.data[starts[0] : ends[0]].tobytes()
+
+    @cached_property
+    def gaps(self) -> GapFigures:
+        """What lies between the frames."""
+        return sort_gaps(self.data, self.index, self._table)
+
+    @property
+    def bytes_by_kind(self) -> Mapping[str, int]:
+        """Where every byte went."""
+        gaps = self.gaps
+        return {
+            "frames": self.index.frame_bytes,
+            "timestamps": gaps.stamp_bytes,
+            "unknown_messages": gaps.unknown_bytes,
+            "bad_crc": gaps.bad_crc_bytes,
+            "unsupported_flags": gaps.unsupported_bytes,
+            "junk": gaps.junk_bytes,
+            "torn_tail": gaps.torn_bytes,
+        }
+
+    @property
+    def drops(self) -> Mapping[str, int]:
+        """How often frames were dropped, by reason."""
+        gaps = self.gaps
+        return {
+            "unknown_messages": gaps.unknown,
+            "bad_crc": gaps.bad_crc,
+            "unsupported_flags": gaps.unsupported,
+        }
+
+    @property
+    def remarks(self) -> Mapping[str, int | str]:
+        """Figures of the wire and of the time stamps."""
+        return {
+            "frames_v1": self.index.frames_v1,
+            "frames_v2": self.count - self.index.frames_v1,
+            "frames_signed": self.index.frames_signed,
+            "frames_without_timestamp": self.index.unstamped if self.index.lead else self.count,
+            "timestamps": self._stamp_kind,
+        }
+
+    @property
+    def _stamp_kind(self) -> str:
+        if not self.index.lead:
+            return "none"
+        times = self.log_time_us(np.arange(min(self.count, _STAMP_SAMPLE)))
+        return "milliseconds" if not np.any(times % _MILLISECOND_US) else "microseconds"
+
+    @property
+    def losses(self) -> Sequence[SourceLoss]:
+        """Loss by sequence numbers, by system and component."""
+        sources = self.index.sources
+        return tuple(
+            SourceLoss(
+                system_id=int(row) >> 8,
+                component_id=int(row) & 0xFF,
+                frames=int(sources[row, FRAMES]),
+                lost=max(0, int(sources[row, LOST] - sources[row, LATE])),
+                late=int(sources[row, LATE]),
+            )
+            for row in np.flatnonzero(sources[:, FRAMES])
+        )
+
+    @cached_property
+    def unknown(self) -> Sequence[UnknownMessage]:
+        """Messages that the dialect does not know."""
+        starts = self.gaps.unknown_starts
+        if not len(starts):
+            return ()
+        data = self.data
+        v2 = data[starts] == MAGIC_V2
+        system = np.where(v2, data[starts + np.where(v2, 5, 3)], data[starts + 3]).astype(np.int64)
+        component = data[starts + np.where(v2, 6, 4)].astype(np.int64)
+        number = data[starts + np.where(v2, 7, 5)].astype(np.int64)
+        # Bytes 8 and 9 are within the frame in MAVLink 2 only.
+        number += np.where(v2, data[starts + np.where(v2, 8, 0)].astype(np.int64) << 8, 0)
+        number += np.where(v2, data[starts + np.where(v2, 9, 0)].astype(np.int64) << 16, 0)
+        ends = np.empty_like(starts)
+        _frame_ends(data, starts, ends)
+        codes, which = np.unique(number << 16 | system << 8 | component, return_inverse=True)
+        counts = np.bincount(which)
+        sizes = np.bincount(which, weights=(ends - starts).astype(np.float64)).astype(np.int64)
+        return tuple(
+            UnknownMessage(
+                message_id=code >> 16,
+                system_id=code >> 8 & 0xFF,
+                component_id=code & 0xFF,
+                count=count,
+                frame_bytes=size,
+            )
+            for code, count, size in zip(codes.tolist(), counts.tolist(), sizes.tolist(), strict=True)
+        )
+
+    def unknown_frames(self, message_id: int) -> list[bytes]:
+        """Raw frames of a message that the dialect does not know, in the order of the file."""
+        starts = self.gaps.unknown_starts
+        ends = np.empty_like(starts)
+        _frame_ends(self.data, starts, ends)
+        frames = (self.data[start:end].tobytes() for start, end in zip(starts, ends, strict=True))
+        return [raw for raw in frames if _message_id(raw) == message_id]
+
+
+def open_tlog(path: Path, dialect: Dialect) -> TlogSource:
+    """Map a telemetry log and find its frames.
+
+    Raises:
+        LogError: it can't be read, or has no valid frame.
+    """
+    try:
+        with open(path, "rb") as file:
+            mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise LogError(f"can't read {path}: {reason}; give the path of a log") from error
+    return TlogSource(path, np.frombuffer(mapped, dtype=np.uint8), dialect)
+
+
+def _message_id(raw: bytes) -> int:
+    return int.from_bytes(raw[7:10], "little") if raw[0] == MAGIC_V2 else raw[5]
+
+
+@kernel
+def _group(streams: NDArray[np.int32], places: NDArray[np.int64], grouped: NDArray[np.int32]) -> None:
+    """Counting sort: positions by stream, in order within each."""
+    for position in range(len(streams)):
+        stream = streams[position]
+        grouped[places[stream]] = position
+        places[stream] += 1
+
+
+@kernel
+def _frame_end(data: NDArray[np.uint8], start: int) -> int:
+    length = np.int64(data[start + 1])
+    if data[start] != MAGIC_V2:
+        return start + 8 + length
+    return start + 12 + length + (13 if data[start + 2] & 1 else 0)
+
+
+@kernel
+def _frame_ends(data: NDArray[np.uint8], starts: NDArray[np.int64], ends: NDArray[np.int64]) -> None:
+    for index in range(len(starts)):
+        ends[index] = _frame_end(data, starts[index])
+
+
+@kernel
+def _log_times(
+    data: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    order: NDArray[np.int64],
+    little_endian: bool,
+    times: NDArray[np.int64],
+) -> None:
+    for index in range(len(order)):
+        position = order[index]
+        while position >= 0:
+            start = starts[position]
+            before = _frame_end(data, starts[position - 1]) if position > 0 else 0
+            if start - before >= STAMP_SIZE:
+                value = np.uint64(0)
+                for byte in range(STAMP_SIZE):
+                    at = start - 1 - byte if little_endian else start - STAMP_SIZE + byte
+                    value = value << np.uint64(8) | np.uint64(data[at])
+                if value < np.uint64(_FAR_FUTURE_US):
+                    times[index] = np.int64(value)
+                    break
+            if index > 0 and position - 1 == order[index - 1]:
+                times[index] = times[index - 1]
+                break
+            position -= 1
+
+
+@kernel
+def _own_stamps(
+    data: NDArray[np.uint8],
+    starts: NDArray[np.int64],
+    streams: NDArray[np.int32],
+    layout: NDArray[np.int64],
+    times: NDArray[np.int64],
+) -> None:
+    for index in range(len(starts)):
+        stream = streams[index]
+        width = layout[stream, 1]
+        value = np.uint64(0)
+        if width:
+            start = starts[index]
+            payload = start + (HEADER_SIZE_V2 if data[start] == MAGIC_V2 else HEADER_SIZE_V1)
+            length = np.int64(data[start + 1])
+            offset = layout[stream, 0]
+            for byte in range(min(width, length - offset)):
+                value |= np.uint64(data[payload + offset + byte]) << np.uint64(8 * byte)
+            if value >= np.uint64(UNIX_TIME_US):
+                value = np.uint64(0)
+        times[index] = np.int64(value) * layout[stream, 2]

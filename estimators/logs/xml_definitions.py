@@ -1,0 +1,177 @@
+"""Definition files of MAVLink (XML): the messages, with what the wire needs of them.
+
+Nothing in the file is executed and nothing generated; enumerations are passed over. Order on the wire and
+CRC_EXTRA as in the MAVLink guide, "Serialization" (field reordering, CRC_EXTRA calculation).
+"""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from fastcrc.crc16 import mcrf4xx
+
+from estimators.logs.errors import LogError
+
+TYPE_SIZES: Final = {
+    "char": 1,
+    "uint8_t": 1,
+    "int8_t": 1,
+    "uint16_t": 2,
+    "int16_t": 2,
+    "uint32_t": 4,
+    "int32_t": 4,
+    "float": 4,
+    "uint64_t": 8,
+    "int64_t": 8,
+    "double": 8,
+}
+_MAX_PAYLOAD: Final = 255
+_MAX_ID: Final = 0xFFFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class FieldText:
+    """A field as the file has it.
+
+    Attributes:
+        name: field name.
+        type: C type of one element.
+        length: elements of the array; 0 for a scalar.
+        units: "degE7", or "".
+        instance: it tells which of several like devices speaks.
+    """
+
+    name: str
+    type: str
+    length: int
+    units: str = ""
+    instance: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MessageText:
+    """A message as the file has it.
+
+    Attributes:
+        message_id, name: its number and name.
+        fields: in the order of the file.
+        base_count: how many fields come before the extensions.
+    """
+
+    message_id: int
+    name: str
+    fields: tuple[FieldText, ...]
+    base_count: int
+
+    @property
+    def wire_order(self) -> tuple[FieldText, ...]:
+        """Fields as on the wire: base fields by falling size of an element, then the extensions."""
+        base = self.fields[: self.base_count]
+        return (
+            *sorted(base, key=lambda field: TYPE_SIZES[field.type], reverse=True),
+            *self.fields[self.base_count :],
+        )
+
+    @property
+    def crc_extra(self) -> int:
+        """The byte that makes the checksum depend on the definition."""
+        text = bytearray(f"{self.name} ".encode())
+        for field in self.wire_order[: self.base_count]:
+            text += f"{field.type} {field.name} ".encode()
+            if field.length:
+                text.append(field.length)
+        crc = mcrf4xx(bytes(text))
+        return (crc & 0xFF) ^ (crc >> 8)
+
+
+def read_definitions(path: Path) -> tuple[MessageText, ...]:
+    """All messages of a definition file and of those that it includes.
+
+    Raises:
+        LogError: a file can't be read, is no definition file, or two messages have one id or name.
+    """
+    messages: list[MessageText] = []
+    seen: set[Path] = set()
+    waiting = [path]
+    while waiting:
+        file = waiting.pop()
+        if (resolved := file.resolve()) in seen:
+            continue
+        seen.add(resolved)
+        root = _root(file)
+        messages.extend(_messages(root, file))
+        waiting.extend(file.parent / (item.text or "").strip() for item in root.findall("include"))
+    by_id: dict[int, MessageText] = {}
+    by_name: dict[str, MessageText] = {}
+    for item in messages:
+        twin = by_id.setdefault(item.message_id, item)
+        namesake = by_name.setdefault(item.name, item)
+        if twin is not item or namesake is not item:
+            other = twin if twin is not item else namesake
+            raise LogError(
+                f"{path}: messages {item.name} ({item.message_id}) and {other.name} ({other.message_id}) clash; "
+                "each id and each name may be used once"
+            )
+    if not messages:
+        raise LogError(f"{path} defines no message; give a MAVLink definition file")
+    return tuple(messages)
+
+
+def _root(path: Path) -> ElementTree.Element:
+    try:
+        root = ElementTree.parse(path).getroot()
+    except OSError as error:
+        raise LogError(f"can't read the dialect {path}: {error.strerror}; give a MAVLink XML file") from error
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise LogError(f"{path} is no MAVLink definition file: {error}; give a MAVLink XML file") from error
+    if root.tag != "mavlink":
+        raise LogError(
+            f"{path} is no MAVLink definition file: it begins with <{root.tag}>; expected <mavlink>"
+        )
+    return root
+
+
+def _messages(root: ElementTree.Element, path: Path) -> Iterator[MessageText]:
+    for element in root.findall("messages/message"):
+        name = (element.get("name") or "").strip()
+        number = (element.get("id") or "").strip()
+        where = f"{path}: message {name or '?'} ({number or '?'})"
+        if not name.isidentifier() or not number.isdecimal() or int(number) > _MAX_ID:
+            raise LogError(f"{where} needs a name and an id in 0..{_MAX_ID}")
+        fields: list[FieldText] = []
+        base_count: int | None = None
+        for child in element:
+            if child.tag == "extensions":
+                base_count = len(fields)
+            elif child.tag == "field":
+                fields.append(_field(child, where))
+        if len({field.name for field in fields}) < len(fields):
+            raise LogError(f"{where} has a field twice")
+        size = sum(TYPE_SIZES[field.type] * (field.length or 1) for field in fields)
+        if not fields or size > _MAX_PAYLOAD:
+            raise LogError(f"{where} has a payload of {size} bytes; accepted: 1 to {_MAX_PAYLOAD}")
+        yield MessageText(int(number), name, tuple(fields), len(fields) if base_count is None else base_count)
+
+
+def _field(element: ElementTree.Element, where: str) -> FieldText:
+    name = (element.get("name") or "").strip()
+    text = (element.get("type") or "").strip()
+    base, bracket, rest = text.partition("[")
+    length = 0
+    if bracket:
+        digits = rest.removesuffix("]")
+        length = int(digits) if rest.endswith("]") and digits.isdecimal() else -1
+    if base == "uint8_t_mavlink_version":
+        base = "uint8_t"
+    elif base == "array":
+        base = "int8_t"
+    elif base not in TYPE_SIZES and f"{base}_t" in TYPE_SIZES:
+        base = f"{base}_t"
+    if not name.isidentifier() or base not in TYPE_SIZES or not 0 <= length <= _MAX_PAYLOAD:
+        raise LogError(
+            f"{where}: field {name or '?'} of type {text!r}; accepted: {', '.join(TYPE_SIZES)}, "
+            "or an array of them such as float[4]"
+        )
+    return FieldText(name, base, length, element.get("units") or "", element.get("instance") == "true")

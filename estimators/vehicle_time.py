@@ -1,0 +1,186 @@
+"""Vehicle time of messages, from the messages and their order alone.
+
+A vehicle's messages are told apart by their system id; its clock is that of its autopilot, component 1. A message that
+carries a time of that clock has it; any other has the newest that was heard before. Not when a message arrived but what
+came before it decides, so a live link and the log of it agree to the microsecond.
+
+In full, for each system:
+
+* The *own stamp* of a message is `time_boot_ms`, or else `time_usec` below 10^15 (above, it is a Unix time); 0 is none,
+  and SERVO_OUTPUT_RAW's is none: its 32 bits wrap after 71 minutes.
+* The autopilot leads. As long as it has not been heard with a stamp, any component does.
+* A leader's stamp no older than a second before the newest is the message's time, and the newest if it is greater.
+* An older one is a new boot, if it is also more than a second older than the newest of the same message: its own clock
+  has gone back. If it is not, the stamp has gone stale (a receiver without a fix repeats the time of its last one), and
+  the message has the newest time.
+* A stamp of another component counts for its message when it is within a second of the newest (it may have booted with
+  the vehicle); otherwise the message has the newest.
+* Before the first stamp the time is 0.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.messages import Message
+from flightsim.kernels import kernel
+
+AUTOPILOT: Final = 1
+"""Component id of autopilots (MAV_COMP_ID_AUTOPILOT1)."""
+
+LATE_US: Final = 1_000_000
+"""A step back by more is a new boot."""
+
+UNIX_TIME_US: Final = 1_000_000_000_000_000
+"""`time_usec` from here on is a Unix time (this one is of September 2001)."""
+
+_WITHOUT: Final = frozenset({"SERVO_OUTPUT_RAW"})
+_STAMPS: Final = (("time_boot_ms", 1000), ("time_usec", 1))
+
+
+def stamp_field(name: str, fields: Any) -> tuple[str, int] | None:
+    """The field that holds the own stamp of a message, and its unit in microseconds; None: it has none.
+
+    Args:
+        name: of the message.
+        fields: names of its fields.
+    """
+    if name in _WITHOUT:
+        return None
+    return next(((stamp, unit) for stamp, unit in _STAMPS if stamp in fields), None)
+
+
+@dataclass(slots=True)
+class _SystemTime:
+    newest_us: int = 0
+    boot: int = 0
+    led: bool = False
+    by_message: dict[tuple[int, int], int] = field(default_factory=dict)
+
+
+class VehicleTime:
+    """Gives messages their vehicle time, one after the other, in the order in which they came."""
+
+    __slots__ = ("_fields", "_systems")
+
+    def __init__(self) -> None:
+        self._fields: dict[Any, tuple[str, int] | None] = {}
+        self._systems: dict[int, _SystemTime] = {}
+
+    def stamp(self, message: Message) -> int:
+        """Microseconds since the boot of the message's system.
+
+        Args:
+            message: from `estimators.messages`.
+        """
+        made = type(message)
+        try:
+            found = self._fields[made]
+        except KeyError:
+            found = self._fields[made] = stamp_field(made.name, made._fields)
+        system = self._systems.get(message.src_system)
+        if system is None:
+            system = self._systems[message.src_system] = _SystemTime()
+        if found is None:
+            return system.newest_us
+        own = getattr(message, found[0]) * found[1]
+        if not 0 < own < UNIX_TIME_US:
+            return system.newest_us
+        autopilot = message.src_component == AUTOPILOT
+        if autopilot and not system.led:
+            system.led = True
+            system.newest_us = 0
+            system.by_message.clear()
+        if system.led and not autopilot:
+            return own if abs(own - system.newest_us) <= LATE_US else system.newest_us
+        key = message.src_component, made.message_id
+        last = system.by_message.get(key, 0)
+        if own >= system.newest_us - LATE_US:
+            if own > last:
+                system.by_message[key] = own
+            if own > system.newest_us:
+                system.newest_us = own
+            return own
+        if own < last - LATE_US:
+            system.boot += 1
+            system.newest_us = own
+            system.by_message.clear()
+            system.by_message[key] = own
+            return own
+        if own > last:
+            system.by_message[key] = own
+        return system.newest_us
+
+    def boot(self, system_id: int) -> int:
+        """How often the time of a system has started anew."""
+        found = self._systems.get(system_id)
+        return 0 if found is None else found.boot
+
+
+def vehicle_times(
+    own_us: NDArray[np.int64],
+    streams: NDArray[np.int32],
+    systems: NDArray[np.int64],
+    components: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """Vehicle times of a whole log; the same as `VehicleTime.stamp` gives one after the other.
+
+    Args:
+        own_us: own stamps in the order of the file, 0 for none; overwritten with the vehicle times.
+        streams: which stream (message, system and component) each message belongs to.
+        systems, components: ids of each stream.
+
+    Returns:
+        Positions of the messages that begin a new boot of their system, ascending.
+    """
+    begins = np.zeros(len(own_us), dtype=np.uint8)
+    _vehicle_times(own_us, streams, systems, components, begins)
+    return np.flatnonzero(begins)
+
+
+@kernel
+def _vehicle_times(
+    times: NDArray[np.int64],
+    streams: NDArray[np.int32],
+    systems: NDArray[np.int64],
+    components: NDArray[np.int64],
+    begins: NDArray[np.uint8],
+) -> None:
+    newest = np.zeros(256, dtype=np.int64)
+    epoch = np.zeros(256, dtype=np.int64)  # of what is remembered by stream; older is forgotten
+    led = np.zeros(256, dtype=np.bool_)
+    last_of = np.zeros(len(systems), dtype=np.int64)
+    epoch_of = np.zeros(len(systems), dtype=np.int64)
+    for index in range(len(times)):
+        stream = streams[index]
+        system = systems[stream]
+        own = times[index]
+        if own <= 0 or own >= UNIX_TIME_US:
+            times[index] = newest[system]
+            continue
+        autopilot = components[stream] == AUTOPILOT
+        if autopilot and not led[system]:
+            led[system] = True
+            newest[system] = 0
+            epoch[system] += 1
+        if led[system] and not autopilot:
+            if abs(own - newest[system]) > LATE_US:
+                times[index] = newest[system]
+            continue
+        if epoch_of[stream] != epoch[system]:
+            epoch_of[stream] = epoch[system]
+            last_of[stream] = 0
+        last = last_of[stream]
+        if own >= newest[system] - LATE_US:
+            newest[system] = max(newest[system], own)
+        elif own < last - LATE_US:
+            begins[index] = 1
+            newest[system] = own
+            epoch[system] += 1
+            epoch_of[stream] = epoch[system]
+            last = 0
+        else:
+            times[index] = newest[system]
+        last_of[stream] = max(last, own)
