@@ -13,6 +13,7 @@ import click
 _COMMANDS: Final = {
     "fly": ("missions.cli_fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
     "sitl": ("missions.cli_sitl", "sitl", "SITL for other people's clients."),
+    "study": ("missions.cli_study", "study", "Monte Carlo: the papers' experiments."),
 }
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
