@@ -38,7 +38,7 @@ class CameraParameters:
         pixel_noise_px: one sigma of a detection's place, each axis.
         size_noise: one sigma of a detection's size, as a share of it.
         tag_range: tell the distance of tagged targets from their apparent size, as AprilTag detectors do. The
-            size is then as good as the pixels: the mean of four corners' sides has `pixel_noise_px` / sqrt(2).
+            size is then as good as the pixels: `pixel_noise_px` / sqrt(2) for the mean side of four corners.
         detection: how likely a target in the image is detected.
         max_range_m: haze and resolution end there.
         min_depression_rad: targets seen flatter than this below the horizon are lost in the background.

@@ -1,7 +1,7 @@
 """The Monte Carlo study `lissajous-localization`: two drones on Lissajous paths localise a target (Table IV).
 
-Every run has a random stream of its own, named by seed, cell and run, so neither the number of workers nor that
-of the runs changes any of them; all estimators of a run see the same flight.
+Every run has a random stream of its own, named by seed, cell and run, so neither the number of workers nor
+that of the runs changes any of them; all estimators of a run see the same flight.
 """
 
 from collections.abc import Callable, Sequence

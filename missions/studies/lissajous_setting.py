@@ -1,6 +1,7 @@
 """The setting of the localisation study, from Steckenrider, Leamy and Furukawa 2020.
 
-What they give in Tables II, III and V, what they found (Table IV), and what the text leaves open, as chosen here.
+What they give in Tables II, III and V, what they found (Table IV), and what is chosen here because the text
+leaves it open.
 
 All is unitless, as in the paper. The state is (x, x', y, y').
 """
@@ -72,7 +73,7 @@ SIGHT: Final[Array] = 0.1 * np.array([[[0.28, 0.12], [0.12, 0.31]], [[0.33, -0.1
 TARGET_CENTRE: Final = (50.0, 50.0)
 TARGET_RADIUS: Final = 100.0
 TARGET_PERIOD: Final = 20.0
-"""The paper says a circle and no more. Only its mean distance from the drones, some 135, shows in Table IV."""
+"""The paper says a circle and no more. What shows in Table IV is its mean distance, some 135."""
 
 
 class Equations(StrEnum):
@@ -83,7 +84,7 @@ class Equations(StrEnum):
     SIGN_AS_PRINTED = "sign as printed"
     """As corrected, but for the sign in 25a: the reading that gives the paper's Table IV."""
     AS_PRINTED = "as printed"
-    """17 and 25a as printed, 17 in the truth as well. 28 and 29 are corrected: as printed they give nonsense."""
+    """17 and 25a as printed, 17 in the truth as well. 28 and 29 are corrected all the same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
