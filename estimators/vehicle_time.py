@@ -1,20 +1,21 @@
 """Vehicle time of messages, from the messages and their order alone.
 
-A vehicle's messages are told apart by their system id; its clock is that of its autopilot, component 1. A message that
-carries a time of that clock has it; any other has the newest that was heard before. Not when a message arrived but what
-came before it decides, so a live link and the log of it agree to the microsecond.
+A vehicle's messages are told apart by their system id; its clock is that of its autopilot, component 1. A
+message that carries a time of that clock has it; any other has the newest that was heard before. Not when a
+message arrived but what came before it decides, so a live link and the log of it agree to the microsecond.
 
 In full, for each system:
 
-* The *own stamp* of a message is `time_boot_ms`, or else `time_usec` below 10^15 (above, it is a Unix time); 0 is none,
-  and SERVO_OUTPUT_RAW's is none: its 32 bits wrap after 71 minutes.
+* The *own stamp* of a message is `time_boot_ms`, or else `time_usec` below 10^15 (above, it is a Unix time);
+  0 is none, and SERVO_OUTPUT_RAW's is none: its 32 bits wrap after 71 minutes.
 * The autopilot leads. As long as it has not been heard with a stamp, any component does.
-* A leader's stamp no older than a second before the newest is the message's time, and the newest if it is greater.
-* An older one is a new boot, if it is also more than a second older than the newest of the same message: its own clock
-  has gone back. If it is not, the stamp has gone stale (a receiver without a fix repeats the time of its last one), and
-  the message has the newest time.
-* A stamp of another component counts for its message when it is within a second of the newest (it may have booted with
-  the vehicle); otherwise the message has the newest.
+* A leader's stamp no older than a second before the newest is the message's time, and the newest if it is
+  greater.
+* An older one is a new boot, if it is also more than a second older than the newest of the same message: its
+  own clock has gone back. If it is not, the stamp has gone stale (a receiver without a fix repeats the time
+  of its last one), and the message has the newest time.
+* A stamp of another component counts for its message when it is within a second of the newest (it may have
+  booted with the vehicle); otherwise the message has the newest.
 * Before the first stamp the time is 0.
 """
 

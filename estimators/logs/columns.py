@@ -63,7 +63,7 @@ def decode_columns(
         row[:] = field.offset, field.size, room
         room += -(-count * field.size // _ALIGNMENT) * _ALIGNMENT
     buffer = np.empty(room, dtype=np.uint8)
-    scratch = np.empty((_ROWS_AT_ONCE, definition.size + 8), dtype=np.uint8)
+    scratch = np.empty(_ROWS_AT_ONCE * definition.size, dtype=np.uint8)
     _gather(data, starts, definition.size, layout, scratch, buffer)
     columns = {}
     for field, (_, size, at) in zip(fields, layout.tolist(), strict=True):
@@ -86,24 +86,88 @@ def _gather(
     buffer: NDArray[np.uint8],
 ) -> None:
     """Payloads into rows of `scratch`, and from there, while they are in the cache, into the columns."""
-    rows = len(scratch)
+    stride = size
+    rows = _ROWS_AT_ONCE
     first = 0
     while first < len(starts):
         count = min(rows, len(starts) - first)
         for row in range(count):
             start = starts[first + row]
             at = start + (HEADER_SIZE_V2 if data[start] == MAGIC_V2 else HEADER_SIZE_V1)
-            length = min(np.int64(data[start + 1]), size)
-            for byte in range(length):
-                scratch[row, byte] = data[at + byte]
-            for byte in range(length, size):
-                scratch[row, byte] = 0
+            length = np.int64(min(data[start + 1], size))
+            byte = 0
+            while byte + 8 <= length:
+                _copy_8(data, at + byte, scratch, row * stride + byte)
+                byte += 8
+            while byte < length:
+                scratch[row * stride + byte] = data[at + byte]
+                byte += 1
+            while byte < size:
+                scratch[row * stride + byte] = 0
+                byte += 1
         for field in range(len(layout)):
             offset = layout[field, 0]
             width = layout[field, 1]
             to = layout[field, 2] + first * width
-            for row in range(count):
-                for byte in range(width):
-                    buffer[to + byte] = scratch[row, offset + byte]
-                to += width
+            if width == 4:
+                for row in range(count):
+                    _copy_4(scratch, row * stride + offset, buffer, to + 4 * row)
+            elif width == 2:
+                for row in range(count):
+                    _copy_2(scratch, row * stride + offset, buffer, to + 2 * row)
+            elif width == 8:
+                for row in range(count):
+                    _copy_8(scratch, row * stride + offset, buffer, to + 8 * row)
+            else:
+                for row in range(count):
+                    for byte in range(width):
+                        buffer[to + row * width + byte] = scratch[row * stride + offset + byte]
         first += count
+
+
+# Loads before stores: only so can the compiler make one load and one store of them.
+@kernel
+def _copy_2(source: NDArray[np.uint8], at: int, target: NDArray[np.uint8], to: int) -> None:
+    i = np.uint64(at)
+    j = np.uint64(to)
+    one = np.uint64(1)
+    a = source[i]
+    b = source[i + one]
+    target[j] = a
+    target[j + one] = b
+
+
+@kernel
+def _copy_4(source: NDArray[np.uint8], at: int, target: NDArray[np.uint8], to: int) -> None:
+    i = np.uint64(at)
+    j = np.uint64(to)
+    a = source[i]
+    b = source[i + np.uint64(1)]
+    c = source[i + np.uint64(2)]
+    d = source[i + np.uint64(3)]
+    target[j] = a
+    target[j + np.uint64(1)] = b
+    target[j + np.uint64(2)] = c
+    target[j + np.uint64(3)] = d
+
+
+@kernel
+def _copy_8(source: NDArray[np.uint8], at: int, target: NDArray[np.uint8], to: int) -> None:
+    i = np.uint64(at)
+    j = np.uint64(to)
+    a = source[i]
+    b = source[i + np.uint64(1)]
+    c = source[i + np.uint64(2)]
+    d = source[i + np.uint64(3)]
+    e = source[i + np.uint64(4)]
+    f = source[i + np.uint64(5)]
+    g = source[i + np.uint64(6)]
+    h = source[i + np.uint64(7)]
+    target[j] = a
+    target[j + np.uint64(1)] = b
+    target[j + np.uint64(2)] = c
+    target[j + np.uint64(3)] = d
+    target[j + np.uint64(4)] = e
+    target[j + np.uint64(5)] = f
+    target[j + np.uint64(6)] = g
+    target[j + np.uint64(7)] = h

@@ -3,12 +3,15 @@
 Eight bytes at a time by tables (Sarwate's method, sliced by eight); the guide calls it X.25.
 """
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.kernels import kernel
+
+Int = int | np.integer[Any]
+"""A whole number, in compiled code or out of it."""
 
 _POLYNOMIAL: Final = 0x8408  # 0x1021 with its bits reversed
 _SLICES: Final = 8
@@ -32,7 +35,7 @@ _T0, _T1, _T2, _T3, _T4, _T5, _T6, _T7 = (np.ascontiguousarray(table) for table 
 
 
 @kernel
-def checksum(data: NDArray[np.uint8], start: int, stop: int, extra: int) -> int:
+def checksum(data: NDArray[np.uint8], start: Int, stop: Int, extra: Int) -> np.uint32:
     """Checksum of data[start:stop] and one byte more."""
     crc = np.uint32(0xFFFF)
     at = np.uint64(start)

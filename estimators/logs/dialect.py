@@ -93,8 +93,8 @@ def load_dialect(name: str | Path | None = None) -> Dialect:
     """A dialect.
 
     Args:
-        name: one of `dialect_names`, or the path of an XML definition file, whose includes are read too; None:
-            every message of MAVLink's public definitions.
+        name: one of `dialect_names`, or the path of an XML definition file, whose includes are read too;
+            None: every message of MAVLink's public definitions.
 
     Raises:
         LogError: there is no such dialect, or the file can't be read or is not a definition file.

@@ -1,8 +1,9 @@
 """What lies between the valid frames of a log: every byte of it gets a reason.
 
-A whole record (time stamp and something of the shape of a frame) that is followed by another, or by the end of the
-gap, is one reason: its message is unknown, its flags are unsupported, or its checksum is wrong. What is left is junk,
-or, behind the last whole record of a file, the torn record of a writer that was killed.
+A whole record (time stamp and something of the shape of a frame) that is followed by another, or by the end
+of the
+gap, is one reason: its message is unknown, its flags are unsupported, or its checksum is wrong. What is left
+is junk, or, behind the last whole record of a file, the torn record of a writer that was killed.
 """
 
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
+from estimators.logs.crc import Int
 from estimators.logs.scan import FrameIndex, MessageTable
 from flightsim.kernels import kernel
 
@@ -88,8 +90,8 @@ def sort_gaps(data: NDArray[np.uint8], index: FrameIndex, table: MessageTable) -
 
 @kernel
 def _shape(
-    data: NDArray[np.uint8], at: int, pages: NDArray[np.int16], rows: NDArray[np.int16]
-) -> tuple[int, int]:
+    data: NDArray[np.uint8], at: Int, pages: NDArray[np.int16], rows: NDArray[np.int16]
+) -> tuple[Int, Int]:
     """End of what has the shape of a frame, and why it is none; end -1: no shape, -2: the file ends first."""
     size = len(data)
     if at >= size:

@@ -1,8 +1,7 @@
 """Messages of several streams, in the order of the file, made from columns some thousands at a time."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain
-from operator import itemgetter
+from itertools import repeat
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import WireField
 from estimators.logs.source import LogSource, Stream
-from estimators.messages import Message, rows, text
+from estimators.messages import Message, text
 
 _MESSAGES_AT_ONCE: Final = 16384
 
@@ -28,36 +27,41 @@ def messages_in_order(source: LogSource, selections: Sequence[Selection]) -> Ite
     edges = _edges(orders, total)
     ends = [np.searchsorted(order, edges) for order in orders]
     for part in range(len(edges) - 1):
-        pieces, places = [], []
+        takers, places = [], []
         for (stream, chosen), order, end in zip(selections, orders, ends, strict=True):
             first, last = int(end[part]), int(end[part + 1])
             if first < last:
-                pieces.append(stream_messages(source, stream, chosen[first:last]))
+                takers.append(stream_messages(source, stream, chosen[first:last]).__next__)
                 places.append(order[first:last])
         if not places:
             continue
         place = np.concatenate(places)
-        if len(places) == 1:
-            yield from zip(time_us[place].tolist(), pieces[0], strict=True)
-            continue
         sorting = np.argsort(place)
-        made = list(chain.from_iterable(pieces))
-        yield from zip(time_us[place[sorting]].tolist(), itemgetter(*sorting.tolist())(made), strict=True)
+        taker_of = np.repeat(np.arange(len(places)), [len(order) for order in places])[sorting]
+        # One message at a time, each when it is asked for: thousands alive at once would keep the garbage
+        # collector busy.
+        for time, taker in zip(time_us[place[sorting]].tolist(), taker_of.tolist(), strict=True):
+            yield time, takers[taker]()
 
 
 def stream_messages(source: LogSource, stream: Stream, chosen: NDArray[np.int64]) -> Iterator[Message]:
-    """Messages of one stream."""
+    """Messages of one stream, in order, equal to what `estimators.messages.read_message` gives."""
     columns = source.columns(stream, chosen)
     fields = stream.description.definition.wire_fields
     values = [python_values(columns[field.name], field) for field in fields]
-    return rows(stream.description.made, stream.system_id, stream.component_id, values)
+    # As `estimators.messages.rows` does it, in a third of the time: no Python code runs for a message.
+    made = stream.description.made
+    parts = zip(repeat(stream.system_id, len(chosen)), repeat(stream.component_id), *values, strict=False)
+    return map(tuple.__new__, repeat(made), parts)
 
 
 def python_values(column: NDArray[Any], field: WireField) -> Iterable[Any]:
     """A column as Python values, just as `estimators.messages.read_message` gives them."""
     if field.code == "s":
         return map(text, column.tolist())
-    return map(tuple, column.tolist()) if field.length else column.tolist()
+    if not field.length:
+        return column.tolist()
+    return zip(*[iter(column.reshape(-1).tolist())] * field.length, strict=True)  # neighbours together
 
 
 def _edges(orders: Sequence[NDArray[Any]], total: int) -> NDArray[np.int64]:

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, Protocol
 from weakref import WeakValueDictionary
@@ -17,7 +18,7 @@ from estimators.logs.source import LogSource, Stream
 from estimators.logs.table import Table
 from estimators.messages import Message
 
-_LONG_GAP_US: Final = 1_000_000
+_LONG_GAP_US: Final = 5_000_000
 _LONG_GAP_INTERVALS: Final = 10.0
 
 Ids = int | Collection[int] | None
@@ -117,7 +118,7 @@ class Log:
             orders = [s.order for s in self.source.streams if s.system_id == system_id]
             starts = self.source.boot_starts.get(system_id, np.empty(0, dtype=np.int64)).tolist()
             edges = [0, *starts, self.source.count]
-            for number, (begin, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+            for number, (begin, end) in enumerate(pairwise(edges)):
                 first, last, start_us, end_us = end, begin, 0, 0
                 for order in orders:
                     low, high = np.searchsorted(order, (begin, end))
@@ -155,7 +156,7 @@ class Log:
 
     @property
     def duration_s(self) -> float:
-        """From the first record to the last; where the file has no times, as long as the longest-heard system."""
+        """From the first record to the last; without record times, as long as the longest-heard system."""
         first, last = self._recorded_us
         if last > first:
             return (last - first) * 1e-6
@@ -270,7 +271,7 @@ class Log:
             if condition is not None and len(rows):
                 if hasattr(condition, "mask"):
                     order = stream.order[rows].astype(np.int64)
-                    kept = condition.mask(order, lambda name, stream=stream: self._tables_for(stream, name))
+                    kept = condition.mask(order, partial(self._tables_for, stream))
                 else:
                     kept = condition(self.stream_table(stream).select(rows))
                 rows = rows[np.asarray(kept, dtype=np.bool_)]
@@ -362,7 +363,7 @@ class Log:
     def _missing(self, name: str, system_id: int | None, component_id: int | None) -> LogError:
         senders = [f"{s.system_id}/{s.component_id}" for s in self._find((name,), None, None)]
         if senders:
-            asked = f"{system_id if system_id is not None else '*'}/{component_id if component_id is not None else '*'}"
+            asked = "/".join("*" if number is None else str(number) for number in (system_id, component_id))
             return LogError(
                 f"{self.path}: no {name.upper()} from {asked}; it comes from {', '.join(senders)}"
             )

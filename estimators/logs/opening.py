@@ -22,8 +22,8 @@ def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
     Args:
         path: a telemetry log (.tlog), a capture of a MAVLink stream, an ArduPilot .bin, or a PX4 .ulg; told
             by its content, whatever its name is.
-        dialect: of a telemetry log: a dialect of pymavlink's by name ("common"), or the path of an XML definition
-            file; None: every message of MAVLink's public definitions.
+        dialect: of a telemetry log: a dialect of pymavlink's by name ("common"), or the path of an XML
+            definition file; None: every message of MAVLink's public definitions.
 
     Raises:
         LogError: the file can't be read or is no log, or there is no such dialect.

@@ -1,10 +1,66 @@
 """What a log holds and what it lacks, in figures."""
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from estimators.logs.source import SourceLoss, UnknownMessage
+from estimators.logs.vehicles import VehicleReport, vehicles
 
 if TYPE_CHECKING:
     from estimators.logs.log import Log
+
+GAP_US: Final = 2_000_000
+"""Silence of a system for longer than this is a gap."""
+
+_MAX_INSTANCES: Final = 32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StreamReport:
+    """One message of one component.
+
+    Attributes:
+        name, system_id, component_id: which.
+        count: messages.
+        rate_hz: mean rate while it was sent.
+        longest_gap_s: longest time from one to the next, on vehicle time, in one boot.
+        instances: values of its instance field, at most 32; empty for messages without.
+    """
+
+    name: str
+    system_id: int
+    component_id: int
+    count: int
+    rate_hz: float
+    longest_gap_s: float
+    instances: tuple[int | str, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gap:
+    """A time in which nothing was heard of a system, though its clock went on.
+
+    Attributes:
+        system_id, boot: which system, in which of its boots.
+        start_us, end_us: vehicle time before and after.
+    """
+
+    system_id: int
+    boot: int
+    start_us: int
+    end_us: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BootReport:
+    """One boot of a system: its number, and vehicle time of its first message and of the newest."""
+
+    system_id: int
+    number: int
+    start_us: int
+    end_us: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,23 +69,38 @@ class LogReport:
 
     Attributes:
         path, format, size_bytes: the file.
-        messages: valid frames.
+        dialect: in which its messages were looked up.
+        messages: valid ones.
         duration_s, start_unix_us: as in `Log`.
-        bytes_by_kind: where every byte went.
+        bytes_by_kind: where every byte went; the sum is `size_bytes`.
         drops: how often something was dropped, by reason.
+        remarks: figures that only this format has: versions of the wire, kind of time stamps.
+        losses: by sequence numbers, for each component.
+        unknown: messages that the dialect does not know.
+        boots, gaps: for each system.
+        vehicles: what they are, modes and flights.
+        streams: rates, by system, component and name.
     """
 
     path: str
     format: str
     size_bytes: int
+    dialect: str
     messages: int
     duration_s: float
     start_unix_us: int | None
     bytes_by_kind: dict[str, int]
     drops: dict[str, int]
+    remarks: dict[str, int | str]
+    losses: tuple[SourceLoss, ...]
+    unknown: tuple[UnknownMessage, ...]
+    boots: tuple[BootReport, ...]
+    gaps: tuple[Gap, ...]
+    vehicles: tuple[VehicleReport, ...]
+    streams: tuple[StreamReport, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """The same for JSON."""
+        """The same for JSON: numbers, texts, lists and dictionaries."""
         return asdict(self)
 
 
@@ -40,9 +111,70 @@ def make_report(log: "Log") -> LogReport:
         path=str(log.path),
         format=log.format,
         size_bytes=log.size_bytes,
+        dialect=source.dialect.name,
         messages=len(log),
         duration_s=log.duration_s,
         start_unix_us=log.start_unix_us,
         bytes_by_kind=dict(source.bytes_by_kind),
         drops=dict(source.drops),
+        remarks=dict(source.remarks),
+        losses=tuple(source.losses),
+        unknown=tuple(source.unknown),
+        boots=tuple(
+            BootReport(
+                system_id=boot.system_id, number=boot.number, start_us=boot.start_us, end_us=boot.end_us
+            )
+            for boot in log.boots
+        ),
+        gaps=_gaps(log),
+        vehicles=vehicles(log),
+        streams=_streams(log),
     )
+
+
+def _streams(log: "Log") -> tuple[StreamReport, ...]:
+    found = []
+    for stream in log.source.streams:
+        steps = np.diff(log.source.time_us[stream.order])
+        field = stream.description.instance_field
+        instances: list[int | str] = []
+        if field is not None:
+            values = np.unique(log.stream_table(stream)[field])[:_MAX_INSTANCES]
+            instances = [
+                item.decode("ascii", "replace") if isinstance(item, bytes) else item
+                for item in values.tolist()
+            ]
+        found.append(
+            StreamReport(
+                name=stream.name,
+                system_id=stream.system_id,
+                component_id=stream.component_id,
+                count=len(stream.order),
+                rate_hz=log.stream_rate_hz(stream),
+                longest_gap_s=max(0, int(steps.max(initial=0))) * 1e-6,
+                instances=tuple(instances),
+            )
+        )
+    return tuple(sorted(found, key=lambda item: (item.system_id, item.component_id, item.name)))
+
+
+def _gaps(log: "Log") -> tuple[Gap, ...]:
+    found = []
+    for boot in log.boots:
+        orders = [
+            stream.order[slice(*np.searchsorted(stream.order, (boot.first, boot.last + 1)))]
+            for stream in log.source.streams
+            if stream.system_id == boot.system_id
+        ]
+        times = np.maximum.accumulate(log.source.time_us[np.sort(np.concatenate(orders))])
+        times = times[times > 0]
+        for row in np.flatnonzero(np.diff(times) > GAP_US).tolist():
+            found.append(
+                Gap(
+                    system_id=boot.system_id,
+                    boot=boot.number,
+                    start_us=int(times[row]),
+                    end_us=int(times[row + 1]),
+                )
+            )
+    return tuple(found)

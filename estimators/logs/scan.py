@@ -1,11 +1,11 @@
 """Where the frames of a telemetry log are: one compiled pass over the bytes.
 
-A frame is valid when the dialect knows its message, it has no incompatibility flag but "signed", it lies in the file
-whole, and its checksum is right. Behind each frame the next is first looked for where it belongs, behind a time stamp
-of 8 bytes (`lead`; 0 in captures without stamps); if none is there, it is the first valid one that begins anywhere
-behind the last. So no damage hides a frame that begins outside of a valid one, and a stamp that
-happens to look like the beginning of a frame hides none either. What lies between is told apart afterwards
-(`gaps`).
+A frame is valid when the dialect knows its message, it has no incompatibility flag but "signed", it lies in
+the file whole, and its checksum is right. Behind each frame the next is first looked for where it belongs,
+behind a time stamp of 8 bytes (`lead`; 0 in captures without stamps); if none is there, it is the first
+valid one that begins anywhere behind the last. So no damage hides a frame that begins outside of a valid
+one, and a stamp that happens to look like the beginning of a frame hides none either. What lies between is
+told apart afterwards (`gaps`).
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
-from estimators.logs.crc import checksum
+from estimators.logs.crc import Int, checksum
 from estimators.logs.dialect import Dialect
 from flightsim.kernels import kernel
 
@@ -76,8 +76,8 @@ class FrameIndex:
         streams: which stream each belongs to (int32): message, system and component.
         stream_keys: shape (streams, 3): message number of the `MessageTable`, system id, component id; in the
             order of their first frames.
-        gaps: shape (gaps, 2): from the end of a frame (or of nothing) to the beginning of the next (or the end of
-            the file), wherever these are not exactly `lead` bytes.
+        gaps: shape (gaps, 2): from the end of a frame (or of nothing) to the beginning of the next (or the
+            end of the file), wherever these are not exactly `lead` bytes.
         sources: by system and component (row = system * 256 + component): frames, lost, late, last sequence.
         frames_v1, frames_signed: how many are in MAVLink 1, and with a signature.
         unstamped: frames with fewer than 8 bytes before them, though the log has stamps.
@@ -102,7 +102,7 @@ def scan(data: NDArray[np.uint8], table: MessageTable) -> FrameIndex:
 
 
 def _find_lead(data: NDArray[np.uint8], table: MessageTable) -> int:
-    """8 when most frames at the beginning of the file stand behind a gap as long as a time stamp, otherwise 0."""
+    """8 when most frames at the beginning of the file stand behind a gap long enough for a stamp, else 0."""
     size = _SAMPLE_BYTES
     while True:
         sample = data[:size]
@@ -169,7 +169,7 @@ def _grown(keys: NDArray[np.int64], used: int) -> tuple[NDArray[np.int64], NDArr
 
 
 @kernel
-def _slot(message: int, sender: int, size: int) -> int:
+def _slot(message: Int, sender: Int, size: int) -> Int:
     code = np.uint64(message) * np.uint64(65536) + np.uint64(sender)
     return np.int64(((code * np.uint64(_HASH)) >> np.uint64(32)) & np.uint64(size - 1))
 
@@ -185,11 +185,11 @@ def _insert(keys: NDArray[np.int64], slots: NDArray[np.int32], number: int) -> N
 @kernel
 def valid_frame(
     data: NDArray[np.uint8],
-    at: int,
+    at: Int,
     pages: NDArray[np.int16],
     rows: NDArray[np.int16],
     extras: NDArray[np.uint8],
-) -> tuple[int, int]:
+) -> tuple[Int, Int]:
     """End of the valid frame that begins at `at`, and the number of its message; (-1, -1) if none does."""
     size = len(data)
     magic = data[at]
@@ -239,24 +239,24 @@ def _scan_some(
     sources: NDArray[np.int64],
     progress: NDArray[np.int64],
 ) -> None:
-    """Go on from `progress` until the file ends, the arrays are full, or the table of streams is half full."""
+    """Go on from `progress` until the file ends, an array is full, or the table of streams is half full."""
     size = len(data)
-    at = progress[_AT]
+    at: Int = progress[_AT]
     found = 0
     gap_count = 0
     stream_count = progress[_STREAMS]
     mask = len(slots) - 1
     while at < size and found < len(starts) and gap_count < len(gaps) and 2 * stream_count < len(keys):
         start = at + lead
-        end = np.int64(-1)
-        message = np.int64(-1)
+        end: Int = np.int64(-1)
+        message: Int = np.int64(-1)
         if start < size:
             end, message = valid_frame(data, start, pages, rows, extras)
         if end < 0:
             start = at
             while start < size:
                 byte = data[start]
-                if byte == MAGIC_V1 or byte == MAGIC_V2:
+                if byte in (MAGIC_V1, MAGIC_V2):
                     end, message = valid_frame(data, start, pages, rows, extras)
                     if end >= 0:
                         break

@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from estimators.logs.columns import Columns
 from estimators.logs.dialect import Description, Dialect
 
+Positions = NDArray[np.int32] | NDArray[np.int64]
+"""Positions of messages in a log."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
@@ -25,7 +28,7 @@ class Stream:
     description: Description
     system_id: int
     component_id: int
-    order: NDArray[np.int32] | NDArray[np.int64]
+    order: Positions
 
     @property
     def name(self) -> str:
@@ -70,7 +73,8 @@ class SourceLoss:
 
 
 class LogSource(ABC):
-    """A file's messages. Messages are numbered in the order of the file; no method makes an object per message.
+    """A file's messages. Messages are numbered in the order of the file; no method makes an object per
+    message.
 
     Attributes:
         path: the file.
@@ -99,7 +103,7 @@ class LogSource(ABC):
         """By system id: positions of the messages that begin its second, third, ... boot."""
 
     @abstractmethod
-    def log_time_us(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
+    def log_time_us(self, order: Positions) -> NDArray[np.int64]:
         """Unix microseconds at which the messages at these positions were recorded; 0 where not known."""
 
     @abstractmethod

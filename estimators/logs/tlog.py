@@ -4,18 +4,19 @@ import mmap
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, MAGIC_V2
 from estimators.logs.columns import Columns, decode_columns
+from estimators.logs.crc import Int
 from estimators.logs.dialect import Description, Dialect
 from estimators.logs.errors import LogError
 from estimators.logs.gaps import GapFigures, sort_gaps
 from estimators.logs.scan import FRAMES, LATE, LOST, STAMP_SIZE, FrameIndex, message_table, scan
-from estimators.logs.source import LogSource, SourceLoss, Stream, UnknownMessage
+from estimators.logs.source import LogSource, Positions, SourceLoss, Stream, UnknownMessage
 from estimators.vehicle_time import UNIX_TIME_US, stamp_field, vehicle_times
 from flightsim.kernels import kernel
 
@@ -27,8 +28,8 @@ _MILLISECOND_US: Final = 1000
 class TlogSource(LogSource):
     """A mapped telemetry log and the index of its frames.
 
-    The file must not be shortened while it is open; a log that is still being written is read up to where it ended
-    when it was opened.
+    The file must not be shortened while it is open; a log that is still being written is read up to where it
+    ended when it was opened.
 
     Args:
         path: the file.
@@ -62,7 +63,7 @@ class TlogSource(LogSource):
     def _make_streams(self) -> tuple[Stream, ...]:
         keys = self.index.stream_keys
         counts = np.bincount(self.index.streams, minlength=len(keys))
-        grouped = np.empty(self.count, dtype=np.int32 if self.count < 1 << 31 else np.int64)
+        grouped: NDArray[Any] = np.empty(self.count, dtype=np.int32 if self.count < 1 << 31 else np.int64)
         ends = np.cumsum(counts)
         _group(self.index.streams, (ends - counts).astype(np.int64), grouped)
         return tuple(
@@ -103,7 +104,7 @@ class TlogSource(LogSource):
         systems = self.index.stream_keys[self.index.streams[begins], 1]
         return {int(system): begins[systems == system] for system in np.unique(systems)}
 
-    def log_time_us(self, order: NDArray[np.int64]) -> NDArray[np.int64]:
+    def log_time_us(self, order: Positions) -> NDArray[np.int64]:
         """Times of the records; a frame without one of its own has that of the frame before."""
         times = np.zeros(len(order), dtype=np.int64)
         if self.index.lead:
@@ -112,7 +113,7 @@ class TlogSource(LogSource):
 
     @cached_property
     def _little_endian(self) -> bool:
-        """Old ground stations wrote their stamps that way; as big-endian numbers they lie far in the future."""
+        """Old ground stations wrote their stamps that way; read as big-endian they lie far in the future."""
         sample = np.arange(min(self.count, _STAMP_SAMPLE))
         times = np.zeros(len(sample), dtype=np.int64)
         _log_times(self.data, self.index.starts, sample, False, times)
@@ -125,7 +126,7 @@ class TlogSource(LogSource):
         """Fields of some messages of a stream."""
         return decode_columns(self.data, self.index.starts[stream.order[rows]], stream.description.definition)
 
-    def frame_spans(self, order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def frame_spans(self, order: Positions) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """First byte, and the one behind the last, of frames in the file; the time stamp lies before them."""
         starts = self.index.starts[order]
         ends = np.empty_like(starts)
@@ -186,14 +187,18 @@ class TlogSource(LogSource):
 
     @property
     def losses(self) -> Sequence[SourceLoss]:
-        """Loss by sequence numbers, by system and component."""
+        """Loss by sequence numbers, by system and component; messages that are not known are not lost."""
         sources = self.index.sources
+        unknown: dict[int, int] = {}
+        for item in self.unknown:
+            row = item.system_id << 8 | item.component_id
+            unknown[row] = unknown.get(row, 0) + item.count
         return tuple(
             SourceLoss(
                 system_id=int(row) >> 8,
                 component_id=int(row) & 0xFF,
                 frames=int(sources[row, FRAMES]),
-                lost=max(0, int(sources[row, LOST] - sources[row, LATE])),
+                lost=max(0, int(sources[row, LOST] - sources[row, LATE]) - unknown.get(int(row), 0)),
                 late=int(sources[row, LATE]),
             )
             for row in np.flatnonzero(sources[:, FRAMES])
@@ -258,7 +263,7 @@ def _message_id(raw: bytes) -> int:
 
 
 @kernel
-def _group(streams: NDArray[np.int32], places: NDArray[np.int64], grouped: NDArray[np.int32]) -> None:
+def _group(streams: NDArray[np.int32], places: NDArray[np.int64], grouped: Positions) -> None:
     """Counting sort: positions by stream, in order within each."""
     for position in range(len(streams)):
         stream = streams[position]
@@ -267,7 +272,7 @@ def _group(streams: NDArray[np.int32], places: NDArray[np.int64], grouped: NDArr
 
 
 @kernel
-def _frame_end(data: NDArray[np.uint8], start: int) -> int:
+def _frame_end(data: NDArray[np.uint8], start: Int) -> Int:
     length = np.int64(data[start + 1])
     if data[start] != MAGIC_V2:
         return start + 8 + length

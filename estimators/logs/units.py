@@ -1,7 +1,7 @@
 """SI from the units of MAVLink's definition files.
 
-Temperatures stay in degrees Celsius, decibels and counts (pixels, bytes, bits) what they are; parts of a hundred
-become a fraction of one.
+Temperatures stay in degrees Celsius, decibels and counts (pixels, bytes, bits) what they are; parts of a
+hundred become a fraction of one.
 """
 
 import math

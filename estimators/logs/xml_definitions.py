@@ -111,8 +111,8 @@ def read_definitions(path: Path) -> tuple[MessageText, ...]:
         if twin is not item or namesake is not item:
             other = twin if twin is not item else namesake
             raise LogError(
-                f"{path}: messages {item.name} ({item.message_id}) and {other.name} ({other.message_id}) clash; "
-                "each id and each name may be used once"
+                f"{path}: messages {item.name} ({item.message_id}) and {other.name} ({other.message_id}) "
+                "clash; each id and each name may be used once"
             )
     if not messages:
         raise LogError(f"{path} defines no message; give a MAVLink definition file")
