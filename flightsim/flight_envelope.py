@@ -17,6 +17,7 @@ from flightsim.environment import Environment
 from flightsim.flight_figures import FlightEnvelope
 from flightsim.home import Home
 from flightsim.linear_modes import LinearModel, P, Q, R, U, V, W, linearise
+from flightsim.model_files import content_digest
 from flightsim.trim_flight import FlightTrim, TrimError, trim_in_tunnel
 from flightsim.wind_tunnel import WindTunnel
 
@@ -38,6 +39,9 @@ def flight_envelope(
 ) -> FlightEnvelope:
     """Work out what an aircraft can do; asked again for the same in this process, remembered.
 
+    The same is: an equal description (its limits included) and files of equal content, engines, propellers and
+    systems among them, in air of equal density.
+
     Args:
         model: as for `Vehicle`.
         home: its altitude makes the density.
@@ -48,13 +52,11 @@ def flight_envelope(
     """
     airframe = model if isinstance(model, Airframe) else load_airframe(model)
     air = environment or Environment()
-    return _envelope(airframe, home or Home(), air.temperature_offset_k, airframe.xml_path.stat().st_mtime_ns)
+    return _envelope(airframe, home or Home(), air.temperature_offset_k, content_digest(airframe))
 
 
 @lru_cache(maxsize=32)
-def _envelope(
-    airframe: Airframe, home: Home, temperature_offset_k: float, modified_ns: int
-) -> FlightEnvelope:
+def _envelope(airframe: Airframe, home: Home, temperature_offset_k: float, _content: str) -> FlightEnvelope:
     air = Environment(temperature_offset_k=temperature_offset_k)
     tunnel = WindTunnel(airframe, home=home, environment=air, height_m=_HEIGHT_M)
     return _Survey(tunnel).envelope()
@@ -95,6 +97,7 @@ class _Survey:
             wing_span_m=tunnel.wing_span_m,
             wing_area_m2=tunnel.wing_area_m2,
             chord_m=tunnel.chord_m,
+            standing_height_m=tunnel.standing_height_m,
             density_kg_m3=tunnel.density_kg_m3,
             stall_speed_m_s=stall,
             airspeed_min_m_s=slow,

@@ -50,6 +50,7 @@ class FlightEnvelope:
         thrust_per_throttle_n: slope of thrust at the trim throttle.
         lift_slope_per_rad: d(lift coefficient) / d(angle of attack).
         drag_n: with the throttle closed (idling propeller included), at the trim airspeed.
+        standing_height_m: of the centre of gravity over the ground, on its wheels (or belly).
     """
 
     name: str
@@ -96,3 +97,4 @@ class FlightEnvelope:
     thrust_per_throttle_n: float
     lift_slope_per_rad: float
     drag_n: float
+    standing_height_m: float = 0.3

@@ -147,9 +147,15 @@ def standing_height_m(fdm: jsbsim.FGFDMExec, airframe: Airframe) -> float:
 
     Where the description does not say: that at which its lowest contact point touches the ground.
     """
+    if airframe.cg_height_at_rest_m is None:
+        fdm.run_ic()  # the centre of gravity is known after that, fuel included
+    return height_on_wheels_m(fdm, airframe)
+
+
+def height_on_wheels_m(fdm: jsbsim.FGFDMExec, airframe: Airframe) -> float:
+    """As `standing_height_m`, of a model that has been initialised."""
     if airframe.cg_height_at_rest_m is not None:
         return airframe.cg_height_at_rest_m
-    fdm.run_ic()  # the centre of gravity is known after that, fuel included
     cg_m = fdm.get_property_value("inertia/cg-z-in") * _INCH
     lowest_m = cg_m
     for contact in ElementTree.parse(airframe.xml_path).iterfind("ground_reactions/contact"):

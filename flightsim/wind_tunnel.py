@@ -18,7 +18,7 @@ from flightsim.actuation import FixedWingActuators
 from flightsim.airframe import Airframe, AirframeError, AirframeKind, Role, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
-from flightsim.initial_state import InitialState, initialise
+from flightsim.initial_state import InitialState, height_on_wheels_m, initialise
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
 from flightsim.rotations import quaternion_from_euler, rotate
@@ -81,6 +81,7 @@ class WindTunnel:
         actuators: writes its commands.
         density_kg_m3: of the air at the height of the measurements.
         mass_kg, wing_span_m, wing_area_m2, chord_m: of the model.
+        standing_height_m: of its centre of gravity over the ground, on its wheels.
     """
 
     __slots__ = (
@@ -98,6 +99,7 @@ class WindTunnel:
         "chord_m",
         "density_kg_m3",
         "mass_kg",
+        "standing_height_m",
         "wing_area_m2",
         "wing_span_m",
     )
@@ -157,6 +159,7 @@ class WindTunnel:
         self.wing_span_m = float(value("metrics/bw-ft")) * _FT
         self.wing_area_m2 = float(value("metrics/Sw-sqft")) * _FT**2
         self.chord_m = float(value("metrics/cbarw-ft")) * _FT
+        self.standing_height_m = height_on_wheels_m(self._fdm, airframe)
 
     @property
     def powered(self) -> bool:

@@ -16,17 +16,22 @@ from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParamet
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
 _ALIGN_M: Final = 1.0  # over the ground the crab angle is taken out
-_TOUCH_M: Final = 0.15
+_TOUCH_M: Final = 0.12
+_TOUCH_S: Final = 0.1  # so long that near: one gust less than a wheel's height over the ground is no touch
 _STILL_M_S: Final = 0.25
 _STILL_S: Final = 0.6
+_STILL_M: Final = 0.5  # by the rangefinder, whose ground may be grass
 _SHORTEST_S: Final = 1.0
 _LONG_S: Final = 6.0  # a flare that lasts this long has reached a ground that lies higher than believed
 _PITCH_BLEND_S: Final = 1.0
-_PITCH_FREE_M: Final = 1.0  # over the ground a gust may still ask for a lower nose than the flare's
+_PITCH_FREE_M: Final = 0.4  # over the ground a gust may still ask for a lower nose than the flare's,
+_PITCH_FREE_RAD_M: Final = math.radians(3.0)  # the lower the higher it is
 _LEAD_S: Final = 0.3  # the pitch needs so long to follow
 _HEIGHT_GAIN_1_S: Final = 1.6
 _FIRMEST_M_S: Final = 0.6  # over the sink of the touch, at the ground; more higher up:
 _FIRMER_1_S: Final = 0.5
+_LATE_1_S: Final = 0.06  # added to the sink of the touch for every metre flown beyond the place, ...
+_LATE_M_S: Final = 0.8  # ... at most this (ArduPilot: TECS_LAND_SRC)
 _SOFTEST: Final = 0.5  # of the sink of the touch: so low over the path
 _AIRSPEED_SHARE: Final = 0.9  # of the approach's airspeed, held in the flare
 _POWER_SHARE: Final = 0.6  # of the trim throttle flies the glide slope about
@@ -66,7 +71,7 @@ class Flare:
         aligning: low enough to point the nose along the runway.
     """
 
-    __slots__ = ("_height_m", "_pitch_rad", "_sink_m_s", "_still_s", "_time_s", "aligning")
+    __slots__ = ("_height_m", "_pitch_rad", "_sink_m_s", "_still_s", "_time_s", "_touching_s", "aligning")
 
     def __init__(self) -> None:
         self.reset()
@@ -74,7 +79,7 @@ class Flare:
     def reset(self) -> None:
         """No flare yet."""
         self.aligning = False
-        self._time_s = self._still_s = 0.0
+        self._time_s = self._still_s = self._touching_s = 0.0
         self._height_m = 1.0
         self._sink_m_s = self._pitch_rad = 0.0
 
@@ -93,6 +98,9 @@ class Flare:
     def _sink(self, state: AircraftState, height_m: float, to_go_m: float, after_m_s: float) -> float:
         """Sink to fly."""
         start, before = self._height_m, self._sink_m_s
+        if to_go_m < 0.0:
+            after_m_s += min(_LATE_M_S, -_LATE_1_S * to_go_m)
+            before = max(before, after_m_s)
         ahead = max(0.0, height_m - _LEAD_S * state.vel_down_m_s)
         if to_go_m == to_go_m:
             speed = max(state.ground_speed_m_s, 1.0)
@@ -149,15 +157,30 @@ class Flare:
         command.height_rate_m_s = -sink
         command.throttle = power(state, _AIRSPEED_SHARE * p.landing_airspeed_m_s, p)
         # the limits of the pitch close in gradually: no jerk of the elevator
-        part = min(1.0, self._time_s / _PITCH_BLEND_S, max(0.0, 1.0 - height_m / _PITCH_FREE_M))
-        low = min(self._pitch_rad, p.flare_pitch_min_rad)
+        part = min(1.0, self._time_s / _PITCH_BLEND_S)
+        ahead = height_m - _LEAD_S * state.vel_down_m_s
+        lowest = p.flare_pitch_min_rad - _PITCH_FREE_RAD_M * max(0.0, ahead - _PITCH_FREE_M)
+        lowest = max(lowest, p.pitch_min_rad)
+        low = min(self._pitch_rad, lowest)
         high = max(self._pitch_rad, p.flare_pitch_max_rad)
-        command.pitch_min_rad = low + (p.flare_pitch_min_rad - low) * part
+        command.pitch_min_rad = low + (lowest - low) * part
         command.pitch_max_rad = high + (p.flare_pitch_max_rad - high) * part
         self.aligning = height_m < _ALIGN_M
+        return self._time_s > _SHORTEST_S and (self._touches(ctx, state, height_m, p) or ctx.ground_contact)
+
+    def _touches(
+        self,
+        ctx: FlightContext,
+        state: AircraftState,
+        height_m: float,
+        parameters: FixedWingFlightParameters,
+    ) -> bool:
         near = height_m < 2.0 * _ALIGN_M or self._time_s > _LONG_S
         still = abs(state.vel_down_m_s) < _STILL_M_S and near
-        self._still_s = self._still_s + ctx.dt_s if still else 0.0
         measured = state.height_above_ground_m
-        touched = p.rangefinder_landing and measured == measured and measured < p.standing_height_m + _TOUCH_M
-        return self._time_s > _SHORTEST_S and (touched or self._still_s > _STILL_S or ctx.ground_contact)
+        if parameters.rangefinder_landing and measured == measured:
+            low = measured < parameters.standing_height_m + _TOUCH_M
+            self._touching_s = self._touching_s + ctx.dt_s if low else 0.0
+            still = still and height_m < _STILL_M
+        self._still_s = self._still_s + ctx.dt_s if still else 0.0
+        return self._touching_s > _TOUCH_S or self._still_s > _STILL_S

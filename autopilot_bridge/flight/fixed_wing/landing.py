@@ -28,6 +28,7 @@ _FREE_BANK_M: Final = 15.0  # over the ground the bank is no longer limited for 
 _LOW_M: Final = 2.0
 _SHORT_FINAL_M: Final = 12.0  # over the ground: from here on pitch flies the path, throttle the airspeed
 _MISSED_M: Final = 40.0  # beyond the place, too high: go around
+_ASIDE_M: Final = 20.0  # so far beside the runway on short final: go around
 _SLOPE_GAIN: Final = 0.4
 _DIVE_FREE_M: Final = 25.0  # over the ground the nose may go down as far as anywhere; lower, ever less
 _DIVE_LOW_RAD: Final = math.radians(-1.0)
@@ -35,6 +36,8 @@ _LATEST_FLARE: Final = 0.6  # of the flare's time, before the ground at the pres
 _STANDING_M_S: Final = 1.5
 _BRAKE_AFTER_S: Final = 1.5
 _NOSE_DOWN_S: Final = 1.0
+_BOUNCED_M: Final = 0.3  # over the ground again, so soon after the touch: it still flies
+_BOUNCE_S: Final = 3.0
 
 
 class LandPhase(IntEnum):
@@ -197,6 +200,9 @@ class LandTask(AircraftTask):
                 self._fly_flare(ctx, p)
             case LandPhase.GO_AROUND:
                 self._fly_go_around(ctx, p, approach)
+            case _ if self._bounced(p):
+                self.phase = LandPhase.FLARE
+                self._fly_flare(ctx, p)
             case _:
                 self._fly_roll_out(ctx, p)
         command.write(ctx)
@@ -277,8 +283,12 @@ class LandTask(AircraftTask):
         if height <= max(flare_height, _LATEST_FLARE * p.flare_time_s * state.vel_down_m_s):
             self.phase = LandPhase.FLARE
             self._flare.begin(state, flare_height, sink, p)
-        elif past_place > _MISSED_M:
+        elif past_place > _MISSED_M or (height < _SHORT_FINAL_M and self._aside(ctx)):
             self.phase = LandPhase.GO_AROUND
+
+    def _aside(self, ctx: FlightContext) -> bool:
+        """Too far beside the runway to land."""
+        return ctx.position_valid and abs(self._line.offset_m(self._state)) > _ASIDE_M
 
     def _fly_flare(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
         state, command, approach = self._state, self._command, self.approach
@@ -299,6 +309,15 @@ class LandTask(AircraftTask):
             self.phase = LandPhase.ROLL_OUT
             self._rolled_s = 0.0
             self._touch_pitch_rad = state.pitch_rad
+
+    def _bounced(self, p: FixedWingFlightParameters) -> bool:
+        """In the air again: a gust or the springs have lifted it, and the flare is to set it down once more."""
+        measured = self._state.height_above_ground_m
+        return (
+            p.rangefinder_landing
+            and self._rolled_s < _BOUNCE_S
+            and measured > p.standing_height_m + _BOUNCED_M  # false for NaN
+        )
 
     def _fly_roll_out(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
         state, command = self._state, self._command

@@ -206,6 +206,7 @@ class FixedWingFlightParameters:
             "takeoff_airspeed_m_s": e.airspeed_trim_m_s,
             "rotation_airspeed_m_s": max(1.15 * e.stall_speed_m_s, 0.9 * e.airspeed_min_m_s),
             "landing_airspeed_m_s": min(landing, e.airspeed_trim_m_s),
+            "standing_height_m": e.standing_height_m,
             "loiter_radius_m": max(40.0, radius),
             "return_loiter_radius_m": max(40.0, radius),
         }
