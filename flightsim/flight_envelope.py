@@ -39,8 +39,8 @@ def flight_envelope(
 ) -> FlightEnvelope:
     """Work out what an aircraft can do; asked again for the same in this process, remembered.
 
-    The same is: an equal description (its limits included) and files of equal content, engines, propellers and
-    systems among them, in air of equal density.
+    The same is: an equal description (its limits included) and files of equal content, engines, propellers
+    and systems among them, in air of equal density.
 
     Args:
         model: as for `Vehicle`.

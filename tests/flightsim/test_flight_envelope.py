@@ -1,15 +1,20 @@
 """Flight envelopes: figures against closed forms, foreign aircraft, and refusals in plain words."""
 
 import math
+import os
+import shutil
 from pathlib import Path
 
+import jsbsim
 import pytest
 
-from flightsim.airframe import AirframeError
+import flightsim
+from flightsim.airframe import AirframeError, load_airframe
 from flightsim.environment import Environment
 from flightsim.flight_envelope import FlightEnvelope, flight_envelope
 from flightsim.home import Home
 from flightsim.linear_modes import linear_modes
+from flightsim.model_files import content_digest, model_files
 from flightsim.trim_flight import TrimError, trim_flight
 
 # Of the book's Aerosonde, appendix E (newer edition), see aerosonde.xml.
@@ -192,3 +197,45 @@ def test_modes_of_a_foreign_aircraft_are_those_of_its_kind() -> None:
     assert 1.5 < model.dutch_roll.frequency_rad_s < 3.5
     assert 0.05 < model.roll.time_constant_s < 0.4
     assert abs(model.spiral.time_constant_s) > 10.0
+
+
+def rewrite(path: Path, old: str, new: str) -> None:
+    """Change a file, and leave its time as it was."""
+    stamp = path.stat()
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    os.utime(path, ns=(stamp.st_atime_ns, stamp.st_mtime_ns))
+
+
+def test_an_envelope_is_worked_out_anew_when_description_or_model_has_changed(tmp_path: Path) -> None:
+    """By content, whatever the times of the files say."""
+    folder = shutil.copytree(Path(flightsim.__file__).parent / "models" / "aerosonde", tmp_path / "aerosonde")
+    first = flight_envelope(folder)
+    assert flight_envelope(folder) is first
+    rewrite(folder / "vehicle.toml", "airspeed_max_m_s = 30", "airspeed_max_m_s = 29")
+    slower = flight_envelope(folder)
+    assert slower.airspeed_max_m_s == 29.0
+    rewrite(folder / "aerosonde.xml", "<description>", "<description> ")
+    assert flight_envelope(folder) is not slower
+
+
+@pytest.mark.parametrize("name", ["c172x.xml", "eng_io320.xml", "prop_75in2f.xml"])
+def test_a_model_has_changed_when_its_engine_or_propeller_has(name: str, tmp_path: Path) -> None:
+    """Own files of the names that the model gives come before those of the package."""
+    package = Path(jsbsim.get_default_root_dir())
+    folder = shutil.copytree(package / "aircraft" / "c172x", tmp_path / "c172x")
+    engines = folder / "Engines"
+    engines.mkdir()
+    for own in ("eng_io320.xml", "prop_75in2f.xml"):
+        shutil.copy(package / "engine" / own, engines)
+    airframe = load_airframe(folder / "c172x.xml")
+    before = content_digest(airframe)
+    assert content_digest(airframe) == before
+    rewrite(next(folder.rglob(name)), "</", " </")
+    assert content_digest(airframe) != before
+
+
+def test_the_files_of_a_packaged_aircraft_are_found() -> None:
+    names = {path.name for path in model_files(load_airframe("c172x"))}
+    assert names >= {"c172x.xml", "eng_io320.xml", "prop_75in2f.xml"}
