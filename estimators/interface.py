@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
+from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage
 from estimators.messages import Message
 
@@ -134,6 +135,11 @@ class Estimator(ABC, Generic[P]):
     @abstractmethod
     def estimates(self) -> Sequence[Estimate]:
         """What the newest UPDATED message has changed; most have one."""
+
+    @property
+    def origin(self) -> GeodeticPosition | None:
+        """Where `north_m` and `east_m` of its estimates are counted from; None: the vehicle's home."""
+        return None
 
     def publish(self) -> Sequence[MAVLinkMessage]:
         """Messages that tell the newest estimates, to be sent from a component id of the estimator's own."""

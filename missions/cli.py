@@ -13,6 +13,16 @@ import click
 _COMMANDS: Final = {
     "fly": ("missions.cli_fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
     "sitl": ("missions.cli_sitl", "sitl", "SITL for other people's clients."),
+    "estimate": (
+        "missions.cli_estimate",
+        "estimate",
+        "An estimator on a live link, a process of its own.",
+    ),
+    "replay": (
+        "missions.cli_replay",
+        "replay",
+        "Logs through an estimator, and how far off it was.",
+    ),
     "study": ("missions.cli_study", "study", "Monte Carlo: the papers' experiments."),
 }
 

@@ -150,6 +150,12 @@ def _owners(option_name: str) -> list[str]:
 @click.option(
     "--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS."
 )
+@click.option(
+    "--estimator", metavar="NAME|FILE.py", help="Run beside the flight: attitude, lissajous, target-fusion."
+)
+@click.option(
+    "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
+)
 @click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
 @click.option("--arg", multiple=True, metavar="NAME=VALUE", help="For a mission of your own.")
 def fly(**given: Any) -> int:
@@ -278,6 +284,8 @@ def _fly(given: dict[str, Any]) -> int:
                 identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
                 on_failure=Mode(given["on_failure"]),
                 max_error_m=given["max_error"],
+                estimator=given["estimator"],
+                estimator_settings=given["settings"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),
             ),
             line if terminal else None,

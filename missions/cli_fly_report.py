@@ -85,7 +85,28 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
                 f"path at most, more than the acceptance radius of {block['acceptance_m']:g} m"
             )
     click.echo(f"run: {result.folder}")
-    return 0
+    return _tell_estimator(summary["estimator"]) if "estimator" in summary else 0
+
+
+def _tell_estimator(summary: Mapping[str, Any]) -> int:
+    """Say what the estimator of the flight has done; the exit code."""
+    name = summary["estimator"]
+    for block in summary["vehicles"]:
+        for subject in block["subjects"]:
+            errors = [
+                f"{key.removesuffix(f'_rms_{unit}')} {subject[key]:.2f} {unit}"
+                for unit in ("deg", "m")
+                for key in subject
+                if key.endswith(f"_rms_{unit}")
+            ]
+            told = f": {', '.join(errors)} RMS off {subject['reference']}" if errors else ""
+            click.echo(
+                f"{summary['estimator']}, {subject['subject']}: {subject['estimates']} estimates{told}"
+            )
+    if summary["outcome"] == "completed":
+        return 0
+    click.echo(f"flightstack: {name}: {summary['reason']}; results are partial", err=True)
+    return _FAILED
 
 
 def _warn(summary: Mapping[str, Any]) -> None:

@@ -177,6 +177,12 @@ class Connection:
 
     # sending
 
+    def speak_as(self, system_id: int, component_id: int) -> None:
+        """Take another identity: a process on board learns its system id from the vehicle."""
+        if (system_id, component_id) != (self.system_id, self.component_id):
+            self.system_id, self.component_id = system_id, component_id
+            self._encoder = FrameEncoder(system_id, component_id)
+
     def send(self, message: MAVLinkMessage) -> None:
         """Send one message with the connection's own ids.
 

@@ -29,6 +29,8 @@ class RunRequest:
         identity: MAVLink system and component id of the mission.
         on_failure: what the vehicle is told when the mission fails or is interrupted.
         max_error_m: a check: the run has failed when the path error exceeds it; None: no check.
+        estimator: one to run beside the flight: its name, or the path of a user's file; None: none.
+        estimator_settings: its parameters as NAME=VALUE.
         command: the command line, for the summary.
     """
 
@@ -51,6 +53,8 @@ class RunRequest:
     identity: tuple[int, int] = GROUND_STATION
     on_failure: Mode = Mode.RETURN
     max_error_m: float | None = None
+    estimator: str | None = None
+    estimator_settings: Sequence[str] = ()
     command: str = ""
 
     @property

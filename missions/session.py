@@ -15,8 +15,9 @@ from autopilot_bridge.clock import Clock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
 from autopilot_bridge.tlog import TlogWriter
-from missions.connection import Connection
+from missions.connection import Connection, Recorder
 from missions.errors import MissionError, PlanError
+from missions.estimation.in_flight import estimators_of
 from missions.limits_before_flight import adapted, check_request, check_stage, vehicle_options
 from missions.mission import Debriefing, Mission
 from missions.notes import FlightNotes
@@ -39,6 +40,7 @@ from missions.together import together
 from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
+    from missions.estimation.embedded import FlightEstimators
     from missions.score import FlightScore
 
 __all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
@@ -101,6 +103,7 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
             f"{len(request.connect)} connections for {request.options.vehicles} vehicles; "
             "give --connect once for each vehicle"
         )
+    estimators = estimators_of(request)
     made = _missing_folders(request.out or RUNS)
     folder = create_run_folder(request.out, mission.name)
     stage = None
@@ -118,9 +121,10 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     try:
         with TlogWriter(folder / LOG_NAME) as log:
             recorder = FlightRecorder(log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
-            stage.on_truth(recorder.record_truth)
+            heard_by = recorder if estimators is None else estimators.around(recorder)
+            stage.on_truth(heard_by.record_truth)
             try:
-                run(_fly(mission, request, stage, recorder, flight, on_progress), stage.loop)
+                run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
             except KeyboardInterrupt:
                 outcome, reason = INTERRUPTED, INTERRUPTED
             except (MissionError, PlanError, BridgeError) as error:
@@ -138,6 +142,8 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     elif outcome == INTERRUPTED and how_left(blocks):
         reason = f"{INTERRUPTED}; {how_left(blocks)}"
     summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
+    if estimators is not None:
+        summary["estimator"] = estimators.report(folder, picture=request.picture, wall_time_s=wall_s).summary
     write_summary(folder, summary)
     if request.picture and debriefing.flights:
         mission.draw(folder / PICTURE_NAME, _title(mission, debriefing, summary), debriefing)
@@ -166,8 +172,9 @@ async def _fly(
     mission: Mission[Any],
     request: RunRequest,
     stage: Stage,
-    recorder: FlightRecorder,
+    recorder: Recorder,
     flight: Flight,
+    estimators: "FlightEstimators | None",
     on_progress: ProgressListener | None,
 ) -> None:
     async with AsyncExitStack() as stack:
@@ -178,7 +185,9 @@ async def _fly(
             )
             await stack.enter_async_context(connection)
             flight.vehicles.append(Vehicle(connection, system_id))
-        flight.clock = stage.clocks[0]
+        flight.clock = clock = stage.clocks[0]
+        if estimators is not None:
+            await stack.enter_async_context(estimators.on_board(flight.vehicles, stage.links, clock))
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
             await together([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])

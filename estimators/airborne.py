@@ -1,0 +1,94 @@
+"""When a vehicle was in the air, from its log."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from estimators.logs import Log
+
+__all__ = ["ALWAYS", "Spans", "airborne_spans", "duration_s", "within"]
+
+Spans = list[tuple[int, int]]
+"""From and to (exclusive), vehicle time in microseconds, ascending."""
+
+ALWAYS: Final[tuple[int, int]] = (-(1 << 62), 1 << 62)
+
+_ARMED: Final = 128  # MAV_MODE_FLAG_SAFETY_ARMED
+_IN_AIR: Final = (2, 3, 4)  # MAV_LANDED_STATE_IN_AIR, _TAKEOFF, _LANDING
+_LEAST_HEIGHT_MM: Final = 2000
+_LEAST_AIRSPEED_M_S: Final = 8.0
+_HOLD_US: Final = 2_500_000
+"""How long a state counts that is not told again: one lost message of a 1 Hz stream doesn't end it."""
+_AUTOPILOT: Final = 1
+
+_Judge = Callable[[NDArray[Any]], NDArray[np.bool_]]
+
+
+def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple[Spans, str]:
+    """When a vehicle was in the air.
+
+    EXTENDED_SYS_STATE tells it; where it doesn't know, a vehicle counts that is armed and more than 2 m above
+    home (or faster than 8 m/s through the air where no height is told; or armed, where neither is).
+
+    Returns:
+        Spans, and what they are taken from; all time where the log tells nothing of it ("all of the log").
+    """
+
+    def spans_of(name: str, field: str, judge: _Judge) -> Spans | None:
+        # Asked for by name only where it is: the log's dialect may not have it at all.
+        if not any(key.name == name and key.system_id == system_id for key in log.keys):
+            return None
+        tables = log.tables(name, system_id=system_id, component_id=_AUTOPILOT, boot=boot)
+        return _spans(tables[0].time_us, judge(tables[0][field])) if tables else None
+
+    told = spans_of("EXTENDED_SYS_STATE", "landed_state", lambda state: np.isin(state, _IN_AIR))
+    if told:
+        return told, "EXTENDED_SYS_STATE"
+    armed = spans_of("HEARTBEAT", "base_mode", lambda mode: (mode & _ARMED) != 0)
+    if armed is None:
+        return [ALWAYS], "all of the log"
+    high = spans_of("GLOBAL_POSITION_INT", "relative_alt", lambda height: height > _LEAST_HEIGHT_MM)
+    if high is not None:
+        return _both(armed, high), "armed, above 2 m"
+    fast = spans_of("VFR_HUD", "airspeed", lambda speed: speed > _LEAST_AIRSPEED_M_S)
+    if fast is not None:
+        return _both(armed, fast), "armed, faster than 8 m/s"
+    return armed, "armed"
+
+
+def within(spans: Spans, time_us: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which times are in one of the spans."""
+    inside = np.zeros(len(time_us), dtype=np.bool_)
+    for start_us, end_us in spans:
+        inside |= (time_us >= start_us) & (time_us < end_us)
+    return inside
+
+
+def duration_s(spans: Spans, time_us: NDArray[np.int64]) -> float:
+    """Time in the spans between the first and the last of some times."""
+    if not len(time_us):
+        return 0.0
+    first_us, last_us = int(time_us.min()), int(time_us.max())
+    return 1e-6 * sum(max(0, min(end, last_us) - max(start, first_us)) for start, end in spans)
+
+
+def _spans(time_us: NDArray[np.int64], state: NDArray[np.bool_]) -> Spans:
+    """Where a state holds: from each message that says so to the next one."""
+    order = np.argsort(time_us, kind="stable")
+    times, holds = time_us[order], state[order]
+    ends = np.minimum(np.append(times[1:], times[-1:] + _HOLD_US), times + _HOLD_US)
+    spans: Spans = []
+    for start_us, end_us in zip(times[holds].tolist(), ends[holds].tolist(), strict=True):
+        if spans and start_us <= spans[-1][1]:
+            spans[-1] = (spans[-1][0], end_us)
+        else:
+            spans.append((start_us, end_us))
+    return spans
+
+
+def _both(first: Spans, second: Spans) -> Spans:
+    common = [(max(a, c), min(b, d)) for a, b in first for c, d in second]
+    return [(start_us, end_us) for start_us, end_us in common if start_us < end_us]

@@ -1,0 +1,194 @@
+"""Estimates beside references: errors over time, and their statistics over the part in the air."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from estimators.airborne import ALWAYS, airborne_spans, duration_s, within
+from estimators.references import (
+    AUTOPILOT,
+    COMPARED,
+    TRUTH,
+    Column,
+    ErrorFigures,
+    Reference,
+    error_figures,
+    errors,
+    home_of,
+    references,
+    target_reference,
+)
+from estimators.runner import EstimateTable, Runner
+
+if TYPE_CHECKING:
+    from estimators.logs import Log
+
+__all__ = ["AGAINST", "Comparison", "comparisons"]
+
+AGAINST: Final[Mapping[str, Sequence[str]]] = {
+    "autopilot": (AUTOPILOT,),
+    "truth": (TRUTH,),
+    "both": (AUTOPILOT, TRUTH),
+}
+"""What estimates can be compared with, the main reference first."""
+
+_TARGET: Final = "target"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """The estimates of one subject, compared.
+
+    Attributes:
+        label: "vehicle 1", "target 3".
+        subject: system id; 0 for a target.
+        time_us: (n,) vehicle time of the estimates; after a new boot it begins anew.
+        boot: (n,) number of the boot of each.
+        estimates: (n,) columns by name.
+        references: by name of the reference and of the column, at the estimates' times; NaN: not known.
+        sources: messages that each reference is taken from.
+        counted: (n,) estimates made in the air.
+        airborne_s: how long that was.
+        airborne_from: what says so.
+        figures: statistics by name of the reference.
+    """
+
+    label: str
+    subject: int
+    time_us: NDArray[np.int64]
+    boot: NDArray[np.int64]
+    estimates: Mapping[str, Column]
+    references: Mapping[str, Mapping[str, Column]]
+    sources: Mapping[str, Sequence[str]]
+    counted: NDArray[np.bool_]
+    airborne_s: float
+    airborne_from: str
+    figures: Mapping[str, Sequence[ErrorFigures]]
+
+    @property
+    def reference(self) -> str | None:
+        """The reference of the main figures; None where there is none."""
+        return next((name for name, figures in self.figures.items() if figures), None)
+
+    def errors(self, reference: str, column: str) -> Column:
+        """Estimate minus reference."""
+        return errors(column, self.estimates[column], self.references[reference][column])
+
+
+def comparisons(logs: "Sequence[Log]", runner: Runner, against: str = "both") -> list[Comparison]:
+    """Compare what a runner's estimator said with what its logs know.
+
+    Args:
+        logs: that the runner was fed with.
+        runner: when it is done.
+        against: one of `AGAINST`.
+
+    Returns:
+        One for each vehicle or target that there are estimates of.
+
+    Raises:
+        ValueError: no such reference.
+    """
+    if against not in AGAINST:
+        raise ValueError(f"against {against!r} is not accepted; there are {', '.join(AGAINST)}")
+    found = []
+    for table in runner.tables.values():
+        numbers = (
+            table[_TARGET].astype(np.int64) if _TARGET in table.columns else np.zeros(len(table), np.int64)
+        )
+        subjects = table.subject
+        for subject, number in sorted({*zip(subjects.tolist(), numbers.tolist(), strict=True)}):
+            rows = np.flatnonzero((subjects == subject) & (numbers == number))
+            found.append(_compared(logs, runner, table, rows, subject, number, AGAINST[against]))
+    return found
+
+
+def _compared(
+    logs: "Sequence[Log]",
+    runner: Runner,
+    table: EstimateTable,
+    rows: NDArray[np.intp],
+    subject: int,
+    number: int,
+    wanted: Sequence[str],
+) -> Comparison:
+    time_us, boot = table.time_us[rows], table.boot[rows]
+    estimates = dict(zip(table.columns, table.values[rows].T.copy(), strict=True))
+    compared = [name for name in COMPARED if name in estimates]
+    counted = np.zeros(len(rows), dtype=np.bool_)
+    known: dict[str, dict[str, Column]] = {}
+    sources: dict[str, list[str]] = {}
+    airborne_s, airborne_from = 0.0, ""
+    log = _log_of(logs, subject)
+    boots = [None] if log is None or not subject else _boots_with_estimates(log, runner, subject)
+    for index, number_in_log in enumerate(boots):
+        here = boot == index if len(boots) > 1 else np.ones(len(rows), dtype=np.bool_)
+        times = time_us[here]
+        if subject and log is not None:
+            spans, airborne_from = airborne_spans(log, subject, number_in_log)
+            found = references(log, subject, origin=runner.estimator.origin, boot=number_in_log)
+        else:
+            spans, airborne_from = [ALWAYS], "all of the log"
+            found = _target_references(logs, runner, number)
+        counted[here] = within(spans, times)
+        airborne_s += duration_s(spans, times)
+        for name in wanted:
+            reference = found.get(name)
+            shared = [c for c in compared if reference is not None and c in reference.columns]
+            if reference is None or not shared:
+                continue
+            columns = known.setdefault(name, {})
+            sources[name] = list(dict.fromkeys(reference.columns[c].source for c in shared))
+            for column in shared:
+                at = columns.setdefault(column, np.full(len(rows), np.nan))
+                at[here] = reference.columns[column].at(times)
+    figures = {}
+    for name in (n for n in wanted if n in known):
+        made = [
+            error_figures(column, errors(column, estimates[column], at), counted)
+            for column, at in known[name].items()
+        ]
+        figures[name] = [item for item in made if item is not None]
+    return Comparison(
+        label=f"vehicle {subject}" if subject else f"target {number}",
+        subject=subject,
+        time_us=time_us,
+        boot=boot,
+        estimates=estimates,
+        references=known,
+        sources=sources,
+        counted=counted,
+        airborne_s=airborne_s,
+        airborne_from=airborne_from,
+        figures=figures,
+    )
+
+
+def _log_of(logs: "Sequence[Log]", subject: int) -> "Log | None":
+    """The log that a vehicle is in."""
+    return next((log for log in logs if subject in log.systems), logs[0] if logs else None)
+
+
+def _boots_with_estimates(log: "Log", runner: Runner, system_id: int) -> list[int | None]:
+    """Boots of the log, as the runner has counted them: those in which something came that it was given."""
+    numbers = [boot.number for boot in log.boots if boot.system_id == system_id]
+    if len(numbers) < 2:
+        return [None]
+    known = {key.name for key in log.keys}
+    names = sorted(runner.names & known)
+    return [n for n in numbers if any(log.has(name, system_id=system_id, boot=n) for name in names)]
+
+
+def _target_references(logs: "Sequence[Log]", runner: Runner, number: int) -> dict[str, Reference]:
+    origin: GeodeticPosition | None = runner.estimator.origin
+    for log in logs:
+        if origin is None:
+            origin = next((place for s in log.systems if (place := home_of(log, s)) is not None), None)
+        reference = target_reference(log, number, origin=origin)
+        if reference is not None:
+            return {TRUTH: reference}
+    return {}

@@ -1,0 +1,335 @@
+"""What estimates are compared with: the autopilot's word, and a simulator's truth, where a log has it.
+
+Estimates and references meet by the names of their columns: `roll_rad`, `north_m`. Nothing here is for
+estimators; they never see truth.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+
+if TYPE_CHECKING:
+    from estimators.logs import Log, Table
+
+__all__ = [
+    "AUTOPILOT",
+    "COMPARED",
+    "TRUTH",
+    "ErrorFigures",
+    "Reference",
+    "Series",
+    "error_figures",
+    "errors",
+    "home_of",
+    "quantity_of",
+    "references",
+    "target_reference",
+]
+
+Column = NDArray[np.float64]
+
+AUTOPILOT: Final = "autopilot"
+TRUTH: Final = "truth"
+
+MAX_AWAY_US: Final = 100_000
+"""An estimate further from every sample of the reference than this has none."""
+MAX_BRIDGED_US: Final = 1_000_000
+"""A longer gap of the reference is not interpolated across."""
+_LEAST_SPEED_M_S: Final = 1.0
+"""Slower than this, the direction of travel says nothing."""
+_TARGET_SYSTEM: Final = 251
+_SIMULATORS: Final = (25, 1)
+"""Components that tell truth, the preferred first: our SITL's, PX4's own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """A quantity over time.
+
+    Attributes:
+        source: message that it is taken from.
+        time_us: (n,) vehicle time, rising.
+        values: (n,) finite.
+        angle: wraps around at a full turn.
+    """
+
+    source: str
+    time_us: NDArray[np.int64]
+    values: Column
+    angle: bool
+
+    def at(self, time_us: NDArray[np.int64]) -> Column:
+        """Linear between samples (angles the short way round); NaN where there is none within 0.1 s, or
+        none across a gap of a second.
+        """
+        times = self.time_us
+        if not len(times):
+            return np.full(len(time_us), np.nan)
+        values = np.unwrap(self.values) if self.angle else self.values
+        found = np.interp(time_us.astype(np.float64), times.astype(np.float64), values)
+        after = np.clip(np.searchsorted(times, time_us), 1, max(1, len(times) - 1))
+        left, right = times[after - 1], times[np.minimum(after, len(times) - 1)]
+        away = np.minimum(np.abs(time_us - left), np.abs(time_us - right))
+        inside = (time_us >= left) & (time_us <= right)
+        bridged = ~inside | (right - left <= MAX_BRIDGED_US) | (away == 0)
+        return np.where((away <= MAX_AWAY_US) & bridged, found, np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Somebody's word on a vehicle.
+
+    Attributes:
+        name: "autopilot" or "truth".
+        columns: quantities by the names that estimates have for them.
+    """
+
+    name: str
+    columns: Mapping[str, Series]
+
+    @property
+    def sources(self) -> list[str]:
+        """Messages that it is taken from."""
+        return list(dict.fromkeys(series.source for series in self.columns.values()))
+
+
+def references(
+    log: "Log", system_id: int, *, origin: GeodeticPosition | None = None, boot: int | None = None
+) -> dict[str, Reference]:
+    """What a log says of a vehicle; empty references are left out.
+
+    Args:
+        log: an open log.
+        system_id: the vehicle.
+        origin: where `north_m` and `east_m` are counted from; None: its home.
+        boot: of the log; None: all of it.
+    """
+    place = home_of(log, system_id, boot) if origin is None else origin
+    frame = None if place is None else LocalFrame(place)
+    found = {AUTOPILOT: _autopilot(log, system_id, boot, frame), TRUTH: _truth(log, system_id, boot, frame)}
+    return {name: Reference(name, columns) for name, columns in found.items() if columns}
+
+
+def target_reference(
+    log: "Log", number: int, *, origin: GeodeticPosition | None, boot: int | None = None
+) -> Reference | None:
+    """Where a ground target of our SITL really was.
+
+    Args:
+        number: of its tag; where only one target is known, that one counts whatever its number.
+        origin: where `north_m` and `east_m` are counted from; None: not compared.
+    """
+    name = "HIL_STATE_QUATERNION"
+    known = sorted(
+        {key.component_id for key in log.keys if key.name == name and key.system_id == _TARGET_SYSTEM}
+    )
+    if not known:
+        return None
+    component = number + 1 if number + 1 in known else known[0]
+    if component != number + 1 and len(known) > 1:
+        return None
+    table = log.table(name, system_id=_TARGET_SYSTEM, component_id=component, boot=boot)
+    frame = None if origin is None else LocalFrame(origin)
+    return Reference(TRUTH, _from_hil_state(table, frame))
+
+
+def home_of(log: "Log", system_id: int, boot: int | None = None) -> GeodeticPosition | None:
+    """A vehicle's home: the newest HOME_POSITION that is a place; None where it has told none."""
+    table = _table(log, "HOME_POSITION", system_id, boot)
+    if table is None:
+        return None
+    for k in range(len(table) - 1, -1, -1):
+        lat, lon = 1e-7 * float(table["latitude"][k]), 1e-7 * float(table["longitude"][k])
+        if (lat, lon) != (0.0, 0.0) and abs(lat) <= 90.0 and abs(lon) <= 180.0:
+            return GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=1e-3 * float(table["altitude"][k]))
+    return None
+
+
+def _table(log: "Log", name: str, system_id: int, boot: int | None) -> "Table | None":
+    """A message of the autopilot, or None."""
+    tables = _tables(log, name, system_id, boot, (1,))
+    return tables[0] if tables else None
+
+
+def _tables(
+    log: "Log", name: str, system_id: int, boot: int | None, preferred: Sequence[int]
+) -> "list[Table]":
+    """A message of one system, from the preferred components first; not asked for by a name that the log's
+    dialect may not have.
+    """
+    if not any(key.name == name and key.system_id == system_id for key in log.keys):
+        return []
+    found = {table.component_id: table for table in log.tables(name, system_id=system_id, boot=boot)}
+    return [found[component] for component in preferred if component in found]
+
+
+def _autopilot(log: "Log", system_id: int, boot: int | None, frame: LocalFrame | None) -> dict[str, Series]:
+    columns: dict[str, Series] = {}
+    attitude = _table(log, "ATTITUDE", system_id, boot)
+    if attitude is not None:
+        columns |= _series(
+            attitude, {f"{axis}_rad": _floats(attitude[axis]) for axis in ("roll", "pitch", "yaw")}
+        )
+    position = _table(log, "GLOBAL_POSITION_INT", system_id, boot)
+    if position is not None:
+        columns |= _series(position, _places(position, frame))
+    return columns
+
+
+def _truth(log: "Log", system_id: int, boot: int | None, frame: LocalFrame | None) -> dict[str, Series]:
+    for name, read in _TRUTHS.items():
+        tables = _tables(log, name, system_id, boot, (*_SIMULATORS, *range(256)))
+        if tables:
+            return read(tables[0], frame)
+    return {}
+
+
+def _from_hil_state(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
+    w, x, y, z = _floats(table["attitude_quaternion"]).T
+    # ZYX Euler angles of a Hamilton quaternion that takes FRD to NED
+    angles = {
+        "roll_rad": np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        "pitch_rad": np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
+        "yaw_rad": np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    }
+    return _series(table, angles | _places(table, frame))
+
+
+def _from_simstate(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
+    angles = {f"{axis}_rad": _floats(table[axis]) for axis in ("roll", "pitch", "yaw")}
+    lat, lon = 1e-7 * _floats(table["lat"]), 1e-7 * _floats(table["lng"])
+    return _series(table, angles | _placed(lat, lon, frame))
+
+
+def _from_sim_state(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
+    angles = {f"{axis}_rad": _floats(table[axis]) for axis in ("roll", "pitch", "yaw")}
+    # `lat` and `lon` are floats, good for some metres; the integers came later and may be 0.
+    whole = np.any(table["lat_int"]) or np.any(table["lon_int"])
+    lat = 1e-7 * _floats(table["lat_int"]) if whole else _floats(table["lat"])
+    lon = 1e-7 * _floats(table["lon_int"]) if whole else _floats(table["lon"])
+    moving = _moving(_floats(table["vn"]), _floats(table["ve"]))
+    return _series(table, angles | _placed(lat, lon, frame) | moving)
+
+
+_TRUTHS: Final[Mapping[str, Callable[["Table", LocalFrame | None], dict[str, Series]]]] = {
+    "HIL_STATE_QUATERNION": _from_hil_state,
+    "SIM_STATE": _from_sim_state,
+    "SIMSTATE": _from_simstate,
+}
+"""Best first: SIMSTATE has no time of its own."""
+
+
+def _places(table: "Table", frame: LocalFrame | None) -> dict[str, Column]:
+    """Position and velocity as GLOBAL_POSITION_INT and HIL_STATE_QUATERNION have them."""
+    lat, lon = 1e-7 * _floats(table["lat"]), 1e-7 * _floats(table["lon"])
+    north, east = 1e-2 * _floats(table["vx"]), 1e-2 * _floats(table["vy"])
+    places = _placed(lat, lon, frame) | {"alt_m": 1e-3 * _floats(table["alt"])}
+    return places | _moving(north, east) | {"down_m_s": 1e-2 * _floats(table["vz"])}
+
+
+def _placed(lat_deg: Column, lon_deg: Column, frame: LocalFrame | None) -> dict[str, Column]:
+    places = {"lat_deg": lat_deg, "lon_deg": lon_deg}
+    if frame is None:
+        return places
+    per_lat, per_lon = frame.metres_per_degree
+    east_deg = np.remainder(lon_deg - frame.origin.lon_deg + 180.0, 360.0) - 180.0
+    return places | {"north_m": per_lat * (lat_deg - frame.origin.lat_deg), "east_m": per_lon * east_deg}
+
+
+def _moving(north_m_s: Column, east_m_s: Column) -> dict[str, Column]:
+    course = np.arctan2(east_m_s, north_m_s)
+    moving = np.hypot(north_m_s, east_m_s) > _LEAST_SPEED_M_S
+    return {"north_m_s": north_m_s, "east_m_s": east_m_s, "course_rad": np.where(moving, course, np.nan)}
+
+
+def _series(table: "Table", columns: Mapping[str, Column]) -> dict[str, Series]:
+    """Columns over the table's time: sorted, each time once, finite."""
+    time_us, first = np.unique(table.time_us, return_index=True)
+    made = {}
+    for name, values in columns.items():
+        chosen = values[first]
+        good = np.isfinite(chosen)
+        made[name] = Series(table.name, time_us[good], chosen[good], name.endswith("_rad"))
+    return made
+
+
+def _floats(values: NDArray[Any]) -> Column:
+    return np.asarray(values, dtype=np.float64)
+
+
+def errors(name: str, estimate: Column, reference: Column) -> Column:
+    """Estimate minus reference; angles within half a turn, degrees of latitude and longitude as they are."""
+    difference = estimate - reference
+    if name.endswith("_rad"):
+        return np.remainder(difference + math.pi, 2.0 * math.pi) - math.pi
+    return difference
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorFigures:
+    """Errors of one quantity, in `unit`.
+
+    Attributes:
+        quantity: "roll", "north".
+        unit: "deg", "m", "m_s".
+        samples: how many estimates were compared.
+        mean, rms, mse, max: mean, root of the mean square, mean square, largest magnitude.
+    """
+
+    quantity: str
+    unit: str
+    samples: int
+    mean: float
+    rms: float
+    mse: float
+    max: float
+
+    def as_summary(self) -> dict[str, float]:
+        """`roll_mean_deg`, `roll_rms_deg`, `roll_mse_deg2`, `roll_max_deg`."""
+        q, u = self.quantity, self.unit
+        square = {"m_s": "m2_s2"}.get(u, f"{u}2")
+        return {
+            f"{q}_mean_{u}": self.mean,
+            f"{q}_rms_{u}": self.rms,
+            f"{q}_mse_{square}": self.mse,
+            f"{q}_max_{u}": self.max,
+        }
+
+
+def quantity_of(column: str) -> tuple[str, str, float]:
+    """What a column is called, its unit for people, and the factor to that: `roll_rad` in degrees."""
+    for suffix, unit, factor in (("_rad", "deg", 180.0 / math.pi), ("_m_s", "m_s", 1.0), ("_m", "m", 1.0)):
+        if column.endswith(suffix):
+            return column.removesuffix(suffix), unit, factor
+    return column, "", 1.0
+
+
+def error_figures(column: str, error: Column, counted: NDArray[np.bool_]) -> ErrorFigures | None:
+    """Statistics of the errors that are counted and known; None where there is none."""
+    name, unit, factor = quantity_of(column)
+    chosen = factor * error[counted & np.isfinite(error)]
+    if not len(chosen):
+        return None
+    mse = float(np.mean(chosen * chosen))
+    return ErrorFigures(
+        quantity=name,
+        unit=unit,
+        samples=len(chosen),
+        mean=float(np.mean(chosen)),
+        rms=math.sqrt(mse),
+        mse=mse,
+        max=float(np.max(np.abs(chosen))),
+    )
+
+
+COMPARED: Final[Sequence[str]] = (
+    "roll_rad", "pitch_rad", "yaw_rad", "north_m", "east_m", "down_m", "alt_m",
+    "north_m_s", "east_m_s", "down_m_s", "course_rad",
+)  # fmt: skip
+"""Columns that have references, in the order of tables and pictures."""

@@ -1,0 +1,166 @@
+"""A log through an estimator. Only the messages that it needs are read: seconds for hours of flight."""
+
+import heapq
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from estimators.errors import EstimatorError, EstimatorFailure
+from estimators.fleet import Fleet
+from estimators.interface import Estimator, Need
+from estimators.messages import Message
+from estimators.needs import Supply, supplies
+from estimators.runner import ESTIMATOR_COMPONENTS, TRUTH_COMPONENT
+
+if TYPE_CHECKING:
+    from estimators.logs import Log
+
+__all__ = ["Replay", "log_rate_hz", "log_supplies", "replay", "vehicles_in"]
+
+_AUTOPILOT = 1
+_GROUND = 200
+"""System ids from here on are ground stations and simulated targets."""
+_LEARNT_FROM = 20
+"""SYSTEM_TIMEs of each vehicle that are looked at before several logs are put in order."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replay:
+    """What a replay gave.
+
+    Attributes:
+        logs: what was replayed.
+        fleet: runners with their estimates and counters.
+        supplies: by system id: how each need was served.
+        lacking: by system id: what was missing, in words. Such a vehicle was not run, nor a team with it.
+        failure: what an estimator's own error said; estimates end there. "" if none.
+    """
+
+    logs: Sequence["Log"]
+    fleet: Fleet
+    supplies: dict[int, list[Supply]]
+    lacking: dict[int, list[str]]
+    failure: str = ""
+
+    @property
+    def partial(self) -> bool:
+        """Something was missing, so that there is not all that was asked for."""
+        return bool(self.failure or self.lacking or not self.supplies)
+
+
+def replay(
+    logs: "Log | Sequence[Log]",
+    make: Callable[[], Estimator[Any]],
+    *,
+    system_id: int | None = None,
+    from_us: int | None = None,
+    to_us: int | None = None,
+) -> Replay:
+    """Run an estimator over a log, one for each vehicle in it; or over the logs of a team.
+
+    Args:
+        logs: open; several only for an estimator of a team, each with vehicles of its own.
+        make: a fresh estimator.
+        system_id: the one vehicle that counts; None: all in the log.
+        from_us, to_us: part of each boot to read, vehicle time; None: from its begin, to its end.
+
+    Raises:
+        EstimatorError: the estimator needs what it may not see; several logs for an estimator of one vehicle,
+            or with the same vehicle in them.
+    """
+    opened = [logs] if not isinstance(logs, Sequence) else list(logs)
+    probe = Fleet(make)
+    if len(opened) > 1 and not probe.team:
+        raise EstimatorError(f"{probe.name} is for one vehicle; replay {len(opened)} logs one by one")
+    found = _own_vehicles(opened, probe.needs, system_id)
+    served = {system: log_supplies(log, system, probe.needs) for system, log in found.items()}
+    lacking = {system: missing for system, given in served.items() if (missing := missing_of(given))}
+    fleet = Fleet(make, system_ids=[system for system in served if system not in lacking])
+    failure = ""
+    if not (fleet.team and lacking) and served:
+        try:
+            for time_us, message in _messages(opened, fleet, system_id):
+                if (from_us is None or time_us >= from_us) and (to_us is None or time_us <= to_us):
+                    fleet.take(time_us, message)
+        except EstimatorFailure as error:
+            failure = str(error)
+    return Replay(logs=opened, fleet=fleet, supplies=served, lacking=lacking, failure=failure)
+
+
+def vehicles_in(log: "Log", needs: Sequence[Need]) -> list[int]:
+    """System ids of vehicles: whose autopilot has sent a heartbeat, or something that is needed."""
+    names = {"HEARTBEAT"} | {name for need in needs for name in need.messages}
+    return sorted(
+        {
+            key.system_id
+            for key in log.keys
+            if key.component_id == _AUTOPILOT and key.name in names and key.system_id < _GROUND
+        }
+    )
+
+
+def log_rate_hz(log: "Log", system_id: int, name: str) -> float:
+    """Rate of a message in a log, from whichever component of a vehicle sends most; 0 where it is absent, and
+    not 0 where it came once.
+    """
+    components = [
+        key.component_id
+        for key in log.keys
+        if key.name == name
+        and key.system_id == system_id
+        and key.component_id != TRUTH_COMPONENT
+        and key.component_id not in ESTIMATOR_COMPONENTS
+    ]
+    if not components:
+        return 0.0
+    rate_hz = log.rate_hz(name, system_id=system_id, component_id=components)
+    return rate_hz or 1.0 / max(1.0, log.duration_s)
+
+
+def log_supplies(log: "Log", system_id: int, needs: Sequence[Need]) -> list[Supply]:
+    """How a log serves needs on a vehicle's messages."""
+    return supplies(needs, lambda name: log_rate_hz(log, system_id, name))
+
+
+def missing_of(given: Sequence[Supply]) -> list[str]:
+    """What can't be done without and is not there, in words."""
+    return [supply.text for supply in given if not supply.met and not supply.need.optional]
+
+
+def _own_vehicles(logs: Sequence["Log"], needs: Sequence[Need], system_id: int | None) -> dict[int, "Log"]:
+    found: dict[int, Log] = {}
+    for log in logs:
+        for system in vehicles_in(log, needs):
+            if system_id not in (None, system):
+                continue
+            if system in found:
+                raise EstimatorError(
+                    f"vehicle {system} is in {found[system].path} and in {log.path}; "
+                    "logs of one team must have different vehicles in them"
+                )
+            found[system] = log
+    return found
+
+
+def _messages(logs: Sequence["Log"], fleet: Fleet, system_id: int | None) -> Iterator[tuple[int, Message]]:
+    """Needed messages in the order of the file; of several logs, in the order of the team's common time."""
+    names = sorted(fleet.heard_names)
+    streams = [log.messages(_present(log, names), system_id=system_id) for log in logs]
+    if len(streams) == 1:
+        return streams[0]
+    runner = fleet.runners[0]
+    for log in logs:
+        runner.learn_times(_first_system_times(log))
+    return heapq.merge(*streams, key=lambda item: runner.common_us(item[0], item[1].src_system))
+
+
+def _present(log: "Log", names: Sequence[str]) -> list[str]:
+    known = {key.name for key in log.keys}
+    return [name for name in names if name in known]
+
+
+def _first_system_times(log: "Log") -> Iterator[tuple[int, Message]]:
+    for count, item in enumerate(log.messages(_present(log, ["SYSTEM_TIME"]))):
+        if count >= _LEARNT_FROM:
+            return
+        yield item

@@ -1,0 +1,238 @@
+"""The one loop behind every way to run an estimator: messages in, columns of estimates out.
+
+Live and embedded flights feed it frames, a log gives it messages; from there on all is the same, so that the
+same messages in the same order give the same estimates, bit for bit.
+"""
+
+from array import array
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.mavlink import DEFINITIONS, Frame
+from estimators.errors import EstimatorError, EstimatorFailure
+from estimators.input_guard import NEW_BOOT_US
+from estimators.interface import Estimate, Estimator, Outcome
+from estimators.messages import Message, read_message
+from estimators.needs import message_names
+from estimators.team_time import TeamTime
+from estimators.vehicle_time import VehicleTime
+
+__all__ = ["ESTIMATOR_COMPONENTS", "TRUTH_COMPONENT", "TRUTH_MESSAGES", "EstimateTable", "Runner"]
+
+TRUTH_COMPONENT: Final = 25
+"""The simulator in an embedded SITL (MAV_COMP_ID_USER1)."""
+TRUTH_MESSAGES: Final = frozenset({"SIMSTATE", "SIM_STATE", "HIL_STATE", "HIL_STATE_QUATERNION"})
+ESTIMATOR_COMPONENTS: Final = frozenset(range(191, 195))
+"""Onboard computers: what estimators publish. None hears itself, in flight or in the log of it."""
+
+_SYSTEM_TIME: Final = "SYSTEM_TIME"
+
+
+class EstimateTable:
+    """Estimates of one kind in growing columns.
+
+    Args:
+        kind: class of the estimates.
+
+    Attributes:
+        name: of that class.
+        columns: names of the values, unit-suffixed.
+    """
+
+    __slots__ = ("_boots", "_subjects", "_times", "_values", "columns", "name")
+
+    def __init__(self, kind: type[Estimate]) -> None:
+        self.name = kind.__name__
+        self.columns: tuple[str, ...] = tuple(kind.COLUMNS)
+        self._times = array("q")
+        self._subjects = array("q")
+        self._boots = array("q")
+        self._values = array("d")
+
+    def append(self, estimate: Estimate, boot: int) -> None:
+        """Take one estimate, of the boot with this number."""
+        self._times.append(estimate.time_us)
+        self._subjects.append(estimate.subject)
+        self._boots.append(boot)
+        self._values.extend(estimate.row())
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    @property
+    def time_us(self) -> NDArray[np.int64]:
+        """Vehicle time of each; of a team, the time common to it."""
+        return np.array(self._times, dtype=np.int64)
+
+    @property
+    def subject(self) -> NDArray[np.int64]:
+        """System id that each is about; 0 for a target."""
+        return np.array(self._subjects, dtype=np.int64)
+
+    @property
+    def boot(self) -> NDArray[np.int64]:
+        """Boot of the vehicle that each was made in; 0 is the first that was heard."""
+        return np.array(self._boots, dtype=np.int64)
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """One row per estimate, as `columns` names them."""
+        return np.array(self._values, dtype=np.float64).reshape(len(self._times), len(self.columns))
+
+    def __getitem__(self, column: str) -> NDArray[np.float64]:
+        if column not in self.columns:
+            raise KeyError(f"{self.name} has no column {column!r}; there are {', '.join(self.columns)}")
+        return self.values[:, self.columns.index(column)]
+
+
+class Runner:
+    """Gives an estimator what it may hear, and keeps what it says.
+
+    Left out: truth, what estimators publish, messages of no concern, and, unless the estimator serves a team,
+    other vehicles. When the vehicle has booted anew, an estimator of one vehicle is reset.
+
+    Args:
+        estimator: fresh.
+        system_id: the vehicle it is for; None: the one whose autopilot gives the first message that it needs.
+            For a team it must be None.
+
+    Attributes:
+        estimator: the one given.
+        system_id: the vehicle; None as long as none was heard, and for a team.
+        names: messages that are given to the estimator.
+        outcomes: how often which.
+        left_out: messages kept from it, by reason.
+        boot: number of the vehicle's boot, from 0.
+        tables: estimates by the name of their class.
+
+    Raises:
+        EstimatorError: the estimator needs what it may not see, or a system id was given for a team.
+    """
+
+    def __init__(self, estimator: Estimator[Any], *, system_id: int | None = None) -> None:
+        self.estimator = estimator
+        self.names = message_names(estimator.needs)
+        forbidden = sorted(self.names & TRUTH_MESSAGES)
+        if forbidden:
+            raise EstimatorError(
+                f"{estimator.NAME} needs {', '.join(forbidden)}: truth is for comparison, not for estimators"
+            )
+        unknown = sorted(self.names - {found.name for found in DEFINITIONS.values()})
+        if unknown:
+            raise EstimatorError(f"{estimator.NAME} needs {', '.join(unknown)}: no such message in MAVLink")
+        if estimator.TEAM and system_id is not None:
+            raise EstimatorError(f"{estimator.NAME} hears all vehicles; system id {system_id} has no effect")
+        self.system_id = system_id
+        self.outcomes: Counter[Outcome] = Counter()
+        self.left_out: Counter[str] = Counter()
+        self.boot = 0
+        self.tables: dict[str, EstimateTable] = {}
+        self._kinds: dict[type[Any], EstimateTable] = {}
+        self._vehicle_time = VehicleTime()
+        self._team_time = TeamTime() if estimator.TEAM else None
+        self._newest_us: int | None = None
+
+    @property
+    def heard_names(self) -> frozenset[str]:
+        """What must be read of a log: what the estimator needs, and for a team what its common time needs."""
+        return self.names | {_SYSTEM_TIME} if self._team_time is not None else self.names
+
+    @property
+    def remarks(self) -> Mapping[str, float | str]:
+        """Further figures of the estimator's own."""
+        return self.estimator.remarks()
+
+    def feed(self, frame: Frame) -> Outcome | None:
+        """Take a frame of a link; every one that was heard, in order, for the time is told by all of them.
+
+        Returns:
+            What became of it; None for one that was left out.
+        """
+        message = read_message(frame)
+        return self.take(self._vehicle_time.stamp(message), message)
+
+    def take(self, time_us: int, message: Message) -> Outcome | None:
+        """Take a message at its vehicle time.
+
+        Returns:
+            What became of it; None for one that was left out.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error.
+        """
+        name = message.name
+        team_time = self._team_time
+        if team_time is not None and name == _SYSTEM_TIME and message.src_component == 1:
+            team_time.learn(time_us, message)
+        if name not in self.names:
+            return None
+        component = message.src_component
+        if component == TRUTH_COMPONENT:
+            self.left_out["truth"] += 1
+            return None
+        if component in ESTIMATOR_COMPONENTS:
+            self.left_out["from an estimator"] += 1
+            return None
+        if team_time is not None:
+            time_us = team_time.common_us(time_us, message.src_system)
+        elif message.src_system != self.system_id:
+            if self.system_id is not None or component != 1:
+                self.left_out["of another vehicle"] += 1
+                return None
+            self.system_id = message.src_system
+        if team_time is None:
+            newest_us = self._newest_us
+            if newest_us is None or time_us > newest_us:
+                self._newest_us = time_us
+            elif time_us < newest_us - NEW_BOOT_US:
+                self.start_boot()
+                self._newest_us = time_us
+        return self._handle(time_us, message)
+
+    def learn_times(self, system_times: Iterable[tuple[int, Message]]) -> None:
+        """Learn when the vehicles of a team booted, before their messages come.
+
+        Args:
+            system_times: vehicle times and SYSTEM_TIMEs.
+        """
+        assert self._team_time is not None, "for teams"
+        for time_us, message in system_times:
+            if message.src_component == 1:
+                self._team_time.learn(time_us, message)
+
+    def common_us(self, time_us: int, system_id: int) -> int:
+        """The time common to a team of a vehicle's time; of one vehicle it is its own."""
+        return time_us if self._team_time is None else self._team_time.common_us(time_us, system_id)
+
+    def start_boot(self) -> None:
+        """The vehicle has booted anew: what the estimator knew is of no use."""
+        self.boot += 1
+        self.estimator.reset()
+
+    def _handle(self, time_us: int, message: Message) -> Outcome:
+        estimator = self.estimator
+        try:
+            outcome = estimator.handle(time_us, message)
+            # A jump in time starts an estimator anew from this message: there may be an estimate at once.
+            estimates = estimator.estimates if outcome is Outcome.UPDATED else ()
+        except Exception as error:
+            raise EstimatorFailure(
+                f"{estimator.NAME} failed at {message.name} of {time_us * 1e-6:.3f} s: "
+                f"{type(error).__name__}: {error}"
+            ) from error
+        self.outcomes[outcome] += 1
+        for estimate in estimates:
+            table = self._kinds.get(type(estimate))
+            if table is None:
+                table = self._new_table(type(estimate))
+            table.append(estimate, self.boot)
+        return outcome
+
+    def _new_table(self, kind: type[Any]) -> EstimateTable:
+        table = self._kinds[kind] = EstimateTable(kind)
+        self.tables[table.name] = table
+        return table

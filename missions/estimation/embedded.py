@@ -1,0 +1,153 @@
+"""Estimators in a flight: the same loop as in a process of their own, on the flight's vehicle time."""
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from autopilot_bridge.mavlink import FrameEncoder, MAVLinkMessage, dialect
+from estimators.fleet import Fleet
+from estimators.interface import Estimator
+from estimators.library import estimator_class, parameters_from
+from estimators.runner import Runner
+from missions.connection import Recorder
+from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
+from missions.estimation.report import EstimationResult, ReportRequest, report
+from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
+from missions.notes import FlightNotes
+from missions.run import LOG_NAME
+
+if TYPE_CHECKING:
+    from autopilot_bridge.clock import Clock
+    from autopilot_bridge.links import Link
+
+__all__ = ["COMPONENT_ID", "FlightEstimators", "heartbeat"]
+
+COMPONENT_ID: Final = 191
+"""MAV_COMP_ID_ONBOARD_COMPUTER."""
+_HEARTBEAT_PERIOD_S: Final = 1.0
+
+
+class _Vehicle(Protocol):
+    """What is needed of `missions.vehicle.Vehicle`: its system id, 0 before it was heard."""
+
+    @property
+    def notes(self) -> FlightNotes: ...
+
+
+def heartbeat() -> Any:
+    """What a process on board says of itself."""
+    return dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+    )
+
+
+class FlightEstimators:
+    """The estimators of a flight, one per vehicle or one for the team: a recorder around the flight's own.
+
+    Args:
+        name: of the estimator, or the path of a user's file.
+        settings: its parameters as NAME=VALUE.
+        component_id: own.
+
+    Attributes:
+        fleet: their runners.
+
+    Raises:
+        EstimatorError: no such estimator or parameter.
+    """
+
+    def __init__(self, name: str, settings: Sequence[str] = (), *, component_id: int = COMPONENT_ID) -> None:
+        found = estimator_class(name)
+        parameters = parameters_from(found, settings)
+
+        def make() -> Estimator[Any]:
+            return found(parameters)
+
+        self.fleet = Fleet(make)
+        self._settings = tuple(settings)
+        self._component_id = component_id
+        self._publisher = Publisher(self._say)
+        self._encoders: dict[int, FrameEncoder] = {}
+        self._tap: EstimatorTap | None = None
+        self._watch: RateWatch | None = None
+        self._vehicles: Sequence[_Vehicle] = ()
+        self._links: Sequence[Link] = ()
+        self._clock: Clock | None = None
+
+    def around(self, recorder: Recorder) -> EstimatorTap:
+        """What the connections, and the truth, are to be recorded by instead of this recorder."""
+        self._tap = EstimatorTap(recorder, self.fleet, self._on_estimate)
+        self._watch = RateWatch(self.fleet.needs, self._tap.heard)
+        return self._tap
+
+    @asynccontextmanager
+    async def on_board(
+        self, vehicles: Sequence[_Vehicle], links: Sequence["Link"], clock: "Clock"
+    ) -> AsyncIterator[None]:
+        """Publish, and ask the autopilots for the rates that are needed, while the block runs.
+
+        Args:
+            vehicles: of the flight.
+            links: to each of them.
+            clock: vehicle time.
+        """
+        self._vehicles, self._links, self._clock = vehicles, links, clock
+        server = asyncio.get_running_loop().create_task(self._serve(clock))
+        try:
+            yield
+        finally:
+            self._links = ()
+            server.cancel()
+            await asyncio.gather(server, return_exceptions=True)
+
+    def report(self, folder: Path, *, picture: bool, wall_time_s: float) -> EstimationResult:
+        """Write the estimates and their picture beside the flight's log, which is closed.
+
+        The summary is for the flight's to take in.
+        """
+        return report(
+            ReportRequest(
+                folder=folder,
+                logs=folder / LOG_NAME,
+                fleet=self.fleet,
+                settings=self._settings,
+                picture=picture,
+                wall_time_s=wall_time_s,
+                failure=self._tap.failure if self._tap is not None else "",
+            ),
+            summary_file=False,
+        )
+
+    async def _serve(self, clock: "Clock") -> None:
+        assert self._watch is not None
+        looked_us = clock.time_us
+        while True:
+            for system_id in (0,) if self.fleet.team else tuple(self.fleet.runners):
+                self._say(system_id, heartbeat())
+            if clock.time_us - looked_us >= CHECK_PERIOD_S * 1e6:
+                looked_us = clock.time_us
+                known = [v.notes.system_id for v in self._vehicles if v.notes.system_id]
+                for system_id, name, rate_hz in self._watch.look(looked_us, known):
+                    self._say(system_id, interval_request(system_id, name, rate_hz))
+            await clock.sleep(_HEARTBEAT_PERIOD_S)
+
+    def _on_estimate(self, runner: Runner, time_us: int) -> None:
+        # Estimates from too little are no news for anybody.
+        if self._links and self._watch is not None and not self._watch.lacking:
+            self._publisher.on_estimate(runner, time_us)
+
+    def _say(self, system_id: int, message: MAVLinkMessage) -> None:
+        """Over the link of a vehicle that the mission knows already; a team's go over the first."""
+        for vehicle, link in zip(self._vehicles, self._links, strict=False):
+            if vehicle.notes.system_id and system_id in (0, vehicle.notes.system_id):
+                encoder = self._encoders.get(system_id)
+                if encoder is None:
+                    encoder = FrameEncoder(system_id or TEAM_SYSTEM, self._component_id)
+                    self._encoders[system_id] = encoder
+                frame = encoder.encode(message)
+                assert self._tap is not None and self._clock is not None
+                self._tap.record(frame, self._clock.time_us)
+                link.send(frame)
+                return

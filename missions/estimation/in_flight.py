@@ -1,0 +1,32 @@
+"""The estimators that a flight is asked to take along; what they need is imported only then."""
+
+from typing import TYPE_CHECKING
+
+from missions.errors import PlanError
+from missions.request import RunRequest
+
+if TYPE_CHECKING:
+    from missions.estimation.embedded import FlightEstimators
+
+
+def estimators_of(request: RunRequest) -> "FlightEstimators | None":
+    """The estimators of a flight; None where none is asked for.
+
+    Raises:
+        PlanError: no such estimator or parameter.
+    """
+    if request.estimator is None:
+        if request.estimator_settings:
+            raise PlanError(
+                f"{request.estimator_settings[0]!r} is for an estimator; name one with --estimator"
+            )
+        return None
+    from estimators.errors import EstimatorError
+    from missions.estimation.embedded import COMPONENT_ID, FlightEstimators
+
+    # A mission on board may have the first id of an onboard computer itself.
+    component_id = COMPONENT_ID + (request.identity[1] == COMPONENT_ID)
+    try:
+        return FlightEstimators(request.estimator, request.estimator_settings, component_id=component_id)
+    except EstimatorError as error:
+        raise PlanError(str(error)) from error

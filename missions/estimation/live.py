@@ -1,0 +1,286 @@
+"""An estimator in a process of its own, on a live link: hears, tells, logs.
+
+Everything that is heard and sent goes into the run folder's log, in the order in which the estimator heard
+it: the replay of that log gives the same estimates, bit for bit.
+"""
+
+import asyncio
+import math
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
+from autopilot_bridge.clock.pacing import wall_time_s
+from autopilot_bridge.links import Link, ReplayLog, open_link, parse_address
+from autopilot_bridge.mavlink import MAVLinkMessage
+from autopilot_bridge.tlog import TlogWriter
+from estimators.errors import EstimatorError
+from estimators.fleet import Fleet
+from estimators.interface import Estimator
+from estimators.library import estimator_class, parameters_from
+from estimators.runner import ESTIMATOR_COMPONENTS, Runner
+from missions.connection import Connection
+from missions.errors import LinkClosed
+from missions.estimation.embedded import COMPONENT_ID
+from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
+from missions.estimation.report import EstimationResult, ReportRequest, report
+from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
+from missions.records import FlightRecorder
+from missions.run import LOG_NAME, create_run_folder
+
+__all__ = ["LiveProgress", "LiveRequest", "estimate"]
+
+SILENCE_S: Final = 10.0
+_LOOK_S: Final = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveRequest:
+    """What is asked of an estimator process.
+
+    Attributes:
+        estimator: its name, or the path of a user's file.
+        connect: connection string of the link.
+        settings: parameters as NAME=VALUE.
+        duration_s: vehicle time from the first that was heard; None: until it is stopped.
+        system_id: of the vehicle; None: the first that is heard.
+        component_id: own.
+        publish: whether estimates are told on the link.
+        request_rates: whether the autopilot is asked for the rates that the estimator needs.
+        silence_s: vehicle time without a word from the vehicle after which the run ends.
+        against: what the estimates are compared with afterwards: "autopilot", "truth" or "both".
+        out: run folder; None: the next `runs/<estimator>-<n>`.
+        picture: whether to draw `errors.png`.
+        command: the command line, for the summary.
+    """
+
+    estimator: str
+    connect: str
+    settings: Sequence[str] = ()
+    duration_s: float | None = None
+    system_id: int | None = None
+    component_id: int = COMPONENT_ID
+    publish: bool = True
+    request_rates: bool = True
+    silence_s: float = SILENCE_S
+    against: str = "both"
+    out: Path | None = None
+    picture: bool = True
+    command: str = ""
+
+    def __post_init__(self) -> None:
+        if self.component_id not in ESTIMATOR_COMPONENTS:
+            raise EstimatorError(
+                f"component id {self.component_id} is not an onboard computer's; "
+                f"give {min(ESTIMATOR_COMPONENTS)} to {max(ESTIMATOR_COMPONENTS)}"
+            )
+        for name, value in (("duration_s", self.duration_s), ("silence_s", self.silence_s)):
+            if value is not None and not 0.0 < value < math.inf:
+                raise EstimatorError(f"{name} {value:g} is not accepted; give seconds, above 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveProgress:
+    """How it goes, for whoever shows it.
+
+    Attributes:
+        time_s: vehicle time since the vehicle was first heard.
+        estimates: made so far.
+        lacking: what the link does not give, in words.
+    """
+
+    time_s: float
+    estimates: int
+    lacking: Sequence[str]
+
+
+class _Process:
+    """One run on an open link."""
+
+    def __init__(self, request: LiveRequest, link: Link, fleet: Fleet, log: TlogWriter) -> None:
+        self._request = request
+        self._link = link
+        self._fleet = fleet
+        self._clock = TelemetryClock()
+        recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
+        self._publisher = Publisher(self._say)
+        self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None)
+        self._watch = RateWatch(fleet.needs, self._tap.heard)
+        self._look_us = 0
+        self._stop = asyncio.Event()
+        self._met = False
+        self.stopped = False
+        self.reason = ""
+        self.connection = Connection(
+            link,
+            self._clock,
+            self._tap,
+            identity=(request.system_id or (TEAM_SYSTEM if fleet.team else 1), request.component_id),
+            vehicle_system_id=request.system_id,
+        )
+
+    def stop(self) -> None:
+        """End the run soon."""
+        self.stopped = True
+        self._stop.set()
+
+    def figures(self) -> dict[str, Any]:
+        """What became of the bytes of the link, and what was sent."""
+        return {
+            "bytes_received": self._link.counters.bytes_in,
+            "bytes_junk": self.connection.parsers.counters.bytes_junk,
+            "published": self._publisher.sent,
+        }
+
+    async def run(self, on_progress: Callable[[LiveProgress], None] | None) -> None:
+        """Until the duration is over, the link is silent, the estimator fails, or somebody stops it."""
+        request, clock, tap = self._request, self._clock, self._tap
+        async with self.connection:
+            heard, heard_wall_s = 0, wall_time_s()
+            first_us: int | None = None  # vehicle time when the vehicle first told it
+            while not self.stopped:
+                wall_s = wall_time_s()
+                newest = sum(tap.autopilots[system_id] for system_id in self._vehicles())
+                if newest != heard:
+                    heard, heard_wall_s = newest, wall_s
+                    self._meet()
+                if first_us is None and clock.vehicle_time_us is not None:
+                    first_us = self._look_us = clock.time_us
+                    self._watch.restart()
+                if tap.failure:
+                    self.reason = tap.failure
+                    return
+                if wall_s - heard_wall_s > request.silence_s:
+                    self.reason = self._silence(heard)
+                    return
+                if heard:
+                    self._look(clock.time_us)
+                since_us = 0 if first_us is None else clock.time_us - first_us
+                if on_progress is not None:
+                    on_progress(self._progress(since_us))
+                wait_s = _LOOK_S
+                if request.duration_s is not None and first_us is not None:
+                    left_s = request.duration_s - since_us * 1e-6
+                    if left_s <= 0.0:
+                        return
+                    wait_s = min(wait_s, left_s / clock.rate)
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._stop.wait(), wait_s)
+
+    def _vehicles(self) -> tuple[int, ...]:
+        """System ids of the vehicles that count: the one asked for, the one it is for, or all of a team."""
+        heard = tuple(self._tap.autopilots)
+        if self._fleet.team:
+            return heard
+        if self._request.system_id is not None:
+            return (self._request.system_id,)
+        return tuple(self._fleet.runners) or heard[:1]
+
+    def _meet(self) -> None:
+        """Speak as a part of the vehicle, once it is known which."""
+        vehicles = self._vehicles()
+        if not self._met and vehicles and not self._fleet.team:
+            self.connection.speak_as(vehicles[0], self._request.component_id)
+        self._met = bool(self._fleet.runners)
+
+    def _look(self, now_us: int) -> None:
+        """Measure rates, and ask for more where they are too low."""
+        if now_us < self._look_us:
+            return
+        self._look_us = now_us + round(CHECK_PERIOD_S * 1e6)
+        requests = self._watch.look(now_us, self._vehicles())
+        if self._request.request_rates:
+            for system_id, name, rate_hz in requests:
+                self.connection.send(interval_request(system_id, name, rate_hz))
+
+    def _silence(self, heard: int) -> str:
+        request = self._request
+        if heard:
+            return f"{request.connect} has been silent for {request.silence_s:g} s; what came before is kept"
+        which = "vehicle" if request.system_id is None else f"vehicle {request.system_id}"
+        others = ", ".join(map(str, sorted(self._tap.autopilots)))
+        also = f" (heard: vehicle {others})" if others else ""
+        return (
+            f"no {which} was heard on {request.connect} within {request.silence_s:g} s{also}; "
+            "is it on, and sending there?"
+        )
+
+    def _progress(self, since_us: int) -> LiveProgress:
+        count = sum(len(table) for r in self._fleet.runners.values() for table in r.tables.values())
+        return LiveProgress(time_s=since_us * 1e-6, estimates=count, lacking=tuple(self._watch.lacking))
+
+    def _on_estimate(self, runner: Runner, time_us: int) -> None:
+        # Estimates from too little are no news for anybody.
+        if not self._watch.lacking:
+            self._publisher.on_estimate(runner, time_us)
+
+    def _say(self, _system_id: int, message: MAVLinkMessage) -> None:
+        with suppress(LinkClosed):
+            self.connection.send(message)
+
+
+def estimate(
+    request: LiveRequest, on_progress: Callable[[LiveProgress], None] | None = None
+) -> EstimationResult:
+    """Run an estimator on a live link and write its run folder. Blocks until it is done.
+
+    Ctrl-C and SIGTERM end it in good order, as the end of its duration does.
+
+    Raises:
+        EstimatorError: no such estimator or parameter; nothing was opened.
+        PlanError: the run folder can't be made.
+        BridgeError: the link can't be opened.
+    """
+    found = estimator_class(request.estimator)
+    parameters = parameters_from(found, request.settings)
+    address = parse_address(request.connect)
+    if isinstance(address, ReplayLog):
+        raise EstimatorError(f"--connect {address}: that is a log; use flightstack replay {address}")
+
+    def make() -> Estimator[Any]:
+        return found(parameters)
+
+    only = None if request.system_id is None else (request.system_id,)
+    fleet = Fleet(make, system_ids=only, single=True)
+    link = open_link(address)
+    try:
+        folder = create_run_folder(request.out, fleet.name)
+        begun_wall_s = wall_time_s()
+        with TlogWriter(folder / LOG_NAME) as log:
+            loop = asyncio.new_event_loop()
+            process = _Process(request, link, fleet, log)
+            with _ending(loop, process.stop):
+                run(process.run(on_progress), loop)
+    finally:
+        link.close()
+    reason = process.reason
+    interrupted = process.stopped and request.duration_s is not None
+    return report(
+        ReportRequest(
+            folder=folder,
+            logs=folder / LOG_NAME,
+            fleet=fleet,
+            settings=tuple(request.settings),
+            against=request.against,
+            picture=request.picture,
+            wall_time_s=wall_time_s() - begun_wall_s,
+            failure=reason,
+            interrupted=interrupted,
+            command=request.command,
+            more={"connect": request.connect, "link": process.figures()},
+        )
+    )
+
+
+@contextmanager
+def _ending(loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> Iterator[None]:
+    """Ctrl-C and SIGTERM end the run in good order, where the system and the thread allow to say so."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    for number in numbers:
+        with suppress(NotImplementedError, ValueError, RuntimeError):
+            loop.add_signal_handler(number, stop)
+    yield

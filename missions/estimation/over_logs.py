@@ -1,0 +1,165 @@
+"""Logs through an estimator, with a run folder for each; the logs of a team together, with one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from autopilot_bridge.clock.pacing import wall_time_s
+from estimators.errors import EstimatorError
+from estimators.interface import Estimator
+from estimators.library import estimator_class, parameters_from
+from estimators.logs import Log, LogError, open_log
+from estimators.replay import replay
+from missions.errors import PlanError
+from missions.estimation.report import FAILED, EstimationResult, ReportRequest, report
+from missions.run import RUNS, create_run_folder
+
+__all__ = ["ReplayRequest", "replay_logs"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayRequest:
+    """What is asked of a replay.
+
+    Attributes:
+        logs: files; for an estimator of a team all of them are one team's.
+        estimator: its name, or the path of a user's file.
+        settings: parameters as NAME=VALUE.
+        system_id: the one vehicle that counts; None: all in each log.
+        against: "autopilot", "truth" or "both".
+        from_s, to_s: part of the logs to replay, vehicle time.
+        dialect: of telemetry logs; None: every message of MAVLink's public definitions.
+        out: run folder; with several logs the folder of theirs. None: the next `runs/<estimator>-<n>`.
+        picture: whether to draw `errors.png`.
+        command: the command line, for the summaries.
+    """
+
+    logs: Sequence[Path]
+    estimator: str
+    settings: Sequence[str] = ()
+    system_id: int | None = None
+    against: str = "both"
+    from_s: float | None = None
+    to_s: float | None = None
+    dialect: str | None = None
+    out: Path | None = None
+    picture: bool = True
+    command: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.logs:
+            raise EstimatorError("no log is given; give one or more")
+        if self.from_s is not None and self.to_s is not None and self.from_s >= self.to_s:
+            raise EstimatorError(f"from {self.from_s:g} s to {self.to_s:g} s is no time; give from before to")
+
+
+Done = Callable[[str, EstimationResult | str], None]
+"""Called after each log with what it is called, and how it went: a result, or why it can't be read."""
+
+
+def replay_logs(
+    request: ReplayRequest, on_done: Done | None = None
+) -> list[tuple[str, EstimationResult | str]]:
+    """Replay logs and write their run folders.
+
+    A log that can't be read doesn't keep the others from being replayed.
+
+    Raises:
+        EstimatorError: no such estimator or parameter, or logs that are not of one team.
+        PlanError: a run folder can't be made.
+    """
+    found = estimator_class(request.estimator)
+    parameters = parameters_from(found, request.settings)
+
+    def make() -> Estimator[Any]:
+        return found(parameters)
+
+    together = found.TEAM
+    groups = [list(request.logs)] if together else [[path] for path in request.logs]
+    results: list[tuple[str, EstimationResult | str]] = []
+    for paths in groups:
+        label = ", ".join(path.name for path in paths)
+        result: EstimationResult | str
+        try:
+            opened = [open_log(path, dialect=request.dialect) for path in paths]
+        except LogError as error:
+            result = str(error)
+        else:
+            result = _replay_one(request, opened, make, found.NAME, several=len(groups) > 1)
+        results.append((label, result))
+        if on_done is not None:
+            on_done(label, result)
+    return results
+
+
+def _replay_one(
+    request: ReplayRequest, logs: list[Log], make: Callable[[], Estimator[Any]], name: str, *, several: bool
+) -> EstimationResult:
+    begun_s = wall_time_s()
+    done = replay(
+        logs,
+        make,
+        system_id=request.system_id,
+        from_us=_microseconds(request.from_s),
+        to_us=_microseconds(request.to_s),
+    )
+    wall_s = wall_time_s() - begun_s
+    failure = done.failure
+    if request.system_id is not None and not done.supplies:
+        heard = sorted({key.system_id for log in logs for key in log.keys if key.component_id == 1})
+        failure = (
+            f"there is no vehicle {request.system_id} in it; there are {', '.join(map(str, heard)) or 'none'}"
+        )
+    return report(
+        ReportRequest(
+            folder=_folder(request, logs[0].path, name, several),
+            logs=logs,
+            fleet=done.fleet,
+            settings=tuple(request.settings),
+            against=request.against,
+            picture=request.picture,
+            wall_time_s=wall_s,
+            failure=failure,
+            command=request.command,
+            supplies=done.supplies,
+            more={"from_s": request.from_s, "to_s": request.to_s},
+        )
+    )
+
+
+def _folder(request: ReplayRequest, log: Path, name: str, several: bool) -> Path:
+    """The folder of one log: named after it where there are several."""
+    if not several:
+        return create_run_folder(request.out, name)
+    if request.out is None:
+        return create_run_folder(None, f"{name}-{log.stem}", RUNS)
+    number, folder = 1, request.out / log.stem
+    while folder.exists():  # two logs of the same name
+        number += 1
+        folder = request.out / f"{log.stem}-{number}"
+    return create_run_folder(folder, name)
+
+
+def check_out(request: ReplayRequest) -> None:
+    """Refuse a folder that holds something, before anything is replayed.
+
+    Raises:
+        PlanError: it does.
+    """
+    out = request.out
+    if out is None:
+        return
+    if out.exists() and not out.is_dir():
+        raise PlanError(f"{out} is a file; choose a folder with --out")
+    if out.is_dir() and any(out.iterdir()):
+        raise PlanError(f"{out} is not empty, and nothing is overwritten; choose another --out")
+
+
+def failed(result: EstimationResult | str) -> bool:
+    """Whether a log gave less than was asked for."""
+    return isinstance(result, str) or result.outcome == FAILED
+
+
+def _microseconds(seconds: float | None) -> int | None:
+    return None if seconds is None else round(seconds * 1e6)

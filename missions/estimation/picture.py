@@ -1,0 +1,160 @@
+"""The picture of an estimator's errors: each estimate beside its references, and the difference below."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from estimators.comparison import Comparison
+from estimators.references import AUTOPILOT, TRUTH, quantity_of
+from missions.picture import tidy
+
+__all__ = ["draw_errors"]
+
+_INK: Final = "#1f2937"
+_ESTIMATE: Final = "#c2410c"
+_COLOURS: Final = {AUTOPILOT: "#1769aa", TRUTH: "#111827"}
+_IN_AIR: Final = "#f3f4f6"
+_MOST: Final = 6  # quantities in one picture
+_POINTS: Final = 6000  # more can't be told apart
+_UNITS: Final = {"deg": "deg", "m": "m", "m_s": "m/s"}
+
+
+def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
+    """Draw `errors.png`.
+
+    Args:
+        path: the file; it must not exist.
+        title: above the picture.
+        compared: vehicles or targets; the first quantities of all of them are shown.
+    """
+    shown = [
+        (c, column) for c in compared for column in dict.fromkeys(k for r in c.references.values() for k in r)
+    ][:_MOST]
+    figure = Figure(figsize=(10.0, 0.9 + 3.1 * len(shown)), dpi=120, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
+    grid = figure.add_gridspec(2 * len(shown), 1, height_ratios=(1.9, 1.0) * len(shown))
+    several = len({c.label for c, _ in shown}) > 1
+    for k, (c, column) in enumerate(shown):
+        above = figure.add_subplot(grid[2 * k])
+        below = figure.add_subplot(grid[2 * k + 1], sharex=above)
+        _draw_quantity(above, below, c, column, c.label if several else "")
+        above.tick_params(labelbottom=False)
+        if k == 0:
+            _legend(above, c)
+        if k == len(shown) - 1:
+            below.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
+        tidy(above)
+        tidy(below)
+    with path.open("xb") as file:
+        figure.savefig(file, format="png", metadata={"Software": None})
+
+
+def _legend(axes: Any, compared: Comparison) -> None:
+    handles = [
+        Line2D([], [], color=_COLOURS[name], linewidth=1.4, label=f"{name} ({', '.join(sources)})")
+        for name, sources in compared.sources.items()
+    ]
+    handles.append(Line2D([], [], color=_ESTIMATE, linewidth=1.4, label="estimate"))
+    handles.append(Line2D([], [], color=_IN_AIR, linewidth=7, label="in the air"))
+    axes.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=len(handles),
+        fontsize=8,
+        frameon=False,
+    )
+
+
+def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: str) -> None:
+    name, unit, factor = quantity_of(column)
+    time_s = _continuous_s(c)
+    for axes in (above, below):
+        _shade(axes, time_s, c.counted)
+    thin = slice(None, None, max(1, len(time_s) // _POINTS))
+    breaks = _breaks(time_s)
+    # Truth lies below the autopilot's line where both are there, and both below the estimate.
+    for reference in sorted(c.references, key=lambda r: r != TRUTH):
+        columns = c.references[reference]
+        if column not in columns:
+            continue
+        colour = _COLOURS[reference]
+        width = 2.2 if reference == TRUTH and len(c.references) > 1 else 1.3
+        above.plot(
+            time_s[thin],
+            factor * _parted(columns[column], breaks, column)[thin],
+            color=colour,
+            linewidth=width,
+        )
+        error = factor * c.errors(reference, column)
+        below.plot(time_s[thin], _parted(error, breaks, "")[thin], color=colour, linewidth=0.8)
+    estimate = factor * _parted(c.estimates[column], breaks, column)
+    above.plot(time_s[thin], estimate[thin], color=_ESTIMATE, linewidth=0.9)
+    written = _UNITS.get(unit, unit)
+    above.set_ylabel(f"{label} {name}, {written}".strip(), fontsize=9, color=_INK)
+    below.set_ylabel(f"error, {written}", fontsize=9, color=_INK)
+    below.axhline(0.0, color=_INK, linewidth=0.6)
+    _limit(below, c, column, factor)
+    told = [
+        f"{reference}: RMS {figure.rms:.3g} {written}, at most {figure.max:.3g} {written}"
+        for reference, figures in c.figures.items()
+        for figure in figures
+        if figure.quantity == name and figure.unit == unit
+    ]
+    below.annotate(
+        "   ".join(told), (1.0, 1.0), xycoords="axes fraction", xytext=(-4, -3), textcoords="offset points",
+        ha="right", va="top", fontsize=8, color=_INK,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
+    )  # fmt: skip
+
+
+def _limit(axes: Any, c: Comparison, column: str, factor: float) -> None:
+    """Make room for the errors in the air; what happens on the ground may leave the picture."""
+    largest = 0.0
+    for reference, columns in c.references.items():
+        if column in columns:
+            error = np.abs(factor * c.errors(reference, column)[c.counted])
+            largest = max(largest, float(np.nanmax(error, initial=0.0, where=np.isfinite(error))))
+    if largest > 0.0:
+        axes.set_ylim(-1.2 * largest, 1.8 * largest)  # the figures stand above the line
+
+
+def _continuous_s(c: Comparison) -> NDArray[np.float64]:
+    """Time for the axis: boots one after the other."""
+    time_s = c.time_us * 1e-6
+    offset = 0.0
+    for number in np.unique(c.boot)[1:]:
+        before, here = time_s[c.boot < number], c.boot == number
+        offset = float(before.max()) + 5.0 - float(time_s[here].min()) if len(before) else 0.0
+        time_s[here] += offset
+    return np.asarray(time_s, dtype=np.float64)
+
+
+def _breaks(time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where a line must not go on: after more than a second without an estimate."""
+    return np.append(np.diff(time_s) > 1.0, False) if len(time_s) else np.zeros(0, dtype=np.bool_)
+
+
+def _parted(values: NDArray[np.float64], breaks: NDArray[np.bool_], column: str) -> NDArray[np.float64]:
+    """Values with holes where the line is to be broken: gaps, and angles that wrap around."""
+    wrapped = values
+    if column.endswith("_rad"):
+        wrapped = np.remainder(values + math.pi, 2.0 * math.pi) - math.pi
+        with np.errstate(invalid="ignore"):
+            jumps = np.append(np.abs(np.diff(wrapped)) > math.pi, False)
+        return np.where(breaks | jumps, np.nan, wrapped)
+    return np.where(breaks, np.nan, wrapped)
+
+
+def _shade(axes: Any, time_s: NDArray[np.float64], counted: NDArray[np.bool_]) -> None:
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], counted, [False])).astype(np.int8)))
+    for first, last in edges.reshape(-1, 2).tolist():
+        axes.axvspan(time_s[first], time_s[last - 1], color=_IN_AIR, zorder=0, linewidth=0)

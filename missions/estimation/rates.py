@@ -1,0 +1,106 @@
+"""Rates on a live link: what is heard, what of it is too slow, and asking the autopilot for more."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import definition, dialect
+from estimators.interface import Need
+from estimators.needs import RATE_TOLERANCE, lacking, wanted_rate_hz
+
+__all__ = ["CHECK_PERIOD_S", "RateWatch", "interval_request"]
+
+CHECK_PERIOD_S: Final = 2.0
+"""Vehicle time over which rates are measured; an autopilot answers a request within it."""
+_ROUNDS: Final = 3
+"""How often each alternative of what would only be nice to have is asked for."""
+
+
+def interval_request(system_id: int, name: str, rate_hz: float) -> Any:
+    """MAV_CMD_SET_MESSAGE_INTERVAL to an autopilot."""
+    return dialect.MAVLink_command_long_message(
+        system_id,
+        dialect.MAV_COMP_ID_AUTOPILOT1,
+        dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
+        0,
+        float(definition(name).message_id),
+        1e6 / rate_hz,
+        *(0.0,) * 5,
+    )
+
+
+class RateWatch:
+    """Measures rates between looks, and says what to ask for.
+
+    Args:
+        needs: of the estimator.
+        heard: frames by (system id, message id), counted by somebody else.
+
+    Attributes:
+        lacking: what is missing at the newest look, in words.
+    """
+
+    def __init__(self, needs: Sequence[Need], heard: Mapping[tuple[int, int], int]) -> None:
+        self._needs = needs
+        self._heard = heard
+        self._before: Counter[tuple[int, int]] = Counter()
+        self._before_us: int | None = None
+        self._asked: Counter[tuple[int, int]] = Counter()
+        self.lacking: list[str] = []
+
+    def restart(self) -> None:
+        """Begin the measurement anew, where time has changed its base."""
+        self._before_us = None
+
+    def look(self, time_us: int, system_ids: Iterable[int]) -> list[tuple[int, str, float]]:
+        """Measure since the last look.
+
+        Args:
+            time_us: vehicle time.
+            system_ids: vehicles that count.
+
+        Returns:
+            (system id, message name, rate) to ask for; the first look only begins the measurement.
+        """
+        before_us, before = self._before_us, self._before
+        self._before_us, self._before = time_us, Counter(self._heard)
+        if before_us is None or time_us <= before_us:
+            return []
+        elapsed_s = (time_us - before_us) * 1e-6
+        ids = tuple(system_ids)
+        requests: list[tuple[int, str, float]] = []
+        self.lacking = [] if ids else lacking(self._needs, lambda _name: 0.0)
+        for system_id in ids:
+            rate_hz = self._rate_of(system_id, before, elapsed_s)
+            which = f"vehicle {system_id}: " if len(ids) > 1 else ""
+            self.lacking += [which + text for text in lacking(self._needs, rate_hz)]
+            for index, need in enumerate(self._needs):
+                name = self._to_ask(system_id, index, need, rate_hz)
+                if name is not None:
+                    requests.append((system_id, name, wanted_rate_hz(need)))
+        return requests
+
+    def _rate_of(
+        self, system_id: int, before: Mapping[tuple[int, int], int], elapsed_s: float
+    ) -> Callable[[str], float]:
+        seldom = {name for need in self._needs if not need.rate_hz for name in need.messages}
+
+        def rate_hz(name: str) -> float:
+            key = (system_id, definition(name).message_id)
+            count = self._heard.get(key, 0)
+            # What may come at any rate need not come in this very period (a target out of sight).
+            return (count - (0 if name in seldom else before.get(key, 0))) / elapsed_s
+
+        return rate_hz
+
+    def _to_ask(self, system_id: int, index: int, need: Need, rate_hz: Callable[[str], float]) -> str | None:
+        """The next alternative to ask for; None where one is fast enough, or asking was of no use."""
+        rates = [rate_hz(name) for name in need.messages]
+        if max(rates) >= RATE_TOLERANCE * wanted_rate_hz(need) or (not need.rate_hz and max(rates) > 0.0):
+            return None
+        times = self._asked[system_id, index]
+        served = max(rates) > 0.0 and max(rates) >= RATE_TOLERANCE * need.rate_hz
+        if times >= _ROUNDS * len(need.messages) and (served or need.optional):
+            return None
+        self._asked[system_id, index] += 1
+        return need.messages[times % len(need.messages)]

@@ -1,0 +1,324 @@
+"""The run folder of an estimator: summary, estimates as columns and as text, the picture of its errors."""
+
+import csv
+import enum
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from estimators.comparison import Comparison, comparisons
+from estimators.fleet import Fleet
+from estimators.logs import Log, LogError, open_log
+from estimators.needs import Supply
+from estimators.replay import log_supplies, missing_of, vehicles_in
+from estimators.runner import EstimateTable, Runner
+from missions.run import versions, write_summary
+
+__all__ = [
+    "COMPLETED",
+    "FAILED",
+    "INTERRUPTED",
+    "EstimationResult",
+    "ReportRequest",
+    "report",
+    "table_lines",
+    "write_estimates",
+]
+
+COMPLETED: Final = "completed"
+FAILED: Final = "failed"
+INTERRUPTED: Final = "interrupted"
+
+PICTURE_NAME: Final = "errors.png"
+ESTIMATES_NAME: Final = "estimates"
+_CSV_DIGITS: Final = 9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportRequest:
+    """What is to be reported.
+
+    Attributes:
+        folder: the run folder.
+        logs: that the estimators heard, open or the path of the run's own.
+        fleet: the estimators, done.
+        settings: parameters as they were given.
+        against: "autopilot", "truth" or "both".
+        picture: whether to draw `errors.png`.
+        wall_time_s: how long it took.
+        failure: why there is not all that was asked for; "" if there is.
+        interrupted: the user ended it early.
+        command: the command line.
+        supplies, lacking: by system id, where known already; else taken from the log.
+        more: further entries of the summary.
+    """
+
+    folder: Path
+    logs: Sequence[Log] | Path
+    fleet: Fleet
+    settings: Sequence[str] = ()
+    against: str = "both"
+    picture: bool = True
+    wall_time_s: float = 0.0
+    failure: str = ""
+    interrupted: bool = False
+    command: str = ""
+    supplies: Mapping[int, Sequence[Supply]] | None = None
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EstimationResult:
+    """How an estimator did.
+
+    Attributes:
+        outcome: "completed", "failed" or "interrupted".
+        reason: why it failed; "" otherwise.
+        folder: the run folder.
+        summary: what `summary.json` holds.
+        compared: estimates beside references, by vehicle or target.
+    """
+
+    outcome: str
+    reason: str
+    folder: Path
+    summary: Mapping[str, Any]
+    compared: Sequence[Comparison]
+
+
+def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationResult:
+    """Write what there is of a run: everything that was estimated, marked partial where it is not all.
+
+    Args:
+        request: the run.
+        summary_file: whether to write `summary.json`; a flight has one of its own that takes the summary in.
+    """
+    fleet = request.fleet
+    logs, reason = _opened(request.logs)
+    supplies = request.supplies
+    if supplies is None:
+        supplies = {
+            s: log_supplies(log, s, fleet.needs) for log in logs for s in vehicles_in(log, fleet.needs)
+        }
+        if not fleet.team and fleet.runners:
+            supplies = {s: given for s, given in supplies.items() if s in fleet.runners}
+    lacking = {s: missing for s, given in supplies.items() if (missing := missing_of(given))}
+    reason = request.failure or _told(lacking, len(supplies)) or reason
+    compared = [c for runner in fleet.runners.values() for c in comparisons(logs, runner, request.against)]
+    estimates = sum(len(table) for runner in fleet.runners.values() for table in runner.tables.values())
+    if not reason and not estimates:
+        reason = "no estimate was made" if supplies else "there is no vehicle's autopilot in it"
+    partial = bool(reason) or request.interrupted
+    outcome = FAILED if reason else INTERRUPTED if request.interrupted else COMPLETED
+    blocks = [_block(runner, compared, supplies) for runner in fleet.runners.values()]
+    summary: dict[str, Any] = {
+        "estimator": fleet.name,
+        "outcome": outcome,
+        "reason": reason,
+        "partial": partial,
+        "needs": _needs(supplies),
+        **(_headline(blocks[0]) if blocks else {"samples": 0, "counters": {}, "reference": None}),
+        "vehicles": blocks,
+        "parameters": _plain(fleet.parameters),
+        "settings": list(request.settings),
+        "logs": [str(log.path) for log in logs],
+        "wall_time_s": round(request.wall_time_s, 3),
+        "versions": versions(),
+        "command": request.command,
+        **request.more,
+    }
+    write_estimates(request.folder, fleet)
+    if request.picture and any(c.references for c in compared):
+        from missions.estimation.picture import draw_errors
+
+        draw_errors(request.folder / PICTURE_NAME, _title(fleet.name, logs, summary), compared)
+    if summary_file:
+        write_summary(request.folder, summary)
+    return EstimationResult(
+        outcome=outcome, reason=reason, folder=request.folder, summary=summary, compared=compared
+    )
+
+
+def _opened(logs: Sequence[Log] | Path) -> tuple[Sequence[Log], str]:
+    if not isinstance(logs, Path):
+        return logs, ""
+    try:
+        return [open_log(logs)], ""
+    except LogError:
+        return [], "nothing was heard"
+
+
+def _told(lacking: Mapping[int, Sequence[str]], vehicles: int) -> str:
+    """What is missing, in one sentence."""
+    parts = [
+        text if vehicles == 1 else f"vehicle {system}: {text}"
+        for system, texts in lacking.items()
+        for text in texts
+    ]
+    return "; ".join(parts)
+
+
+def _needs(supplies: Mapping[int, Sequence[Supply]]) -> list[dict[str, Any]]:
+    """Each need of each vehicle, and how it was served."""
+    return [
+        {
+            "vehicle": system,
+            "purpose": supply.need.purpose,
+            "messages": list(supply.need.messages),
+            "needed_hz": supply.need.rate_hz,
+            "served_by": supply.message or None,
+            "rate_hz": round(supply.rate_hz, 3),
+            "optional": supply.need.optional,
+            "met": supply.met,
+            "text": supply.text,
+        }
+        for system, given in supplies.items()
+        for supply in given
+    ]
+
+
+def _block(
+    runner: Runner, compared: Sequence[Comparison], supplies: Mapping[int, Sequence[Supply]]
+) -> dict[str, Any]:
+    """Figures of one runner: of a vehicle, or of a team."""
+    own = [c for c in compared if runner.system_id in (None, c.subject)]
+    block: dict[str, Any] = {
+        "system_id": runner.system_id,
+        "samples": sum(len(table) for table in runner.tables.values()),
+        "boots": runner.boot + 1,
+        "counters": {outcome.value: n for outcome, n in sorted(runner.outcomes.items(), key=_by_value)},
+        "left_out": dict(sorted(runner.left_out.items())),
+        "partial": any(missing_of(given) for s, given in supplies.items() if runner.system_id in (None, s)),
+        "remarks": {key: _plain(value) for key, value in runner.remarks.items()},
+        "subjects": [_subject(c) for c in own],
+    }
+    return block
+
+
+def _by_value(item: tuple[Any, int]) -> str:
+    return str(item[0].value)
+
+
+def _subject(compared: Comparison) -> dict[str, Any]:
+    main = compared.reference
+    return {
+        "subject": compared.label,
+        "estimates": len(compared.time_us),
+        "airborne_s": round(compared.airborne_s, 3),
+        "airborne_from": compared.airborne_from,
+        "reference": main,
+        **({} if main is None else _figures(compared, main)),
+        "against": {
+            name: {"sources": list(compared.sources[name]), **_figures(compared, name)}
+            for name in compared.figures
+        },
+    }
+
+
+def _figures(compared: Comparison, reference: str) -> dict[str, float]:
+    found = {key: value for item in compared.figures[reference] for key, value in item.as_summary().items()}
+    return {key: float(f"{value:.9g}") for key, value in found.items()}
+
+
+def _headline(block: Mapping[str, Any]) -> dict[str, Any]:
+    """What stands at the top of the summary: the first vehicle's, or the first target's."""
+    first = block["subjects"][0] if block["subjects"] else {"airborne_s": 0.0, "reference": None}
+    own = {key: block[key] for key in ("system_id", "samples", "counters", "left_out", "boots", "remarks")}
+    return own | {key: value for key, value in first.items() if key not in ("subject", "estimates")}
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
+    if isinstance(value, enum.Enum):
+        return value.value
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, (np.floating, np.integer)):
+        return value.item()
+    return value if isinstance(value, (bool, int, float, str, type(None))) else str(value)
+
+
+def write_estimates(folder: Path, fleet: Fleet) -> list[Path]:
+    """Write every table of estimates as .npz and as .csv; returns the files.
+
+    They are called `estimates`, and with several vehicles or kinds of estimates also after those.
+    """
+    tables = [(runner, table) for runner in fleet.runners.values() for table in runner.tables.values()]
+    kinds = {table.name for _, table in tables}
+    written = []
+    for runner, table in tables:
+        parts = [ESTIMATES_NAME]
+        if len(fleet.runners) > 1:
+            parts.append(str(runner.system_id))
+        if len(kinds) > 1:
+            parts.append(table.name)
+        written += _write_table(folder, "-".join(parts), table)
+    return written
+
+
+def _write_table(folder: Path, name: str, table: EstimateTable) -> list[Path]:
+    time_us, boot, subject, values = table.time_us, table.boot, table.subject, table.values
+    columns = {"time_us": time_us, "boot": boot, "subject": subject}
+    columns |= dict(zip(table.columns, values.T, strict=True))
+    arrays = folder / f"{name}.npz"
+    with arrays.open("xb") as file:
+        np.savez_compressed(file, **columns)  # type: ignore[arg-type]  # names of columns, not options
+    text = folder / f"{name}.csv"
+    with text.open("x", encoding="utf-8", newline="") as lines:
+        writer = csv.writer(lines)
+        writer.writerow(["time_s", "boot", "subject", *table.columns])
+        for time, number, about, row in zip(
+            time_us.tolist(), boot.tolist(), subject.tolist(), values.tolist(), strict=True
+        ):
+            writer.writerow([f"{time * 1e-6:.6f}", number, about, *(f"{v:.{_CSV_DIGITS}g}" for v in row)])
+    return [arrays, text]
+
+
+def _title(name: str, logs: Sequence[Log], summary: Mapping[str, Any]) -> str:
+    of = ", ".join(log.path.name for log in logs)
+    partial = "" if summary["outcome"] == COMPLETED else f" ({summary['outcome']})"
+    return f"{name}: {of}{partial}"
+
+
+_HEADINGS: Final = ("subject", "reference", "quantity", "samples", "mean", "RMS", "mean squared", "largest")
+_UNITS: Final = {
+    "deg": ("deg", "deg\u00b2"),
+    "m": ("m", "m\u00b2"),
+    "m_s": ("m/s", "m\u00b2/s\u00b2"),
+    "": ("", ""),
+}
+
+
+def table_lines(results: Sequence[tuple[str, EstimationResult]]) -> list[str]:
+    """One table of the errors of several runs.
+
+    Args:
+        results: what each run is called, and how it went.
+    """
+    rows: list[tuple[str, ...]] = []
+    for label, result in results:
+        for compared in result.compared:
+            for reference, figures in compared.figures.items():
+                for f in figures:
+                    unit, square = _UNITS[f.unit]
+                    rows.append(
+                        (label, compared.label, reference, f.quantity, str(f.samples), f"{f.mean:.3f} {unit}",
+                         f"{f.rms:.3f} {unit}", f"{f.mse:.3f} {square}", f"{f.max:.3f} {unit}")
+                    )  # fmt: skip
+    if not rows:
+        return []
+    lines = [("log", *_HEADINGS), *rows]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    left = 4  # columns of text; the others are numbers
+    return [
+        "  ".join(
+            cell.ljust(width) if k < left else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(line, widths, strict=True))
+        ).rstrip()
+        for line in lines
+    ]

@@ -1,0 +1,123 @@
+"""The tap: what a flight records is what its estimators hear, in the same order.
+
+A log's replay reads the frames in the order in which they were recorded. So the estimators of a flight sit at
+the recorder: the flight and the replay of its own log give the same estimates, whatever the link was.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from autopilot_bridge.mavlink import Frame, MAVLinkMessage
+from estimators.errors import EstimatorFailure
+from estimators.fleet import Fleet
+from estimators.interface import Outcome
+from estimators.runner import ESTIMATOR_COMPONENTS, TRUTH_COMPONENT, Runner
+from missions.connection import Recorder
+
+__all__ = ["PUBLISH_RATE_HZ", "EstimatorTap", "Publisher"]
+
+PUBLISH_RATE_HZ: Final = 10.0
+"""How often estimates are told at most; a telemetry radio carries that."""
+
+TEAM_SYSTEM: Final = 255
+"""Who tells the estimates of a team: a process at the base station."""
+
+_UNHEARD: Final = ESTIMATOR_COMPONENTS | {TRUTH_COMPONENT}
+_MAGIC_V2: Final = 0xFD
+_GROUND: Final = 200
+"""System ids from here on are ground stations and the simulated targets, by custom."""
+
+
+class EstimatorTap:
+    """A recorder that hands what it records to estimators as well.
+
+    Args:
+        recorder: where the frames go.
+        fleet: the estimators.
+        on_estimate: called with a runner when its estimator has a new estimate.
+
+    Attributes:
+        failure: what an estimator's own error said; it is given nothing more then. "" while all is well.
+        heard: frames by (system id, message id) of what estimators may hear, for rates.
+        autopilots: frames of autopilots, by system id.
+    """
+
+    def __init__(
+        self, recorder: Recorder, fleet: Fleet, on_estimate: Callable[[Runner, int], None] | None = None
+    ) -> None:
+        self.fleet = fleet
+        self.failure = ""
+        self.heard: Counter[tuple[int, int]] = Counter()
+        self.autopilots: Counter[int] = Counter()
+        self._record = recorder.record
+        self._on_estimate = on_estimate
+
+    def record(self, frame: bytes, time_us: int) -> None:
+        """Record a good frame, and let the estimators hear it."""
+        self._record(frame, time_us)
+        taken = _frame(frame)
+        if taken.system_id < _GROUND and taken.component_id not in _UNHEARD:
+            self.heard[taken.system_id, taken.message_id] += 1
+            if taken.component_id == 1:
+                self.autopilots[taken.system_id] += 1
+        if self.failure:
+            return
+        try:
+            result = self.fleet.feed(taken)
+        except EstimatorFailure as failure:
+            self.failure = str(failure)
+            return
+        if result is not None and result[1] is Outcome.UPDATED and self._on_estimate is not None:
+            self._on_estimate(result[0], time_us)
+
+    def record_truth(self, time_us: int, frame: bytes) -> None:
+        """Record a frame of truth: not for estimators, but it has its place in the order of the log."""
+        self.record(frame, time_us)
+
+
+def _frame(raw: bytes) -> Frame:
+    """A frame from bytes that a parser has checked already, or that an encoder has made."""
+    if raw[0] == _MAGIC_V2:
+        return Frame(raw, raw[7] | raw[8] << 8 | raw[9] << 16, raw[5], raw[6], raw[4], 2, bool(raw[2] & 1))
+    return Frame(raw, raw[5], raw[3], raw[4], raw[2], 1)
+
+
+class Publisher:
+    """Tells estimates over the link of their vehicle, at most so often.
+
+    Messages are sent when the event loop comes round, never from within the arrival of the message that the
+    estimate is made of: on a memory link the sender of that is still at it.
+
+    Args:
+        say: sends a message for a vehicle (system id; 0: of a team) from the estimator's own component.
+        rate_hz: how often at most, in vehicle time.
+
+    Attributes:
+        sent: messages so far.
+    """
+
+    def __init__(
+        self, say: Callable[[int, MAVLinkMessage], None], *, rate_hz: float = PUBLISH_RATE_HZ
+    ) -> None:
+        self._say = say
+        self._period_us = round(1e6 / rate_hz)
+        self._due_us: dict[int, int] = {}
+        self.sent = 0
+
+    def on_estimate(self, runner: Runner, time_us: int) -> None:
+        """A runner has a new estimate at a vehicle time."""
+        system_id = runner.system_id or 0
+        due_us = self._due_us.get(system_id)
+        if due_us is not None and due_us - self._period_us <= time_us < due_us:
+            return
+        self._due_us[system_id] = time_us + self._period_us
+        messages = runner.estimator.publish()
+        if messages:
+            asyncio.get_running_loop().call_soon(self._publish, system_id, tuple(messages))
+
+    def _publish(self, system_id: int, messages: Sequence[MAVLinkMessage]) -> None:
+        for message in messages:
+            self._say(system_id, message)
+            self.sent += 1
