@@ -26,7 +26,7 @@ _RATIO_SPEED_M_S: Final = 3.0  # below it true over equivalent airspeed isn't ta
 
 
 @kernel
-def _acceleration_along_the_flow(nav: Array) -> float:
+def acceleration_along_flow(nav: Array) -> float:
     """Acceleration along the velocity through the air, m/s^2; without wind or velocity, along body x.
 
     The body's x axis is off the flow by the angle of attack, and in a turn or a pull-up it then sees a part
@@ -64,7 +64,7 @@ def update_air(nav: Array, p: Array, s: Array, dt: float) -> None:
         s[c.EAS_RATE] = 0.0
         s[c.EAS_KNOWN] = 1.0
         return
-    forward = _acceleration_along_the_flow(nav) / s[c.EAS_TO_TAS]
+    forward = acceleration_along_flow(nav) / s[c.EAS_TO_TAS]
     if not math.isfinite(forward):
         forward = s[c.EAS_RATE]
     # gains of the continuous filter, from its Riccati equation

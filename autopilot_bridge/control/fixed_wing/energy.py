@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow
 from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
 from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, stall_speed
 from autopilot_bridge.control.fixed_wing.vertical_speed import pitch_for_climb
@@ -39,6 +40,7 @@ _MIN_SPEED_M_S: Final = 3.0  # for divisions
 _UNDERSPEED_START: Final = 0.9  # share of the way from stall to lowest airspeed
 _UNDERSPEED_FULL: Final = 0.4
 _POWERLESS_S: Final = 3.0  # so long full throttle may fail to keep the energy up
+_POWERLESS_DOUBT: Final = 0.4  # of that time: a gust downwards passes
 _GLIDE_SHARE: Final = 1.1  # of the lowest airspeed at this bank
 _FULL_THROTTLE: Final = 0.95  # of its limit
 _PITCH_ONLY_ACCELERATION_M_S2: Final = 1.5  # speed change asked for when pitch alone flies the airspeed
@@ -69,17 +71,19 @@ def _underspeed(p: Array, s: Array, load_factor: float) -> float:
 
 
 @kernel
-def _update_powerless(p: Array, s: Array, dt: float, flown: bool) -> float:
+def _update_powerless(p: Array, s: Array, dt: float, flown: bool, energy_rate: float) -> float:
     """How sure it is that full throttle doesn't keep the energy up: a failed motor, or air that sinks.
 
     Height can't be held then, and the airspeed must be (PX4's uncommanded descent, ArduPilot's bad descent).
-    `flown`: throttle and pitch are the energy control's.
+    `flown`: throttle and pitch are the energy control's; `energy_rate`: m^2/s^3, of height and inertial
+    acceleration. A gust that takes airspeed isn't in it: that gives it back, and to give up height and
+    airspeed for it would cost much more.
     """
     full = s[c.THROTTLE] >= _FULL_THROTTLE * p[c.THROTTLE_MAX]
-    falling = s[c.ENERGY_RATE] < 0.0 and s[c.ENERGY_RATE_SETPOINT] > s[c.ENERGY_RATE]
+    falling = energy_rate < 0.0 and s[c.ENERGY_RATE_SETPOINT] > energy_rate
     step = dt / _POWERLESS_S if flown and full and falling else -dt / _POWERLESS_S
     s[c.POWERLESS] = _clip(s[c.POWERLESS] + step, 0.0, 1.0)
-    return s[c.POWERLESS]
+    return max(0.0, (s[c.POWERLESS] - _POWERLESS_DOUBT) / (1.0 - _POWERLESS_DOUBT))
 
 
 @kernel
@@ -232,7 +236,12 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     under = 0.0 if flare else _underspeed(p, s, load_factor)
     s[c.UNDERSPEED] = under
     energy_flown = powered and known and climb_given and not (pitch_given or throttle_given)
-    powerless = _update_powerless(p, s, dt, energy_flown)
+    speed = max(_MIN_SPEED_M_S, s[c.EAS] * s[c.EAS_TO_TAS])
+    potential_rate = GRAVITY_M_S2 * climb
+    kinetic_rate = speed * s[c.EAS_RATE] * s[c.EAS_TO_TAS]
+    acceleration = acceleration_along_flow(nav)
+    inertial_rate = speed * acceleration if math.isfinite(acceleration) else kinetic_rate
+    powerless = _update_powerless(p, s, dt, energy_flown, potential_rate + inertial_rate)
 
     airspeed_min = min(p[c.AIRSPEED_MAX], p[c.AIRSPEED_MIN] * math.sqrt(load_factor))
     airspeed = sp[_AIRSPEED] if math.isfinite(sp[_AIRSPEED]) else p[c.AIRSPEED_TRIM]
@@ -250,9 +259,6 @@ def energy_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, enterin
     gives_way = max(under, powerless)
     weight = 2.0 * gives_way + (1.0 - gives_way) * weight
 
-    speed = max(_MIN_SPEED_M_S, s[c.EAS] * s[c.EAS_TO_TAS])
-    potential_rate = GRAVITY_M_S2 * climb
-    kinetic_rate = speed * s[c.EAS_RATE] * s[c.EAS_TO_TAS]
     wanted_potential_rate = GRAVITY_M_S2 * wanted_climb if climb_given else potential_rate
     if not powered and not known:  # its glide, by the attitude it should have
         wanted_potential_rate = -GRAVITY_M_S2 * p[c.SINK_MIN]

@@ -133,17 +133,17 @@ def _energy_gains(envelope: FlightEnvelope, values: dict[str, float | bool], pit
     values["lift_angle_rad"] = lift / envelope.lift_slope_per_rad
 
     values["height_time_constant_s"] = max(1.5, 6.0 * pitch_s)
-    values["airspeed_time_constant_s"] = max(1.2, 4.5 * pitch_s)
+    values["airspeed_time_constant_s"] = max(1.0, 4.0 * pitch_s)
     values["energy_rate_time_constant_s"] = max(0.2, 0.8 * pitch_s)
     values["height_rate_ff"] = 1.0
     values["height_acceleration_m_s2"] = min(1.5, 0.4 / pitch_s)
     values["pitch_damping"] = 0.6
     values["pitch_integral_1_s"] = 0.45 / values["height_time_constant_s"]
-    values["throttle_damping"] = 0.75 / values["airspeed_time_constant_s"]
+    values["throttle_damping"] = 0.9 / values["airspeed_time_constant_s"]
     values["throttle_integral_1_s"] = 0.24 / values["airspeed_time_constant_s"]
     # gusts change airspeed and height both: most of the airspeed is the throttle's
     values["speed_weight"] = 0.4 if envelope.powered else 2.0
-    values["airspeed_rate_process_noise_m_s2"] = 0.4
+    values["airspeed_rate_process_noise_m_s2"] = 0.7
     # induced drag grows with the square of the load factor, n^2 - 1 = 2.2 (n - 1) about n = 1.2
     aspect_ratio = envelope.wing_span_m**2 / envelope.wing_area_m2
     induced_m_s2 = _G * lift / (math.pi * _OSWALD_FACTOR * aspect_ratio)

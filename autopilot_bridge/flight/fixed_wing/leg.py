@@ -3,6 +3,7 @@
 import math
 from typing import Final
 
+from autopilot_bridge.flight.fixed_wing.circle import wrap_pi
 from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, TurnInRule
@@ -11,6 +12,7 @@ from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
 _GRAVITY_M_S2: Final = 9.80665
 _TURN_BANK_RAD: Final = math.radians(30.0)  # of the turn towards a waypoint beside the aircraft
+_RIGHT_ANGLE_RAD: Final = 0.5 * math.pi
 _SAME_PLACE_M: Final = 1.0
 _SLOPE_LONGER_THAN_M: Final = 20.0
 
@@ -34,6 +36,7 @@ class Leg:
         "_ramps",
         "_start_down_m",
         "_turn_rad",
+        "_turn_side",
         "course_rad",
         "length_m",
         "radius_m",
@@ -47,6 +50,7 @@ class Leg:
         self._ramps = ramps
         self._direct = not ramps
         self._start_down_m = start[2]
+        self._turn_side = 0.0
         self._line = Line()
         self._set_line(start)
 
@@ -60,6 +64,10 @@ class Leg:
     def too_short(self) -> bool:
         """Start and target are one place: there is no line."""
         return self.length_m < _SAME_PLACE_M
+
+    def turn_from(self, course_rad: float) -> None:
+        """The leg begins with a turn from a course: the shorter way round to its own."""
+        self._turn_side = math.copysign(1.0, wrap_pi(self.course_rad - course_rad))
 
     def start_again(self, state: AircraftState) -> None:
         """The waypoint was missed: straight to it from here."""
@@ -76,6 +84,7 @@ class Leg:
             self._set_line((state.north_m, state.east_m, state.down_m))
             return
         self._line.follow(state, guidance, command)
+        self._hold_turn(state, command)
         climb = self._start_down_m - self.target[2]
         # the height is there when the turn begins
         length = self.length_m - self.radius_m
@@ -85,6 +94,18 @@ class Leg:
         if share < 1.0:
             command.down_m = self._start_down_m - max(0.0, share) * climb
             command.height_rate_m_s = climb / length * state.ground_speed_m_s
+
+    def _hold_turn(self, state: AircraftState, command: FlightCommand) -> None:
+        """Turning back, the way to the line is about as far round to either side, and a gust decides: the
+        way round of the corner is kept to (ArduPlane's L1 does so too), until less than a right angle is left.
+        """
+        if self._turn_side == 0.0:
+            return
+        left = wrap_pi(command.course_rad - state.course_rad)
+        if abs(left) <= _RIGHT_ANGLE_RAD:
+            self._turn_side = 0.0
+        elif left * self._turn_side < 0.0:
+            command.course_rad = wrap_pi(state.course_rad + self._turn_side * _RIGHT_ANGLE_RAD)
 
     def _inside_turn(self, state: AircraftState) -> bool:
         """The waypoint is so near and so far aside that no turn from here leads over it."""

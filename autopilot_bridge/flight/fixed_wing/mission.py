@@ -186,6 +186,8 @@ class MissionTask(PlanTask):
             radius_m=own if own > 0.0 else p.acceptance_radius_m,
             turn_rad=turn,
         )
+        if came_from is not None:
+            self._leg.turn_from(state.course_rad)
 
     def update(self, ctx: FlightContext) -> TaskStatus:
         if self._version < 0:
