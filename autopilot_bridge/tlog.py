@@ -75,11 +75,7 @@ class TlogWriter:
         buffer += _pack_time(time_us)
         buffer += frame
         self.records += 1
-        if self._flushed_us is None:
-            self._flushed_us = time_us
-        if len(buffer) >= FLUSH_BYTES or abs(time_us - self._flushed_us) >= FLUSH_INTERVAL_US:
-            self._flushed_us = time_us
-            self.flush()
+        self._flush_if_due(time_us)
 
     def write_packet(self, time_us: int, packet: bytes) -> None:
         """Append the frames of a packet that a channel of ours has sent: whole unsigned MAVLink 2 frames.
@@ -93,13 +89,24 @@ class TlogWriter:
         Raises:
             TlogError: the packet does not end with a frame, the log is closed, or the disk is full.
         """
+        buffer, stamp = self._buffer, _pack_time(time_us)
         start, size = 0, len(packet)
         while start < size:
             end = start + _OVERHEAD_V2 + (packet[start + 1] if start + 1 < size else 0)
             if end > size or packet[start] != MAGIC_V2:
                 raise TlogError(f"a packet of {size} bytes has no whole frame at byte {start}")
-            self.write(time_us, packet[start:end])
+            buffer += stamp + packet[start:end]
+            self.records += 1
             start = end
+        self._flush_if_due(time_us)
+
+    def _flush_if_due(self, time_us: int) -> None:
+        flushed_us = self._flushed_us
+        if flushed_us is None:
+            self._flushed_us = flushed_us = time_us
+        if len(self._buffer) >= FLUSH_BYTES or abs(time_us - flushed_us) >= FLUSH_INTERVAL_US:
+            self._flushed_us = time_us
+            self.flush()
 
     def flush(self) -> None:
         """Hand everything to the operating system.

@@ -25,7 +25,7 @@ try:
 except ImportError:  # Numba's internals have moved: its own cache serves then
     dumps = None
 
-__all__ = ["kernel", "source_stamp"]
+__all__ = ["compiled_for", "kernel", "source_stamp"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -49,6 +49,20 @@ def kernel(function: Function) -> Function:
     if cache is not None and dumps and folder and base and hasattr(cache, "_cache_file"):
         cache._cache_file = _CacheFile(Path(folder), base, function)
     return dispatcher
+
+
+def compiled_for(function: Function, *arguments: object) -> Function:
+    """The machine code of a kernel for arguments of the same types as these.
+
+    A kernel looks at the type of every argument of every call, which costs as much as a small kernel's own
+    work. This is for calls at the physics rate whose arguments are always the same arrays: what it returns
+    must not be called with others (an array of other dimensions is refused, one of another layout is not).
+    A function that is no kernel is returned as it is.
+    """
+    if not is_jitted(function):
+        return function
+    code: Function = function.compile(tuple(map(numba.typeof, arguments)))  # type: ignore[attr-defined]
+    return code
 
 
 def source_stamp(function: Callable[..., Any]) -> str:

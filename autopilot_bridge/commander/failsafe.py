@@ -89,7 +89,7 @@ class FailsafeMonitor:
         self.started = []
         time_us = situation.time_us
         for kind, present, action in self._conditions(situation, parameters):
-            active = self._active.get(kind)
+            active = self._active.get(kind) if self._active else None
             present = present and situation.armed
             if present and active is None:
                 self._active[kind] = _Active(action, time_us)

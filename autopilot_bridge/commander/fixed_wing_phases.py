@@ -31,7 +31,7 @@ class PhaseWatch:
 
     def update(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
         """The events of a new phase."""
-        if not isinstance(task, TakeoffTask | LandTask) or not context.armed:
+        if task is None or not context.armed or not isinstance(task, (TakeoffTask, LandTask)):
             self._task = None
             return _NOTHING
         phase, before = task.phase, self._phase if task is self._task else None

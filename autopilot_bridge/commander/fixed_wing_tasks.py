@@ -188,7 +188,7 @@ class FixedWingTasks:
 
 def _flown_by(task: FlightTask | None) -> FlightTask | None:
     """The task that flies for a plan or a return, else the task itself."""
-    while isinstance(task, MissionTask | ReturnTask):
+    while task is not None and isinstance(task, (MissionTask, ReturnTask)):
         task = task.sub_task
     return task
 

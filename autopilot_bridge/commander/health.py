@@ -6,11 +6,9 @@ filter says of itself.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
-
-import numpy as np
-from numpy.typing import NDArray
 
 from flightsim import interface
 from flightsim.interface import Reading, SensorReadings
@@ -138,22 +136,22 @@ class HealthMonitor:
         """Judge every source; called by the commander at 10 Hz."""
         health, readings, navigation = self.health, self._readings, self.navigation
         imu_alive = self._imu.alive(time_us)
-        values = readings.imu.values
+        values = readings.imu.values.tolist()
         health.gyro = imu_alive and _within(values[interface.IMU_GYRO_FRD_RAD_S], _MAX_RATE_RAD_S)
         health.accelerometer = imu_alive and _within(values[interface.IMU_ACCEL_FRD_M_S2], _MAX_ACCEL_M_S2)
         pressure_pa = float(readings.barometer.values[interface.BARO_PRESSURE_PA])
         health.barometer = self._barometer.alive(time_us) and _PRESSURE_PA[0] < pressure_pa < _PRESSURE_PA[1]
-        field = readings.magnetometer.values[interface.MAG_FRD_GAUSS]
-        strength = math.sqrt(float(field[0]) ** 2 + float(field[1]) ** 2 + float(field[2]) ** 2)
+        field = readings.magnetometer.values[interface.MAG_FRD_GAUSS].tolist()
+        strength = math.sqrt(field[0] ** 2 + field[1] ** 2 + field[2] ** 2)
         health.magnetometer = (
             self._magnetometer.alive(time_us) and _FIELD_GAUSS[0] < strength < _FIELD_GAUSS[1]
         )
-        gps = readings.gps.values
+        gps = readings.gps.values.tolist()
         health.gps = (
             self._gps.alive(time_us)
-            and bool(gps[interface.GPS_FIX_TYPE] >= _FIX_3D)
-            and bool(gps[interface.GPS_SATELLITES] >= _GPS_MIN_SATELLITES)
-            and bool(gps[interface.GPS_EPH_M] <= _GPS_MAX_EPH_M)
+            and gps[interface.GPS_FIX_TYPE] >= _FIX_3D
+            and gps[interface.GPS_SATELLITES] >= _GPS_MIN_SATELLITES
+            and gps[interface.GPS_EPH_M] <= _GPS_MAX_EPH_M
         )
         health.rangefinder = self._rangefinder.alive(time_us)
         if self._airspeed is not None:
@@ -166,13 +164,13 @@ class HealthMonitor:
         health.velocity = navigation.velocity_valid
         health.position = navigation.position_valid
         health.position_accuracy_m = navigation.position_accuracy_m
-        battery = readings.battery.values
-        health.battery = self._battery.alive(time_us) and bool(battery[interface.BATTERY_VOLTAGE_V] > 0.0)
-        health.battery_voltage_v = float(battery[interface.BATTERY_VOLTAGE_V])
-        health.battery_used_ah = float(battery[interface.BATTERY_USED_AH])
-        health.battery_remaining = float(battery[interface.BATTERY_REMAINING])
+        battery = readings.battery.values.tolist()
+        health.battery_voltage_v = battery[interface.BATTERY_VOLTAGE_V]
+        health.battery_used_ah = battery[interface.BATTERY_USED_AH]
+        health.battery_remaining = battery[interface.BATTERY_REMAINING]
+        health.battery = self._battery.alive(time_us) and health.battery_voltage_v > 0.0
 
 
-def _within(vector: NDArray[np.float64], limit: float) -> bool:
+def _within(vector: Sequence[float], limit: float) -> bool:
     """True when every component is finite and below `limit` in magnitude (NaN compares false)."""
-    return bool(abs(vector[0]) < limit and abs(vector[1]) < limit and abs(vector[2]) < limit)
+    return abs(vector[0]) < limit and abs(vector[1]) < limit and abs(vector[2]) < limit

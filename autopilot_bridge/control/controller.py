@@ -21,7 +21,7 @@ from autopilot_bridge.control.position import (
 )
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.kernels import kernel
+from flightsim.kernels import compiled_for, kernel
 
 Array = NDArray[np.float64]
 
@@ -187,7 +187,7 @@ class MulticopterController:
         actuators: motor commands 0..1 (front right, rear left, front left, rear right), then zeros.
     """
 
-    __slots__ = ("_nav", "_packed", "_parameters", "_scratch", "_state", "actuators", "setpoint")
+    __slots__ = ("_nav", "_packed", "_parameters", "_scratch", "_state", "_step", "actuators", "setpoint")
 
     def __init__(
         self, parameters: MulticopterParameters | None = None, *, physics_rate_hz: float, nav: Array
@@ -211,6 +211,9 @@ class MulticopterController:
         state[c.COUNTER] = state[c.DIVISOR]
         state[c.Q_SETPOINT] = 1.0
         state[c.HOVER_VARIANCE] = 0.01
+        self._step = compiled_for(
+            _step, nav, self.setpoint, self._packed, state, self._scratch, self.actuators
+        )
         self.set_parameters(MulticopterParameters() if parameters is None else parameters)
         state[c.HOVER] = self._parameters.hover_thrust
 
@@ -236,7 +239,7 @@ class MulticopterController:
 
     def step(self) -> None:
         """Write `actuators` for this physics step from `nav` and `setpoint`."""
-        _step(self._nav, self.setpoint, self._packed, self._state, self._scratch, self.actuators)
+        self._step(self._nav, self.setpoint, self._packed, self._state, self._scratch, self.actuators)
 
     @property
     def hover_thrust(self) -> float:

@@ -472,7 +472,7 @@ class Aiding:
     def _prepare_mag(self, time_us: int) -> int:
         reading, solution, health = self._readings.magnetometer, self._solution, self._health
         row = solution.row_at(reading.time_us, time_us)
-        norm = math.hypot(*reading.values)
+        norm = math.hypot(*reading.values.tolist())
         if row < 0 or not 0.05 < norm < 2.0 or self._heading.magnetometer_wrong:
             return -1
         if not health.yaw_aligned:

@@ -25,6 +25,7 @@ from flightsim.interface import SensorReadings
 
 Array = NDArray[np.float64]
 
+_WIND_NE: Final = slice(WIND_NED_M_S.start, WIND_NED_M_S.start + 2)
 _AIRBORNE_M: Final = 3.0  # this far from the height of the last rest, and fast: in flight
 _LONGEST_ROLL_US: Final = 30_000_000  # so long so fast: not on a runway
 _KNOWN_WIND_M_S: Final = 3.0  # 1-sigma up to which the wind is of use
@@ -133,8 +134,8 @@ class AirAiding:
         """Speed and accelerometer agree that the vehicle is at rest: a launch is seen here before a land
         detector has made up its mind."""
         core = self._solution.core
-        force = math.hypot(core[ACCEL], core[ACCEL + 1], core[ACCEL + 2])
-        if abs(force - core[GRAVITY]) > _STILL_FORCE_M_S2:
+        force = math.hypot(*core[ACCEL : ACCEL + 3].tolist())
+        if abs(force - float(core[GRAVITY])) > _STILL_FORCE_M_S2:
             self._quiet_since_us = -1
             return False
         if self._quiet_since_us < 0:
@@ -294,7 +295,8 @@ class AirAiding:
             self._shown_m_s = math.nan
             state[AIRSPEED_M_S] = state[AIRSPEED_TRUE_M_S] = math.nan
         if health.wind_valid:
-            state[WIND_NED_M_S] = core[X_WIND], core[X_WIND + 1], 0.0
+            state[_WIND_NE] = core[X_WIND : X_WIND + 2]
+            state[_WIND_NE.stop] = 0.0
         else:
             state[WIND_NED_M_S] = math.nan
 

@@ -29,6 +29,7 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import GYRO, GYRO_LAST
 from flightsim.interface import SensorReadings
+from flightsim.kernels import compiled_for
 
 FIXED_IN_FLIGHT: Final = (
     "covariance_rate_hz",
@@ -60,6 +61,7 @@ class NavigationFilter:
         "_divisor",
         "_dt_s",
         "_limits",
+        "_mechanise",
         "_parameters",
         "_pending",
         "_readings",
@@ -101,6 +103,18 @@ class NavigationFilter:
         self.vehicle_at_rest = False
         self._alignment = Alignment(duration_s=parameters.alignment_time_s, dt_s=self._dt_s)
         self._solution = Solution(parameters, physics_rate_hz=physics_rate_hz)
+        solution, imu = self._solution, readings.imu
+        self._mechanise = compiled_for(
+            mechanisation.step,
+            solution.core,
+            self.state,
+            solution.history,
+            imu.values,
+            imu.fresh,
+            solution.row,
+            self._dt_s,
+            *map(float, self._limits),
+        )
         self._aiding = Aiding(parameters, readings=readings, solution=self._solution, health=self.health)
         self.reset()
 
@@ -180,7 +194,7 @@ class NavigationFilter:
         readings = self._readings
         imu = readings.imu
         gyro_range, accel_range, timeout_s = self._limits
-        mechanisation.step(
+        self._mechanise(
             solution.core,
             self.state,
             solution.history,

@@ -60,10 +60,8 @@ class GpsQuality:
 
     def __init__(self, parameters: NavigationParameters) -> None:
         self._parameters = parameters
-        self._last: NDArray[np.float64] = np.zeros(GPS_SIZE)
-        self._anchor: NDArray[np.float64] = np.zeros(GPS_SIZE)
-        self._travelled: NDArray[np.float64] = np.zeros(3)
-        self._said: NDArray[np.float64] = np.zeros(GPS_SIZE)
+        self._last = self._anchor = self._said = [0.0] * GPS_SIZE
+        self._travelled = [0.0] * 3
         self.restart()
 
     def set_parameters(self, parameters: NavigationParameters) -> None:
@@ -80,14 +78,14 @@ class GpsQuality:
         self._distrusted = False
         self._equal = 0
 
-    def judge(self, values: NDArray[np.float64], measured_us: int, time_us: int) -> bool:
+    def judge(self, sample: NDArray[np.float64], measured_us: int, time_us: int) -> bool:
         """Take a sample received at `time_us`; True when it is good and the checks have held long enough."""
-        p = self._parameters
+        p, values = self._parameters, sample.tolist()
         if self._newest_us >= 0 and time_us - self._newest_us > 2_000_000:
             self.good_since_us = -1  # silence ends a series
         self._newest_us = time_us
         north, east, down = values[GPS_VEL_NED_M_S]
-        self.good = bool(
+        self.good = (
             values[GPS_FIX_TYPE] >= 3.0
             and values[GPS_SATELLITES] >= p.gps_required_satellites
             and 0.0 <= values[GPS_EPH_M] <= p.gps_required_eph_m
@@ -115,42 +113,45 @@ class GpsQuality:
             self._distrusted = proven_us < _WINDOW_US
         return not self._distrusted and proven_us >= round(p.gps_check_time_s * 1e6)
 
-    def _repeats_itself(self, values: NDArray[np.float64]) -> bool:
+    def _repeats_itself(self, values: list[float]) -> bool:
         """Position and velocity have been the same, digit by digit, for too long."""
-        if np.array_equal(values[_MEASURED], self._said[_MEASURED]):
+        if values[_MEASURED] == self._said[_MEASURED]:
             self._equal += 1
         else:
             self._equal = 0
-            self._said[:] = values
+            self._said = values
         return self._equal >= _FROZEN_SAMPLES
 
-    def _moves_as_it_says(self, values: NDArray[np.float64], measured_us: int) -> bool:
+    def _moves_as_it_says(self, values: list[float], measured_us: int) -> bool:
         """Compare position with the velocity's integral since an anchor up to two seconds ago."""
-        last, anchor = self._last, self._anchor
+        anchor, travelled = self._anchor, self._travelled
         elapsed_us = measured_us - self._last_us
         if self._anchor_us < 0 or not 0 < elapsed_us <= _WINDOW_US:
             self._set_anchor(values, measured_us)
             return True
-        self._travelled += 0.5e-6 * elapsed_us * (values[GPS_VEL_NED_M_S] + last[GPS_VEL_NED_M_S])
+        half_s = 0.5e-6 * elapsed_us
+        for i, (now, before) in enumerate(
+            zip(values[GPS_VEL_NED_M_S], self._last[GPS_VEL_NED_M_S], strict=True)
+        ):
+            travelled[i] += half_s * (now + before)
         north_m = (values[GPS_LAT_DEG] - anchor[GPS_LAT_DEG]) * _M_PER_DEG
         dlon = (values[GPS_LON_DEG] - anchor[GPS_LON_DEG] + 180.0) % 360.0 - 180.0
         east_m = dlon * _M_PER_DEG * math.cos(math.radians(values[GPS_LAT_DEG]))
         down_m = anchor[GPS_ALT_M] - values[GPS_ALT_M]
-        north, east, down = self._travelled
+        north, east, down = travelled
         allowed_m = _ALLOWED_SIGMAS * math.hypot(values[GPS_EPH_M], values[GPS_EPV_M]) + _ALLOWED_M
         coherent = math.hypot(north_m - north, east_m - east, down_m - down) <= allowed_m
         if measured_us - self._anchor_us >= _WINDOW_US:
             self._set_anchor(values, measured_us)
         else:
-            last[:] = values
+            self._last = values
             self._last_us = measured_us
         return coherent
 
-    def _set_anchor(self, values: NDArray[np.float64], measured_us: int) -> None:
-        self._anchor[:] = values
-        self._last[:] = values
+    def _set_anchor(self, values: list[float], measured_us: int) -> None:
+        self._anchor = self._last = values
         self._anchor_us = self._last_us = measured_us
-        self._travelled[:] = 0.0
+        self._travelled = [0.0] * 3
 
     def silent(self, time_us: int) -> None:
         """No sample lately: the receiver is not good."""

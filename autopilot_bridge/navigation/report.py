@@ -61,13 +61,13 @@ def report(
     at_rest: bool,
 ) -> None:
     """Write `health` (what GPS quality and the rangefinder say excepted)."""
-    p, obs = solution.p, solution.obs
-    horizontal_var = p[POS, POS] + p[POS + 1, POS + 1]
-    tilt_var = p[ATT, ATT] + p[ATT + 1, ATT + 1]
+    variance, obs = solution.p.diagonal().tolist(), solution.obs
+    horizontal_var = variance[POS] + variance[POS + 1]
+    tilt_var = variance[ATT] + variance[ATT + 1]
     health.position_horizontal_accuracy_m = math.sqrt(horizontal_var)
-    health.position_vertical_accuracy_m = math.sqrt(p[POS + 2, POS + 2])
-    health.velocity_accuracy_m_s = math.sqrt(p[VEL, VEL] + p[VEL + 1, VEL + 1])
-    health.attitude_accuracy_rad = (math.sqrt(tilt_var), math.sqrt(p[ATT + 2, ATT + 2]))
+    health.position_vertical_accuracy_m = math.sqrt(variance[POS + 2])
+    health.velocity_accuracy_m_s = math.sqrt(variance[VEL] + variance[VEL + 1])
+    health.attitude_accuracy_rad = (math.sqrt(tilt_var), math.sqrt(variance[ATT + 2]))
 
     def within(since_us: int, limit_us: float) -> bool:
         return since_us >= 0 and time_us - since_us <= limit_us

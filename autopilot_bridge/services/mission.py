@@ -93,6 +93,8 @@ class MissionService:
         self._downloads = MissionDownloads(policy, self._stores, self._sessions, announce, self._read_plan)
         self._report = MissionReport(policy, self._stores, broadcast, self._progress)
         self._judged: tuple[_Judged, tuple[str, ...]] | None = None
+        self._rules: AircraftRules | None = None
+        self._parameters.subscribe(self._forget_rules)
         self._last_time_us = 0
 
     @property
@@ -115,12 +117,17 @@ class MissionService:
             return ()
         home = self._home()
         home_alt_m = None if home is None else home.alt_m
-        aircraft = AircraftRules.of(self._parameters) if self._policy.aircraft else None
+        if self._policy.aircraft and self._rules is None:
+            self._rules = AircraftRules.of(self._parameters)
+        aircraft = self._rules
         key = _Judged(store.version, landed, home_alt_m, aircraft)
         if self._judged is None or self._judged[0] != key:
             problems = mission_problems(store.items, home_alt_m=home_alt_m, landed=landed, aircraft=aircraft)
             self._judged = (key, problems)
         return self._judged[1]
+
+    def _forget_rules(self, name: str, value: float) -> None:
+        self._rules = None  # made of parameters
 
     def has_mission(self) -> bool:
         """There is something to fly (ArduPilot's home item does not count)."""

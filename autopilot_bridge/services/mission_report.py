@@ -48,16 +48,13 @@ class MissionReport:
     ) -> None:
         self._policy = policy
         self._stores = stores
+        self._mission = stores[MissionType.MISSION]
         self._broadcast = broadcast
         self._progress = progress
         self._announced = (self._mission.current, self._mission.version)
         self._reached = -1
         self._repeats_left = 0
         self._repeat_at_us = 0
-
-    @property
-    def _mission(self) -> MissionStore:
-        return self._stores[MissionType.MISSION]
 
     def current_message(self) -> MavlinkMessage:
         """MISSION_CURRENT as it stands now."""

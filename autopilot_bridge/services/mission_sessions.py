@@ -63,7 +63,7 @@ class Sessions:
         return session
 
     def all(self) -> tuple[ChannelSession, ...]:
-        return tuple(self._sessions.values())
+        return tuple(self._sessions.values()) if self._sessions else ()
 
 
 def mission_type_of(value: int) -> MissionType | None:

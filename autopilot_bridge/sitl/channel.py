@@ -65,7 +65,7 @@ class LinkChannel:
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Send what is due together, a packet of a network at most at a time."""
         packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
-        for frame in self._encoder.encode_payloads(payloads):
+        for frame in self._encoder.encode_payloads(payloads) if payloads else ():
             if len(packet) + len(frame) > _MAX_PACKET:
                 self.link.send(packet)
                 packet = b""

@@ -92,6 +92,7 @@ class SitlVehicle:
             unix_epoch_us=configuration.unix_epoch_us,
             inject_failure=FailureInjector(self.vehicle, self.sensors).inject,
         )
+        self._actuators = self.autopilot.actuators  # written in place
         self._crew = (
             None
             if self.vehicle.launcher is None
@@ -128,7 +129,7 @@ class SitlVehicle:
 
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
-        self.vehicle.step(self.autopilot.actuators)
+        self.vehicle.step(self._actuators)
         self.sensors.step(time_us)
         self.autopilot.step(time_us)
         if self.payload is not None:

@@ -96,6 +96,8 @@ class TargetTruthEncoder:
 
     def encode(self, time_us: int) -> list[bytes]:
         """A HIL_STATE_QUATERNION frame for each target, as they are at a vehicle time."""
+        if not self._encoders:
+            return []
         self._targets.step(time_us)
         frames = []
         for encoder, position, velocity in zip(

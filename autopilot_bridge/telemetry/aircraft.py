@@ -28,6 +28,8 @@ class AircraftState:
 
     def __init__(self, sources: TelemetrySources) -> None:
         self._sources = sources
+        self._path: FlightPath | None = None
+        self._path_of: tuple[int, object] = (-1, None)
 
     @property
     def airspeed_m_s(self) -> float:
@@ -57,11 +59,16 @@ class AircraftState:
 
     @property
     def path(self) -> FlightPath | None:
-        """What is being flown along."""
+        """What is being flown along; looked for once per step, since several messages tell of it."""
         sources = self._sources
         if not sources.context.armed:
             return None
-        return flight_path(sources.task(), sources.context, sources.missions)
+        task = sources.task()
+        now = (sources.view.time_us, task)
+        if now != self._path_of:
+            self._path_of = now
+            self._path = flight_path(task, sources.context, sources.missions)
+        return self._path
 
     @property
     def surfaces(self) -> Surfaces:

@@ -3,9 +3,7 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing import (
     GuidedTask,
     LandTask,
@@ -87,8 +85,10 @@ class FlightPath(NamedTuple):
 
 def flight_path(task: object, context: FlightContext, missions: MissionStore | None) -> FlightPath | None:
     """What a flight task is flying along; None for one that flies no place (sticks, attitudes, headings)."""
-    while isinstance(task, MissionTask | ReturnTask) and task.sub_task is not None:
+    while isinstance(task, (MissionTask, ReturnTask)) and task.sub_task is not None:
         task = task.sub_task
+    if isinstance(task, MissionTask):
+        return None if missions is None else _leg(context, missions)
     if isinstance(task, GuidedTask):
         task = task.circle
     if isinstance(task, LoiterTask):
@@ -105,8 +105,6 @@ def flight_path(task: object, context: FlightContext, missions: MissionStore | N
             from_north_m=entry_north_m,
             from_east_m=entry_east_m,
         )
-    if isinstance(task, MissionTask) and missions is not None:
-        return _leg(context, missions)
     return None
 
 
@@ -116,18 +114,21 @@ def _leg(context: FlightContext, missions: MissionStore) -> FlightPath | None:
     if not 0 <= current < len(items):
         return None
     target = target_of(items[current], context)
-    path = None if target is None else _path(target)
-    if path is None:
+    if target is None:
         return None
     for item in reversed(items[:current]):
         before = target_of(item, context) if is_navigation(item) else None
-        if before is not None and bool(np.isfinite(before[0:2]).all()):
-            return path._replace(from_north_m=float(before[0]), from_east_m=float(before[1]))
-    return path
+        if before is not None:
+            north_m, east_m, _ = before.tolist()
+            if math.isfinite(north_m) and math.isfinite(east_m):
+                return _path(target, start=(north_m, east_m))
+    return _path(target)
 
 
-def _path(place: np.ndarray, radius_m: float = math.nan) -> FlightPath | None:
-    north_m, east_m, down_m = (float(value) for value in place)
+def _path(
+    place: Array, radius_m: float = math.nan, start: tuple[float, float] = (math.nan, math.nan)
+) -> FlightPath | None:
+    north_m, east_m, down_m = place.tolist()
     if not (math.isfinite(north_m) and math.isfinite(east_m) and math.isfinite(down_m)):
         return None
-    return FlightPath(north_m, east_m, down_m, radius_m)
+    return FlightPath(north_m, east_m, down_m, radius_m, *start)

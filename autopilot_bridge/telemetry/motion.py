@@ -21,7 +21,7 @@ from autopilot_bridge.telemetry.records import record_type, whole
 from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
-from flightsim.kernels import kernel
+from flightsim.kernels import compiled_for, kernel
 
 Array = NDArray[np.float64]
 
@@ -116,30 +116,32 @@ def _crc_table() -> NDArray[np.uint16]:
     return table
 
 
+def _parts() -> NDArray[np.int64]:
+    """(n, 4) of `MESSAGES`: first byte in the record, size, message id, CRC_EXTRA."""
+    parts = np.zeros((len(MESSAGES), 4), np.int64)
+    start = 0
+    for index, found in enumerate(map(definition, MESSAGES)):
+        parts[index] = start, found.size, found.message_id, found.crc_extra
+        start += found.size
+    return parts
+
+
 _CRC_TABLE: Final = _crc_table()
+_PARTS: Final = _parts()
 
 
 @kernel
-def _frames(
-    record: NDArray[np.uint8],
-    parts: NDArray[np.int64],
-    crc_table: NDArray[np.uint16],
-    due: int,
-    sender: int,
-    sequence: int,
-    out: NDArray[np.uint8],
-) -> int:
+def _frames(record: NDArray[np.uint8], due: int, sender: int, sequence: int, out: NDArray[np.uint8]) -> int:
     """MAVLink 2 frames of the parts whose bit is set in `due`, one behind the other; returns their length.
 
     Args:
-        parts: (n, 4): first byte in `record`, size, message id, CRC_EXTRA.
         sender: system id x 256 + component id.
     """
     end = 0
-    for part in range(parts.shape[0]):
+    for part in range(_PARTS.shape[0]):
         if not due >> part & 1:
             continue
-        first, size, message_id = parts[part, 0], parts[part, 1], parts[part, 2]
+        first, size, message_id = _PARTS[part, 0], _PARTS[part, 1], _PARTS[part, 2]
         while size > 1 and record[first + size - 1] == 0:
             size -= 1
         out[end] = 0xFD
@@ -156,8 +158,8 @@ def _frames(
             out[end + 10 + i] = record[first + i]
         crc = 0xFFFF
         for i in range(end + 1, end + 10 + size):
-            crc = crc >> 8 ^ int(crc_table[(crc ^ out[i]) & 0xFF])
-        crc = crc >> 8 ^ int(crc_table[(crc ^ parts[part, 3]) & 0xFF])
+            crc = crc >> 8 ^ int(_CRC_TABLE[(crc ^ out[i]) & 0xFF])
+        crc = crc >> 8 ^ int(_CRC_TABLE[(crc ^ _PARTS[part, 3]) & 0xFF])
         end += 10 + size
         out[end] = crc & 0xFF
         out[end + 1] = crc >> 8
@@ -202,17 +204,27 @@ class MotionMessages:
         row["odometry__frame_id"] = row["odometry__child_frame_id"] = mavlink.MAV_FRAME_LOCAL_NED
         row["odometry__estimator_type"] = mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT
         row["odometry__pose_covariance"] = row["odometry__velocity_covariance"] = math.nan
-        self._slices: dict[str, slice] = {}
-        self._parts = np.zeros((len(MESSAGES), 4), np.int64)
-        start = 0
-        for index, found in enumerate(map(definition, MESSAGES)):
-            self._slices[found.name] = slice(start, start + found.size)
-            self._parts[index] = start, found.size, found.message_id, found.crc_extra
-            start += found.size
-        self._packet = np.zeros(start + len(MESSAGES) * _FRAME_OVERHEAD, np.uint8)
+        self._slices = {
+            name: slice(first, first + size)
+            for name, (first, size, _, _) in zip(MESSAGES, _PARTS.tolist(), strict=True)
+        }
+        self._packet = np.zeros(self._record.nbytes + len(MESSAGES) * _FRAME_OVERHEAD, np.uint8)
+        self._packet_bytes = self._packet.data
         self._record_bytes = self._record.view(np.uint8)
+        self._make_frames = compiled_for(_frames, self._record_bytes, 0, 0, 0, self._packet)
+        self._fill = compiled_for(
+            _fill,
+            navigation.state,
+            readings.imu.values,
+            readings.magnetometer.values,
+            readings.barometer.values,
+            self._covariance,
+            self._place,
+            0,
+            self._record,
+        )
         self.bits: Mapping[int, int] = {
-            int(message_id): 1 << index for index, message_id in enumerate(self._parts[:, 2])
+            message_id: 1 << index for index, (_, _, message_id, _) in enumerate(_PARTS.tolist())
         }
 
     def frames(self, due: int, encoder: FrameEncoder) -> bytes:
@@ -234,9 +246,8 @@ class MotionMessages:
         sequence = encoder.sequence
         encoder.sequence = (sequence + due.bit_count()) & 0xFF
         sender = encoder.system_id << 8 | encoder.component_id
-        packet = self._packet
-        end = _frames(self._record_bytes, self._parts, _CRC_TABLE, due, sender, sequence, packet)
-        return packet[:end].tobytes()
+        end = self._make_frames(self._record_bytes, due, sender, sequence, self._packet)
+        return self._packet_bytes[:end].tobytes()
 
     def builders(self) -> Mapping[int, Builder]:
         """Message id -> builder of its payload."""
@@ -287,7 +298,7 @@ class MotionMessages:
             home_down_m = context.home_ned_m[2]
             place[5] = home_down_m if home_down_m == home_down_m else 0.0
         readings = self._readings
-        _fill(
+        self._fill(
             self._navigation.state,
             readings.imu.values,
             readings.magnetometer.values,

@@ -76,14 +76,16 @@ class Px4PlaneMessages(Px4Messages):
 
     def servo_output_raw(self) -> Values:
         """SERVO_OUTPUT_RAW (36): aileron, elevator, rudder, motor; 900 us where nothing is driven."""
-        pulses = [_STOPPED_US] * 4
+        aileron = elevator = rudder = motor = _STOPPED_US
         if self.sources.context.armed:
             surfaces = self._aircraft.surfaces
-            moved = (surfaces.aileron, surfaces.elevator, surfaces.rudder)
-            pulses = [_NEUTRAL_US + round(_TRAVEL_US * value) for value in moved]
-            powered = self._aircraft.powered
-            pulses.append(1000 + round(1000.0 * surfaces.throttle) if powered else _STOPPED_US)
-        return (self.view.time_us & 0xFFFFFFFF, 0, *pulses, *(self.servo_unused_us,) * 12)
+            aileron = _NEUTRAL_US + round(_TRAVEL_US * surfaces.aileron)
+            elevator = _NEUTRAL_US + round(_TRAVEL_US * surfaces.elevator)
+            rudder = _NEUTRAL_US + round(_TRAVEL_US * surfaces.rudder)
+            if self._aircraft.powered:
+                motor = 1000 + round(1000.0 * surfaces.throttle)
+        unused = (self.servo_unused_us,) * 12
+        return (self.view.time_us & 0xFFFFFFFF, 0, aileron, elevator, rudder, motor, *unused)
 
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62): nav_roll and nav_pitch stay 0, bearings are signed, as in PX4.

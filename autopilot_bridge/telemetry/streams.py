@@ -5,8 +5,10 @@ on the physics grid; the payload of a message that several channels send in the 
 (`PayloadCache`).
 """
 
+from bisect import insort
 from collections.abc import Callable, Mapping, Sequence
 from heapq import heapify, heappush, heapreplace
+from itertools import count
 from typing import Final, Protocol
 
 from autopilot_bridge.mavlink.definitions import definition
@@ -66,6 +68,30 @@ class PayloadCache:
         return payloads[message_id] if message_id in payloads else self.build(message_id)
 
 
+class _Group:
+    """Streams that are always due together: one interval, one phase.
+
+    Attributes:
+        interval_us, due_us: time between two messages, and when the next ones are due.
+        message_ids: the streams, in rising order, without those of `motion`.
+        motion: bits of the motion messages among them.
+    """
+
+    __slots__ = ("due_us", "interval_us", "message_ids", "motion")
+
+    def __init__(self, interval_us: int, due_us: int) -> None:
+        self.interval_us = interval_us
+        self.due_us = due_us
+        self.message_ids: list[int] = []
+        self.motion = 0
+
+    @property
+    def wake_us(self) -> int:
+        """When they are sent: the slower ones wait for the grid, to share a packet with others."""
+        due_us = self.due_us
+        return due_us if self.interval_us < 2 * GRID_US else -(-due_us // GRID_US) * GRID_US
+
+
 class StreamTable:
     """The periodic messages of one channel.
 
@@ -80,10 +106,11 @@ class StreamTable:
     __slots__ = (
         "_cache",
         "_defaults_us",
-        "_due_times_us",
+        "_groups",
         "_heap",
         "_intervals_us",
         "_motion_bits",
+        "_serials",
         "_sink",
         "_step_us",
         "next_due_us",
@@ -104,9 +131,10 @@ class StreamTable:
         self._motion_bits = motion_bits or {}
         self._sink = sink
         self._step_us = physics_step_us
-        self._heap: list[tuple[int, int]] = []
+        self._serials = count()  # tell groups apart that wake together
+        self._heap: list[tuple[int, int, _Group]] = []
+        self._groups: dict[int, _Group] = {}
         self._intervals_us: dict[int, int] = {}
-        self._due_times_us: dict[int, int] = {}
         self._defaults_us = {
             message_id: max(physics_step_us, round(MICROSECONDS / rate_hz))
             for message_id, rate_hz in rates_hz.items()
@@ -127,20 +155,17 @@ class StreamTable:
 
     def set_interval(self, message_id: int, interval_us: int, time_us: int) -> None:
         """Run a stream at a new interval (us) or stop it (-1). The next one is due after one interval."""
-        self._heap = [entry for entry in self._heap if entry[1] != message_id]
-        heapify(self._heap)
-        self._intervals_us.pop(message_id, None)
+        self._stop(message_id)
         if interval_us > 0:
             interval_us = max(interval_us, self._step_us)
             self._start(message_id, interval_us, time_us + interval_us)
-        self.next_due_us = self._heap[0][0] if self._heap else self.NEVER
 
     def delay(self, message_id: int, due_us: int) -> None:
         """Have the next message of a running stream sent at `due_us`."""
-        if message_id in self._intervals_us:
-            self._heap = [entry for entry in self._heap if entry[1] != message_id]
-            heapify(self._heap)
-            self._start(message_id, self._intervals_us[message_id], due_us)
+        interval_us = self._intervals_us.get(message_id)
+        if interval_us is not None:
+            self._stop(message_id)
+            self._start(message_id, interval_us, due_us)
 
     def set_default(self, message_id: int, interval_us: int, time_us: int) -> None:
         """Change the default of a stream (-1: none) and run it so, as a stream-rate parameter does."""
@@ -152,37 +177,63 @@ class StreamTable:
 
     def tick(self, time_us: int) -> None:
         """Send what is due."""
-        heap, intervals_us, cache = self._heap, self._intervals_us, self._cache
-        payloads, motion_bits, due_times_us = cache.at(time_us), self._motion_bits, self._due_times_us
+        heap, cache = self._heap, self._cache
         motion = 0
-        due: list[tuple[int, bytes]] = []
-        while heap:
-            wake_us, message_id = heap[0]
-            if wake_us > time_us:
-                break
-            interval_us = intervals_us[message_id]
-            next_us = due_times_us[message_id] + interval_us
+        woken: list[tuple[int, list[int]]] = []
+        while heap and heap[0][0] <= time_us:
+            wake_us, serial, group = heap[0]
+            next_us = group.due_us + group.interval_us
             if next_us <= time_us:  # a stream never bursts to catch up
-                next_us = time_us + interval_us
-            due_times_us[message_id] = next_us
-            heapreplace(heap, (_wake_us(next_us, interval_us), message_id))
-            if message_id in motion_bits:
-                motion |= motion_bits[message_id]
-                continue
-            payload = payloads[message_id] if message_id in payloads else cache.build(message_id)
-            if payload is not None:
-                due.append((message_id, payload))
+                next_us = time_us + group.interval_us
+            group.due_us = next_us
+            heapreplace(heap, (group.wake_us, serial, group))
+            motion |= group.motion
+            if group.message_ids:
+                woken.append((wake_us, group.message_ids))
+        self.next_due_us = heap[0][0] if heap else self.NEVER
+        due: list[tuple[int, bytes]] = []
+        if woken:
+            payloads = cache.at(time_us)
+            for message_id in woken[0][1] if len(woken) == 1 else _in_order(woken):
+                payload = payloads[message_id] if message_id in payloads else cache.build(message_id)
+                if payload is not None:
+                    due.append((message_id, payload))
         if motion or due:
             self._sink.send_streams(motion, due)
-        self.next_due_us = heap[0][0] if heap else self.NEVER
 
     def _start(self, message_id: int, interval_us: int, due_us: int) -> None:
         self._intervals_us[message_id] = interval_us
-        self._due_times_us[message_id] = due_us
-        heappush(self._heap, (_wake_us(due_us, interval_us), message_id))
-        self.next_due_us = self._heap[0][0]
+        for _, _, group in self._heap:
+            if (group.interval_us, group.due_us) == (interval_us, due_us):
+                break
+        else:
+            group = _Group(interval_us, due_us)
+            heappush(self._heap, (group.wake_us, next(self._serials), group))
+            self.next_due_us = self._heap[0][0]
+        self._groups[message_id] = group
+        if message_id in self._motion_bits:
+            group.motion |= self._motion_bits[message_id]
+        else:
+            insort(group.message_ids, message_id)
+
+    def _stop(self, message_id: int) -> None:
+        self._intervals_us.pop(message_id, None)
+        group = self._groups.pop(message_id, None)
+        if group is None:
+            return
+        if message_id in self._motion_bits:
+            group.motion &= ~self._motion_bits[message_id]
+        else:
+            group.message_ids.remove(message_id)
+        if not group.motion and not group.message_ids:
+            self._heap = [entry for entry in self._heap if entry[2] is not group]
+            heapify(self._heap)
+            self.next_due_us = self._heap[0][0] if self._heap else self.NEVER
 
 
-def _wake_us(due_us: int, interval_us: int) -> int:
-    """When a stream that is due is sent: the slower ones wait for the grid, to share a packet with others."""
-    return due_us if interval_us < 2 * GRID_US else -(-due_us // GRID_US) * GRID_US
+def _in_order(woken: list[tuple[int, list[int]]]) -> list[int]:
+    """Message ids of several groups: those that woke earlier first, then by their numbers."""
+    return [
+        message_id
+        for _, message_id in sorted((wake_us, number) for wake_us, numbers in woken for number in numbers)
+    ]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.interface import Reading
+from flightsim.kernels import compiled_for
 from flightsim.sensors.fault_kinds import FaultTarget
 from flightsim.sensors.fault_stage import FaultPoint
 
@@ -109,7 +110,6 @@ class Sensor:
         self.interval_steps = interval_steps
         self.latency_steps = latency_steps
         self.fault_points = fault_points
-        self._kernel = model.kernel
         self._constants = model.constants
         self._state = model.state
         self._truth = truth
@@ -117,6 +117,9 @@ class Sensor:
         self._block: Array = np.empty((NOISE_ROWS, model.normals_per_sample))
         self._row = NOISE_ROWS
         self._scratch: Array = np.empty(model.size)
+        self._kernel = compiled_for(
+            model.kernel, truth, model.constants, model.state, self._block, 0, self._scratch
+        )
         # Delay line: the samples between measurement and delivery, newest at _head.
         depth = latency_steps // interval_steps + 1
         storage = np.empty((depth, model.size))

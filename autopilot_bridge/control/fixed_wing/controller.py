@@ -13,6 +13,7 @@ from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.control.fixed_wing.step import control_step
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.interface import MAX_ACTUATORS
+from flightsim.kernels import compiled_for
 
 Array = NDArray[np.float64]
 
@@ -47,7 +48,7 @@ class FixedWingController:
         actuators: roles of `flightsim.interface`, `AILERON` ... `BRAKE`.
     """
 
-    __slots__ = ("_nav", "_packed", "_parameters", "_state", "actuators", "setpoint")
+    __slots__ = ("_nav", "_packed", "_parameters", "_state", "_step", "actuators", "setpoint")
 
     def __init__(
         self, parameters: FixedWingParameters | None = None, *, physics_rate_hz: float, nav: Array
@@ -67,6 +68,7 @@ class FixedWingController:
         state = self._state
         state[c.DT] = 1.0 / physics_rate_hz
         state[c.DIVISOR] = max(1.0, math.floor(physics_rate_hz / GUIDANCE_RATE_HZ))
+        self._step = compiled_for(control_step, nav, self.setpoint, self._packed, state, self.actuators)
         self.set_parameters(FixedWingParameters() if parameters is None else parameters)
         self.step()
 
@@ -90,7 +92,7 @@ class FixedWingController:
 
     def step(self) -> None:
         """Write `actuators` for this physics step from `nav` and `setpoint`."""
-        control_step(self._nav, self.setpoint, self._packed, self._state, self.actuators)
+        self._step(self._nav, self.setpoint, self._packed, self._state, self.actuators)
 
     @property
     def hover_thrust(self) -> float:

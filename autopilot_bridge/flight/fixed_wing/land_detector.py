@@ -9,14 +9,18 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
+
 from autopilot_bridge.control import fixed_wing_setpoint as sp
-from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState
+from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, LandedState
 from autopilot_bridge.navigation import layout as nav_layout
+from flightsim.kernels import kernel
 
 _IDLE_THROTTLE: Final = 0.1
 _VELOCITY: Final = nav_layout.VEL_NED_M_S.start
 _ACCELERATION: Final = nav_layout.ACC_NED_M_S2.start
 _RATES: Final = nav_layout.RATES_FRD_RAD_S.start
+_AIRSPEED: Final = nav_layout.AIRSPEED_M_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +44,26 @@ class LandDetectorParameters:
                 raise ValueError(f"{name} = {value} is not positive")
 
 
+@kernel
+def _smooth(nav: Array, keep: float, smoothed: Array) -> None:
+    """Low-pass ground speed, vertical speed, airspeed and horizontal acceleration, in this order.
+
+    An unknown value leaves what was known. Behind them: the rate of turn and the vertical speed of now.
+    """
+    vertical = abs(nav[_VELOCITY + 2])
+    newest = (
+        math.hypot(nav[_VELOCITY], nav[_VELOCITY + 1]),
+        vertical,
+        nav[_AIRSPEED],
+        math.hypot(nav[_ACCELERATION], nav[_ACCELERATION + 1]),
+    )
+    for i in range(4):
+        if not math.isnan(newest[i]):
+            smoothed[i] = newest[i] + (smoothed[i] - newest[i]) * keep
+    smoothed[4] = math.sqrt(nav[_RATES] ** 2 + nav[_RATES + 1] ** 2 + nav[_RATES + 2] ** 2)
+    smoothed[5] = vertical
+
+
 class LandDetector:
     """Judges the landed state at the task rate.
 
@@ -51,21 +75,12 @@ class LandDetector:
         state: newest judgement.
     """
 
-    __slots__ = (
-        "_acceleration_m_s2",
-        "_airspeed_m_s",
-        "_contact_s",
-        "_parameters",
-        "_slow_s",
-        "_speed_m_s",
-        "_vertical_m_s",
-        "state",
-    )
+    __slots__ = ("_contact_s", "_parameters", "_slow_s", "_smoothed", "state")
 
     def __init__(self, parameters: LandDetectorParameters | None = None, *, on_ground: bool = True) -> None:
         self._parameters = LandDetectorParameters() if parameters is None else parameters
         self._slow_s = self._contact_s = math.inf if on_ground else 0.0
-        self._speed_m_s = self._vertical_m_s = self._airspeed_m_s = self._acceleration_m_s2 = 0.0
+        self._smoothed: Array = np.zeros(6)
         self.state = LandedState.ON_GROUND if on_ground else LandedState.IN_AIR
 
     def update(self, ctx: FlightContext, thrust: float) -> LandedState:
@@ -76,30 +91,19 @@ class LandDetector:
             thrust: throttle given to the motor, 0..1.
         """
         p = self._parameters
-        nav = ctx.nav.tolist()
-        north, east, down = nav[_VELOCITY : _VELOCITY + 3]
-        keep = math.exp(-ctx.dt_s / p.filter_time_s)
-        self._speed_m_s = _filtered(self._speed_m_s, math.hypot(north, east), keep)
-        self._vertical_m_s = _filtered(self._vertical_m_s, abs(down), keep)
-        self._airspeed_m_s = _filtered(self._airspeed_m_s, nav[nav_layout.AIRSPEED_M_S], keep)
-        acceleration = math.hypot(nav[_ACCELERATION], nav[_ACCELERATION + 1])
-        self._acceleration_m_s2 = _filtered(self._acceleration_m_s2, acceleration, keep)
+        _smooth(ctx.nav, math.exp(-ctx.dt_s / p.filter_time_s), self._smoothed)
+        speed, vertical_speed, airspeed, acceleration, turn_rate, sink_or_climb = self._smoothed.tolist()
         if not ctx.armed:
             # an unforced disarm happens on the ground only; a forced one in the air is gliding or falling
-            moving = self._speed_m_s > p.horizontal_speed_max_m_s or self._vertical_m_s > 2.0
+            moving = speed > p.horizontal_speed_max_m_s or vertical_speed > 2.0
             if self.state is LandedState.ON_GROUND or not moving:
                 self._slow_s = self._contact_s = math.inf
                 self.state = LandedState.ON_GROUND
             return self._store(ctx, self.state is LandedState.ON_GROUND)
-        fast = (
-            self._speed_m_s > p.horizontal_speed_max_m_s
-            if ctx.velocity_valid
-            else self._airspeed_m_s > p.airspeed_max_m_s
-        )
-        rates = nav[_RATES : _RATES + 3]
-        turning = math.sqrt(sum(r * r for r in rates)) > p.rotation_max_rad_s
-        vertical = ctx.altitude_valid and self._vertical_m_s > p.vertical_speed_max_m_s
-        shaken = self._acceleration_m_s2 > p.acceleration_max_m_s2
+        fast = speed > p.horizontal_speed_max_m_s if ctx.velocity_valid else airspeed > p.airspeed_max_m_s
+        turning = turn_rate > p.rotation_max_rad_s
+        vertical = ctx.altitude_valid and vertical_speed > p.vertical_speed_max_m_s
+        shaken = acceleration > p.acceleration_max_m_s2
         slow = not (fast or vertical or shaken)
         if self.state is LandedState.ON_GROUND:
             # leaving: at once, but by motion only, not by being carried or turned around
@@ -109,7 +113,7 @@ class LandDetector:
         self._slow_s = self._slow_s + ctx.dt_s if slow else 0.0
         level = float(ctx.setpoint[sp.LEVEL])
         closed = level <= sp.IDLE or thrust < _IDLE_THROTTLE
-        touching = closed and abs(down) < p.contact_speed_m_s and ctx.phase is FlightPhase.LANDING
+        touching = closed and sink_or_climb < p.contact_speed_m_s and ctx.phase is FlightPhase.LANDING
         self._contact_s = self._contact_s + ctx.dt_s if touching else 0.0
         if self._slow_s >= p.trigger_time_s:
             self.state = LandedState.ON_GROUND
@@ -127,8 +131,3 @@ class LandDetector:
         ctx.ground_contact = landed or contact
         ctx.maybe_landed = landed or self._slow_s >= 0.5 * self._parameters.trigger_time_s
         return self.state
-
-
-def _filtered(old: float, new: float, keep: float) -> float:
-    """First-order low pass; an unknown value leaves it."""
-    return old if new != new else new + (old - new) * keep

@@ -207,5 +207,7 @@ def _look_ahead(error_m: float, bound_m: float) -> float:
 def _feasibility(wind_cross: float, wind_along: float, airspeed: float, wind: float) -> float:
     """1 where a bearing can be held with room to spare, 0 where the wind across (or against) is too much."""
     across = wind if wind_along < 0.0 else abs(wind_cross)
-    share = min(1.0, max(0.0, (airspeed - across) / _AIRSPEED_BUFFER_M_S))
+    if airspeed - across >= _AIRSPEED_BUFFER_M_S:
+        return 1.0
+    share = max(0.0, (airspeed - across) / _AIRSPEED_BUFFER_M_S)
     return math.sin(0.5 * math.pi * share) ** 2
