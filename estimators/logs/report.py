@@ -7,6 +7,7 @@ import numpy as np
 
 from estimators.logs.source import SourceLoss, UnknownMessage
 from estimators.logs.vehicles import VehicleReport, vehicles
+from estimators.vehicle_time import AUTOPILOT
 
 if TYPE_CHECKING:
     from estimators.logs.log import Log
@@ -40,7 +41,7 @@ class StreamReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gap:
-    """A time in which nothing was heard of a system, though its clock went on.
+    """A time in which nothing was heard of a system with an autopilot, though its clock went on.
 
     Attributes:
         system_id, boot: which system, in which of its boots.
@@ -160,7 +161,11 @@ def _streams(log: "Log") -> tuple[StreamReport, ...]:
 
 def _gaps(log: "Log") -> tuple[Gap, ...]:
     found = []
+    # Who has no autopilot has no clock that goes on by itself.
+    clocked = {stream.system_id for stream in log.source.streams if stream.component_id == AUTOPILOT}
     for boot in log.boots:
+        if boot.system_id not in clocked:
+            continue
         orders = [
             stream.order[slice(*np.searchsorted(stream.order, (boot.first, boot.last + 1)))]
             for stream in log.source.streams

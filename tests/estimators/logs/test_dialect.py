@@ -129,8 +129,8 @@ def test_dialects_by_name(tmp_path):
         ("bad.xml", '<mavlink><messages><message name="A" id="x"/></messages></mavlink>', "an id in 0"),
         (
             "bad.xml",
-            '<mavlink><messages><message name="A" id="1"><field name="b" type="uint7_t"/></message></messages>'
-            "</mavlink>",
+            '<mavlink><messages><message name="A" id="1"><field name="b" type="uint7_t"/></message>'
+            "</messages></mavlink>",
             "field b of type 'uint7_t'; accepted",
         ),
         (
