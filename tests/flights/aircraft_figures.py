@@ -9,14 +9,23 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink import dialect
 from flightsim import truth as t
 from tests.flights.aircraft import AircraftFlight, Item
+from tests.flights.turn_geometry import Place, course, ground_speed, turn_over_m
 
-SETTLED_AFTER_M = 350.0  # turning back takes two turning circles
-"""A leg counts from here on: 8 s of flight, in which the turn onto it has died away."""
+AIRSPEED_M_S = 25.0
+"""Trim airspeed of the aircraft flown."""
+SETTLED_AFTER_M = 200.0
+"""A leg counts from here on: 8 s of flight, in which the turn onto it has died away. Only where the quickest
+turn onto it that wings and wind allow (`turn_geometry`) isn't over by then, it counts from where that is, and
+`DIES_AWAY_S` later: sharper turns than about a right angle."""
+DIES_AWAY_S = 2.2
+"""The guidance takes back small track errors at the rate pi / (period x damping), of 10 s and 0.7."""
 SETTLED_BEFORE_M = 100.0
 """... up to here, where the turn to the next one may begin."""
 _SEA_LEVEL_DENSITY_KG_M3 = 1.225
-
-Place = tuple[float, float]
+_BANK_RAD = math.radians(45.0)  # limit of both flavours, on this aircraft
+_REVERSAL_S = 1.0  # from limit to limit, at the roll rate of its wings
+_SWITCH_S = 0.32 * 0.7 * 10.0  # PX4: NPFG_SW_DST_MLT, _DAMPING and _PERIOD times the ground speed
+_WP_RADIUS_M = 50.0  # ArduPlane; less for turns of less than a right angle
 
 
 def equivalent_airspeed_m_s(flight: AircraftFlight) -> float:
@@ -33,12 +42,14 @@ class Plan:
     """A plan in metres from home: take-off, waypoints, and a landing at home along the runway.
 
     Attributes:
+        start: place of the take-off item.
         corners: north and east of the waypoints.
         height_m: of the waypoints above home.
         items: without ArduPilot's item 0.
         land: where the wheels shall touch.
     """
 
+    start: Place
     corners: tuple[Place, ...]
     height_m: float
     items: tuple[Item, ...]
@@ -60,7 +71,8 @@ def plan(
     land = at(50.0)
     away_m = approach_height_m / math.tan(math.radians(5.0))
     places = [at(*corner) for corner in corners]
-    items = [Item(dialect.MAV_CMD_NAV_TAKEOFF, *at(350.0), 40.0, (10.0, 0.0, 0.0, math.nan))]
+    start = at(350.0)
+    items = [Item(dialect.MAV_CMD_NAV_TAKEOFF, *start, 40.0, (10.0, 0.0, 0.0, math.nan))]
     items += [Item(dialect.MAV_CMD_NAV_WAYPOINT, *place, height_m) for place in places]
     items.append(Item(dialect.MAV_CMD_DO_LAND_START))
     if flight.flavour == "px4":
@@ -75,7 +87,30 @@ def plan(
         )
         items.append(Item(dialect.MAV_CMD_NAV_WAYPOINT, *at(50.0 - away_m), approach_height_m))
     items.append(Item(dialect.MAV_CMD_NAV_LAND, *land, 0.0))
-    return Plan(corners=tuple(places), height_m=height_m, items=tuple(items), land=land)
+    return Plan(start=start, corners=tuple(places), height_m=height_m, items=tuple(items), land=land)
+
+
+def settled_after_m(flavour: str, before: Place, corner: Place, after: Place, wind: Place) -> float:
+    """From where on the leg `corner`..`after` counts: `SETTLED_AFTER_M`, or later where nothing could turn
+    onto it so soon.
+    """
+    turn_rad = abs((course(corner, after) - course(before, corner) + math.pi) % (2.0 * math.pi) - math.pi)
+    if flavour == "px4":
+        turn_in_m = _SWITCH_S * ground_speed(course(before, corner), AIRSPEED_M_S, wind)
+    else:
+        turn_in_m = _WP_RADIUS_M * min(1.0, turn_rad / (0.5 * math.pi))
+    over_m = turn_over_m(
+        before,
+        corner,
+        after,
+        turn_in_m=turn_in_m,
+        airspeed_m_s=AIRSPEED_M_S,
+        bank_rad=_BANK_RAD,
+        reversal_s=_REVERSAL_S,
+        wind=wind,
+    )
+    dies_away_m = DIES_AWAY_S * ground_speed(course(corner, after), AIRSPEED_M_S, wind)
+    return max(SETTLED_AFTER_M, over_m + dies_away_m)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -117,7 +152,11 @@ def fly_plan(flight: AircraftFlight, what: Plan, *, limit_s: float = 600.0) -> M
     standing_m = flight.height_over_home_m  # heights are over the centre of gravity as it stood
     first = 2 + (flight.flavour == "ardupilot")  # the item that ends the first leg between waypoints
     legs = dict(enumerate(zip(what.corners, what.corners[1:], strict=False), start=first))
-    trim_m_s = flight.vehicle.autopilot.controller.parameters.airspeed_trim_m_s
+    wind = flight.sitl.configuration.environment.wind_ned_m_s[:2]
+    befores = (what.start, *what.corners)
+    settled_m = {
+        seq: settled_after_m(flight.flavour, befores[seq - first], *leg, wind) for seq, leg in legs.items()
+    }
     flying = [False]
 
     def look() -> bool:
@@ -135,10 +174,10 @@ def fly_plan(flight: AircraftFlight, what: Plan, *, limit_s: float = 600.0) -> M
             along_m = (
                 (north - start[0]) * (end[0] - start[0]) + (east - start[1]) * (end[1] - start[1])
             ) / length_m
-            if SETTLED_AFTER_M <= along_m <= length_m - SETTLED_BEFORE_M:
+            if settled_m[current.seq] <= along_m <= length_m - SETTLED_BEFORE_M:
                 figures.across_m.append(flight.cross_track_m(start, end))
                 figures.height_m.append(flight.height_over_home_m - standing_m - what.height_m)
-                figures.airspeed_m_s.append(airspeed_m_s - trim_m_s)
+                figures.airspeed_m_s.append(airspeed_m_s - AIRSPEED_M_S)
         return bool(flying[0] and truth[t.HEIGHT_ABOVE_GROUND_M] < 5.0)
 
     flight.fly_until(look, limit_s, "flare")

@@ -9,6 +9,7 @@ from autopilot_bridge.mavlink import dialect
 from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
 from tests.flights.aircraft import AircraftFlight
+from tests.flights.turn_geometry import turn_over_m
 
 LIGHT = Environment.from_wind(speed_m_s=6.0, from_deg=210.0, turbulence=Turbulence.LIGHT)
 PLACE = (150.0, 150.0)
@@ -96,3 +97,37 @@ def test_returns_home_in_rough_air(flavour: str, wind_from_deg: float, seed: int
     flight.fly(40.0, look)
     assert np.ptp(radii) < 12.0 and max(radii) < 200.0
     assert np.sqrt(np.mean(np.square(heights))) < 2.0
+
+
+@pytest.mark.parametrize("turn_deg", [-170.0, -120.0, 90.0, 150.0])
+@pytest.mark.parametrize("turn_in_m", [0.0, 50.0])
+def test_quickest_turn_in_still_air(turn_deg: float, turn_in_m: float) -> None:
+    """The closed form that tells which part of a leg counts."""
+    turn, radius_m = abs(math.radians(turn_deg)), 25.0**2 / 9.80665
+    beside_m = radius_m * (1.0 - math.cos(turn)) - turn_in_m * math.sin(turn)
+    phi = math.acos(1.0 - 0.5 * beside_m / radius_m)
+    expected = radius_m * math.sin(turn) - turn_in_m * math.cos(turn) + 2.0 * radius_m * math.sin(phi)
+    after = (500.0 * math.cos(turn), 500.0 * math.copysign(math.sin(turn), turn_deg))
+    over_m = turn_over_m(
+        (-500.0, 0.0),
+        (0.0, 0.0),
+        after,
+        turn_in_m=turn_in_m,
+        airspeed_m_s=25.0,
+        bank_rad=math.radians(45.0),
+        reversal_s=0.0,
+        wind=(0.0, 0.0),
+    )
+    assert over_m == pytest.approx(expected, abs=1e-6)
+
+
+def test_quickest_turn_drifts_with_the_wind() -> None:
+    """Half a turn and no more, flown with the wind along: the circle ends beside the line as in still air,
+    and the air has moved by the wind in the time it took.
+    """
+    places = ((-500.0, 0.0), (0.0, 0.0), (-500.0, 1e-3))
+    values = {"turn_in_m": 0.0, "airspeed_m_s": 25.0, "bank_rad": math.radians(45.0), "reversal_s": 0.0}
+    still_m = turn_over_m(*places, **values, wind=(0.0, 0.0))
+    windy_m = turn_over_m(*places, **values, wind=(-6.0, 0.0))
+    time_s = 2.0 * math.pi * 25.0 / 9.80665  # half a turn, and a quarter to either side
+    assert windy_m - still_m == pytest.approx(6.0 * time_s, abs=0.1)

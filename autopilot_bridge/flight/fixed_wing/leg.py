@@ -97,7 +97,8 @@ class Leg:
 
     def _hold_turn(self, state: AircraftState, command: FlightCommand) -> None:
         """Turning back, the way to the line is about as far round to either side, and a gust decides: the
-        way round of the corner is kept to (ArduPlane's L1 does so too), until less than a right angle is left.
+        corner's own way round is kept to, until less than a right angle is left (ArduPlane's L1 prevents
+        such indecision too).
         """
         if self._turn_side == 0.0:
             return
