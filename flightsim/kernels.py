@@ -56,7 +56,7 @@ def compiled_for(function: Function, *arguments: object) -> Function:
 
     A kernel looks at the type of every argument of every call, which costs as much as a small kernel's own
     work. This is for calls at the physics rate whose arguments are always the same arrays: what it returns
-    must not be called with others (an array of other dimensions is refused, one of another layout is not).
+    takes the caller's word for it that an array has the element type, dimensions and layout of the example.
     A function that is no kernel is returned as it is.
     """
     if not is_jitted(function):

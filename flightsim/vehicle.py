@@ -1,7 +1,9 @@
 """One simulated vehicle: a JSBSim model in its air, stepped by actuator commands, writing its truth."""
 
 import math
+from operator import call
 from pathlib import Path
+from struct import Struct
 from typing import Any, Final
 
 import numpy as np
@@ -23,6 +25,7 @@ from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
+from flightsim.kernels import compiled_for
 from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.truth_reading import (
@@ -43,6 +46,7 @@ __all__ = ["InitialState", "Vehicle", "VehicleDivergedError"]
 Array = NDArray[np.float64]
 
 _FT: Final = 0.3048
+_FLOAT64_SIZE: Final = 8
 _FOLLOW_S: Final = 10.0  # in which actuators and engines follow the commands of a start in the air
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
@@ -71,14 +75,18 @@ class Vehicle:
     """
 
     __slots__ = (
+        "_accel_scale",
         "_breaks_at_m_s2",
         "_fdm",
-        "_getters_motion",
-        "_getters_slow",
+        "_get_motion",
+        "_get_slow",
+        "_ground_alt_m",
         "_gusts",
         "_initial",
         "_magnetic_steps",
         "_motor_effectiveness",
+        "_pack_motion",
+        "_pack_slow",
         "_raw",
         "_raw_view",
         "_run",
@@ -93,6 +101,7 @@ class Vehicle:
         "_truth_extra",
         "_truth_scale",
         "_turbulence",
+        "_write_truth",
         "airframe",
         "crash",
         "environment",
@@ -147,7 +156,20 @@ class Vehicle:
             self.airframe.truth_scale or np.ones(len(self.airframe.truth)), dtype=float
         )
         self._raw = np.zeros(STATE_SIZE + len(self.airframe.truth))
-        self._raw_view = self._raw.data  # its elements are set faster than the array's
+        self._raw_view = self._raw.data
+        self._pack_motion = Struct(f"{MOTION_SIZE}d").pack_into  # faster than setting elements of an array
+        self._pack_slow = Struct(f"{self._raw.size - MOTION_SIZE}d").pack_into
+        self._ground_alt_m = float(home.alt_m)
+        self._write_truth = compiled_for(
+            write_truth,
+            self._raw,
+            ACCEL_SCALE,
+            self._truth_extra,
+            self._truth_scale,
+            BREAKS_AT_M_S2,
+            self._ground_alt_m,
+            self.truth,
+        )
         self._slow_steps = max(1, physics_rate_hz // (slow_rate_hz or physics_rate_hz))
         self._slow_phase = 1 % self._slow_steps  # the first step, then at the slow rate, as sensors measure
         self._magnetic_steps = _MAGNETIC_REFRESH_S * physics_rate_hz
@@ -178,14 +200,14 @@ class Vehicle:
         self._run = fdm.run
         self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
         self._breaks_at_m_s2 = BREAKS_AT_M_S2 if fixed_wing else math.inf
+        self._accel_scale = LOAD_FACTOR_SCALE if fixed_wing else ACCEL_SCALE
         name = self.airframe.name
         state = [LOAD_FACTORS.get(prop, prop) for prop in STATE] if fixed_wing else STATE
         properties = (*state, *(prop for _, prop in self.airframe.truth))
         getters = tuple(
-            (i, find_property(fdm, prop, needed_by="the truth vector").get_double_value)
-            for i, prop in enumerate(properties)
+            find_property(fdm, prop, needed_by="the truth vector").get_double_value for prop in properties
         )
-        self._getters_motion, self._getters_slow = getters[:MOTION_SIZE], getters[MOTION_SIZE:]
+        self._get_motion, self._get_slow = getters[:MOTION_SIZE], getters[MOTION_SIZE:]
         self._set_actuators = tuple(
             find_property(fdm, prop, needed_by=f"vehicle '{name}'").set_double_value
             for prop in self.airframe.actuators
@@ -354,22 +376,19 @@ class Vehicle:
 
     def _observe(self) -> int:
         """Write `truth`, if there is any; a `Motion`."""
-        raw = self._raw_view
-        for i, get in self._getters_motion:
-            raw[i] = get()
+        raw = self._raw
+        self._pack_motion(self._raw_view, 0, *map(call, self._get_motion))
         if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
-            for i, get in self._getters_slow:
-                raw[i] = get()
+            self._pack_slow(self._raw_view, MOTION_SIZE * _FLOAT64_SIZE, *map(call, self._get_slow))
             if raw[GEAR_FORCE_Z] != 0.0:
                 self._touched_step = self._steps
-        accel_scale = ACCEL_SCALE if self._surfaces is None else LOAD_FACTOR_SCALE
-        motion: int = write_truth(
-            self._raw,
-            accel_scale,
+        motion: int = self._write_truth(
+            raw,
+            self._accel_scale,
             self._truth_extra,
             self._truth_scale,
             self._breaks_at_m_s2,
-            self.home.alt_m,
+            self._ground_alt_m,
             self.truth,
         )
         if self.launcher is not None and not self.launcher.released:

@@ -7,9 +7,11 @@ import time
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
-from flightsim.kernels import source_stamp
+from flightsim.kernels import compiled_for, source_stamp
+from flightsim.rotations import quaternion_from_euler
 
 ROOT = Path(__file__).parents[2]
 
@@ -158,3 +160,19 @@ def test_without_a_writable_package_folder_the_users_cache_serves(package: Packa
     home.rename(tmp_path / "away")
     home.write_text("in the way", encoding="utf-8")  # no folder at all: the kernel still runs
     assert package.run(**places) == (13.0, 0)
+
+
+def test_code_for_given_types_does_what_the_kernel_does() -> None:
+    angles = (0.1, -0.2, 3.0)
+    expected, found = np.zeros(4), np.zeros(4)
+    quaternion_from_euler(*angles, expected)
+    code = compiled_for(quaternion_from_euler, *angles, found)
+    assert compiled_for(quaternion_from_euler, *angles, found) is code
+    code(*angles, found)
+    assert found.tolist() == expected.tolist()
+    with pytest.raises(TypeError):
+        code(*angles, [0.0] * 4)  # type: ignore[arg-type]
+
+
+def test_a_function_that_is_no_kernel_stays_as_it_is() -> None:
+    assert compiled_for(len, [1]) is len

@@ -100,3 +100,56 @@ def test_nothing_to_say_sends_nothing_and_keeps_the_time() -> None:
     run(table, sink, 0, 5_000_000)
     assert not sink.sent
     assert table.next_due_us == 6_000_000
+
+
+def test_streams_of_one_rhythm_can_part() -> None:
+    sink = Sink()
+    ids = (HEARTBEAT, ATTITUDE)
+    table = StreamTable(
+        PayloadCache({i: lambda: b"\1" for i in ids}), sink, dict.fromkeys(ids, 10), physics_step_us=STEP_US
+    )
+    run(table, sink, 0, 1_000_000)
+    table.set_interval(HEARTBEAT, -1, 1_000_000)
+    run(table, sink, 1_000_000, 2_000_000)
+    assert sink.sent == {HEARTBEAT: 10, ATTITUDE: 20}
+    table.set_interval(HEARTBEAT, 100_000, 2_000_000)
+    table.delay(ATTITUDE, 2_950_000)
+    run(table, sink, 2_000_000, 3_000_000)
+    assert sink.sent == {HEARTBEAT: 20, ATTITUDE: 21}
+
+
+def test_what_is_due_together_goes_out_by_time_and_number() -> None:
+    order: list[int] = []
+    ids = (HEARTBEAT, mavlink.MAVLINK_MSG_ID_SYS_STATUS, mavlink.MAVLINK_MSG_ID_VFR_HUD, ATTITUDE)
+
+    class Listing(Sink):
+        def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+            order.extend(message_id for message_id, _ in payloads)
+
+    rates_hz = dict(zip(ids, (10, 20, 10, 20), strict=True))
+    cache = PayloadCache({i: lambda: b"\1" for i in ids})
+    table = StreamTable(cache, Listing(), rates_hz, physics_step_us=STEP_US)
+    table.delay(ATTITUDE, 90_000)
+    table.tick(60_000)
+    table.tick(100_000)
+    twenty, ten = (mavlink.MAVLINK_MSG_ID_SYS_STATUS,), (HEARTBEAT, mavlink.MAVLINK_MSG_ID_VFR_HUD)
+    assert order == [*twenty, ATTITUDE, *sorted(twenty + ten)]
+
+
+def test_motion_messages_go_as_bits() -> None:
+    bits: list[int] = []
+
+    class Motion(Sink):
+        def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+            bits.append(motion)
+
+    rates_hz = {ATTITUDE: 100, HEARTBEAT: 50}
+    cache = PayloadCache({i: lambda: b"\1" for i in rates_hz})
+    table = StreamTable(
+        cache, Motion(), rates_hz, physics_step_us=STEP_US, motion_bits={ATTITUDE: 1, HEARTBEAT: 2}
+    )
+    table.tick(12_000)
+    table.tick(20_000)
+    table.set_interval(HEARTBEAT, -1, 20_000)
+    table.tick(40_000)
+    assert bits == [1, 3, 1]
