@@ -4,7 +4,7 @@ import importlib
 import pkgutil
 import re
 import struct
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -75,10 +75,11 @@ class Dialect:
         Raises:
             LogError: the dialect has no such message.
         """
-        wanted = name.strip().upper()
-        for item in self.messages.values():
-            if item.name == wanted:
-                return item
+        wanted = name.strip()
+        for same in (wanted, wanted.upper()):  # tables of other formats have names in small letters
+            for item in self.messages.values():
+                if item.name == same:
+                    return item
         raise LogError(
             f"no message {name!r} in dialect '{self.name}'; give a name such as ATTITUDE, or another dialect"
         )
@@ -128,6 +129,19 @@ def _described(
             same, MappingProxyType(dict(units)), instance_field, message_class(same)
         )
     return MappingProxyType(found)
+
+
+def describe(number: int, name: str, fields: Sequence[FieldText], units: Mapping[str, str]) -> Description:
+    """A message that is none of MAVLink's: a table of a log of another format.
+
+    Args:
+        number: instead of a message id; negative.
+        name: of the table.
+        fields: in the order of the file.
+        units: of the fields that have one.
+    """
+    definition = _define(number, name, 0, tuple(field.name for field in fields), fields, None)
+    return Description(definition, MappingProxyType(dict(units)), None, message_class(definition))
 
 
 def _layout(found: MessageDefinition) -> tuple[object, ...]:

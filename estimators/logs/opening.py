@@ -1,9 +1,7 @@
 """Opens logs, by their content."""
 
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from estimators.logs.dialect import load_dialect
 from estimators.logs.errors import LogError
@@ -35,20 +33,18 @@ def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
 
 def _open_source(path: Path, head: bytes, dialect: str | Path | None) -> LogSource:
     """The one place that knows the formats."""
-    if head.startswith(_ULG_MAGIC):
-        return _other("estimators.logs.ulog", "open_ulog", path, dialect)
-    if head.startswith(_DATAFLASH_MAGIC):
-        return _other("estimators.logs.dataflash", "open_dataflash", path, dialect)
-    return open_tlog(path, load_dialect(dialect))
-
-
-def _other(module: str, function: str, path: Path, dialect: str | Path | None) -> LogSource:
+    if not head.startswith((_ULG_MAGIC, _DATAFLASH_MAGIC)):
+        return open_tlog(path, load_dialect(dialect))
     if dialect is not None:
         raise LogError(f"{path} is no MAVLink stream; a dialect ({dialect}) has no effect, leave it out")
-    if find_spec(module) is None:
-        raise LogError(f"{path}: this version reads telemetry logs (.tlog) only; convert it first")
-    opener: Any = getattr(import_module(module), function)
-    return opener(path)
+    # Imported here, for the libraries behind them take their time.
+    if head.startswith(_ULG_MAGIC):
+        from estimators.logs.ulog import open_ulog
+
+        return open_ulog(path)
+    from estimators.logs.dataflash import open_dataflash
+
+    return open_dataflash(path)
 
 
 def _read_head(path: Path) -> bytes:

@@ -1,0 +1,218 @@
+"""Logs that are no MAVLink streams, as sources of MAVLink messages: what their openers make of them.
+
+Every table of the file stays readable under its own name. What estimators ask for is there as MAVLink
+messages too, in MAVLink's units.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.logs.columns import Columns, field_dtype
+from estimators.logs.dialect import Description, Dialect, describe, load_dialect
+from estimators.logs.source import LogSource, Positions, Stream
+from estimators.logs.xml_definitions import FieldText
+from estimators.vehicle_time import AUTOPILOT
+
+Array = NDArray[Any]
+
+SYSTEM_ID: Final = 1
+"""A flight controller's own log is of one vehicle, which it does not number."""
+
+_TYPES: Final = MappingProxyType(
+    {
+        "u1": "uint8_t",
+        "i1": "int8_t",
+        "u2": "uint16_t",
+        "i2": "int16_t",
+        "u4": "uint32_t",
+        "i4": "int32_t",
+        "u8": "uint64_t",
+        "i8": "int64_t",
+        "f4": "float",
+        "f8": "double",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Part:
+    """Messages of one kind, in the order of their times.
+
+    Attributes:
+        description: of the message.
+        time_us: (n,) vehicle time.
+        columns: fields by name, with the types of the definition.
+    """
+
+    description: Description
+    time_us: NDArray[np.int64]
+    columns: Mapping[str, Array]
+
+
+def mavlink_part(name: str, time_us: Array, **columns: Any) -> Part:
+    """A MAVLink message made from columns; fields that are not given are 0, as on the wire.
+
+    Args:
+        name: of the message.
+        time_us: (n,) vehicle time; the message's own time stamp is set from it.
+        columns: wire values by field, (n,), (n, length) for arrays, or one for all. Integers are rounded and
+            clipped to what the field can hold; NaN becomes 0 there.
+    """
+    described = load_dialect().find(name)
+    times = np.ascontiguousarray(time_us, dtype=np.int64)
+    given = dict(columns)
+    names = described.definition.field_names
+    if "time_boot_ms" in names:
+        given.setdefault("time_boot_ms", times // 1000)
+    elif "time_usec" in names:
+        given.setdefault("time_usec", times)
+    made = {}
+    for field in described.definition.wire_fields:
+        dtype = field_dtype(field)
+        column = np.zeros(len(times), dtype=dtype)
+        if field.name in given:
+            column[...] = _fitted(given.pop(field.name), column.dtype)
+        made[field.name] = column
+    if given:
+        raise ValueError(f"{name} has no field {', '.join(sorted(given))}")
+    return _sorted(Part(described, times, made))
+
+
+def own_part(
+    name: str, number: int, time_us: Array, columns: Mapping[str, Array], units: Mapping[str, str]
+) -> Part:
+    """A table of the file under its own name.
+
+    Args:
+        name: of the table.
+        number: negative, one for each table, so that it is no MAVLink message's.
+        time_us: (n,) vehicle time.
+        columns: fields by name.
+        units: of the fields that have one.
+    """
+    fields = [_layout(field, column) for field, column in columns.items()]
+    made = {field: np.ascontiguousarray(column) for field, column in columns.items()}
+    return _sorted(Part(describe(number, name, fields, units), np.asarray(time_us, np.int64), made))
+
+
+def newest(times_us: Array, values: Array, at_us: Array, before: float = 0.0) -> Array:
+    """The newest of `values` at each time; `before` until the first."""
+    if not len(times_us):
+        return np.full(len(at_us), before)
+    rows = np.searchsorted(times_us, at_us, side="right") - 1
+    found: Array = np.where(rows >= 0, values[np.maximum(rows, 0)], before)
+    return found
+
+
+class MappedSource(LogSource):
+    """Messages of a flight controller's own log, put in the order of their times.
+
+    Args:
+        path, size_bytes, format: the file.
+        parts: what was found; at least one message in all.
+        unix_offset_us: Unix time of vehicle time 0; None: not known.
+        bytes_by_kind: where every byte of the file went.
+        drops, remarks: figures for the report.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        size_bytes: int,
+        format: str,
+        parts: Sequence[Part],
+        unix_offset_us: int | None,
+        bytes_by_kind: Mapping[str, int],
+        drops: Mapping[str, int],
+        remarks: Mapping[str, int | str],
+    ) -> None:
+        self.path, self.size_bytes, self.format = path, size_bytes, format
+        self._bytes_by_kind, self._drops, self._remarks = bytes_by_kind, drops, remarks
+        self._unix_offset_us = unix_offset_us
+        parts = [part for part in parts if len(part.time_us)]
+        base = load_dialect()
+        own = {part.description.definition.message_id: part.description for part in parts}
+        self.dialect = Dialect(format, MappingProxyType(dict(base.messages) | own))
+        times = np.concatenate([part.time_us for part in parts])
+        sorting = np.argsort(times, kind="stable")
+        places = np.empty(len(times), dtype=np.int64)
+        places[sorting] = np.arange(len(times))
+        self.count = len(times)
+        self._time_us = times[sorting]
+        self._time_us.flags.writeable = False
+        ends = np.cumsum([len(part.time_us) for part in parts]).tolist()
+        found = []
+        for part, end in zip(parts, ends, strict=True):
+            order = places[end - len(part.time_us) : end]
+            found.append((Stream(part.description, SYSTEM_ID, AUTOPILOT, order), part.columns))
+        found.sort(key=lambda item: int(item[0].order[0]))
+        self.streams = tuple(stream for stream, _ in found)
+        self._columns = {id(stream): columns for stream, columns in found}
+
+    @property
+    def time_us(self) -> NDArray[np.int64]:
+        """Vehicle time of every message."""
+        return self._time_us
+
+    @property
+    def boot_starts(self) -> Mapping[int, NDArray[np.int64]]:
+        """A flight controller begins a new file with each boot."""
+        return {}
+
+    def log_time_us(self, order: Positions) -> NDArray[np.int64]:
+        """Unix times, when a GPS has told the date; else 0."""
+        if self._unix_offset_us is None:
+            return np.zeros(len(order), dtype=np.int64)
+        return self._time_us[order] + self._unix_offset_us
+
+    def columns(self, stream: Stream, rows: slice | NDArray[np.int64]) -> Columns:
+        """Fields of some messages of a stream."""
+        return {name: column[rows] for name, column in self._columns[id(stream)].items()}
+
+    @property
+    def bytes_by_kind(self) -> Mapping[str, int]:
+        """Where every byte went."""
+        return self._bytes_by_kind
+
+    @property
+    def drops(self) -> Mapping[str, int]:
+        """How often something was dropped, by reason."""
+        return self._drops
+
+    @property
+    def remarks(self) -> Mapping[str, int | str]:
+        """Further figures."""
+        return self._remarks
+
+
+def _fitted(values: Any, dtype: np.dtype[Any]) -> Array:
+    column = np.asarray(values)
+    if dtype.kind not in "iu" or column.dtype.kind == "S":
+        return column
+    if column.dtype.kind == "f":
+        column = np.rint(np.nan_to_num(column, nan=0.0, posinf=0.0, neginf=0.0))
+    limits = np.iinfo(dtype)
+    if column.dtype.kind == "f" and dtype.itemsize == 8:
+        return np.clip(column, max(limits.min, -(2.0**62)), 2.0**62).astype(dtype)
+    return np.clip(column, limits.min, limits.max).astype(dtype)
+
+
+def _sorted(part: Part) -> Part:
+    if not len(part.time_us) or not np.any(np.diff(part.time_us) < 0):
+        return part
+    sorting = np.argsort(part.time_us, kind="stable")
+    columns = {name: column[sorting] for name, column in part.columns.items()}
+    return Part(part.description, part.time_us[sorting], columns)
+
+
+def _layout(name: str, column: Array) -> FieldText:
+    if column.dtype.kind == "S":
+        return FieldText(name, "char", column.dtype.itemsize)
+    return FieldText(name, _TYPES[column.dtype.str[1:]], column.shape[1] if column.ndim == 2 else 0)

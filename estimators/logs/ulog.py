@@ -1,0 +1,97 @@
+"""PX4's onboard logs (.ulg), read with `pyulog`."""
+
+import re
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+import pyulog
+from pyulog.core import ULog
+
+from estimators.logs.errors import LogError
+from estimators.logs.mapped import Array, MappedSource, Part, own_part
+from estimators.logs.ulog_mapping import Topic, map_topics
+
+_TIME: Final = "timestamp"
+_MAX_TIME_US: Final = 10**13
+_ELEMENT: Final = re.compile(r"(.+)\[(\d+)\]")
+
+
+def open_ulog(path: Path) -> MappedSource:
+    """Open a PX4 .ulg.
+
+    Raises:
+        LogError: it can't be read, or holds no message.
+    """
+    try:
+        log = ULog(str(path), disable_str_exceptions=True)
+    except Exception as error:  # pyulog raises whatever a damaged file leads it to
+        raise LogError(
+            f"{path} can't be read as a PX4 .ulg: {type(error).__name__} {error}; is it whole?"
+        ) from error
+    topics: dict[tuple[str, int], Topic] = {}
+    parts: list[Part] = []
+    names_taken: dict[str, int] = {}
+    for number, data in enumerate(sorted(log.data_list, key=lambda item: (item.name, item.multi_id))):
+        times = np.asarray(data.data[_TIME], dtype=np.uint64)
+        good = times < _MAX_TIME_US
+        columns = _arrays({name: np.asarray(column)[good] for name, column in data.data.items()})
+        if not columns or not np.any(good):
+            continue
+        topic = Topic(times[good].astype(np.int64), columns)
+        topics.setdefault((data.name, data.multi_id), topic)
+        # Instances of a topic are tables of their own: sensor_accel, sensor_accel_1, ...
+        name = data.name if not data.multi_id else f"{data.name}_{data.multi_id}"
+        names_taken[name] = names_taken.get(name, 0) + 1
+        if names_taken[name] == 1:
+            parts.append(own_part(name, -1 - number, topic.time_us, columns, {}))
+    if not parts:
+        raise LogError(f"{path} holds no messages; is it a PX4 .ulg, and whole?")
+    size_bytes = path.stat().st_size
+    offset_us = _unix_offset_us(topics)
+    mapped = map_topics(topics, log.logged_messages, offset_us)
+    return MappedSource(
+        path,
+        size_bytes=size_bytes,
+        format="ulg",
+        parts=[*parts, *mapped],
+        unix_offset_us=offset_us,
+        bytes_by_kind={"file": size_bytes},
+        drops={"dropouts": len(log.dropouts)},
+        remarks={
+            "dropout_ms": int(sum(item.duration for item in log.dropouts)),
+            "corrupt": int(bool(log.file_corruption)),
+            "pyulog": str(getattr(pyulog, "__version__", "")),
+        },
+    )
+
+
+def _arrays(columns: dict[str, Array]) -> dict[str, Array]:
+    """Columns `q[0]`, `q[1]`, ... as one of shape (n, 4); names as Python takes them."""
+    single: dict[str, Array] = {}
+    elements: dict[str, dict[int, Array]] = {}
+    for name, column in columns.items():
+        match = _ELEMENT.fullmatch(name)
+        if match is not None and "[" not in match[1]:
+            elements.setdefault(match[1], {})[int(match[2])] = column
+        else:
+            single[name] = column
+    for name, parts in elements.items():
+        if set(parts) == set(range(len(parts))) and len({part.dtype for part in parts.values()}) == 1:
+            single[name] = np.column_stack([parts[index] for index in range(len(parts))])
+        else:
+            single |= {f"{name}[{index}]": part for index, part in parts.items()}
+    named = {re.sub(r"\W+", "_", name).strip("_"): column for name, column in single.items()}
+    return {name: column for name, column in named.items() if name.isidentifier()}
+
+
+def _unix_offset_us(topics: dict[tuple[str, int], Topic]) -> int | None:
+    """Unix time at boot, by the first time that the GPS told."""
+    for name in ("vehicle_gps_position", "sensor_gps"):
+        topic = topics.get((name, 0))
+        if topic is not None and "time_utc_usec" in topic.columns:
+            told = topic.columns["time_utc_usec"].astype(np.int64)
+            rows = np.flatnonzero(told > 0)
+            if len(rows):
+                return int(told[rows[0]] - topic.time_us[rows[0]])
+    return None

@@ -1,0 +1,338 @@
+"""PX4's uORB topics as the MAVLink messages that estimators ask for.
+
+Source: PX4's message definitions (docs.px4.io, "uORB message reference", 1.12 to 1.16) and MAVLink streams.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from autopilot_bridge.mavlink import dialect
+from estimators.logs.mapped import Array, Part, mavlink_part, newest
+
+_ACCELEROMETER_AND_GYRO: Final = 0b111111
+_SECOND_US: Final = 1_000_000
+_ARMED: Final = 2  # vehicle_status: ARMING_STATE_ARMED
+_MAIN_MANUAL, _MAIN_ALTITUDE, _MAIN_POSITION, _MAIN_AUTO, _MAIN_ACRO, _MAIN_OFFBOARD, _MAIN_STABILIZED = (
+    range(1, 8)
+)
+_CUSTOM_MODES: Final = {  # NAVIGATION_STATE of vehicle_status: PX4's main and sub mode
+    0: (_MAIN_MANUAL, 0),
+    1: (_MAIN_ALTITUDE, 0),
+    2: (_MAIN_POSITION, 0),
+    3: (_MAIN_AUTO, 4),
+    4: (_MAIN_AUTO, 3),
+    5: (_MAIN_AUTO, 5),
+    10: (_MAIN_ACRO, 0),
+    14: (_MAIN_OFFBOARD, 0),
+    15: (_MAIN_STABILIZED, 0),
+    17: (_MAIN_AUTO, 2),
+    18: (_MAIN_AUTO, 6),
+    19: (_MAIN_AUTO, 8),
+    20: (_MAIN_AUTO, 9),
+    21: (_MAIN_POSITION, 1),
+}
+_LANDED, _IN_AIR = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Topic:
+    """All messages of one topic and instance.
+
+    Attributes:
+        time_us: (n,) vehicle time.
+        columns: fields by name; arrays are (n, length).
+    """
+
+    time_us: Array
+    columns: Mapping[str, Array]
+
+    def has(self, *fields: str) -> bool:
+        """Whether there are these fields."""
+        return all(field in self.columns for field in fields)
+
+
+Topics = Mapping[tuple[str, int], Topic]
+"""By name and instance."""
+
+
+def map_topics(topics: Topics, texts: Iterable[Any], unix_offset_us: int | None) -> list[Part]:
+    """MAVLink messages from what the log has.
+
+    Args:
+        topics: by name and instance.
+        texts: pyulog's logged messages.
+        unix_offset_us: Unix time of vehicle time 0; None: not known.
+    """
+    found = [
+        *_imu(topics),
+        *_attitude(topics),
+        *_air(topics),
+        *_positions(topics),
+        *_gps(topics),
+        *_state(topics),
+        *_truth(topics),
+        *_texts(texts),
+    ]
+    if unix_offset_us is not None:
+        times = _seconds(topics)
+        found.append(mavlink_part("SYSTEM_TIME", times, time_unix_usec=times + unix_offset_us))
+    return [part for part in found if len(part.time_us)]
+
+
+def _find(topics: Topics, names: Iterable[str], *fields: str) -> Topic | None:
+    """The first of these topics that there is, with these fields."""
+    return next((t for name in names if (t := topics.get((name, 0))) is not None and t.has(*fields)), None)
+
+
+def _at(topic: Topic | None, field: str, times: Array, before: float = 0.0) -> Array:
+    if topic is None or not topic.has(field):
+        return np.full(len(times), before)
+    return newest(topic.time_us, topic.columns[field], times, before)
+
+
+def _seconds(topics: Topics) -> Array:
+    first = min(int(topic.time_us.min()) for topic in topics.values())
+    last = max(int(topic.time_us.max()) for topic in topics.values())
+    return np.arange(first, last + 1, _SECOND_US, dtype=np.int64)
+
+
+def _imu(topics: Topics) -> list[Part]:
+    """The voted pair of sensors is number 0; the others follow by their instance."""
+    samples: list[tuple[Array, Array, Array, int]] = []  # times, rates, specific forces, number
+    combined = _find(topics, ("sensor_combined",), "gyro_rad", "accelerometer_m_s2")
+    if combined is not None:
+        c = combined.columns
+        samples.append((combined.time_us, c["gyro_rad"], c["accelerometer_m_s2"], 0))
+    for number in range(0 if combined is None else 1, 4):
+        rates, forces = topics.get(("sensor_gyro", number)), topics.get(("sensor_accel", number))
+        if rates is None or forces is None or not (rates.has("x", "y", "z") and forces.has("x", "y", "z")):
+            continue
+        gyro = np.column_stack([rates.columns[axis] for axis in "xyz"])
+        force = np.column_stack([_at(forces, axis, rates.time_us, np.nan) for axis in "xyz"])
+        known = np.isfinite(force).all(axis=1)
+        samples.append((rates.time_us[known], gyro[known], force[known], number))
+    if not samples:
+        return []
+    times, gyros, accelerometers, numbers = zip(*samples, strict=True)
+    gyro, accelerometer = np.concatenate(gyros), np.concatenate(accelerometers)
+    return [
+        mavlink_part(
+            "HIGHRES_IMU",
+            np.concatenate(times),
+            **{f"{axis}gyro": gyro[:, index] for index, axis in enumerate("xyz")},
+            **{f"{axis}acc": accelerometer[:, index] for index, axis in enumerate("xyz")},
+            fields_updated=_ACCELEROMETER_AND_GYRO,
+            id=np.repeat(numbers, [len(part) for part in times]),
+        )
+    ]
+
+
+def _attitude(topics: Topics) -> list[Part]:
+    attitude = _find(topics, ("vehicle_attitude",), "q")
+    if attitude is None:
+        return []
+    times, q = attitude.time_us, attitude.columns["q"]
+    rates = _find(topics, ("vehicle_angular_velocity",), "xyz")
+    body = [np.zeros(len(times))] * 3
+    if rates is not None:
+        body = [newest(rates.time_us, rates.columns["xyz"][:, axis], times) for axis in range(3)]
+    speeds = dict(zip(("rollspeed", "pitchspeed", "yawspeed"), body, strict=True))
+    roll, pitch, yaw = _euler(q)
+    return [
+        mavlink_part("ATTITUDE", times, roll=roll, pitch=pitch, yaw=yaw, **speeds),
+        mavlink_part("ATTITUDE_QUATERNION", times, q1=q[:, 0], q2=q[:, 1], q3=q[:, 2], q4=q[:, 3], **speeds),
+    ]
+
+
+def _air(topics: Topics) -> list[Part]:
+    found = []
+    local = _find(topics, ("vehicle_local_position",), "vx", "vy", "vz")
+    place = _find(topics, ("vehicle_global_position",), "alt")
+    for names, field in (
+        (("airspeed_validated",), "calibrated_airspeed_m_s"),
+        (("airspeed",), "indicated_airspeed_m_s"),
+    ):
+        airspeed = _find(topics, names, field)
+        if airspeed is not None and np.isfinite(airspeed.columns[field]).any():
+            good = np.isfinite(airspeed.columns[field])
+            times = airspeed.time_us[good]
+            heading = np.degrees(_at(local, "heading", times))
+            thrust = _find(topics, ("vehicle_thrust_setpoint",), "xyz")
+            throttle = 0.0 if thrust is None else newest(thrust.time_us, thrust.columns["xyz"][:, 0], times)
+            found.append(
+                mavlink_part(
+                    "VFR_HUD",
+                    times,
+                    airspeed=airspeed.columns[field][good],
+                    groundspeed=np.hypot(_at(local, "vx", times), _at(local, "vy", times)),
+                    heading=np.mod(heading, 360.0),
+                    throttle=100.0 * np.clip(throttle, 0.0, 1.0),
+                    alt=_at(place, "alt", times),
+                    climb=-_at(local, "vz", times),
+                )
+            )
+            break
+    pressure = _find(topics, ("vehicle_air_data",), "baro_pressure_pa")
+    field = "baro_pressure_pa"
+    if pressure is None:
+        pressure, field = _find(topics, ("sensor_baro",), "pressure"), "pressure"
+    if pressure is not None:
+        difference = _find(topics, ("differential_pressure",), "differential_pressure_pa")
+        times = pressure.time_us
+        found.append(
+            mavlink_part(
+                "SCALED_PRESSURE",
+                times,
+                press_abs=pressure.columns[field] / 100.0,
+                press_diff=_at(difference, "differential_pressure_pa", times) / 100.0,
+                temperature=100.0 * _at(pressure, "baro_temp_celcius", times),
+            )
+        )
+    return found
+
+
+def _positions(topics: Topics) -> list[Part]:
+    found = []
+    local = _find(topics, ("vehicle_local_position",), "x", "y", "z", "vx", "vy", "vz")
+    if local is not None:
+        axes = ("x", "y", "z", "vx", "vy", "vz")
+        found.append(
+            mavlink_part("LOCAL_POSITION_NED", local.time_us, **{axis: local.columns[axis] for axis in axes})
+        )
+    place = _find(topics, ("vehicle_global_position",), "lat", "lon", "alt")
+    if place is not None:
+        c, times = place.columns, place.time_us
+        home = _find(topics, ("home_position",), "alt")
+        base = _at(home, "alt", times, float(c["alt"][0]))
+        found.append(
+            mavlink_part(
+                "GLOBAL_POSITION_INT",
+                times,
+                lat=c["lat"] * 1e7,
+                lon=c["lon"] * 1e7,
+                alt=c["alt"].astype(np.float64) * 1e3,
+                relative_alt=(c["alt"] - base) * 1e3,
+                **{axis: 100.0 * _at(local, axis, times) for axis in ("vx", "vy", "vz")},
+                hdg=100.0 * np.mod(np.degrees(_at(local, "heading", times)), 360.0),
+            )
+        )
+    return found
+
+
+def _gps(topics: Topics) -> list[Part]:
+    gps = _find(topics, ("vehicle_gps_position", "sensor_gps"), "fix_type")
+    if gps is None:
+        return []
+    c, times = gps.columns, gps.time_us
+    if gps.has("latitude_deg", "longitude_deg", "altitude_msl_m"):  # since 1.14
+        place = c["latitude_deg"] * 1e7, c["longitude_deg"] * 1e7, c["altitude_msl_m"] * 1e3
+    elif gps.has("lat", "lon", "alt"):
+        place = c["lat"], c["lon"], c["alt"]
+    else:
+        return []
+    nothing = np.zeros(len(times))
+    return [
+        mavlink_part(
+            "GPS_RAW_INT",
+            times,
+            fix_type=c["fix_type"],
+            lat=place[0],
+            lon=place[1],
+            alt=place[2],
+            eph=c.get("hdop", nothing) * 100.0,
+            epv=c.get("vdop", nothing) * 100.0,
+            vel=c.get("vel_m_s", nothing) * 100.0,
+            cog=np.mod(np.degrees(c.get("cog_rad", nothing)), 360.0) * 100.0,
+            satellites_visible=c.get("satellites_used", 255),
+            h_acc=c.get("eph", nothing) * 1e3,
+            v_acc=c.get("epv", nothing) * 1e3,
+            vel_acc=c.get("s_variance_m_s", nothing) * 1e3,
+        )
+    ]
+
+
+def _state(topics: Topics) -> list[Part]:
+    found = []
+    status = _find(topics, ("vehicle_status",), "nav_state", "arming_state")
+    if status is not None:
+        times = np.union1d(_seconds(topics), status.time_us)
+        times = times[times >= int(status.time_us.min())]
+        armed = _at(status, "arming_state", times) == _ARMED
+        modes = np.array(
+            [_custom_mode(int(state)) for state in status.columns["nav_state"]], dtype=np.float64
+        )
+        kind = status.columns.get("system_type", np.zeros(len(status.time_us)))
+        found.append(
+            mavlink_part(
+                "HEARTBEAT",
+                times,
+                type=newest(status.time_us, kind, times),
+                autopilot=dialect.MAV_AUTOPILOT_PX4,
+                base_mode=dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+                + np.where(armed, dialect.MAV_MODE_FLAG_SAFETY_ARMED, 0),
+                custom_mode=newest(status.time_us, modes, times),
+                system_status=np.where(armed, dialect.MAV_STATE_ACTIVE, dialect.MAV_STATE_STANDBY),
+                mavlink_version=3,
+            )
+        )
+    landed = _find(topics, ("vehicle_land_detected",), "landed")
+    if landed is not None:
+        times = _seconds(topics)
+        times = np.union1d(times[times >= int(landed.time_us.min())], landed.time_us)
+        on_ground = _at(landed, "landed", times) != 0
+        state = np.where(on_ground, _LANDED, _IN_AIR)
+        found.append(mavlink_part("EXTENDED_SYS_STATE", times, landed_state=state))
+    return found
+
+
+def _truth(topics: Topics) -> list[Part]:
+    attitude = _find(topics, ("vehicle_attitude_groundtruth",), "q")
+    if attitude is None:
+        return []
+    times = attitude.time_us
+    place = _find(topics, ("vehicle_global_position_groundtruth",), "lat", "lon", "alt")
+    local = _find(topics, ("vehicle_local_position_groundtruth",), "vx", "vy", "vz")
+    return [
+        mavlink_part(
+            "HIL_STATE_QUATERNION",
+            times,
+            attitude_quaternion=attitude.columns["q"],
+            lat=1e7 * _at(place, "lat", times),
+            lon=1e7 * _at(place, "lon", times),
+            alt=1e3 * _at(place, "alt", times),
+            **{axis: 100.0 * _at(local, axis, times) for axis in ("vx", "vy", "vz")},
+        )
+    ]
+
+
+def _texts(texts: Iterable[Any]) -> list[Part]:
+    rows = [(int(item.timestamp), _severity(item.log_level), str(item.message)) for item in texts]
+    if not rows:
+        return []
+    text = np.array([message.encode("ascii", "replace")[:50] for _, _, message in rows], dtype="S50")
+    times = np.array([time_us for time_us, _, _ in rows], dtype=np.int64)
+    return [mavlink_part("STATUSTEXT", times, severity=np.array([s for _, s, _ in rows]), text=text)]
+
+
+def _severity(log_level: Any) -> int:
+    """ULog has the levels of syslog as digits of ASCII."""
+    number = ord(log_level) if isinstance(log_level, (str, bytes)) and len(log_level) == 1 else int(log_level)
+    number = number - ord("0") if number >= ord("0") else number
+    return min(max(number, 0), dialect.MAV_SEVERITY_DEBUG)
+
+
+def _custom_mode(nav_state: int) -> int:
+    main, sub = _CUSTOM_MODES.get(nav_state, (0, 0))
+    return main << 16 | sub << 24
+
+
+def _euler(q: Array) -> tuple[Array, Array, Array]:
+    """Roll, pitch, yaw (ZYX) of q_ned_from_frd, (n, 4), w first."""
+    w, x, y, z = (q[:, index].astype(np.float64) for index in range(4))
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return roll, pitch, yaw
