@@ -93,7 +93,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         track = self.track
         assert track.pattern is not None and track.filter.time_us is not None
         motion = track.filter
-        if motion.distance == motion.distance:
+        if not motion.distance > self.parameters.off_pattern_gate > 0.0:
             self._distance_sum += motion.distance
             self._distance_count += 1
         state, covariance = track.pattern.motion_ned(motion.state, motion.covariance)
@@ -167,6 +167,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         return {
             "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),
             "normalised_innovation": mean,
+            "restarts": float(self.track.filter.restarts),
             "omega_x_rad_s": omega_x,
             "omega_y_rad_s": omega_y,
         }

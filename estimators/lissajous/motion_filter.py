@@ -37,12 +37,14 @@ class MotionFilter:
         time_us: of the newest sample; None before the first.
         state, covariance: (4,), (4, 4), or with frequencies (6,), (6, 6).
         distance: squared Mahalanobis distance of the newest sample from its prediction.
+        restarts: how often a sample lay so far off that the filter began anew.
     """
 
     def __init__(self, parameters: LissajousParameters) -> None:
         p = self.parameters = parameters
         self.time_us: int | None = None
         self.distance = 0.0
+        self.restarts = 0
         size = AUGMENTED if p.frequency else MOTION
         self.state: Array = np.zeros(size)
         self.covariance: Array = np.zeros((size, size))
@@ -95,6 +97,9 @@ class MotionFilter:
             if noise is self._blind:  # what is predicted stands for what was not measured
                 measured[1], measured[3] = self.state[1], self.state[3]
             self.distance = correct(self.state, self.covariance, measured, noise, self._work)
+            if 0.0 < self.parameters.off_pattern_gate < self.distance:
+                self.restarts += 1
+                self._start(measured, noise)
             if self.parameters.frequency:
                 self._keep_frequencies()
         self.time_us = time_us

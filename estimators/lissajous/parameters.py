@@ -54,6 +54,9 @@ class LissajousParameters:
         position_delay_s: age of a measurement at the time that it carries.
         acceleration_psd_m2_s3: spectral density of the acceleration that the motion model lacks.
         frequency_walk_rad2_s3: variance that a frequency gains per second, where it is a state.
+        off_pattern_gate: squared Mahalanobis distance (four degrees of freedom) above which a measurement says
+            that the vehicle does not fly the pattern, on its way there or home: the filter begins anew from
+            it. 0: never.
         max_gap_s: a longer silence starts the estimator anew.
         history_s: how far back states are kept, for what is known late.
     """
@@ -74,6 +77,7 @@ class LissajousParameters:
     position_delay_s: float = 0.0
     acceleration_psd_m2_s3: float = 0.02
     frequency_walk_rad2_s3: float = 1e-8
+    off_pattern_gate: float = 50.0
     max_gap_s: float = 5.0
     history_s: float = 2.0
 
@@ -91,6 +95,7 @@ class LissajousParameters:
             "velocity_sigma_m_s",
             "acceleration_psd_m2_s3",
             "frequency_walk_rad2_s3",
+            "off_pattern_gate",
         ):
             _require(name, getattr(self, name), above_zero=False)
         for name in ("orientation_rad", "centre_north_m", "centre_east_m", "position_delay_s"):
