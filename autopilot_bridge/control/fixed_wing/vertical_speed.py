@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 _NAV_VEL_DOWN: Final = 9  # navigation slots, as in navigation.layout
 _NAV_PITCH: Final = 26
 _NAV_EAS: Final = 32
-_GAIN_1_S: Final = 6.0  # error of the vertical speed to vertical acceleration
+_GAIN: Final = 1.5  # error of the vertical speed to vertical acceleration, times the pitch's time constant
 _HASTE: Final = 1.0  # the error of the pitch is added so often: it follows in half of its time constant
 _ACCELERATION_MAX: Final = 0.8  # of gravity
 _INTEGRAL_1_S: Final = 1.5  # flight-path angle missed to pitch
@@ -47,7 +47,7 @@ def pitch_for_climb(
     speed = max(s[c.EAS], stall_speed(p)) * s[c.EAS_TO_TAS]
     actual = -nav[_NAV_VEL_DOWN] if math.isfinite(nav[_NAV_VEL_DOWN]) else 0.0
     missing = climb - actual
-    share = min(_ACCELERATION_MAX, max(-_ACCELERATION_MAX, _GAIN_1_S * missing / GRAVITY_M_S2))
+    share = min(_ACCELERATION_MAX, max(-_ACCELERATION_MAX, _GAIN / p[c.PITCH_TC] * missing / GRAVITY_M_S2))
     load_factor = (1.0 + share) / max(0.5, math.cos(s[c.ROLL_SETPOINT]))
     path = min(_STEEPEST_RAD, max(-_STEEPEST_RAD, actual / speed))
     pitch = _angle_of_attack(airspeed, load_factor, p) + path

@@ -26,8 +26,8 @@ _LONG_S: Final = 6.0  # a flare that lasts this long has reached a ground that l
 _PITCH_BLEND_S: Final = 1.0
 _PITCH_FREE_M: Final = 0.4  # over the ground a gust may still ask for a lower nose than the flare's,
 _PITCH_FREE_RAD_M: Final = math.radians(3.0)  # the lower the higher it is
-_LEAD_S: Final = 0.3  # the pitch needs so long to follow
-_HEIGHT_GAIN_1_S: Final = 1.6
+_HEIGHT_GAIN: Final = 0.5  # over the time constant of the pitch
+_LEAD: Final = 1.2  # time constants of the pitch: so long it needs to follow
 _FIRMEST_M_S: Final = 0.6  # over the sink of the touch, at the ground; more higher up:
 _FIRMER_1_S: Final = 0.5
 _LATE_1_S: Final = 0.06  # added to the sink of the touch for every metre flown beyond the place, ...
@@ -95,21 +95,24 @@ class Flare:
         self._height_m = max(height_m, 0.1)
         self._sink_m_s = max(sink_m_s, parameters.flare_sink_m_s)
 
-    def _sink(self, state: AircraftState, height_m: float, to_go_m: float, after_m_s: float) -> float:
+    def _sink(
+        self, state: AircraftState, height_m: float, to_go_m: float, parameters: FixedWingFlightParameters
+    ) -> float:
         """Sink to fly."""
         start, before = self._height_m, self._sink_m_s
+        after_m_s, lead_s = parameters.flare_sink_m_s, _LEAD * parameters.pitch_time_constant_s
         if to_go_m < 0.0:
             after_m_s += min(_LATE_M_S, -_LATE_1_S * to_go_m)
             before = max(before, after_m_s)
-        ahead = max(0.0, height_m - _LEAD_S * state.vel_down_m_s)
+        ahead = max(0.0, height_m - lead_s * state.vel_down_m_s)
         if to_go_m == to_go_m:
             speed = max(state.ground_speed_m_s, 1.0)
-            time = max(0.0, to_go_m / speed - _LEAD_S)
+            time = max(0.0, to_go_m / speed - lead_s)
             whole = flare_time(start, start, before, after_m_s)
             path = flare_height(min(time, whole), start, before, after_m_s)
             sink = after_m_s + (before - after_m_s) * path / start
             path += before * max(0.0, time - whole)
-            sink += _HEIGHT_GAIN_1_S * (ahead - path)
+            sink += _HEIGHT_GAIN / parameters.pitch_time_constant_s * (ahead - path)
         else:
             sink = after_m_s + (before - after_m_s) * min(1.0, ahead / start)
         return min(after_m_s + _FIRMEST_M_S + _FIRMER_1_S * ahead, max(_SOFTEST * after_m_s, sink))
@@ -133,7 +136,7 @@ class Flare:
         p = parameters
         self._plan(*slope, p)
         command.down_m = math.nan
-        command.height_rate_m_s = -self._sink(state, height_m, to_go_m, p.flare_sink_m_s)
+        command.height_rate_m_s = -self._sink(state, height_m, to_go_m, p)
         command.throttle = power(state, p.landing_airspeed_m_s, p)
 
     def fly(
@@ -153,12 +156,12 @@ class Flare:
         """
         p = parameters
         self._time_s += ctx.dt_s
-        sink = self._sink(state, height_m, to_go_m, p.flare_sink_m_s)
+        sink = self._sink(state, height_m, to_go_m, p)
         command.height_rate_m_s = -sink
         command.throttle = power(state, _AIRSPEED_SHARE * p.landing_airspeed_m_s, p)
         # the limits of the pitch close in gradually: no jerk of the elevator
         part = min(1.0, self._time_s / _PITCH_BLEND_S)
-        ahead = height_m - _LEAD_S * state.vel_down_m_s
+        ahead = height_m - _LEAD * p.pitch_time_constant_s * state.vel_down_m_s
         lowest = p.flare_pitch_min_rad - _PITCH_FREE_RAD_M * max(0.0, ahead - _PITCH_FREE_M)
         lowest = max(lowest, p.pitch_min_rad)
         low = min(self._pitch_rad, lowest)

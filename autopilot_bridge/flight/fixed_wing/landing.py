@@ -311,7 +311,7 @@ class LandTask(AircraftTask):
             self._touch_pitch_rad = state.pitch_rad
 
     def _bounced(self, p: FixedWingFlightParameters) -> bool:
-        """In the air again: a gust or the springs have lifted it, and the flare is to set it down once more."""
+        """In the air again: a gust or the springs have lifted it; the flare sets it down once more."""
         measured = self._state.height_above_ground_m
         return (
             p.rangefinder_landing

@@ -50,6 +50,9 @@ _MAY_BE_INFINITE: Final = frozenset({"acceptance_altitude_m", "position_lost_wai
 _PERIODS: Final = 2.5  # of the guidance over the time of a turn through a radian and of a bank's reversal
 
 
+_FLARE_NOSE_DOWN_RAD: Final = math.radians(3.5)  # in the flare, under the pitch of the approach
+
+
 class LaunchKind(IntEnum):
     """How the aircraft comes into the air: PX4 RWTO_TKOFF and FW_LAUN_DETCN_ON | TKOFF_THR_MINACC."""
 
@@ -141,6 +144,7 @@ class FixedWingFlightParameters:
         5.0
     )  # wing tips free near the ground: FW_WING_* | LEVEL_ROLL_LIMIT
     rangefinder_landing: bool = True  # FW_LND_USETER | RNGFND_LANDING
+    pitch_time_constant_s: float = 0.25  # FW_P_TC | PTCH2SRV_TCONST: of the flare's haste
     standing_height_m: float = 0.3  # what the rangefinder tells on the ground: EKF2_MIN_RNG | RNGFND1_GNDCLR
     landing_abort_climb_m: float = 30.0  # go-around: straight up to so much above home | LAND_ABORT_DEG
     flaps_takeoff: float = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
@@ -176,6 +180,8 @@ class FixedWingFlightParameters:
         """Parameters for any aircraft, from what it can do; `changes` are fields that shall differ."""
         e = envelope
         landing = max(1.35 * e.stall_speed_m_s, 1.2 * e.airspeed_min_m_s)
+        approach = min(landing, e.airspeed_trim_m_s)
+        gains = gains_for(e)
         bank = min(e.bank_max_rad, math.radians(45.0))
         # a circle flown at two thirds of the bank limit's turn rate leaves room for wind
         radius = e.airspeed_trim_m_s**2 / (9.80665 * math.tan(0.6 * bank))
@@ -183,7 +189,10 @@ class FixedWingFlightParameters:
         # the guidance asks for no turn faster than the aircraft can roll into and fly: else it swings to and
         # fro between its bank limits
         turn_s = e.airspeed_trim_m_s / (9.80665 * math.tan(bank))
-        reversal_s = 2.0 * bank / float(gains_for(e)["roll_slew_rad_s"])
+        reversal_s = 2.0 * bank / float(gains["roll_slew_rad_s"])
+        # at a flare's lowest pitch it must come down: a nose that is held too high floats on and on
+        slower = (e.airspeed_trim_m_s / approach) ** 2 - 1.0
+        approach_pitch = e.trim_pitch_rad + float(gains["lift_angle_rad"]) * slower
         climb_pitch = e.trim_pitch_rad + math.atan2(max(0.0, e.climb_max_m_s), e.airspeed_trim_m_s)
         values: dict[str, Any] = {
             "airspeed_min_m_s": e.airspeed_min_m_s,
@@ -205,7 +214,9 @@ class FixedWingFlightParameters:
             "takeoff_pitch_min_rad": min(math.radians(10.0), max(math.radians(2.0), 0.6 * climb_pitch)),
             "takeoff_airspeed_m_s": e.airspeed_trim_m_s,
             "rotation_airspeed_m_s": max(1.15 * e.stall_speed_m_s, 0.9 * e.airspeed_min_m_s),
-            "landing_airspeed_m_s": min(landing, e.airspeed_trim_m_s),
+            "landing_airspeed_m_s": approach,
+            "flare_pitch_min_rad": min(math.radians(1.0), approach_pitch - _FLARE_NOSE_DOWN_RAD),
+            "pitch_time_constant_s": float(gains["pitch_time_constant_s"]),
             "standing_height_m": e.standing_height_m,
             "loiter_radius_m": max(40.0, radius),
             "return_loiter_radius_m": max(40.0, radius),
