@@ -100,12 +100,10 @@ def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
 
 def how_left(blocks: Sequence[Mapping[str, Any]]) -> str:
     """What was done with the vehicles of a flight that was broken off; "" if nothing had to be."""
-    told = [(block["system_id"], block["left"]) for block in blocks if block["left"]]
-    if not told:
-        return ""
+    left = {block["system_id"]: block["left"] for block in blocks if block["left"]}
     if len(blocks) == 1:
-        return f"the vehicle {told[0][1]}"
-    return ", ".join(f"vehicle {system_id} {left}" for system_id, left in told)
+        return f"the vehicle {left[blocks[0]['system_id']]}" if left else ""
+    return ", ".join(f"vehicle {system_id} {words}" for system_id, words in left.items())
 
 
 def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:

@@ -21,10 +21,15 @@ def fly_into(run: Run, mode: str) -> None:
     assert not run.ended, run.process.communicate()
 
 
-def check_interrupted(run: Run, text: str) -> None:
+def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
     lines = [line for line in text.splitlines() if line]
-    assert lines == [f"flightstack: interrupted; the log is in {run.folder}"]
     summary = run.summary
+    told = f"was told to {on_failure}"
+    assert [block["left"] for block in summary["vehicles"]] == [told] * len(summary["vehicles"])
+    ids = [block["system_id"] for block in summary["vehicles"]]
+    who = ", ".join(f"vehicle {system_id} {told}" for system_id in ids)
+    who = who if len(ids) > 1 else f"the vehicle {told}"
+    assert lines == [f"flightstack: interrupted; {who}; the log is in {run.folder}"]
     assert summary["outcome"] == "interrupted"
     assert counts(run.log) == summary["message_counts"]
     records(run.log)
@@ -43,7 +48,7 @@ def test_ctrl_c_in_an_embedded_flight(flavour: str, on_failure: str, via: str, t
         else:
             run.wait_for_log(1_200_000)
         run.process.send_signal(signal.SIGINT)
-        check_interrupted(run, run.finish(INTERRUPTED))
+        check_interrupted(run, run.finish(INTERRUPTED), on_failure)
     assert modes(run.log)[-1] == on_failure
 
 
