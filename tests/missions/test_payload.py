@@ -1,13 +1,15 @@
 """What payload components say and are told, in messages; attitude commands and their masks."""
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
 from autopilot_bridge.mavlink import FrameParser, decode, dialect
 from missions.errors import PlanError, VehicleTimeout
+from missions.notes import FlightNotes
 from missions.vehicle import AttitudeSetpoint
-from missions.vehicle.payload import GIMBAL_COMPONENT, detection, gimbal_attitude
+from missions.vehicle.payload import GIMBAL_COMPONENT, Payload, detection, gimbal_attitude
 
 d = dialect
 
@@ -55,6 +57,52 @@ def test_a_gimbal_says_what_its_yaw_is_from(flags, from_north):
 @pytest.mark.parametrize("q", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0), (math.inf, 0.0, 0.0, 0.0)])
 def test_a_quaternion_that_is_none_makes_no_attitude(q):
     assert gimbal_attitude(status(32, q)) is None
+
+
+# who points the gimbal
+
+
+class Rig:
+    """A vehicle as a payload sees it."""
+
+    def __init__(self):
+        self.system_id = 1
+        self.clock = SimpleNamespace(time_us=0)
+        self.notes = FlightNotes()
+        self.sent = []
+        self.primary = None
+        self.connection = SimpleNamespace(system_id=255, component_id=190, latest=self.latest)
+
+    def latest(self, name, system_id, component_id):
+        if name != "GIMBAL_MANAGER_STATUS" or self.primary is None:
+            return None
+        return d.MAVLink_gimbal_manager_status_message(0, 0, 0, *self.primary, 0, 0)
+
+    def send(self, message):
+        self.sent.append(message)
+
+
+@pytest.mark.parametrize(
+    ("primary", "warned"),
+    [(None, False), ((0, 0), False), ((255, 190), False), ((255, 191), True), ((42, 190), True)],
+)
+def test_a_gimbal_that_somebody_else_points_is_warned_of_once(primary, warned):
+    rig = Rig()
+    payload = Payload(rig)
+    payload.take_gimbal_control()
+    rig.primary = (42, 190)  # it takes the manager some time to tell who has it
+    payload.point_gimbal(pitch_rad=-0.5, yaw_rad=0.0)
+    assert rig.notes.warnings == []
+    rig.primary = primary
+    for time_us in range(4_000_000, 20_000_000, 1_000_000):
+        rig.clock.time_us = time_us
+        payload.point_gimbal(pitch_rad=-0.5, yaw_rad=0.0)
+    assert len(rig.sent) > 16  # it goes on pointing: control may come back
+    if not warned:
+        assert rig.notes.warnings == []
+        return
+    (warning,) = rig.notes.warnings
+    assert f"controlled by system {primary[0]}, component {primary[1]}" in warning
 
 
 # attitude commands
