@@ -44,7 +44,7 @@ def record_dtype(definition: MessageDefinition) -> np.dtype[np.void]:
 
 
 def decode_columns(
-    data: NDArray[np.uint8], starts: NDArray[np.int64], definition: MessageDefinition
+    data: NDArray[np.uint8], starts: NDArray[np.uint32] | NDArray[np.int64], definition: MessageDefinition
 ) -> Columns:
     """Columns of messages of one definition.
 
@@ -79,7 +79,7 @@ def decode_columns(
 @kernel
 def _gather(
     data: NDArray[np.uint8],
-    starts: NDArray[np.int64],
+    starts: NDArray[np.uint32] | NDArray[np.int64],
     size: int,
     layout: NDArray[np.int64],
     scratch: NDArray[np.uint8],

@@ -341,7 +341,7 @@ class Log:
             stream.description,
             system_id=stream.system_id,
             component_id=stream.component_id,
-            order=stream.order[chosen].astype(np.int64),
+            positions=stream.order[chosen],
             columns=columns,
             instance=instance,
             boot=boot,

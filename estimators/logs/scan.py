@@ -66,13 +66,17 @@ def message_table(dialect: Dialect) -> MessageTable:
     return MessageTable(pages, rows, extras, ids)
 
 
+Offsets = NDArray[np.uint32] | NDArray[np.int64]
+"""Positions of bytes in a file."""
+
+
 @dataclass(frozen=True, slots=True)
 class FrameIndex:
     """All valid frames of a log, in the order of the file.
 
     Attributes:
         lead: bytes before each frame that belong to it: 8 (time stamp) or 0.
-        starts: where each frame begins (int64).
+        starts: where each frame begins; uint32, or int64 in files of 4 GiB and more.
         streams: which stream each belongs to (int32): message, system and component.
         stream_keys: shape (streams, 3): message number of the `MessageTable`, system id, component id; in the
             order of their first frames.
@@ -85,7 +89,7 @@ class FrameIndex:
     """
 
     lead: int
-    starts: NDArray[np.int64]
+    starts: Offsets
     streams: NDArray[np.int32]
     stream_keys: NDArray[np.int64]
     gaps: NDArray[np.int64]
@@ -123,11 +127,14 @@ def _scan(data: NDArray[np.uint8], table: MessageTable, lead: int) -> FrameIndex
     keys = np.zeros((1024, 3), dtype=np.int64)
     slots = np.full(4 * len(keys), -1, dtype=np.int32)
     capacity = min(_CAPACITY, len(data) // (_OVERHEAD_V1 + lead) + 2)
-    starts: list[NDArray[np.int64]] = []
+    offset: type[np.unsignedinteger[Any] | np.signedinteger[Any]] = (
+        np.uint32 if len(data) < 1 << 32 else np.int64
+    )
+    starts: list[NDArray[Any]] = []
     streams: list[NDArray[np.int32]] = []
     gaps: list[NDArray[np.int64]] = []
     while progress[_AT] < len(data):
-        starts.append(np.empty(capacity, dtype=np.int64))
+        starts.append(np.empty(capacity, dtype=offset))
         streams.append(np.empty(capacity, dtype=np.int32))
         gaps.append(np.empty((capacity, 2), dtype=np.int64))
         progress[_FOUND] = progress[_GAPS] = 0
@@ -142,7 +149,7 @@ def _scan(data: NDArray[np.uint8], table: MessageTable, lead: int) -> FrameIndex
             keys, slots = _grown(keys, int(progress[_STREAMS]))
     return FrameIndex(
         lead=lead,
-        starts=_joined(starts, np.empty(0, dtype=np.int64)),
+        starts=_joined(starts, np.empty(0, dtype=offset)),
         streams=_joined(streams, np.empty(0, dtype=np.int32)),
         stream_keys=keys[: progress[_STREAMS]].copy(),
         gaps=_joined(gaps, np.empty((0, 2), dtype=np.int64)),
@@ -231,7 +238,7 @@ def _scan_some(
     pages: NDArray[np.int16],
     rows: NDArray[np.int16],
     extras: NDArray[np.uint8],
-    starts: NDArray[np.int64],
+    starts: Offsets,
     streams: NDArray[np.int32],
     gaps: NDArray[np.int64],
     keys: NDArray[np.int64],

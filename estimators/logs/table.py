@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimators.logs.columns import Columns
 from estimators.logs.dialect import Description
 from estimators.logs.errors import LogError
-from estimators.logs.source import LogSource
+from estimators.logs.source import LogSource, Positions
 from estimators.logs.units import to_si
 
 
@@ -23,7 +23,6 @@ class Table:
         instance: value of the instance field that was asked for; None: all.
         boot: number of the system's boot that was asked for, from 0; None: all.
         description: definition, units and instance field.
-        order: (n,) int64, position of each message in the log.
     """
 
     def __init__(
@@ -33,7 +32,7 @@ class Table:
         *,
         system_id: int,
         component_id: int,
-        order: NDArray[np.int64],
+        positions: Positions,
         columns: Columns,
         instance: int | str | None = None,
         boot: int | None = None,
@@ -44,12 +43,12 @@ class Table:
         self.component_id = component_id
         self.instance = instance
         self.boot = boot
-        self.order = order
+        self._positions = positions
         self.columns = columns
         self._source = source
 
     def __len__(self) -> int:
-        return len(self.order)
+        return len(self._positions)
 
     def __repr__(self) -> str:
         return f"Table({self.name}, from {self.system_id}/{self.component_id}, {len(self)} messages)"
@@ -65,14 +64,19 @@ class Table:
         return self.description.units
 
     @cached_property
+    def order(self) -> NDArray[np.int64]:
+        """(n,) position of each message in the log."""
+        return self._positions.astype(np.int64)
+
+    @cached_property
     def time_us(self) -> NDArray[np.int64]:
         """(n,) vehicle time."""
-        return self._source.time_us[self.order]
+        return self._source.time_us[self._positions]
 
     @cached_property
     def log_time_us(self) -> NDArray[np.int64]:
         """(n,) Unix time of the records; 0 where the log has none."""
-        return self._source.log_time_us(self.order)
+        return self._source.log_time_us(self._positions)
 
     def __contains__(self, field: object) -> bool:
         return field in self.columns
@@ -118,7 +122,7 @@ class Table:
             self.description,
             system_id=self.system_id,
             component_id=self.component_id,
-            order=self.order[rows],
+            positions=self._positions[rows],
             columns={name: column[rows] for name, column in self.columns.items()},
             instance=self.instance,
             boot=self.boot,
