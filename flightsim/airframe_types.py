@@ -103,12 +103,14 @@ class ActuatorChannel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightLimits:
-    """Limits for the autopilot of a fixed-wing vehicle; speeds are equivalent airspeeds.
+    """Limits of a fixed-wing vehicle, for its autopilot and of its airframe; speeds are equivalent airspeeds.
 
     Attributes:
         airspeed_min_m_s, airspeed_trim_m_s, airspeed_max_m_s: None: worked out from the stall speed.
         bank_max_rad, pitch_min_rad, pitch_max_rad: attitude.
         throttle_max: highest throttle, 0..1.
+        touchdown_sink_max_m_s: rate of sink beyond which it breaks when it meets the ground. By default that
+            of a gear's reserve energy, 12 ft/s (14 CFR 25.723(b); it is designed for 10 ft/s, 23.473(d)).
     """
 
     airspeed_min_m_s: float | None = None
@@ -118,6 +120,7 @@ class FlightLimits:
     pitch_min_rad: float = math.radians(-20.0)
     pitch_max_rad: float = math.radians(25.0)
     throttle_max: float = 1.0
+    touchdown_sink_max_m_s: float = 3.66
 
     def __post_init__(self) -> None:
         speeds = [
@@ -135,6 +138,10 @@ class FlightLimits:
             value_deg = math.degrees(getattr(self, f"{name}_rad"))
             if not low_deg <= round(value_deg, 9) <= high_deg:
                 raise AirframeError(f"{name}_deg {value_deg:.6g} is not in {low_deg}..{high_deg} degrees")
+        if not 0.5 <= self.touchdown_sink_max_m_s <= 50.0:
+            raise AirframeError(
+                f"touchdown_sink_max_m_s {self.touchdown_sink_max_m_s:.6g} is not in 0.5..50 m/s"
+            )
         if not 0.0 < self.throttle_max <= 1.0:
             raise AirframeError(f"throttle_max {self.throttle_max} is not in 0..1")
 

@@ -50,6 +50,54 @@ def speed_m_s(truth: Array) -> float:
     return float(np.linalg.norm(truth[t.VEL_NED_M_S]))
 
 
+class Touches:
+    """How a vehicle met the ground when it came from the air.
+
+    After the blow the velocity is that of a bounce, or of a wreck that JSBSim throws about: what a gear has
+    to stand, and what is told of a crash, is the velocity just before. Of bounces the hardest counts.
+
+    Args:
+        within_steps: touches no farther apart are bounces of one landing.
+    """
+
+    __slots__ = ("_aloft_ned_m_s", "_on_ground", "_step", "_touch_ned_m_s", "_within_steps")
+
+    def __init__(self, within_steps: int) -> None:
+        self._within_steps = within_steps
+        self._aloft_ned_m_s = np.zeros(3)
+        self._touch_ned_m_s = np.zeros(3)
+        self._on_ground = True
+        self._step = -within_steps
+
+    def observe(self, step: int, touching: bool, truth: Array) -> float:
+        """Look at a vehicle; gives the rate of sink (m/s) of a touch that is new, else 0.
+
+        Args:
+            step: of the physics; it rises from call to call.
+            touching: the ground carries something of it.
+            truth: of the step before.
+        """
+        new = touching and not self._on_ground
+        self._on_ground = touching
+        if not touching:
+            self._aloft_ned_m_s[:] = truth[t.VEL_NED_M_S]
+            return 0.0
+        if new and (not self.recent(step) or self._aloft_ned_m_s[2] > self._touch_ned_m_s[2]):
+            self._touch_ned_m_s[:] = self._aloft_ned_m_s
+        self._step = step
+        return float(self._aloft_ned_m_s[2]) if new else 0.0
+
+    def recent(self, step: int) -> bool:
+        """Whether the ground was touched a moment before."""
+        return step - self._step < self._within_steps
+
+    def words(self, step: int, truth: Array) -> str:
+        """What a crash now is told as."""
+        velocity = self._touch_ned_m_s if self.recent(step) else truth[t.VEL_NED_M_S]
+        speed, sink = float(np.linalg.norm(velocity)), max(0.0, float(velocity[2]))
+        return f"hit the ground at {speed:.0f} m/s, sinking at {sink:.1f} m/s"
+
+
 def lay_down(truth: Array, ground_alt_m: float) -> None:
     """Make of a vehicle in motion a wreck at rest, in place; its heading and attitude stay.
 

@@ -19,7 +19,7 @@ from flightsim.airframe import (
     Role,
     load_airframe,
 )
-from flightsim.crash import BREAKS_AT_M_S2, hits_ground, lay_down, speed_m_s
+from flightsim.crash import BREAKS_AT_M_S2, Touches, hits_ground, lay_down
 from flightsim.environment import CosineGust, Environment, Turbulence
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
@@ -93,11 +93,12 @@ class Vehicle:
         "_seed_sequence",
         "_set_actuators",
         "_set_gust",
+        "_sink_max_m_s",
         "_slow_phase",
         "_slow_steps",
         "_steps",
         "_surfaces",
-        "_touched_step",
+        "_touches",
         "_truth_extra",
         "_truth_scale",
         "_turbulence",
@@ -200,6 +201,7 @@ class Vehicle:
         self._run = fdm.run
         self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
         self._breaks_at_m_s2 = BREAKS_AT_M_S2 if fixed_wing else math.inf
+        self._sink_max_m_s = self.airframe.limits.touchdown_sink_max_m_s if fixed_wing else math.inf
         self._accel_scale = LOAD_FACTOR_SCALE if fixed_wing else ACCEL_SCALE
         name = self.airframe.name
         state = [LOAD_FACTORS.get(prop, prop) for prop in STATE] if fixed_wing else STATE
@@ -220,7 +222,7 @@ class Vehicle:
             for axis in ("north", "east", "down")
         )
         self._steps = 0
-        self._touched_step = -self.physics_rate_hz * _TOUCHED_S
+        self._touches = Touches(self.physics_rate_hz * _TOUCHED_S)
         self.crash: str | None = None
         self.launcher: Launcher | None = None
         self._turbulence: DrydenTurbulence | None = None
@@ -376,12 +378,11 @@ class Vehicle:
 
     def _observe(self) -> int:
         """Write `truth`, if there is any; a `Motion`."""
-        raw = self._raw
+        raw, sink_m_s = self._raw, 0.0
         self._pack_motion(self._raw_view, 0, *map(call, self._get_motion))
         if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
             self._pack_slow(self._raw_view, MOTION_SIZE * _FLOAT64_SIZE, *map(call, self._get_slow))
-            if raw[GEAR_FORCE_Z] != 0.0:
-                self._touched_step = self._steps
+            sink_m_s = self._touches.observe(self._steps, bool(raw[GEAR_FORCE_Z] != 0.0), self.truth)
         motion: int = self._write_truth(
             raw,
             self._accel_scale,
@@ -393,17 +394,17 @@ class Vehicle:
         )
         if self.launcher is not None and not self.launcher.released:
             self.truth[t.ON_GROUND] = 1.0  # the launcher carries its weight
-        return motion
+        return Motion.BROKEN if motion == Motion.SOUND and sink_m_s > self._sink_max_m_s else motion
 
     def _end(self, motion: int, actuators: Array) -> None:
         """What can't go on: a crash, or a model that diverged."""
         ground_alt_m = self.home.alt_m
-        touched = self._steps - self._touched_step < _TOUCHED_S * self.physics_rate_hz
+        touched = self._touches.recent(self._steps)
         sound = bool(np.all(np.isfinite(actuators[: self.actuator_count])))
         broken = motion == Motion.BROKEN
         if not (sound and (broken or hits_ground(self.truth, ground_alt_m, touched=touched))):
             raise self._diverged()
-        self.crash = f"hit the ground at {speed_m_s(self.truth):.0f} m/s"
+        self.crash = self._touches.words(self._steps, self.truth)
         lay_down(self.truth, ground_alt_m)
 
     def _diverged(self) -> VehicleDivergedError:

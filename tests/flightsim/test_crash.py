@@ -1,12 +1,15 @@
 """What hits the ground hard lies there: no wreck flies on, sinks into the ground or ends the world."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from flightsim import truth as t
-from flightsim.crash import lay_down
+from flightsim.airframe import AirframeError, load_airframe
+from flightsim.crash import Touches, lay_down
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
@@ -70,6 +73,80 @@ def test_a_hard_blow_leaves_a_wreck_at_rest(
         vehicle.step(commands)
     assert vehicle.steps == steps + 100
     assert vehicle.truth.tobytes() == wreck.tobytes()
+
+
+def touch_down(model: str, *, sink_m_s: float, speed_m_s: float, height_m: float) -> Vehicle:
+    """Level, straight down onto the wheels from a small height, until a second after it has touched."""
+    vehicle = Vehicle(
+        model,
+        home=HOME,
+        environment=Environment(),
+        seed_sequence=np.random.SeedSequence(0),
+        slow_rate_hz=50,
+        initial=InitialState(
+            height_m=height_m, vel_ned_m_s=(speed_m_s, 0.0, sink_m_s), pitch_rad=0.03, yaw_rad=0.0
+        ),
+    )
+    touched = 0
+    while touched < 250 and vehicle.crash is None:
+        vehicle.step(np.zeros(MAX_ACTUATORS))
+        touched += bool(touched or vehicle.truth[t.ON_GROUND])
+        assert vehicle.steps < 2000
+    return vehicle
+
+
+@pytest.mark.parametrize(
+    ("model", "speed_m_s", "height_m"),
+    [("aerosonde", 15.0, 0.6), ("c172x", 15.0, 1.6), ("sgs126", 12.0, 0.9)],
+)
+@pytest.mark.parametrize(("sink_m_s", "breaks"), [(2.5, False), (5.5, True)])
+def test_a_gear_stands_a_firm_landing_and_breaks_beyond(
+    model: str, speed_m_s: float, height_m: float, sink_m_s: float, breaks: bool
+) -> None:
+    """12 ft/s is what 14 CFR 25.723(b) asks of a gear's reserve energy."""
+    vehicle = touch_down(model, sink_m_s=sink_m_s, speed_m_s=speed_m_s, height_m=height_m)
+    assert (vehicle.crash is not None) == breaks, vehicle.crash
+    if vehicle.crash is not None:
+        told = re.fullmatch(r"hit the ground at (\d+) m/s, sinking at ([0-9.]+) m/s", vehicle.crash)
+        assert told is not None, vehicle.crash
+        assert float(told[1]) == pytest.approx(math.hypot(speed_m_s, sink_m_s), abs=1.5)
+        assert float(told[2]) == pytest.approx(sink_m_s, abs=1.2)
+
+
+def test_a_description_says_what_its_gear_stands(tmp_path: Path) -> None:
+    text = '[vehicle]\nname = "s"\nkind = "fixed_wing"\njsbsim = "c172x"\n[limits]\n'
+    text += "touchdown_sink_max_m_s = {}\n"
+    model = tmp_path / "strong.toml"
+    model.write_text(text.format(8.0))
+    assert touch_down(str(model), sink_m_s=5.5, speed_m_s=15.0, height_m=1.6).crash is None
+    model.write_text(text.format(0.0))
+    with pytest.raises(AirframeError, match=r"touchdown_sink_max_m_s 0 is not in 0.5..50 m/s"):
+        load_airframe(model)
+
+
+def test_a_crash_is_told_with_the_speed_before_the_blow() -> None:
+    """What JSBSim makes of the glider within the blow is not how fast it came."""
+    vehicle = dive("sgs126", speed_m_s=30.0, pitch_deg=-45.0, roll_deg=120.0)
+    while vehicle.crash is None:
+        vehicle.step(np.zeros(MAX_ACTUATORS))
+    told = re.fullmatch(r"hit the ground at (\d+) m/s, sinking at ([0-9.]+) m/s", vehicle.crash)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(32.0, abs=3.0)
+    assert float(told[2]) == pytest.approx(math.sqrt(0.5 * 30.0**2 + 2 * G_M_S2 * 15.0), abs=4.0)
+
+
+def test_of_bounces_the_hardest_is_told() -> None:
+    touches, truth = Touches(2500), np.zeros(t.TRUTH_SIZE)
+    for step, sink, touching in ((0, 1.0, False), (5, 4.0, False), (10, -2.0, True), (15, -2.0, False)):
+        truth[t.VEL_NED_M_S] = (3.0, 0.0, sink)
+        assert touches.observe(step, touching, truth) == (4.0 if touching else 0.0)
+    truth[t.VEL_NED_M_S] = (3.0, 0.0, 2.0)
+    touches.observe(20, False, truth)
+    assert touches.observe(25, True, truth) == 2.0
+    assert touches.observe(30, True, truth) == 0.0
+    assert touches.words(35, truth) == "hit the ground at 5 m/s, sinking at 4.0 m/s"
+    truth[t.VEL_NED_M_S] = (0.0, 0.0, 20.0)
+    assert touches.words(30 + 2500, truth) == "hit the ground at 20 m/s, sinking at 20.0 m/s"
 
 
 def test_a_wreck_starts_again_whole() -> None:
