@@ -127,9 +127,7 @@ def _scan(data: NDArray[np.uint8], table: MessageTable, lead: int) -> FrameIndex
     keys = np.zeros((1024, 3), dtype=np.int64)
     slots = np.full(4 * len(keys), -1, dtype=np.int32)
     capacity = min(_CAPACITY, len(data) // (_OVERHEAD_V1 + lead) + 2)
-    offset: type[np.unsignedinteger[Any] | np.signedinteger[Any]] = (
-        np.uint32 if len(data) < 1 << 32 else np.int64
-    )
+    offset: np.dtype[Any] = np.dtype(np.uint32 if len(data) < 1 << 32 else np.int64)
     starts: list[NDArray[Any]] = []
     streams: list[NDArray[np.int32]] = []
     gaps: list[NDArray[np.int64]] = []
