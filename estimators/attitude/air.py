@@ -18,7 +18,7 @@ _HPA: Final = 100.0
 
 
 def pressure_pa(value: float) -> float | None:
-    """Static pressure of a field in hectopascal; PX4 fills HIGHRES_IMU's with pascal. None: not a pressure."""
+    """Static pressure of a field in hectopascal; PX4 fills HIGHRES_IMU's with pascal. None: no pressure."""
     pascal = value * _HPA if value <= _HECTOPASCAL_MAX else value
     return pascal if _LEAST_PA <= pascal <= 1.2 * SEA_LEVEL_PA else None
 

@@ -1,7 +1,8 @@
 """Roll and pitch from inertial messages and airspeed (seed 004, section II)."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import asin, atan2, inf, nan, sqrt
+from math import asin, atan2, nan, sqrt
+from struct import Struct
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -18,7 +19,7 @@ from estimators.attitude.parameters import (
     VehicleKind,
     coefficients,
 )
-from estimators.attitude.samples import SAMPLES, Sample, fields_given
+from estimators.attitude.samples import SAMPLES, fields_given
 from estimators.attitude.step import start, step
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -29,8 +30,8 @@ __all__ = ["LEAST_RATE_HZ", "AttitudeEstimator"]
 LEAST_RATE_HZ: Final = 20.0
 WANTED_RATE_HZ: Final = 50.0
 _SLOWEST_US: Final = int(1e6 / (0.9 * LEAST_RATE_HZ))
-_RATE_MAX_RAD_S: Final = 70.0
-_FORCE_MAX_M_S2: Final = 400.0
+_GONE_US: Final = 4 * _SLOWEST_US
+_write_sample: Final = Struct(at.SAMPLE_FORMAT).pack_into
 _IMU_NAMES: Final = tuple(SAMPLES)
 _AIRSPEED_NAMES: Final = ("VFR_HUD", "AIRSPEED", "SCALED_PRESSURE")
 
@@ -49,6 +50,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         p = self.parameters
         self._coefficients = coefficients(p)
         self._state = np.empty(at.STATE_SIZE)
+        self._sample = self._state.data
         self._guard = InputGuard(max_gap_us=round(p.gap_max_s * 1e6))
         self._airspeed_age_us = round(p.airspeed_age_max_s * 1e6)
         self._air = AirData(p.airspeed, self._airspeed_age_us)
@@ -59,8 +61,9 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             "SCALED_PRESSURE": self._scaled_pressure,
         }
         wanted = _IMU_NAMES if p.imu is ImuSource.AUTO else (p.imu.value,)
+        inertial = {"HIGHRES_IMU": self._highres_imu, "RAW_IMU": self._raw_imu}
         for name in wanted:
-            self._handlers[name] = self._highres_imu if name == ImuSource.HIGHRES_IMU.value else self._imu
+            self._handlers[name] = inertial.get(name, self._imu)
         self.reset()
 
     @property
@@ -98,7 +101,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._air.reset()
         kind = self.parameters.vehicle
         self._form: int | None = FORM_OF_KIND.get(kind)
-        self._disarmed: bool | None = None
+        self._disarmed = False  # as long as nobody says so
         self._subject = 0
         self._restart()
         self._imu_name = ""
@@ -109,7 +112,6 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         start(self._state, self._coefficients)
         self._time_us: int | None = None
         self._airspeed_us = -(1 << 62)
-        self._highres_difference_hpa = 0.0
 
     @property
     def estimates(self) -> Sequence[AttitudeEstimate]:
@@ -232,7 +234,14 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
     # Inertial messages
 
     def _highres_imu(self, time_us: int, message: Message) -> Outcome:
-        if not fields_given(message):
+        if message.id != self.parameters.imu_instance or not fields_given(message):
+            return Outcome.IGNORED
+        if time_us - self._airspeed_us > self._airspeed_age_us:  # nobody else tells an airspeed
+            self._hear(time_us, self._air.by_pressure(time_us, message.diff_pressure))
+        return self._imu(time_us, message)
+
+    def _raw_imu(self, time_us: int, message: Message) -> Outcome:
+        if message.id != self.parameters.imu_instance:
             return Outcome.IGNORED
         return self._imu(time_us, message)
 
@@ -240,57 +249,40 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         name = message.name
         if name != self._imu_name and not self._chosen(time_us, name):
             return Outcome.IGNORED
-        if name in _WITH_INSTANCE and message.id != self.parameters.imu_instance:
-            return Outcome.IGNORED
         sample = SAMPLES[name](message)
         refused = self._guard.check(time_us, name, sample)
-        if refused is not None and refused is not Outcome.TIME_JUMP:
-            return refused
-        if not _plausible(sample):
-            return Outcome.IMPLAUSIBLE
         if refused is not None:
+            if refused is not Outcome.TIME_JUMP:
+                return refused
             self._restart()
-        form = self._form
-        if form is None:
+        if self._form is None:
             return Outcome.WAITING
         before_us = self._time_us
-        self._subject = message.src_system
         if before_us is None:
             elapsed_s = 0.0
+            self._subject = message.src_system
         elif time_us <= before_us:
             return Outcome.LATE if time_us < before_us else Outcome.REPEATED
         else:
             elapsed_s = (time_us - before_us) * 1e-6
+        state = self._state
         if time_us - self._airspeed_us > self._airspeed_age_us:
-            self._state[at.AIRSPEED] = nan
-        step(self._state, self._coefficients, form, self._disarmed is not False, elapsed_s, *sample)
+            state[at.AIRSPEED] = nan
+        _write_sample(self._sample, 0, self._form, self._disarmed, elapsed_s, *sample)
+        if not step(state, self._coefficients):
+            return Outcome.IMPLAUSIBLE
         self._time_us = time_us
         return Outcome.UPDATED if refused is None else refused
 
     def _chosen(self, time_us: int, name: str) -> bool:
-        """Whether to change to this message: it is better than the one in use, or that has gone, and fast enough."""
-        last_us = self._imu_heard_us.get(name, -inf)
+        """Whether to change to this message: a better one that is fast enough, or the one in use has gone."""
+        last_us = self._imu_heard_us.get(name)
         self._imu_heard_us[name] = time_us
         if self._imu_name and self._time_us is not None:
-            gone = time_us - self._time_us > 4 * _SLOWEST_US
+            gone = time_us - self._time_us > _GONE_US
             better = _IMU_NAMES.index(name) < _IMU_NAMES.index(self._imu_name)
-            if not (gone or (better and 0 < time_us - last_us <= _SLOWEST_US)):
+            fast = last_us is not None and 0 < time_us - last_us <= _SLOWEST_US
+            if not (gone or (better and fast)):
                 return False
         self._imu_name = name
         return True
-
-
-_WITH_INSTANCE: Final = frozenset({ImuSource.HIGHRES_IMU.value, ImuSource.RAW_IMU.value})
-
-
-def _plausible(sample: Sample) -> bool:
-    wx, wy, wz, ax, ay, az = sample
-    return (
-        -_RATE_MAX_RAD_S < wx < _RATE_MAX_RAD_S
-        and -_RATE_MAX_RAD_S < wy < _RATE_MAX_RAD_S
-        and -_RATE_MAX_RAD_S < wz < _RATE_MAX_RAD_S
-        and -_FORCE_MAX_M_S2 < ax < _FORCE_MAX_M_S2
-        and -_FORCE_MAX_M_S2 < ay < _FORCE_MAX_M_S2
-        and -_FORCE_MAX_M_S2 < az < _FORCE_MAX_M_S2
-        and (ax or ay or az) != 0.0
-    )

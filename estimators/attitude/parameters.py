@@ -54,7 +54,7 @@ class AttitudeParameters:
         airspeed: which airspeed.
         gain_1_s: k_p, of the accelerometer on attitude.
         bias_gain_1_s2: k_I, of the accelerometer on the gyro bias.
-        rest_bias_time_s: of the mean by which the gyro bias is found while the vehicle is at rest and disarmed.
+        rest_bias_time_s: of the longest mean by which the gyro bias is found at rest, disarmed.
         reference_tolerance_m_s2: by how much the reference's length may differ from g to count for half.
         gap_max_s: longer silence of the inertial sensor starts the filter anew.
         airspeed_age_max_s: an older airspeed is not used.
@@ -63,8 +63,8 @@ class AttitudeParameters:
         speed_gain_1_s: of the airspeed on its filter, which makes that change.
         attack: whether the angle of attack is estimated; otherwise it is zero.
         lift_1_m: k_L / m; None: learned in flight.
-        lift_slope_1_m_rad: lift slope over mass and square of airspeed; None: `lift_slope_ratio_1_rad` k_L / m.
-        lift_slope_ratio_1_rad: of lift slope to mean lift, where the slope is not given.
+        lift_slope_1_m_rad: lift slope over mass and square of airspeed; None: by the ratio below.
+        lift_slope_ratio_1_rad: of lift slope to k_L, where the slope is not given.
         lift_time_s: of the mean by which k_L is learned.
         climb_time_s: of the mean by which the rate of climb corrects the angle of attack.
         thrust_m_s2: k_M / m, thrust acceleration at full throttle.
@@ -88,21 +88,21 @@ class AttitudeParameters:
     imu: ImuSource = ImuSource.AUTO
     imu_instance: int = 0
     airspeed: AirspeedSource = AirspeedSource.AUTO
-    gain_1_s: float = 0.3
+    gain_1_s: float = 0.13
     bias_gain_1_s2: float = 0.003
-    rest_bias_time_s: float = 1.0
-    reference_tolerance_m_s2: float = 1.5
+    rest_bias_time_s: float = 20.0
+    reference_tolerance_m_s2: float = 3.0
     gap_max_s: float = 2.0
     airspeed_age_max_s: float = 3.0
     airspeed_min_m_s: float = 6.0
     longitudinal: bool = True
-    speed_gain_1_s: float = 1.0
+    speed_gain_1_s: float = 2.0
     attack: bool = True
     lift_1_m: float | None = None
     lift_slope_1_m_rad: float | None = None
     lift_slope_ratio_1_rad: float = 10.0
     lift_time_s: float = 10.0
-    climb_time_s: float = 20.0
+    climb_time_s: float = 10.0
     thrust_m_s2: float = 0.0
     thrust_loss_1_m: float = 0.0
     throttle_trim: float = 0.5

@@ -1,7 +1,7 @@
 """Inertial messages in SI units, and their quirks.
 
-RAW_IMU is what SCALED_IMU is on ArduPilot (milli-g, mrad/s); PX4 sends none of the scaled messages and HIGHRES_IMU in
-SI units. ArduPilot sends SCALED_IMU3 with zeros where there is no third sensor.
+RAW_IMU is what SCALED_IMU is on ArduPilot (milli-g, mrad/s); PX4 sends HIGHRES_IMU, in SI units, and none of
+the others by itself. ArduPilot sends SCALED_IMU3 with zeros where there is no third sensor: no sample at all.
 """
 
 from collections.abc import Callable, Mapping

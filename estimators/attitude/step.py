@@ -13,7 +13,9 @@ from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
-_TURNS_MAX_RAD = 0.5
+RATE_MAX_RAD_S = 70.0
+FORCE_MAX_M_S2 = 400.0
+_LOAD_MAX = 0.5
 
 
 @kernel
@@ -22,6 +24,7 @@ def start(x: Array, p: Array) -> None:
     x[:] = 0.0
     x[at.DOWN + 2] = 1.0
     x[at.RATE] = math.nan
+    x[at.LENGTH] = GRAVITY_M_S2
     x[at.AIRSPEED] = x[at.CLIMB] = x[at.THROTTLE] = x[at.SPEED] = math.nan
     rotor.start(x, p)
     uncertainty.start(x, at.ROLL_COVARIANCE, p)
@@ -29,33 +32,26 @@ def start(x: Array, p: Array) -> None:
 
 
 @kernel
-def step(
-    x: Array,
-    p: Array,
-    form: int,
-    disarmed: bool,
-    dt: float,
-    wx: float,
-    wy: float,
-    wz: float,
-    ax: float,
-    ay: float,
-    az: float,
-) -> None:
-    """Take one sample.
+def step(x: Array, p: Array) -> bool:
+    """Take the sample that was written into the state.
 
     Args:
         x: state (`layout`).
         p: coefficients (`parameters.coefficients`).
-        form: STILL, WING or ROTOR.
-        disarmed: the vehicle can't be flying.
-        dt: since the sample before, s; nothing for the first.
-        wx, wy, wz: measured angular rate, rad/s, FRD.
-        ax, ay, az: specific force, m/s^2, FRD.
+
+    Returns:
+        False when no sensor gives such a sample; nothing has changed then.
     """
+    dt = x[at.ELAPSED]
+    wx, wy, wz = x[at.SAMPLE_RATE], x[at.SAMPLE_RATE + 1], x[at.SAMPLE_RATE + 2]
+    ax, ay, az = x[at.SAMPLE_FORCE], x[at.SAMPLE_FORCE + 1], x[at.SAMPLE_FORCE + 2]
+    if max(abs(wx), abs(wy), abs(wz)) > RATE_MAX_RAD_S or max(abs(ax), abs(ay), abs(az)) > FORCE_MAX_M_S2:
+        return False
+    if ax == 0.0 and ay == 0.0 and az == 0.0:
+        return False
     if math.isnan(x[at.RATE]):
         _first(x, wx, wy, wz, ax, ay, az)
-        return
+        return True
     bx, by, bz = x[at.GYRO_BIAS], x[at.GYRO_BIAS + 1], x[at.GYRO_BIAS + 2]
     # The rate between two samples is taken as their mean.
     tilt.rotate(
@@ -66,23 +62,27 @@ def step(
         0.5 * (x[at.RATE + 2] + wz) - bz,
     )
     x[at.RATE], x[at.RATE + 1], x[at.RATE + 2] = wx, wy, wz
-    if form == at.WING and x[at.AIRSPEED] > 0.0:
+    disarmed = x[at.DISARMED] != 0.0
+    if disarmed:
+        _still(x, ax, ay, az)
+    elif x[at.FORM] == at.WING and x[at.AIRSPEED] > 0.0:
         wing.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
-    elif form == at.ROTOR and not disarmed:
+    elif x[at.FORM] == at.ROTOR:
         rotor.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
     else:
-        x[at.SPEED] = math.nan
-        x[at.VELOCITY] = x[at.VELOCITY + 1] = x[at.VELOCITY + 2] = 0.0
-        x[at.REFERENCE], x[at.REFERENCE + 1], x[at.REFERENCE + 2] = -ax, -ay, -az
+        _still(x, ax, ay, az)
     gain = tilt.correct(x, p, dt)
-    error_x, error_y = _errors(x, p, form, ax, ay, az)
-    uncertainty.propagate(x, at.ROLL_COVARIANCE, p, dt, gain, x[at.WEIGHT], error_x)
-    uncertainty.propagate(x, at.PITCH_COVARIANCE, p, dt, gain, x[at.WEIGHT], error_y)
+    error = _error(x, p, ax, ay, az)
+    learn = p[par.BIAS_GAIN] * x[at.WEIGHT] * dt
+    fade = math.exp(-dt / p[par.REFERENCE_TIME])
+    uncertainty.propagate(x, at.ROLL_COVARIANCE, p, dt, gain, learn, fade, error)
+    uncertainty.propagate(x, at.PITCH_COVARIANCE, p, dt, gain, learn, fade, error)
     found = tilt.rest(x, p, dt, disarmed, wx, wy, wz, ax, ay, az)
     if found > 0.0:
         uncertainty.rest(x, at.ROLL_COVARIANCE, found)
         uncertainty.rest(x, at.PITCH_COVARIANCE, found)
     x[at.AGE] += dt
+    return True
 
 
 @kernel
@@ -96,21 +96,26 @@ def _first(x: Array, wx: float, wy: float, wz: float, ax: float, ay: float, az: 
 
 
 @kernel
-def _errors(x: Array, p: Array, form: int, ax: float, ay: float, az: float) -> tuple[float, float]:
-    """Standard errors of the reference about the forward and the right axis, rad."""
+def _still(x: Array, ax: float, ay: float, az: float) -> None:
+    """No motion to speak of, or none that is known: the specific force points up."""
+    x[at.SPEED] = math.nan
+    x[at.VELOCITY] = x[at.VELOCITY + 1] = x[at.VELOCITY + 2] = 0.0
+    x[at.REFERENCE], x[at.REFERENCE + 1], x[at.REFERENCE + 2] = -ax, -ay, -az
+
+
+@kernel
+def _error(x: Array, p: Array, ax: float, ay: float, az: float) -> float:
+    """Standard error of the reference's direction about an axis, rad."""
     if x[at.REST_TIME] > 0.0:
-        return p[par.REST_ERROR], p[par.REST_ERROR]
+        return p[par.REST_ERROR]
+    # What motion adds to the force scales with it, and so do the errors of airspeed, incidence and drag.
+    if x[at.FORM] == at.WING:
+        mx = x[at.REFERENCE] + ax
+        my = x[at.REFERENCE + 1] + ay
+        mz = x[at.REFERENCE + 2] + az
+        load = math.sqrt(mx * mx + my * my + mz * mz) / GRAVITY_M_S2
+    else:
+        load = math.sqrt(ax * ax + ay * ay) / GRAVITY_M_S2 + x[at.INNOVATION]
+    manoeuvre = p[par.MANOEUVRE_ERROR] * min(_LOAD_MAX, load)
     steady = p[par.FLIGHT_ERROR]
-    if form == at.WING:
-        # What the motion adds to the force scales with it: errors of airspeed, angle of attack and sideslip do.
-        load_x = (x[at.REFERENCE + 1] + ay) / GRAVITY_M_S2
-        load_z = (x[at.REFERENCE + 2] + az) / GRAVITY_M_S2
-        manoeuvre = p[par.MANOEUVRE_ERROR] * math.sqrt(load_x * load_x + load_z * load_z)
-        return math.sqrt(steady * steady + manoeuvre * manoeuvre), math.sqrt(
-            steady * steady + manoeuvre * manoeuvre
-        )
-    turn = p[par.MANOEUVRE_ERROR] * min(
-        _TURNS_MAX_RAD, math.sqrt(ax * ax + ay * ay) / GRAVITY_M_S2 + x[at.INNOVATION]
-    )
-    error = math.sqrt(steady * steady + turn * turn)
-    return error, error
+    return math.sqrt(steady * steady + manoeuvre * manoeuvre)

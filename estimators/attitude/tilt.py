@@ -1,8 +1,8 @@
 """Roll and pitch as the direction down in the body: its motion, its correction, and the gyro bias (compiled).
 
-The direction down, `d = R_b^l' e_3`, is the paper's (seed 004) R_b^l without anything of yaw: with its projector (3), (11)
-`R' = R [(I - d d') w]x` moves d by `d' = -w x d`, for d x d = 0, and leaves the nose where it is. So R can be rebuilt
-from roll and pitch at any time, and no yaw creeps in.
+The direction down, `d = R_b^l' e_3`, is the paper's (seed 004) R_b^l without anything of yaw: with the
+projector of (3) and (11), `R' = R [(I - d d') w]x` moves d by `d' = -w x d`, for d x d = 0. R is rebuilt from
+roll and pitch where it is needed, so no yaw creeps in.
 """
 
 import math
@@ -17,12 +17,14 @@ from flightsim.kernels import kernel
 Array = NDArray[np.float64]
 
 GRAVITY_M_S2 = 9.80665
+_LENGTH_MEAN_S = 0.3
 _REST_MEAN_S = 0.5
 _REST_RATE_RAD_S = 0.02
 _REST_BIAS_RAD_S = 0.1
 _REST_FORCE_M_S2 = 0.3
 _REST_WEIGHT_M_S2 = 0.5
 _REST_AFTER_S = 1.0
+_REST_PRIOR_S = 2.0
 _BIAS_MAX_RAD_S = 0.2
 
 
@@ -49,7 +51,7 @@ def rotate(x: Array, dt: float, wx: float, wy: float, wz: float) -> None:
 
 @kernel
 def correct(x: Array, p: Array, dt: float) -> float:
-    """Pull the direction down towards the reference (11)-(13), and learn the gyro bias (12) from what is left.
+    """Pull the direction down towards the reference (11)-(13), and learn the gyro bias (12).
 
     In the first seconds the gain is the one of a running mean, so that any start is forgotten.
 
@@ -66,12 +68,14 @@ def correct(x: Array, p: Array, dt: float) -> float:
     if length < 1e-3:
         x[at.WEIGHT] = 0.0
         return 0.0
+    dx, dy, dz = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
+    # Judged by its mean over a moment: vibration is no reason to trust it less.
+    x[at.LENGTH] += min(1.0, dt / _LENGTH_MEAN_S) * (length - x[at.LENGTH])
+    off = (x[at.LENGTH] - GRAVITY_M_S2) / p[par.TOLERANCE]
+    weight = 1.0 / (1.0 + off * off)
     mx /= length
     my /= length
     mz /= length
-    dx, dy, dz = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
-    off = (length - GRAVITY_M_S2) / p[par.TOLERANCE]
-    weight = 1.0 / (1.0 + off * off)
     x[at.WEIGHT] = weight
     ex, ey, ez = my * dz - mz * dy, mz * dx - mx * dz, mx * dy - my * dx
     along = mx * dx + my * dy + mz * dz
@@ -134,7 +138,9 @@ def rest(
     x[at.REST_TIME] = x[at.REST_TIME] + dt if still and disarmed else 0.0
     if x[at.REST_TIME] < _REST_AFTER_S:
         return 0.0
-    gain = min(1.0, dt / p[par.REST_BIAS_TIME])
+    # The mean of all rest so far, zero counting for a moment of it: a gust that rocks the vehicle is no bias.
+    x[at.REST_SUM] = min(x[at.REST_SUM] + dt, p[par.REST_BIAS_TIME])
+    gain = min(1.0, dt / (_REST_PRIOR_S + x[at.REST_SUM]))
     x[at.GYRO_BIAS] += gain * (wx - x[at.GYRO_BIAS])
     x[at.GYRO_BIAS + 1] += gain * (wy - x[at.GYRO_BIAS + 1])
     x[at.GYRO_BIAS + 2] += gain * (wz - x[at.GYRO_BIAS + 2])

@@ -1,7 +1,8 @@
 """How far off roll and pitch may be: covariance of the filter as it is, with its fixed gains (compiled).
 
-About one axis the error is `(tilt, bias, reference)`: the tilt and gyro-bias errors, and the error of the reference
-direction, which lasts (first-order Gauss-Markov) because manoeuvres and gusts do. The filter moves it by
+About one axis the error is `(tilt, bias, reference)`: the tilt and gyro-bias errors, and the error of the
+reference direction, which lasts (first-order Gauss-Markov) because manoeuvres and gusts do. The filter moves
+it by
 
     tilt'      = (1 - k) tilt - dt bias + k reference
     bias'      = bias + l (tilt - reference)
@@ -10,8 +11,6 @@ direction, which lasts (first-order Gauss-Markov) because manoeuvres and gusts d
 and the covariance by the same matrix; there is no claim of optimality. Six places hold the upper triangle:
 tilt-tilt, tilt-bias, tilt-reference, bias-bias, bias-reference, reference-reference.
 """
-
-import math
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +33,9 @@ def start(x: Array, at: int, p: Array) -> None:
 
 
 @kernel
-def propagate(x: Array, at: int, p: Array, dt: float, gain: float, weight: float, error: float) -> None:
+def propagate(
+    x: Array, at: int, p: Array, dt: float, gain: float, learn: float, fade: float, error: float
+) -> None:
     """One step.
 
     Args:
@@ -43,13 +44,13 @@ def propagate(x: Array, at: int, p: Array, dt: float, gain: float, weight: float
         p: coefficients.
         dt: s.
         gain: k, of the reference on the tilt in this step.
-        weight: of the reference, 0..1.
+        learn: l, of the reference on the bias.
+        fade: f, part of the reference's error that is left after this step.
         error: standard error of the reference now, rad.
     """
     tt, tb, tr, bb, br, rr = x[at], x[at + 1], x[at + 2], x[at + 3], x[at + 4], x[at + 5]
-    keep, learn = 1.0 - gain, p[par.BIAS_GAIN] * weight * dt
-    f = math.exp(-dt / p[par.REFERENCE_TIME])
-    # Rows of the transition: T = (keep, -dt, gain), B = (learn, 1, -learn), R = (0, 0, f).
+    keep = 1.0 - gain
+    # Rows of the transition: T = (keep, -dt, gain), B = (learn, 1, -learn), R = (0, 0, fade).
     t_t, t_b, t_r = (
         keep * tt - dt * tb + gain * tr,
         keep * tb - dt * bb + gain * br,
@@ -58,10 +59,10 @@ def propagate(x: Array, at: int, p: Array, dt: float, gain: float, weight: float
     b_t, b_b, b_r = learn * tt + tb - learn * tr, learn * tb + bb - learn * br, learn * tr + br - learn * rr
     x[at] = keep * t_t - dt * t_b + gain * t_r + p[par.GYRO_NOISE] ** 2 * dt
     x[at + 1] = learn * t_t + t_b - learn * t_r
-    x[at + 2] = f * t_r
+    x[at + 2] = fade * t_r
     x[at + 3] = learn * b_t + b_b - learn * b_r + p[par.GYRO_BIAS_WALK] ** 2 * dt
-    x[at + 4] = f * b_r
-    x[at + 5] = f * f * rr + (1.0 - f * f) * error * error
+    x[at + 4] = fade * b_r
+    x[at + 5] = fade * fade * rr + (1.0 - fade * fade) * error * error
 
 
 @kernel

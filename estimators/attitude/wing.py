@@ -52,8 +52,8 @@ def reference(
 
     change = 0.0
     if p[par.LONGITUDINAL] != 0.0:
-        # The speed is integrated from force and attitude and held to the measured one; the pull that this takes
-        # is what the airspeed says of the attitude, smoothed as much as the airspeed needs.
+        # The speed is integrated from force and attitude and held to the measured one; the pull that this
+        # takes is what the airspeed says of the attitude, smoothed as much as the airspeed needs.
         if x[at.AIRSPEED_FRESH] != 0.0:
             x[at.SPEED_ERROR] = airspeed - x[at.SPEED]
         pull = p[par.SPEED_GAIN] * x[at.SPEED_ERROR]
@@ -82,7 +82,6 @@ def lift_slope(x: Array, p: Array) -> float:
 
 @kernel
 def _learn_lift(x: Array, p: Array, dt: float, up: float) -> None:
-    x[at.WING_TIME] += dt
     if p[par.LIFT_GIVEN] > 0.0:
         x[at.LIFT] = p[par.LIFT_GIVEN]
         return
