@@ -105,7 +105,6 @@ class AnomalyDetector:
         residual_nt: newest differential measurement, level removed; NaN before the first.
         anomalous: an anomaly is going on.
         dropped: readings that were no use.
-        levels_lost: how often the level was begun anew.
     """
 
     def __init__(
@@ -133,7 +132,6 @@ class AnomalyDetector:
             raise PlanError(f"{least_samples} samples make no anomaly; at least 1 is needed")
         self.residual_nt = math.nan
         self.dropped = 0
-        self.levels_lost = 0
         self._threshold_nt = threshold_nt
         self._least_samples = least_samples
         self._level_time_us = level_time_s * 1e6
@@ -162,7 +160,6 @@ class AnomalyDetector:
             return None
         if self._peak is not None and time_us - self._began_us > self._longest_us:
             self._peak, self._level_nt = None, math.nan
-            self.levels_lost += 1
         if math.isnan(self._level_nt):
             self._level_nt = difference_nt
         elapsed_us = 0 if self._time_us < 0 else time_us - self._time_us

@@ -82,7 +82,6 @@ class Pilot:
 
     Attributes:
         commands: every heading commanded, in time.
-        searching: it has reached its start.
     """
 
     def __init__(self, search: Search, searcher: int, *, start_ne_m: tuple[float, float]) -> None:
@@ -94,7 +93,6 @@ class Pilot:
             start_ne_m: where its part of the search begins.
         """
         self.commands: list[HeadingCommand] = []
-        self.searching = False
         self._search = search
         self._searcher = searcher
         self._start_ne_m = start_ne_m
@@ -108,7 +106,6 @@ class Pilot:
             return self._fly_to(self._start_ne_m, motion)
         if not self._done(self._goal_ne_m, motion):
             return None
-        self.searching = True
         decision = self._search.next_cell(
             self._searcher, motion.north_m, motion.east_m, motion.course_rad % math.tau
         )
