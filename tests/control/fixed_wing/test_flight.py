@@ -9,7 +9,7 @@ from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingParameters
 from autopilot_bridge.navigation import layout as n
 from flightsim.airframe import Role
-from flightsim.environment import Environment, Turbulence
+from flightsim.environment import CosineGust, Environment, Turbulence
 from tests.control.fixed_wing.aerosonde import AEROSONDE
 from tests.control.fixed_wing.rig import ACTUATORS, Rig
 
@@ -166,6 +166,16 @@ def test_with_a_dead_motor_height_is_given_up_for_airspeed() -> None:
     assert log[:, n.AIRSPEED_M_S].min() > 1.05 * AEROSONDE.stall_speed_m_s
     assert -log[-1, 12] < 130.0
     assert np.ptp(log[-500:, PITCH]) < math.radians(1.0)
+
+
+def test_a_lull_is_no_dead_motor() -> None:
+    """A wind from behind grows faster than full throttle can follow; the height isn't given up for that."""
+    lull = CosineGust(start_s=10.0, velocity_ned_m_s=(14.0, 0.0, 0.0), rise_s=5.0, hold_s=5.0, fall_s=8.0)
+    flown = rig(environment=Environment(gusts=(lull,)))
+    log = flown.run(12.0)
+    assert log[:, ACTUATORS][:, 2].max() > 0.99
+    assert log[:, n.AIRSPEED_M_S].min() < TRIM_M_S - 3.0
+    assert np.ptp(log[:, 12]) < 3.0
 
 
 def test_slow_turn_keeps_clear_of_the_stall() -> None:
