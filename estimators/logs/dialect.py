@@ -102,7 +102,7 @@ def load_dialect(name: str | Path | None = None) -> Dialect:
     """
     text = DEFAULT_DIALECT if name is None else str(name)
     if isinstance(name, Path) or re.search(r"[/\\]|\.xml$", text, re.IGNORECASE):
-        return Dialect(text, _described(_from_text(item) for item in read_definitions(Path(text))))
+        return Dialect(text, _described(text, (_from_text(item) for item in read_definitions(Path(text)))))
     if text not in dialect_names():
         raise LogError(
             f"no MAVLink dialect {text!r}; accepted: {', '.join(dialect_names())}, "
@@ -114,10 +114,11 @@ def load_dialect(name: str | Path | None = None) -> Dialect:
 @cache
 def _pymavlink_dialect(name: str) -> Dialect:
     module = importlib.import_module(f"pymavlink.dialects.v20.{name}")
-    return Dialect(name, _described(_from_class(item) for item in module.mavlink_map.values()))
+    return Dialect(name, _described(name, (_from_class(item) for item in module.mavlink_map.values())))
 
 
 def _described(
+    name: str,
     items: Iterable[tuple[MessageDefinition, Mapping[str, str], str | None]],
 ) -> Mapping[int, Description]:
     found = {}
@@ -125,9 +126,11 @@ def _described(
         known = DEFINITIONS.get(made.message_id)
         # The same layout is the same message: one class of messages then serves links and logs.
         same = known if known is not None and _layout(known) == _layout(made) else made
-        found[made.message_id] = Description(
-            same, MappingProxyType(dict(units)), instance_field, message_class(same)
-        )
+        try:
+            message = message_class(same)
+        except ValueError as error:  # a name that can't be one of a field of a named tuple
+            raise LogError(f"dialect {name}: message {made.name}: {error}; rename it") from error
+        found[made.message_id] = Description(same, MappingProxyType(dict(units)), instance_field, message)
     return MappingProxyType(found)
 
 

@@ -151,6 +151,12 @@ def test_dialects_by_name(tmp_path):
             '<field name="b" type="char"/></message></messages></mavlink>',
             "a field twice",
         ),
+        (
+            "bad.xml",
+            '<mavlink><messages><message name="A" id="1"><field name="_b" type="char"/></message>'
+            "</messages></mavlink>",
+            "message A: .*underscore.*rename it",
+        ),
     ],
 )
 def test_dialects_that_are_none(tmp_path, name, content, words):

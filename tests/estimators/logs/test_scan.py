@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.tlog import TlogReader
 from estimators.logs import LogError, open_log
+from estimators.logs.columns import decode_columns
 from estimators.logs.crc import checksum
 from estimators.logs.dialect import load_dialect
 from estimators.logs.tlog import TlogSource
@@ -226,6 +227,18 @@ def test_messages_longer_than_their_definition_and_shorter():
     assert heartbeat["custom_mode"][0] == int.from_bytes(bytes([1, 2, 3, 4]), "little")
     assert heartbeat["mavlink_version"][0] == 9
     assert (attitude["time_boot_ms"][0], attitude["yawspeed"][0]) == (1, 0.0)
+
+
+def test_positions_in_files_too_large_for_32_bits():
+    """Such files have wider offsets; the columns are the same."""
+    source = source_of(tlog(mixed_frames(300)))
+    starts = source.index.starts
+    assert starts.dtype == np.uint32
+    for stream in source.streams:
+        definition = stream.description.definition
+        narrow = decode_columns(source.data, starts[stream.order], definition)
+        wide = decode_columns(source.data, starts[stream.order].astype(np.int64), definition)
+        assert [narrow[name].tobytes() for name in narrow] == [wide[name].tobytes() for name in wide]
 
 
 def test_time_stamps_of_every_kind():
