@@ -16,7 +16,7 @@ from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type, whole
 from flightsim.home import Home
-from flightsim.kernels import kernel
+from flightsim.kernels import compiled_for, kernel
 from flightsim.payload import GroundTargets
 from flightsim.truth import TRUTH_SIZE
 
@@ -56,7 +56,7 @@ class TruthEncoder:
         truth: layout of `flightsim.truth`, written in place by the vehicle.
     """
 
-    __slots__ = ("_encoder", "_record", "_truth")
+    __slots__ = ("_encoder", "_fill", "_record", "_truth")
 
     def __init__(self, system_id: int, truth: NDArray[np.float64]) -> None:
         if truth.shape != (TRUTH_SIZE,):
@@ -64,10 +64,11 @@ class TruthEncoder:
         self._encoder = FrameEncoder(system_id, SIMULATOR_COMPONENT)
         self._truth = truth
         self._record = np.zeros(1, record_type(definition(_MESSAGE_ID)))
+        self._fill = compiled_for(_fill, truth, 0, self._record)
 
     def encode(self, time_us: int) -> bytes:
         """One HIL_STATE_QUATERNION frame of the present truth."""
-        _fill(self._truth, time_us, self._record)
+        self._fill(self._truth, time_us, self._record)
         return self._encoder.encode_payload(_MESSAGE_ID, self._record.tobytes())
 
     def encode_text(self, text: str) -> bytes:

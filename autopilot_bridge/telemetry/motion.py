@@ -36,7 +36,7 @@ MESSAGES: Final = (
 _POSE_POSITION: Final = (0, 6, 11)  # diagonal of an upper-triangular 6x6 covariance, row by row
 _POSE_ATTITUDE: Final = (15, 18, 20)
 _HIGHRES_FIELDS_UPDATED: Final = 63  # accelerometer, gyro: what PX4's driver publishes together
-_PLACE_SIZE: Final = 6
+_PLACE_SIZE: Final = 5
 _FRAME_OVERHEAD: Final = 12  # header and checksum
 _NEED_ATTITUDE: Final = 0b100011  # bits of MESSAGES
 _NEED_FRAME: Final = 0b001000
@@ -51,6 +51,7 @@ def _fill(
     baro: Array,
     covariance: Array,
     place: Array,
+    home_ned_m: Array,
     time_us: int,
     out: NDArray[np.void],
 ) -> None:
@@ -76,7 +77,8 @@ def _fill(
     r.global_position_int__lat = whole((place[0] + nav[10] / place[3]) * 1e7, 1.8e9)
     r.global_position_int__lon = whole(longitude * 1e7, 1.8e9)
     r.global_position_int__alt = whole((place[2] - nav[12]) * 1e3, 2e9)
-    r.global_position_int__relative_alt = whole((place[5] - nav[12]) * 1e3, 2e9)
+    home_down_m = home_ned_m[2] if home_ned_m[2] == home_ned_m[2] else 0.0
+    r.global_position_int__relative_alt = whole((home_down_m - nav[12]) * 1e3, 2e9)
     r.global_position_int__vx = whole(nav[7] * 100.0, 32767.0)
     r.global_position_int__vy = whole(nav[8] * 100.0, 32767.0)
     r.global_position_int__vz = whole(nav[9] * 100.0, 32767.0)
@@ -220,6 +222,7 @@ class MotionMessages:
             readings.barometer.values,
             self._covariance,
             self._place,
+            context.home_ned_m,
             0,
             self._record,
         )
@@ -289,14 +292,10 @@ class MotionMessages:
         self._time_us = time_us
         context, place = self._context, self._place
         frame = context.frame
-        if frame is not None:
-            if frame is not self._frame:
-                self._frame = frame
-                origin = frame.origin
-                place[0], place[1], place[2] = origin.lat_deg, origin.lon_deg, origin.alt_m
-                place[3], place[4] = frame.metres_per_degree
-            home_down_m = context.home_ned_m[2]
-            place[5] = home_down_m if home_down_m == home_down_m else 0.0
+        if frame is not self._frame and frame is not None:
+            self._frame = frame
+            origin = frame.origin
+            place[:] = origin.lat_deg, origin.lon_deg, origin.alt_m, *frame.metres_per_degree
         readings = self._readings
         self._fill(
             self._navigation.state,
@@ -305,6 +304,7 @@ class MotionMessages:
             readings.barometer.values,
             self._covariance,
             place,
+            context.home_ned_m,
             time_us,
             self._record,
         )

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.kernels import kernel
+from flightsim.kernels import compiled_for, kernel
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ class VibrationMeter:
         rate_hz: calls of `update` per second.
     """
 
-    __slots__ = ("_accel", "_blend_level", "_blend_slow", "_level", "_slow")
+    __slots__ = ("_accel", "_blend_level", "_blend_slow", "_level", "_slow", "_take")
 
     def __init__(self, accel_frd_m_s2: Array, *, rate_hz: float) -> None:
         self._accel = accel_frd_m_s2
@@ -37,10 +37,11 @@ class VibrationMeter:
         self._level = np.zeros(3)
         self._blend_slow = min(1.0, 2.0 * math.pi * 5.0 / rate_hz)
         self._blend_level = min(1.0, 2.0 * math.pi * 2.0 / rate_hz)
+        self._take = compiled_for(_update, accel_frd_m_s2, self._slow, self._level, 0.0, 0.0)
 
     def update(self) -> None:
         """Take the newest sample."""
-        _update(self._accel, self._slow, self._level, self._blend_slow, self._blend_level)
+        self._take(self._accel, self._slow, self._level, self._blend_slow, self._blend_level)
 
     @property
     def rms_m_s2(self) -> tuple[float, float, float]:
