@@ -68,21 +68,22 @@ def main() -> int:
     first, _, last = arguments.seeds.partition("-")
     flavours = (arguments.flavour,) if arguments.flavour else ("px4", "ardupilot")
     plans = (arguments.plan,) if arguments.plan else tuple(PLANS)
+    seeds = range(int(first), int(last or first) + 1)
+    rows: dict[str, list[tuple[float, ...]]] = {flavour: [] for flavour in flavours}
     missed = 0
+    for seed, flavour, name, launch, wind_deg in itertools.product(
+        seeds, flavours, plans, LAUNCHES, DIRECTIONS_DEG
+    ):
+        figures = fly_case(Case(flavour, launch, PLANS[name], wind_deg, seed))
+        rows[flavour].append(_numbers(figures))
+        short = shortfalls(figures)
+        missed += bool(short)
+        if arguments.each or short:
+            case = f"{flavour} {name} {launch or 'runway'} wind {wind_deg:.0f} seed {seed}"
+            sys.stdout.write(f"{case}: {figures}{'  MISSED: ' if short else ''}{', '.join(short)}\n")
+            sys.stdout.flush()
     for flavour in flavours:
-        rows: list[tuple[float, ...]] = []
-        seeds = range(int(first), int(last or first) + 1)
-        for name, launch, wind_deg, seed in itertools.product(plans, LAUNCHES, DIRECTIONS_DEG, seeds):
-            figures = fly_case(Case(flavour, launch, PLANS[name], wind_deg, seed))
-            rows.append(_numbers(figures))
-            short = shortfalls(figures)
-            missed += bool(short)
-            if arguments.each or short:
-                case = f"{flavour} {name} {launch or 'runway'} wind {wind_deg:.0f} seed {seed}"
-                sys.stdout.write(f"{case}: {figures}{'  MISSED: ' if short else ''}{', '.join(short)}\n")
-                sys.stdout.flush()
-        sys.stdout.write(_table(flavour, rows) + "\n")
-        sys.stdout.flush()
+        sys.stdout.write(_table(flavour, rows[flavour]) + "\n")
     sys.stdout.write(f"\n{missed} missions missed something\n")
     return 1 if missed else 0
 
