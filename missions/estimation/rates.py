@@ -12,6 +12,8 @@ __all__ = ["CHECK_PERIOD_S", "RateWatch", "interval_request"]
 
 CHECK_PERIOD_S: Final = 2.0
 """Vehicle time over which rates are measured; an autopilot answers a request within it."""
+_MARGIN: Final = 1.25
+"""What would just do is asked for with so much to spare."""
 _ROUNDS: Final = 3
 """How often each alternative of what would only be nice to have is asked for."""
 
@@ -75,9 +77,8 @@ class RateWatch:
             which = f"vehicle {system_id}: " if len(ids) > 1 else ""
             self.lacking += [which + text for text in lacking(self._needs, rate_hz)]
             for index, need in enumerate(self._needs):
-                name = self._to_ask(system_id, index, need, rate_hz)
-                if name is not None:
-                    requests.append((system_id, name, wanted_rate_hz(need)))
+                asked = self._to_ask(system_id, index, need, rate_hz)
+                requests += [(system_id, name, asked_hz) for name, asked_hz in asked]
         return requests
 
     def _rate_of(
@@ -93,14 +94,23 @@ class RateWatch:
 
         return rate_hz
 
-    def _to_ask(self, system_id: int, index: int, need: Need, rate_hz: Callable[[str], float]) -> str | None:
-        """The next alternative to ask for; None where one is fast enough, or asking was of no use."""
-        rates = [rate_hz(name) for name in need.messages]
-        if max(rates) >= RATE_TOLERANCE * wanted_rate_hz(need) or (not need.rate_hz and max(rates) > 0.0):
-            return None
+    def _to_ask(
+        self, system_id: int, index: int, need: Need, rate_hz: Callable[[str], float]
+    ) -> list[tuple[str, float]]:
+        """Messages and rates to ask for; none where one is fast enough, or asking was of no use."""
+        heard_hz, best = max((rate_hz(name), -k) for k, name in enumerate(need.messages))
+        wanted_hz = wanted_rate_hz(need)
+        served = heard_hz > 0.0 and heard_hz >= RATE_TOLERANCE * need.rate_hz
+        if served and (not need.rate_hz or heard_hz >= RATE_TOLERANCE * wanted_hz):
+            return []
         times = self._asked[system_id, index]
-        served = max(rates) > 0.0 and max(rates) >= RATE_TOLERANCE * need.rate_hz
-        if times >= _ROUNDS * len(need.messages) and (served or need.optional):
-            return None
+        if served:  # it would do; whether it can be faster is asked once
+            self._asked[system_id, index] += 1
+            return [] if times else [(need.messages[-best], wanted_hz)]
+        if need.optional and times >= _ROUNDS * len(need.messages):
+            return []
         self._asked[system_id, index] += 1
-        return need.messages[times % len(need.messages)]
+        name = need.messages[times % len(need.messages)]
+        # An autopilot that finds the second too fast has granted the first.
+        enough_hz = _MARGIN * need.rate_hz
+        return [(name, rate) for rate in (enough_hz, wanted_hz) if 0.0 < rate <= wanted_hz]

@@ -35,6 +35,14 @@ INTERRUPTED: Final = "interrupted"
 PICTURE_NAME: Final = "errors.png"
 ESTIMATES_NAME: Final = "estimates"
 _CSV_DIGITS: Final = 9
+_NOTHING: Final[Mapping[str, Any]] = {
+    "system_id": None,
+    "samples": 0,
+    "counters": {},
+    "left_out": {},
+    "airborne_s": 0.0,
+    "reference": None,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +128,7 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
         "reason": reason,
         "partial": partial,
         "needs": _needs(supplies),
-        **(_headline(blocks[0]) if blocks else {"samples": 0, "counters": {}, "reference": None}),
+        **(_headline(blocks[0]) if blocks else _NOTHING),
         "vehicles": blocks,
         "parameters": _plain(fleet.parameters),
         "settings": list(request.settings),
