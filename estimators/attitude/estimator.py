@@ -19,7 +19,7 @@ from estimators.attitude.parameters import (
     VehicleKind,
     coefficients,
 )
-from estimators.attitude.samples import SAMPLES, fields_given
+from estimators.attitude.samples import DIFFERENTIAL_PRESSURE, SAMPLES, fields_given
 from estimators.attitude.step import start, step
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -52,6 +52,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._state = np.empty(at.STATE_SIZE)
         self._sample = self._state.data
         self._guard = InputGuard(max_gap_us=round(p.gap_max_s * 1e6))
+        self._instance = p.imu_instance
         self._airspeed_age_us = round(p.airspeed_age_max_s * 1e6)
         self._air = AirData(p.airspeed, self._airspeed_age_us)
         self._handlers: dict[str, Callable[[int, Message], Outcome]] = {
@@ -111,7 +112,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         """Begin to filter anew; what is known of the vehicle and the air stays true."""
         start(self._state, self._coefficients)
         self._time_us: int | None = None
-        self._airspeed_us = -(1 << 62)
+        self._airspeed_until_us = -1
 
     @property
     def estimates(self) -> Sequence[AttitudeEstimate]:
@@ -224,7 +225,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         if airspeed_m_s is not None:
             self._state[at.AIRSPEED] = airspeed_m_s
             self._state[at.AIRSPEED_FRESH] = 1.0
-            self._airspeed_us = time_us
+            self._airspeed_until_us = time_us + self._airspeed_age_us
 
     def _forget(self) -> None:
         """Time went back: another boot. The guard has kept the message at hand."""
@@ -234,14 +235,14 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
     # Inertial messages
 
     def _highres_imu(self, time_us: int, message: Message) -> Outcome:
-        if message.id != self.parameters.imu_instance or not fields_given(message):
+        if message.id != self._instance or not fields_given(message.fields_updated):
             return Outcome.IGNORED
-        if time_us - self._airspeed_us > self._airspeed_age_us:  # nobody else tells an airspeed
+        if message.diff_pressure > 0.0 and message.fields_updated & DIFFERENTIAL_PRESSURE:
             self._hear(time_us, self._air.by_pressure(time_us, message.diff_pressure))
         return self._imu(time_us, message)
 
     def _raw_imu(self, time_us: int, message: Message) -> Outcome:
-        if message.id != self.parameters.imu_instance:
+        if message.id != self._instance:
             return Outcome.IGNORED
         return self._imu(time_us, message)
 
@@ -266,7 +267,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         else:
             elapsed_s = (time_us - before_us) * 1e-6
         state = self._state
-        if time_us - self._airspeed_us > self._airspeed_age_us:
+        if time_us > self._airspeed_until_us:
             state[at.AIRSPEED] = nan
         _write_sample(self._sample, 0, self._form, self._disarmed, elapsed_s, *sample)
         if not step(state, self._coefficients):

@@ -1,8 +1,8 @@
 """Multirotor: where down is, from the drag of its rotors and body (compiled).
 
 The accelerometer of a multirotor that accelerates does not feel the tilt: thrust is along the body's down
-axis at any attitude. What it feels across that axis is drag, in proportion to the speed against the air. So
-it is a speedometer, and its speed is held against the one integrated from attitude and force (docs/attitude.md).
+axis at any attitude. What it feels across that axis is drag, in proportion to the speed against the air: it
+is a speedometer, and its speed is held against the one integrated from attitude and force (docs/attitude.md).
 """
 
 import math
