@@ -15,10 +15,8 @@ AIRSPEED_M_S = 25.0
 """Trim airspeed of the aircraft flown."""
 SETTLED_AFTER_M = 200.0
 """A leg counts from here on: 8 s of flight, in which the turn onto it has died away. Only where the quickest
-turn onto it that wings and wind allow (`turn_geometry`) isn't over by then, it counts from where that is, and
-`DIES_AWAY_S` later: sharper turns than about a right angle."""
-DIES_AWAY_S = 2.2
-"""The guidance takes back small track errors at the rate pi / (period x damping), of 10 s and 0.7."""
+turn onto it that wings and wind allow (`turn_geometry`) isn't over by then, it counts from where that is:
+behind turns back, and some in a wind from behind."""
 SETTLED_BEFORE_M = 100.0
 """... up to here, where the turn to the next one may begin."""
 _SEA_LEVEL_DENSITY_KG_M3 = 1.225
@@ -109,8 +107,7 @@ def settled_after_m(flavour: str, before: Place, corner: Place, after: Place, wi
         reversal_s=_REVERSAL_S,
         wind=wind,
     )
-    dies_away_m = DIES_AWAY_S * ground_speed(course(corner, after), AIRSPEED_M_S, wind)
-    return max(SETTLED_AFTER_M, over_m + dies_away_m)
+    return max(SETTLED_AFTER_M, over_m)
 
 
 @dataclass(slots=True, kw_only=True)
