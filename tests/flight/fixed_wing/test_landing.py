@@ -14,7 +14,10 @@ from autopilot_bridge.flight.fixed_wing import DescendTask, FixedWingFlightParam
 from autopilot_bridge.flight.fixed_wing.approach import approach_along_leg
 from autopilot_bridge.flight.fixed_wing.flare import flare_height, flare_time
 from autopilot_bridge.flight.task import TaskStatus
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.navigation import layout as n
 from flightsim.environment import Environment
+from tests.control.fixed_wing.aerosonde import AEROSONDE
 from tests.flight.fixed_wing.aircraft import Aircraft
 
 REST_M = 0.3  # height of the centre of gravity, standing
@@ -122,6 +125,43 @@ def test_far_from_the_leg_it_circles_to_its_entry_first() -> None:
     assert task.phase is LandPhase.CIRCLE
     along, right = land(rig, task)
     assert abs(along) < 15.0 and abs(right) < 3.0
+
+
+def test_beside_the_runway_on_short_final_it_goes_around() -> None:
+    rig = flying((0.0, 0.0))
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    rig.run_until(lambda: -rig.nav[12] < 11.0, 60.0)
+    origin = rig.frame.origin  # GPS finds itself aside
+    rig.frame = LocalFrame(replace(origin, lon_deg=origin.lon_deg + 30.0 / 75_000.0))
+    rig.run(0.2)
+    assert task.phase is LandPhase.GO_AROUND
+    along, right = finish(rig, task)
+    assert abs(along) < 15.0 and abs(right) < 3.0
+
+
+def test_lifted_again_after_the_touch_it_flares_once_more() -> None:
+    rig = flying((-4.0, 0.0))
+    rig.rangefinder = True
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    rig.run_until(lambda: task.phase is LandPhase.ROLL_OUT, 60.0)
+    rig.nav[n.HEIGHT_ABOVE_GROUND_M] = REST_M + 0.5
+    task.update(rig.ctx)
+    assert task.phase is LandPhase.FLARE
+    assert rig.controller.setpoint[sp.HEIGHT_RATE_M_S] < 0.0
+    rig.run_until(lambda: task.phase is LandPhase.LANDED, 60.0)
+
+
+def test_other_aircraft_stand_higher_and_hold_their_own_pitch_in_the_flare() -> None:
+    small = FixedWingFlightParameters.for_envelope(AEROSONDE)
+    assert small.standing_height_m == AEROSONDE.standing_height_m
+    assert small.flare_pitch_min_rad == pytest.approx(math.radians(1.0))
+    level = replace(AEROSONDE, standing_height_m=1.3, trim_pitch_rad=0.0, short_period_frequency_rad_s=5.0)
+    other = FixedWingFlightParameters.for_envelope(level)
+    assert other.standing_height_m == 1.3
+    assert other.flare_pitch_min_rad < 0.0  # else it would float until it is slow
+    assert other.pitch_time_constant_s > small.pitch_time_constant_s
 
 
 def test_position_lost_on_short_final_it_goes_straight_on() -> None:
