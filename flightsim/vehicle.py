@@ -394,7 +394,7 @@ class Vehicle:
         )
         if self.launcher is not None and not self.launcher.released:
             self.truth[t.ON_GROUND] = 1.0  # the launcher carries its weight
-        return Motion.BROKEN if motion == Motion.SOUND and sink_m_s > self._sink_max_m_s else motion
+        return Motion.BROKEN if sink_m_s > self._sink_max_m_s and motion == Motion.SOUND else motion
 
     def _end(self, motion: int, actuators: Array) -> None:
         """What can't go on: a crash, or a model that diverged."""
