@@ -13,6 +13,7 @@ import click
 _COMMANDS: Final = {
     "fly": ("missions.cli_fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
     "sitl": ("missions.cli_sitl", "sitl", "SITL for other people's clients."),
+    "log": ("missions.cli_log", "log", "Look into logs, and make others of them."),
     "estimate": (
         "missions.cli_estimate",
         "estimate",

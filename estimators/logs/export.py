@@ -1,0 +1,238 @@
+"""Logs to the formats of other tools: Parquet, CSV, NumPy's npz, MCAP."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from estimators.logs.errors import LogError
+from estimators.logs.iterate import Selection, messages_in_order
+from estimators.logs.log import Log
+from estimators.logs.new_file import new_file
+from estimators.logs.table import Table
+from estimators.messages import SOURCE_FIELDS
+
+FORMATS: Final = ("csv", "parquet", "npz", "mcap")
+"""csv, parquet: a folder with a file for each message and component; npz, mcap: one file."""
+
+_TIMES: Final = ("time_us", "log_time_us")
+
+
+def export(
+    log: Log, selections: Sequence[Selection], path: Path, form: str, *, si: bool = False
+) -> list[Path]:
+    """Write a selection of a log.
+
+    Every row has `time_us` (vehicle time) and `log_time_us` (Unix microseconds; 0: not known).
+
+    Args:
+        log: an open log.
+        selections: from `Log.select`.
+        path: the folder (csv, parquet) or file (npz, mcap); nothing is overwritten.
+        form: one of `FORMATS`.
+        si: SI units and radians in place of wire values (not MCAP, whose messages stay MAVLink's).
+
+    Returns:
+        What was written.
+
+    Raises:
+        LogError: nothing is selected, the format is not known, or a file exists or can't be written.
+    """
+    writer = _WRITERS.get(form)
+    if writer is None:
+        raise LogError(f"no export to {form!r}; accepted: {', '.join(FORMATS)}")
+    if not selections:
+        raise LogError(f"nothing of {log.path} is selected; choose other messages, sources or conditions")
+    if si and form == "mcap":
+        raise LogError("mcap holds MAVLink's own values; leave --si out, or export to csv, parquet or npz")
+    return writer(log, selections, path, si)
+
+
+def table_columns(table: Table, *, si: bool) -> dict[str, np.ndarray[Any, Any]]:
+    """A table's columns by name, times first; with `si`, in SI units and radians where a field has a unit."""
+    columns: dict[str, np.ndarray[Any, Any]] = {"time_us": table.time_us, "log_time_us": table.log_time_us}
+    for field in table.fields:
+        name = field if field not in columns else f"{field}_"  # a field of that name gives way
+        column = table[field]
+        columns[name] = (
+            table.si(field) if si and column.dtype.kind != "S" and field in table.units else column
+        )
+    return columns
+
+
+def _name(table: Table) -> str:
+    return f"{table.name}_{table.system_id}_{table.component_id}"
+
+
+def _tables(log: Log, selections: Sequence[Selection]) -> list[Table]:
+    return [log.stream_table(stream).select(rows) for stream, rows in selections]
+
+
+def _units(table: Table, si: bool) -> Mapping[str, str]:
+    return {field: table.si_unit(field) if si else unit for field, unit in table.units.items()}
+
+
+def _arrow(table: Table, si: bool) -> Any:
+    import pyarrow as pa
+
+    units = _units(table, si)
+    arrays, fields = [], []
+    for name, column in table_columns(table, si=si).items():
+        unit = "us" if name in _TIMES else units.get(name, "")
+        if column.dtype.kind == "S":
+            array = pa.array([item.decode("ascii", "replace") for item in column.tolist()], type=pa.string())
+        elif column.ndim == 2:
+            values = pa.array(np.ascontiguousarray(column).reshape(-1))
+            array = pa.FixedSizeListArray.from_arrays(values, column.shape[1])
+        else:
+            array = pa.array(np.ascontiguousarray(column))
+        arrays.append(array)
+        fields.append(pa.field(name, array.type, metadata={"unit": unit} if unit else None))
+    about = {
+        "message": table.name,
+        "system_id": str(table.system_id),
+        "component_id": str(table.component_id),
+    }
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=about))
+
+
+def _flat(columns: Mapping[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]:
+    """Arrays as one column for each element, for CSV: controls_0, controls_1, ..."""
+    flat: dict[str, np.ndarray[Any, Any]] = {}
+    for name, column in columns.items():
+        if column.ndim == 2:
+            flat |= {f"{name}_{index}": column[:, index] for index in range(column.shape[1])}
+        else:
+            flat[name] = column
+    return flat
+
+
+def _new_folder(path: Path) -> None:
+    try:
+        path.mkdir(parents=True)
+    except FileExistsError as error:
+        if not path.is_dir() or any(path.iterdir()):
+            raise LogError(f"{path} exists and nothing is overwritten; choose another path") from error
+    except OSError as error:
+        raise LogError(f"can't make {path}: {error.strerror}; check the folder") from error
+
+
+def _parquet(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
+    from pyarrow import parquet
+
+    _new_folder(path)
+    written = []
+    for table in _tables(log, selections):
+        file = path / f"{_name(table)}.parquet"
+        with new_file(file) as part:
+            parquet.write_table(_arrow(table, si), part)
+        written.append(file)
+    return written
+
+
+def _csv(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    _new_folder(path)
+    written = []
+    for table in _tables(log, selections):
+        columns = {
+            name: [item.decode("ascii", "replace") for item in column.tolist()]
+            if column.dtype.kind == "S"
+            else np.ascontiguousarray(column)
+            for name, column in _flat(table_columns(table, si=si)).items()
+        }
+        file = path / f"{_name(table)}.csv"
+        with new_file(file) as part:
+            csv.write_csv(pa.table(columns), part)
+        written.append(file)
+    return written
+
+
+def _npz(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
+    arrays: dict[str, Any] = {
+        f"{_name(table)}/{name}": column
+        for table in _tables(log, selections)
+        for name, column in table_columns(table, si=si).items()
+    }
+    with new_file(path) as part, open(part, "wb") as file:
+        np.savez_compressed(file, **arrays)
+    return [path]
+
+
+def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> list[Path]:
+    from mcap.writer import Writer
+
+    with new_file(path) as part, open(part, "wb") as file:
+        writer = Writer(file)
+        writer.start(profile="", library="flightstack")
+        channels = {}
+        for stream, _ in selections:
+            definition = stream.description.definition
+            schema = {
+                "title": stream.name,
+                "type": "object",
+                "properties": {
+                    field.name: _json_type(field.code, field.length) for field in definition.wire_fields
+                },
+            }
+            number = writer.register_schema(
+                name=f"mavlink.{stream.name}", encoding="jsonschema", data=json.dumps(schema).encode()
+            )
+            channels[stream.name, stream.system_id, stream.component_id] = writer.register_channel(
+                topic=f"/{stream.system_id}/{stream.component_id}/{stream.name}",
+                message_encoding="json",
+                schema_id=number,
+            )
+        counts = dict.fromkeys(channels, 0)
+        log_times = _log_times(log, selections)
+        for (time_us, message), log_time_us in zip(
+            messages_in_order(log.source, selections), log_times, strict=True
+        ):
+            key = message.name, message.src_system, message.src_component
+            fields = {
+                name.rstrip("_"): _plain(value)
+                for name, value in zip(message._fields, message, strict=True)
+                if name not in SOURCE_FIELDS
+            }
+            writer.add_message(
+                channel_id=channels[key],
+                log_time=(log_time_us or time_us) * 1000,
+                publish_time=time_us * 1000,
+                sequence=counts[key],
+                data=json.dumps(fields).encode(),
+            )
+            counts[key] += 1
+        writer.finish()
+    return [path]
+
+
+def _log_times(log: Log, selections: Sequence[Selection]) -> list[int]:
+    order = np.sort(np.concatenate([np.asarray(stream.order[rows], np.int64) for stream, rows in selections]))
+    times: list[int] = log.source.log_time_us(order).tolist()
+    return times
+
+
+def _json_type(code: str, length: int) -> dict[str, Any]:
+    if code == "s":
+        return {"type": "string"}
+    element = {"type": "number" if code in "fd" else "integer"}
+    return {"type": "array", "items": element} if length else element
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no NaN and no infinity: null."""
+    if isinstance(value, float):
+        return value if np.isfinite(value) else None
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+_WRITERS: Final[Mapping[str, Callable[[Log, Sequence[Selection], Path, bool], list[Path]]]] = {
+    "csv": _csv,
+    "parquet": _parquet,
+    "npz": _npz,
+    "mcap": _mcap,
+}

@@ -1,0 +1,113 @@
+"""Records of a telemetry log as they are: time stamp and frame, to be cut out, changed, or played."""
+
+import math
+import struct
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.logs.errors import LogError
+from estimators.logs.iterate import Selection
+from estimators.logs.log import Log
+from estimators.logs.new_file import new_file
+from estimators.logs.tlog import TlogSource
+
+Record = tuple[int, bytes]
+"""Time in microseconds and one raw frame."""
+
+_STAMP: Final = struct.Struct(">Q")
+_BATCH: Final = 4096
+
+
+def telemetry(log: Log) -> TlogSource:
+    """The source of a log that has frames.
+
+    Raises:
+        LogError: it is an onboard log, which has none.
+    """
+    if isinstance(log.source, TlogSource):
+        return log.source
+    raise LogError(
+        f"{log.path} is a {log.format}, which holds no MAVLink frames; give a telemetry log (.tlog)"
+    )
+
+
+def record_times_us(log: Log, order: NDArray[np.int64]) -> NDArray[np.int64]:
+    """When messages were recorded; vehicle time where the file has no times of its own."""
+    times = log.source.log_time_us(order)
+    return times if np.any(times) else log.source.time_us[order]
+
+
+def window(
+    log: Log, selections: Sequence[Selection], from_s: float | None, to_s: float | None
+) -> list[Selection]:
+    """What of a selection was recorded between two times.
+
+    Args:
+        from_s, to_s: seconds since the first record; None: no limit. `to_s` itself is left out.
+
+    Raises:
+        LogError: a time is negative or no number, or the end is before the beginning.
+    """
+    for option, value in (("--from", from_s), ("--to", to_s)):
+        if value is not None and not (math.isfinite(value) and value >= 0.0):
+            raise LogError(f"{option} {value:g} is no time; give seconds from the beginning of the log")
+    if from_s is not None and to_s is not None and to_s <= from_s:
+        raise LogError(f"--to {to_s:g} is not behind --from {from_s:g}; give a later time")
+    start_us = int(record_times_us(log, np.zeros(1, dtype=np.int64))[0])
+    low = -math.inf if from_s is None else start_us + from_s * 1e6
+    high = math.inf if to_s is None else start_us + to_s * 1e6
+    found = []
+    for stream, rows in selections:
+        times = record_times_us(log, stream.order[rows].astype(np.int64))
+        kept = rows[(times >= low) & (times < high)]
+        if len(kept):
+            found.append((stream, kept))
+    return found
+
+
+def positions(selections: Sequence[Selection]) -> NDArray[np.int64]:
+    """Positions in the log of what is selected, ascending."""
+    if not selections:
+        return np.empty(0, dtype=np.int64)
+    return np.sort(np.concatenate([stream.order[rows].astype(np.int64) for stream, rows in selections]))
+
+
+def read_records(log: Log, order: NDArray[np.int64]) -> Iterator[Record]:
+    """Records at some positions, in that order."""
+    source = telemetry(log)
+    data = source.data.data
+    for first in range(0, len(order), _BATCH):
+        part = order[first : first + _BATCH]
+        times = record_times_us(log, part).tolist()
+        starts, ends = source.frame_spans(part)
+        for time_us, start, end in zip(times, starts.tolist(), ends.tolist(), strict=True):
+            yield time_us, bytes(data[start:end])
+
+
+def write_records(path: Path, records: Iterator[Record]) -> int:
+    """Write a new telemetry log, whole or not at all.
+
+    Returns:
+        How many records were written.
+
+    Raises:
+        LogError: the file exists or can't be written, or there is nothing to write.
+    """
+    count = 0
+    with new_file(path) as part, open(part, "xb") as file:
+        pending = bytearray()
+        for time_us, frame in records:
+            pending += _STAMP.pack(time_us)
+            pending += frame
+            count += 1
+            if count % _BATCH == 0:
+                file.write(pending)
+                pending.clear()
+        file.write(pending)
+        if not count:
+            raise LogError(f"nothing to write to {path}: no message is selected")
+    return count

@@ -1,0 +1,86 @@
+"""What `flightstack log info` prints of a log's report."""
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from typing import Final
+
+from estimators.logs import LogReport
+from estimators.logs.vehicles import VehicleReport
+
+_MODES_SHOWN: Final = 40
+_GAPS_SHOWN: Final = 20
+
+
+def report_lines(report: LogReport) -> Iterator[str]:
+    """The report as lines of text."""
+    yield f"{report.path}: {report.format}, {report.size_bytes / 1e6:.2f} MB, {report.messages} messages"
+    started = "" if report.start_unix_us is None else f", from {_date(report.start_unix_us)}"
+    yield f"duration {report.duration_s:.1f} s{started}; dialect {report.dialect}"
+    yield "bytes: " + _counts(report.bytes_by_kind)
+    if any(report.drops.values()):
+        yield "dropped: " + _counts(report.drops)
+    yield "remarks: " + ", ".join(f"{_words(name)} {value}" for name, value in report.remarks.items())
+    for vehicle in report.vehicles:
+        yield ""
+        yield from _vehicle(vehicle)
+    boots = [boot for boot in report.boots if boot.end_us > boot.start_us]
+    if len({boot.system_id for boot in boots}) < len(boots):
+        yield ""
+        for boot in boots:
+            yield f"boot {boot.number} of system {boot.system_id}: {_span(boot.start_us, boot.end_us)}"
+    if report.gaps:
+        yield ""
+        yield f"gaps: {len(report.gaps)}"
+        for gap in report.gaps[:_GAPS_SHOWN]:
+            yield f"  system {gap.system_id}: nothing heard {_span(gap.start_us, gap.end_us)}"
+    if report.losses:
+        yield ""
+        yield f"{'component':>9} {'frames':>9} {'lost':>8} {'loss %':>7} {'late':>6}"
+        for loss in report.losses:
+            share = 100.0 * loss.lost / max(1, loss.frames + loss.lost)
+            who = f"{loss.system_id}/{loss.component_id}"
+            yield f"{who:>9} {loss.frames:>9} {loss.lost:>8} {share:>7.2f} {loss.late:>6}"
+    for item in report.unknown:
+        yield (
+            f"unknown message {item.message_id} from {item.system_id}/{item.component_id}: "
+            f"{item.count} frames, {item.frame_bytes} bytes"
+        )
+    yield ""
+    yield f"{'component':>9} {'message':<32} {'count':>8} {'Hz':>8} {'gap s':>8}  instances"
+    for stream in report.streams:
+        who = f"{stream.system_id}/{stream.component_id}"
+        instances = ",".join(str(item) for item in stream.instances[:8])
+        yield (
+            f"{who:>9} {stream.name:<32} {stream.count:>8} {stream.rate_hz:>8.2f} "
+            f"{stream.longest_gap_s:>8.2f}  {instances}"
+        ).rstrip()
+
+
+def _vehicle(vehicle: VehicleReport) -> Iterator[str]:
+    boots = "" if vehicle.boots == 1 else f", {vehicle.boots} boots"
+    yield f"vehicle {vehicle.system_id}: {vehicle.autopilot} {vehicle.type}{boots}"
+    for flight in vehicle.flights:
+        yield f"  armed {_span(flight.start_us, flight.end_us)}"
+    for span in vehicle.modes[:_MODES_SHOWN]:
+        yield f"  {span.mode:<16} {_span(span.start_us, span.end_us)}"
+    if len(vehicle.modes) > _MODES_SHOWN:
+        yield f"  ... and {len(vehicle.modes) - _MODES_SHOWN} more modes"
+
+
+def _span(start_us: int, end_us: int) -> str:
+    return f"{start_us * 1e-6:.2f} to {end_us * 1e-6:.2f} s ({(end_us - start_us) * 1e-6:.1f} s)"
+
+
+def _date(unix_us: int) -> str:
+    try:
+        return datetime.fromtimestamp(unix_us * 1e-6, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    except (ValueError, OverflowError, OSError):
+        return f"{unix_us} us"
+
+
+def _counts(figures: dict[str, int]) -> str:
+    return ", ".join(f"{_words(name)} {value}" for name, value in figures.items() if value)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
