@@ -135,7 +135,7 @@ class FlightEstimators:
 
     def _on_estimate(self, runner: Runner, time_us: int) -> None:
         # Estimates from too little are no news for anybody.
-        if self._links and self._watch is not None and not self._watch.lacking:
+        if self._links and self._watch is not None and self._watch.enough:
             self._publisher.on_estimate(runner, time_us)
 
     def _say(self, system_id: int, message: MAVLinkMessage) -> None:

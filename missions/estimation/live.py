@@ -215,7 +215,7 @@ class _Process:
 
     def _on_estimate(self, runner: Runner, time_us: int) -> None:
         # Estimates from too little are no news for anybody.
-        if not self._watch.lacking:
+        if self._watch.enough:
             self._publisher.on_estimate(runner, time_us)
 
     def _say(self, _system_id: int, message: MAVLinkMessage) -> None:

@@ -40,6 +40,7 @@ class RateWatch:
 
     Attributes:
         lacking: what is missing at the newest look, in words.
+        enough: rates have been measured, and nothing is missing.
     """
 
     def __init__(self, needs: Sequence[Need], heard: Mapping[tuple[int, int], int]) -> None:
@@ -49,6 +50,7 @@ class RateWatch:
         self._before_us: int | None = None
         self._asked: Counter[tuple[int, int]] = Counter()
         self.lacking: list[str] = []
+        self.enough = False
 
     def restart(self) -> None:
         """Begin the measurement anew, where time has changed its base."""
@@ -79,6 +81,7 @@ class RateWatch:
             for index, need in enumerate(self._needs):
                 asked = self._to_ask(system_id, index, need, rate_hz)
                 requests += [(system_id, name, asked_hz) for name, asked_hz in asked]
+        self.enough = not self.lacking
         return requests
 
     def _rate_of(

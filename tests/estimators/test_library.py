@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -58,7 +59,7 @@ def test_a_file_that_is_no_estimator_says_why(tmp_path, text, told):
 
 def test_two_estimators_in_a_file_are_one_too_many(tmp_path, level):
     path = tmp_path / "two.py"
-    text = open(level, encoding="utf-8").read()
+    text = Path(level).read_text(encoding="utf-8")
     path.write_text(text + "\nclass Second(LevelEstimator):\n    NAME = 'second'\n")
     with pytest.raises(EstimatorError, match=r"holds 2 estimators \(LevelEstimator, Second\)"):
         estimator_class(str(path))

@@ -1,4 +1,4 @@
-"""Logs through estimators: what is lacking, parts of logs, teams and their common time; real firmware's logs."""
+"""Logs through estimators: what is lacking, parts of logs, teams and their common time, real logs."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,0 +1,246 @@
+"""An estimator as a process on a UDP link: what it hears, tells, logs; silence, garbage, interruptions."""
+
+import contextlib
+import json
+import math
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
+from estimators.logs import open_log
+from missions.cli import run_command_line
+
+ROOT = Path(__file__).parents[3]
+LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
+
+
+class ScriptedVehicle(threading.Thread):
+    """Says HEARTBEAT and ATTITUDE to a UDP port, up to ten times as fast as real time, and hears the answers.
+
+    It knows no message interval of its own: ATTITUDE comes at 2 Hz until somebody asks for more.
+    """
+
+    def __init__(self, port, *, seconds=math.inf, system=1, willing=True, garbage=False, repeat=False):
+        super().__init__(daemon=True)
+        self.heard = []
+        self.done = threading.Event()
+        self._port, self._seconds, self._system = port, seconds, system
+        self._willing, self._garbage, self._repeat = willing, garbage, repeat
+        self._period_ms = 500
+
+    def run(self):
+        chance = random.Random(1)
+        encoder, parser = FrameEncoder(self._system, 1), FrameParser()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            link.setblocking(False)
+            ms = 1000
+            while not self.done.is_set() and ms < 1000 + 1000 * self._seconds:
+                data = b""
+                if ms % 1000 == 0:
+                    data += encoder.encode(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+                if ms % self._period_ms == 0:
+                    attitude = dialect.MAVLink_attitude_message(ms, math.sin(ms / 3000), 0.1, 0, 0, 0, 0)
+                    frame = encoder.encode(attitude)
+                    data += frame + (frame if self._repeat and chance.random() < 0.2 else b"")
+                if self._garbage:
+                    data += chance.randbytes(chance.randrange(40))
+                with contextlib.suppress(OSError):
+                    link.sendto(data, ("127.0.0.1", self._port))
+                with contextlib.suppress(OSError):
+                    while True:
+                        for frame in parser.feed(link.recv(65536)):
+                            self._hear(decode(frame))
+                ms += 10
+                self.done.wait(0.001)
+
+    def _hear(self, message):
+        self.heard.append(message)
+        if message.get_type() == "COMMAND_LONG" and message.param1 == 30 and self._willing:
+            self._period_ms = max(10, round(message.param2 / 1e4) * 10)
+
+
+@pytest.fixture
+def port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+@pytest.fixture
+def vehicle(port):
+    """Factory of vehicles that talk to the port."""
+    made = []
+
+    def start(**changes):
+        made.append(ScriptedVehicle(port, **changes))
+        made[-1].start()
+        return made[-1]
+
+    yield start
+    for thread in made:
+        thread.done.set()
+        thread.join()
+
+
+def estimate(tmp_path, port, *arguments):
+    return run_command_line(
+        [
+            "estimate",
+            LEVEL,
+            "--connect",
+            f"udpin:127.0.0.1:{port}",
+            "--out",
+            str(tmp_path / "run"),
+            *arguments,
+        ]
+    )
+
+
+def summary_of(tmp_path):
+    return json.loads((tmp_path / "run" / "summary.json").read_text())
+
+
+def assert_replay_is_the_same(tmp_path):
+    log, again = tmp_path / "run" / "flight.tlog", tmp_path / "again"
+    assert (
+        run_command_line(["replay", str(log), "--estimator", LEVEL, "--out", str(again), "--no-picture"]) == 0
+    )
+    ours, theirs = np.load(tmp_path / "run" / "estimates.npz"), np.load(again / "estimates.npz")
+    for column in ours:
+        assert ours[column].tobytes() == theirs[column].tobytes()
+    counters = json.loads((again / "summary.json").read_text())["counters"]
+    assert counters == summary_of(tmp_path)["counters"]
+    return ours
+
+
+@pytest.mark.parametrize("system", [1, 42])
+def test_it_asks_hears_tells_and_its_log_gives_the_same_estimates(tmp_path, port, vehicle, system):
+    there = vehicle(system=system, repeat=True)
+    assert estimate(tmp_path, port, "--duration", "20") == 0
+    summary = summary_of(tmp_path)
+    assert summary["outcome"] == "completed" and not summary["partial"]
+    assert summary["system_id"] == system
+    assert summary["counters"]["repeated"] > 10
+    assert summary["link"]["published"] > 50
+    estimates = assert_replay_is_the_same(tmp_path)
+    assert len(estimates["time_us"]) == summary["samples"] > 200
+    said = {(m.get_type(), m.get_srcSystem(), m.get_srcComponent()) for m in there.heard}
+    assert ("ATTITUDE", system, 191) in said and ("HEARTBEAT", system, 191) in said
+    log = open_log(tmp_path / "run" / "flight.tlog")
+    assert not any(loss.lost for loss in log.source.losses)
+
+
+def test_it_can_be_silent(tmp_path, port, vehicle):
+    there = vehicle(willing=False)
+    assert estimate(tmp_path, port, "--duration", "6", "--no-request", "--no-publish") == 1
+    assert {m.get_type() for m in there.heard} == {"HEARTBEAT"}
+
+
+def test_what_the_link_lacks_is_told_and_nothing_is_published(tmp_path, port, vehicle, capfd):
+    there = vehicle(willing=False)
+    assert estimate(tmp_path, port, "--duration", "10") == 1
+    error = capfd.readouterr().err
+    assert "ATTITUDE at 2 Hz; needs 10 Hz or more for attitude" in error
+    assert "are partial" in error
+    assert summary_of(tmp_path)["partial"]
+    assert [m for m in there.heard if m.get_type() == "COMMAND_LONG"]
+    assert not [m for m in there.heard if m.get_type() == "ATTITUDE"]
+
+
+def test_garbage_on_the_link_is_counted_and_harms_nothing(tmp_path, port, vehicle):
+    vehicle(garbage=True)
+    assert estimate(tmp_path, port, "--duration", "20") == 0
+    assert summary_of(tmp_path)["link"]["bytes_junk"] > 1000
+    assert_replay_is_the_same(tmp_path)
+
+
+def test_a_link_that_goes_silent_keeps_what_came(tmp_path, port, vehicle, capfd):
+    vehicle(seconds=15)
+    assert estimate(tmp_path, port, "--duration", "500", "--silence", "1") == 1
+    assert "has been silent for 1 s; what came before is kept" in capfd.readouterr().err
+    summary = summary_of(tmp_path)
+    assert summary["partial"] and summary["outcome"] == "failed"
+    assert summary["samples"] > 100
+    assert_replay_is_the_same(tmp_path)
+
+
+def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
+    vehicle(system=7)
+    assert estimate(tmp_path, port, "--system-id", "3", "--silence", "0.7") == 1
+    error = capfd.readouterr().err
+    assert f"no vehicle 3 was heard on udpin:127.0.0.1:{port} within 0.7 s (heard: vehicle 7)" in error
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["level", "--connect", "udpin:127.0.0.1:1"], "there are attitude, lissajous, target-fusion"),
+        ([LEVEL, "--connect", "carrier pigeon"], "carrier pigeon"),
+        ([LEVEL, "--connect", "flight.tlog"], "that is a log; use flightstack replay"),
+        ([LEVEL, "--connect", "udpin:127.0.0.1:1", "--component-id", "1"], "is not in the range"),
+        ([LEVEL, "--connect", "udpin:127.0.0.1:1", "--duration", "0"], "is not in the range"),
+        ([LEVEL], "Missing option '--connect'"),
+    ],
+)
+def test_wrong_use(tmp_path, monkeypatch, capfd, arguments, told):
+    monkeypatch.chdir(tmp_path)
+    assert run_command_line(["estimate", *arguments]) == 2
+    assert told in capfd.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def start_process(tmp_path, port, *arguments):
+    """The same as a process; waits until its log has something in it."""
+    command = [sys.executable, "-m", "missions", "estimate", LEVEL, "--connect", f"udpin:127.0.0.1:{port}"]
+    process = subprocess.Popen(
+        [*command, "--out", str(tmp_path / "run"), "--no-picture", *arguments],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    log = tmp_path / "run" / "flight.tlog"
+    waited = threading.Event()
+    for _ in range(1200):
+        if log.exists() and log.stat().st_size > 20_000:
+            return process, log
+        assert process.poll() is None, process.communicate()
+        waited.wait(0.05)
+    process.kill()
+    raise AssertionError(f"nothing was logged: {process.communicate()}")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("arguments", "code"), [((), 0), (("--duration", "9999"), 130)])
+def test_a_signal_ends_it_in_good_order(tmp_path, port, vehicle, number, arguments, code):
+    vehicle()
+    process, _ = start_process(tmp_path, port, *arguments)
+    process.send_signal(number)
+    out, error = process.communicate(timeout=60)
+    assert process.returncode == code, error
+    assert "Traceback" not in error
+    assert summary_of(tmp_path)["partial"] is (code == 130)
+    assert "estimates; run:" in out
+    assert_replay_is_the_same(tmp_path)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_killed_process_leaves_a_log_that_can_be_replayed(tmp_path, port, vehicle):
+    vehicle()
+    process, log = start_process(tmp_path, port)
+    process.kill()
+    process.communicate()
+    again = tmp_path / "again"
+    assert run_command_line(["replay", str(log), "--estimator", LEVEL, "--out", str(again)]) == 0
+    assert json.loads((again / "summary.json").read_text())["samples"] > 100
+    assert open_log(log).source.bytes_by_kind  # and not a byte of it is torn

@@ -1,0 +1,184 @@
+"""`flightstack replay` as a user runs it: tables, folders, exit codes, bad input."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from autopilot_bridge.mavlink import FrameEncoder, dialect
+from autopilot_bridge.tlog import TlogWriter
+from missions.cli import run_command_line
+
+LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
+SHARED = Path(__file__).parents[4] / "shared" / "tlogs"
+FILES = {"summary.json", "estimates.npz", "estimates.csv", "errors.png"}
+
+
+def write_log(path, rate_hz=20, seconds=10, system=1):
+    """A log of an attitude that the estimator follows with a lag, and of its truth."""
+    encoder, truth = FrameEncoder(system, 1), FrameEncoder(system, 25)
+    with TlogWriter(path) as log:
+        for k in range(rate_hz * seconds):
+            ms = 1000 + k * 1000 // rate_hz
+            roll = 0.001 * k
+            log.write(
+                10**15 + ms * 1000,
+                encoder.encode(dialect.MAVLink_attitude_message(ms, roll, 0.1, 0, 0, 0, 0)),
+            )
+            q = [np.cos(roll / 2), np.sin(roll / 2), 0, 0]
+            message = dialect.MAVLink_hil_state_quaternion_message(ms * 1000, q, *[0] * 14)
+            log.write(10**15 + ms * 1000, truth.encode(message))
+    return path
+
+
+def replay(*arguments):
+    return run_command_line(["replay", *map(str, arguments)])
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_one_log_one_folder(tmp_path, capfd):
+    log = write_log(tmp_path / "flight.tlog")
+    out = tmp_path / "out"
+    assert replay(log, "--estimator", LEVEL, "--set", "weight=0.5", "--out", out) == 0
+    assert {path.name for path in out.iterdir()} == FILES
+    summary = summary_of(out)
+    assert summary["outcome"] == "completed"
+    assert not summary["partial"]
+    assert summary["reference"] == "autopilot"
+    assert summary["parameters"]["weight"] == 0.5
+    # an exponential average of a ramp lags behind by (1 - w)/w steps, in the end
+    assert summary["roll_max_deg"] == pytest.approx(np.degrees(0.001), rel=1e-3)
+    assert summary["roll_mse_deg2"] == pytest.approx(summary["roll_rms_deg"] ** 2)
+    assert summary["against"]["truth"]["pitch_mean_deg"] == pytest.approx(np.degrees(0.1), rel=1e-5)
+    arrays = np.load(out / "estimates.npz")
+    assert len(arrays["time_us"]) == summary["samples"] == 200
+    lines = (out / "estimates.csv").read_text().splitlines()
+    assert lines[0] == "time_s,boot,subject,roll_rad,pitch_rad"
+    assert len(lines) == 201
+    told = capfd.readouterr()
+    assert "mean squared" in told.out
+    assert "flight.tlog  vehicle 1  truth" in told.out
+    assert told.err == ""
+
+
+@pytest.mark.parametrize("against", ["autopilot", "truth"])
+def test_against_one_of_them(tmp_path, against):
+    log = write_log(tmp_path / "flight.tlog")
+    assert replay(log, "--estimator", LEVEL, "--against", against, "--out", tmp_path / "out") == 0
+    summary = summary_of(tmp_path / "out")
+    assert summary["reference"] == against
+    assert list(summary["against"]) == [against]
+
+
+def test_several_logs_have_one_table_and_a_folder_each(tmp_path, capfd):
+    (tmp_path / "b").mkdir()
+    logs = [write_log(tmp_path / name) for name in ("one.tlog", "two.tlog", "b/one.tlog")]
+    out = tmp_path / "out"
+    assert replay(*logs, "--estimator", LEVEL, "--out", out, "--no-picture") == 0
+    assert {path.name for path in out.iterdir()} == {"one", "two", "one-2"}
+    assert all({path.name for path in folder.iterdir()} == FILES - {"errors.png"} for folder in out.iterdir())
+    assert capfd.readouterr().out.count("mean squared") == 1
+
+
+def test_a_part_of_it(tmp_path):
+    log = write_log(tmp_path / "flight.tlog")
+    assert replay(log, "--estimator", LEVEL, "--from", 2, "--to", 3, "--out", tmp_path / "out") == 0
+    assert summary_of(tmp_path / "out")["samples"] == 21
+
+
+def test_what_is_lacking_is_told_and_the_rest_goes_on(tmp_path, capfd):
+    slow, good = write_log(tmp_path / "slow.tlog", rate_hz=2), write_log(tmp_path / "good.tlog")
+    out = tmp_path / "out"
+    assert replay(slow, good, "--estimator", LEVEL, "--out", out) == 1
+    told = capfd.readouterr()
+    assert "slow.tlog: ATTITUDE at 2 Hz; needs 10 Hz or more for attitude" in told.err
+    assert "good.tlog: completed" in told.out
+    summary = summary_of(out / "slow")
+    assert summary["partial"] and summary["outcome"] == "failed"
+    assert summary["samples"] == 0
+    assert summary["needs"][0]["met"] is False
+    assert summary_of(out / "good")["outcome"] == "completed"
+
+
+@pytest.mark.parametrize("content", [b"", b"not a log at all" * 100], ids=["empty", "junk"])
+def test_files_that_are_no_logs(tmp_path, capfd, content):
+    path = tmp_path / "bad.tlog"
+    path.write_bytes(content)
+    assert replay(path, "--estimator", LEVEL, "--out", tmp_path / "out") == 1
+    told = capfd.readouterr()
+    assert "bad.tlog" in told.err
+    assert "Traceback" not in told.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["{folder}"], "is a directory; give the path of a log"),
+        (["{folder}/none.tlog"], "does not exist; give the path of a log"),
+        (["{log}", "--set", "weight=x"], "weight: 'x' is not a number"),
+        (["{log}", "--set", "height=1"], "no parameter 'height'; there are: weight"),
+        (["{log}", "--out", "{folder}"], "is not empty, and nothing is overwritten"),
+        (["{log}", "--out", "{log}"], "is a file; choose a folder"),
+        (["{log}", "--from", "5", "--to", "2"], "from 5 s to 2 s is no time"),
+        (["{log}", "--from", "nan"], "not a finite number"),
+        (["{log}", "--system-id", "0"], "is not in the range"),
+        (["{log}", "--against", "moon"], "'moon' is not one of"),
+        ([], "Missing argument 'LOG...'"),
+    ],
+)
+def test_wrong_use_names_value_and_what_is_accepted(tmp_path, capfd, arguments, told):
+    log = write_log(tmp_path / "flight.tlog")
+    filled = [text.format(folder=tmp_path, log=log) for text in arguments]
+    assert replay(*filled, "--estimator", LEVEL) == 2
+    error = capfd.readouterr().err
+    assert told in error
+    assert error.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"flight.tlog"}
+
+
+def test_an_unknown_estimator(tmp_path, capfd):
+    log = write_log(tmp_path / "flight.tlog")
+    assert replay(log, "--estimator", "atitude") == 2
+    assert "there are attitude, lissajous, target-fusion" in capfd.readouterr().err
+
+
+def test_a_vehicle_that_is_not_in_it(tmp_path, capfd):
+    log = write_log(tmp_path / "flight.tlog", system=4)
+    assert replay(log, "--estimator", LEVEL, "--system-id", 2, "--out", tmp_path / "out") == 1
+    assert "there is no vehicle 2 in it; there are 4" in capfd.readouterr().err
+
+
+def test_a_torn_log_gives_what_is_whole(tmp_path):
+    log = write_log(tmp_path / "flight.tlog")
+    log.write_bytes(log.read_bytes()[:-1500])
+    assert replay(log, "--estimator", LEVEL, "--out", tmp_path / "out") == 0
+    assert 150 < summary_of(tmp_path / "out")["samples"] < 200
+
+
+def test_two_vehicles_in_a_log_have_a_row_and_a_file_each(tmp_path, capfd):
+    one, two = (write_log(tmp_path / f"{n}.tlog", system=n) for n in (1, 2))
+    both = tmp_path / "both.tlog"
+    both.write_bytes(one.read_bytes() + two.read_bytes())
+    assert replay(both, "--estimator", LEVEL, "--out", tmp_path / "out") == 0
+    assert {p.name for p in (tmp_path / "out").glob("*.csv")} == {"estimates-1.csv", "estimates-2.csv"}
+    assert "vehicle 2  truth" in capfd.readouterr().out
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="no recorded logs beside the checkout")
+def test_attitude_on_a_real_flight(tmp_path, monkeypatch, capfd):
+    """The table of errors that the estimator is judged by, from a real firmware's log."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(SHARED / "px4_plane_mission.tlog", "flight.tlog")
+    assert replay("flight.tlog", "--estimator", "attitude", "--no-picture") == 0
+    summary = summary_of(tmp_path / "runs" / "attitude-1")
+    assert 290.0 < summary["airborne_s"] < 310.0
+    for against in ("autopilot", "truth"):
+        assert {"roll_mse_deg2", "pitch_mse_deg2", "roll_rms_deg", "pitch_max_deg"} <= set(
+            summary["against"][against]
+        )
+    assert summary["counters"]["updated"] == summary["samples"]
