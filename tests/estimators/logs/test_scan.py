@@ -75,7 +75,8 @@ def invalid_frames(draw):
     if kind == "crc":
         return build(ATTITUDE, payload, crc_extra=1)
     if kind == "flags":
-        return build(ATTITUDE, payload, flags=draw(st.integers(2, 255)))
+        flags = draw(st.one_of(st.sampled_from([2, 3, 4, 0x80]), st.integers(2, 255)))
+        return build(ATTITUDE, payload, flags=flags) + draw(st.sampled_from([b"", bytes(13)]))
     if kind == "unknown_v1":
         return build(UNKNOWN_V1, payload, version=1)
     if kind == "unknown_v2":
@@ -187,6 +188,19 @@ def test_time_stamp_that_looks_like_a_frame_hides_none():
     items = mixed_frames(4)
     data = tlog(items[:2]) + fake + items[2] + record(items[3])
     assert [data[at:end] for at, end in spans(source_of(data))] == items
+
+
+@pytest.mark.parametrize("flags", [2, 3, 4, 0x81])
+@pytest.mark.parametrize("tail", [b"", bytes(13)])
+def test_flags_that_nobody_may_ignore(flags, tail):
+    """The checksum is right, but what the frame means isn't known."""
+    items = mixed_frames(2)
+    foreign = build(ATTITUDE, b"\x01\x02\x03", flags=flags) + tail
+    source = check_against_reference(tlog([items[0], foreign, items[1]]))
+    assert source.count == 2
+    if len(tail) == (13 if flags & 1 else 0):
+        assert source.drops["unsupported_flags"] == 1
+        assert source.bytes_by_kind["unsupported_flags"] == len(foreign)
 
 
 def test_capture_without_time_stamps():
