@@ -166,7 +166,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             "gyro_bias_rad_s": float(np.linalg.norm(x[at.GYRO_BIAS : at.GYRO_BIAS + 3])),
         }
         if self._form == at.ROTOR:
-            told["drag_1_s"] = 1.0 / float(x[at.DRAG_TIME])
+            told["drag_1_s"] = float(x[at.DRAG])
         elif self._form == at.WING and x[at.LIFT] > 0.0:
             told["lift_1_m"] = float(x[at.LIFT])
             told["alpha_mean_rad"] = float(x[at.ALPHA_MEAN])

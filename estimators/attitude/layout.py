@@ -52,39 +52,42 @@ BETA: Final = 29
 """Sideslip, rad."""
 LIFT: Final = 30
 """Mean lift acceleration per square of airspeed, 1/m; 0: not yet known."""
-DRAG_TIME: Final = 31
-"""Reciprocal of a rotorcraft's drag coefficient, s."""
-DRAG_TIME_VARIANCE: Final = 32
-SIDEWAYS: Final = 33
+DRAG: Final = 31
+"""Drag acceleration of a multirotor per speed, 1/s."""
+SPEED_SQUARE: Final = 32
+"""Square of the speed, summed over time for learning the drag, m^2/s."""
+FORCE_SQUARE: Final = 33
+"""The same of the sideways force, m^2/s^3."""
+SIDEWAYS: Final = 34
 """Smoothed forward and right specific force, m/s^2 (two places)."""
 
 # Rest
-AGE: Final = 35
+AGE: Final = 36
 """Time filtered since the start, s."""
-REST_TIME: Final = 36
+REST_TIME: Final = 37
 """How long nothing has moved, s."""
-MEAN_RATE: Final = 37
+REST_SUM: Final = 38
+"""All rest so far that bears on the bias, s."""
+MEAN_RATE: Final = 39
 """Slow mean of the measured rate, rad/s."""
-MEAN_FORCE: Final = 40
+MEAN_FORCE: Final = 42
 """Slow mean of the specific force, m/s^2."""
 
 # The newest correction
-REFERENCE: Final = 43
+REFERENCE: Final = 45
 """Where accelerometer and motion say that down is: m/s^2, FRD, of length g when they agree."""
-WEIGHT: Final = 46
+LENGTH: Final = 48
+"""Smoothed length of the reference, m/s^2."""
+WEIGHT: Final = 49
 """Trust in it, 0..1."""
-INNOVATION: Final = 47
+INNOVATION: Final = 50
 """Angle between reference and estimate, rad."""
 
 # Uncertainty
-ROLL_COVARIANCE: Final = 48
+ROLL_COVARIANCE: Final = 51
 """Six places, see `uncertainty`."""
-PITCH_COVARIANCE: Final = 54
-LENGTH: Final = 60
-"""Smoothed length of the reference, m/s^2."""
-REST_SUM: Final = 61
-"""All rest so far that bears on the bias, s."""
-STATE_SIZE: Final = 62
+PITCH_COVARIANCE: Final = 57
+STATE_SIZE: Final = 63
 
 # Forms of the filter
 STILL: Final = 0

@@ -52,7 +52,7 @@ class AttitudeParameters:
         imu: which inertial message.
         imu_instance: its `id`, where the message has one (HIGHRES_IMU, RAW_IMU).
         airspeed: which airspeed.
-        gain_1_s: k_p, of the accelerometer on attitude.
+        gain_1_s: k_p, of the reference on attitude.
         bias_gain_1_s2: k_I, of the accelerometer on the gyro bias.
         rest_bias_time_s: of the longest mean by which the gyro bias is found at rest, disarmed.
         reference_tolerance_m_s2: by how much the reference's length may differ from g to count for half.
@@ -74,7 +74,8 @@ class AttitudeParameters:
         side_force_time_s: smoothing of the side force.
         drag_1_s: first guess of a multirotor's drag acceleration per speed.
         drag_velocity_gain_1_s: of the velocity by drag on the velocity filter.
-        drag_learning_m_s: spread of the velocity by drag, for learning the drag coefficient; infinite: don't.
+        drag_learning_m_s: disagreement about the velocity at which a sample counts for half in learning the
+            drag; infinite: it is not learned.
         gyro_noise_rad_rts: angular random walk, rad/s/sqrt(Hz).
         gyro_bias_walk_rad_s_rts: random walk of the gyro bias, rad/s per square root of a second.
         gyro_bias_start_rad_s: its spread before anything is known.
@@ -108,9 +109,9 @@ class AttitudeParameters:
     throttle_trim: float = 0.5
     side_force_ratio_1_rad: float = 3.0
     side_force_time_s: float = 1.0
-    drag_1_s: float = 0.5
+    drag_1_s: float = 0.4
     drag_velocity_gain_1_s: float = 0.5
-    drag_learning_m_s: float = 1.0
+    drag_learning_m_s: float = 5.0
     gyro_noise_rad_rts: float = 1e-3
     gyro_bias_walk_rad_s_rts: float = 1e-5
     gyro_bias_start_rad_s: float = 0.01

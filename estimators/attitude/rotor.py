@@ -19,11 +19,11 @@ Array = NDArray[np.float64]
 
 _SMOOTHING_S = 0.2
 _LEARN_AFTER_S = 5.0
-_DRAG_TIME_MIN_S = 0.3
-_DRAG_TIME_MAX_S = 10.0
-_DRAG_TIME_WALK_S2_S = 1e-4
-_DRAG_TIME_SPREAD = 0.5
-"""Standard deviation of the first guess, as a part of it."""
+_DRAG_MIN_1_S = 0.1
+_DRAG_MAX_1_S = 3.0
+_LEARN_TIME_S = 300.0
+_PRIOR_M2_S = 3.0
+"""Square of speed times time for which the first guess counts."""
 _SPEED_MAX_M_S = 40.0
 _LEVEL_LEAST = 0.5
 
@@ -31,8 +31,9 @@ _LEVEL_LEAST = 0.5
 @kernel
 def start(x: Array, p: Array) -> None:
     """Nothing known but the first guess of the drag."""
-    x[at.DRAG_TIME] = 1.0 / p[par.DRAG]
-    x[at.DRAG_TIME_VARIANCE] = (_DRAG_TIME_SPREAD / p[par.DRAG]) ** 2
+    x[at.DRAG] = p[par.DRAG]
+    x[at.SPEED_SQUARE] = _PRIOR_M2_S
+    x[at.FORCE_SQUARE] = _PRIOR_M2_S * p[par.DRAG] * p[par.DRAG]
 
 
 @kernel
@@ -45,8 +46,8 @@ def reference(
     climb = 0.0 if math.isnan(x[at.CLIMB]) else x[at.CLIMB]
     vz = -(climb + down_x * vx + down_y * vy) / max(_LEVEL_LEAST, down_z)
     vz = min(_SPEED_MAX_M_S, max(-_SPEED_MAX_M_S, vz))
-    pull_x = p[par.DRAG_VELOCITY_GAIN] * (-x[at.DRAG_TIME] * ax - vx)
-    pull_y = p[par.DRAG_VELOCITY_GAIN] * (-x[at.DRAG_TIME] * ay - vy)
+    pull_x = p[par.DRAG_VELOCITY_GAIN] * (-ax / x[at.DRAG] - vx)
+    pull_y = p[par.DRAG_VELOCITY_GAIN] * (-ay / x[at.DRAG] - vy)
     vx += dt * (ax + GRAVITY_M_S2 * down_x - (wy * vz - wz * vy) + pull_x)
     vy += dt * (ay + GRAVITY_M_S2 * down_y - (wz * vx - wx * vz) + pull_y)
     x[at.VELOCITY] = min(_SPEED_MAX_M_S, max(-_SPEED_MAX_M_S, vx))
@@ -61,7 +62,11 @@ def reference(
 
 @kernel
 def _learn_drag(x: Array, p: Array, dt: float, ax: float, ay: float) -> None:
-    """Recursive least squares of velocity = -time * force, weighted down where the two disagree."""
+    """Drag as the ratio of the mean squares of force and velocity.
+
+    Least squares of force by velocity makes the drag too small (the velocity has errors), of velocity by
+    force too great (gusts and vibration are in the force); this is the geometric mean of both.
+    """
     slow = min(1.0, dt / _SMOOTHING_S)
     x[at.SIDEWAYS] += slow * (ax - x[at.SIDEWAYS])
     x[at.SIDEWAYS + 1] += slow * (ay - x[at.SIDEWAYS + 1])
@@ -69,11 +74,11 @@ def _learn_drag(x: Array, p: Array, dt: float, ax: float, ay: float) -> None:
     if x[at.AGE] < _LEARN_AFTER_S or math.isinf(spread):
         return
     fx, fy = x[at.SIDEWAYS], x[at.SIDEWAYS + 1]
-    rx = -x[at.DRAG_TIME] * fx - x[at.VELOCITY]
-    ry = -x[at.DRAG_TIME] * fy - x[at.VELOCITY + 1]
-    information = dt / (spread * spread + rx * rx + ry * ry)  # of errors that last one second
-    variance = x[at.DRAG_TIME_VARIANCE]
-    shrink = 1.0 + variance * information * (fx * fx + fy * fy)
-    time = x[at.DRAG_TIME] + variance * information * (fx * rx + fy * ry) / shrink
-    x[at.DRAG_TIME] = min(_DRAG_TIME_MAX_S, max(_DRAG_TIME_MIN_S, time))
-    x[at.DRAG_TIME_VARIANCE] = min(1.0, variance / shrink + dt * _DRAG_TIME_WALK_S2_S)
+    vx, vy = x[at.VELOCITY], x[at.VELOCITY + 1]
+    rx, ry = fx / x[at.DRAG] + vx, fy / x[at.DRAG] + vy
+    weight = dt / (1.0 + (rx * rx + ry * ry) / (spread * spread))
+    fade = 1.0 - dt / _LEARN_TIME_S
+    x[at.FORCE_SQUARE] = fade * x[at.FORCE_SQUARE] + weight * (fx * fx + fy * fy)
+    x[at.SPEED_SQUARE] = fade * x[at.SPEED_SQUARE] + weight * (vx * vx + vy * vy)
+    drag = math.sqrt(x[at.FORCE_SQUARE] / x[at.SPEED_SQUARE])
+    x[at.DRAG] = min(_DRAG_MAX_1_S, max(_DRAG_MIN_1_S, drag))
