@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Final
 
+from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -132,6 +133,12 @@ class LissajousEstimator(Estimator[LissajousParameters]):
     def estimates(self) -> Sequence[LissajousEstimate]:
         """The newest estimate."""
         return self._estimates
+
+    @property
+    def origin(self) -> GeodeticPosition | None:
+        """The pattern's centre."""
+        pattern = self.track.pattern
+        return None if pattern is None else pattern.frame.origin
 
     def publish(self) -> Sequence[MAVLinkMessage]:
         """LOCAL_POSITION_NED_COV, from the pattern's centre; height and acceleration are not estimated."""

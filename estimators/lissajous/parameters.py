@@ -47,16 +47,16 @@ class LissajousParameters:
             standard deviation is sqrt(epsilon omega).
         orientation_rad: of the pattern's x axis, clockwise from north; its y axis is another right angle
             clockwise. A quarter turn: x east, as `fly lissajous` means it.
-        centre_lat_deg, centre_lon_deg: of the pattern; not numbers: the vehicle's home (HOME_POSITION).
+        centre_lat_deg, centre_lon_deg: of the pattern; None: the vehicle's home (HOME_POSITION).
         centre_north_m, centre_east_m: of the pattern from that place.
-        position_sigma_m, velocity_sigma_m_s: one sigma per axis of the measurement; 0: by the source, 0.3 m
-            and 0.1 m/s for gps, 0.15 m and 0.08 m/s for the autopilot's estimates.
+        position_sigma_m, velocity_sigma_m_s: one sigma per axis of the measurement; None: by the source,
+            0.3 m and 0.1 m/s for gps, 0.15 m and 0.08 m/s for the autopilot's estimates.
         position_delay_s: age of a measurement at the time that it carries.
         acceleration_psd_m2_s3: spectral density of the acceleration that the motion model lacks.
         frequency_walk_rad2_s3: variance that a frequency gains per second, where it is a state.
-        off_pattern_gate: squared Mahalanobis distance (four degrees of freedom) above which a measurement says
-            that the vehicle does not fly the pattern, on its way there or home: the filter begins anew from
-            it. 0: never.
+        off_pattern_gate: squared Mahalanobis distance (four degrees of freedom) above which a measurement
+            says that the vehicle does not fly the pattern, on its way there or home: the filter begins anew
+            from it. 0: never.
         max_gap_s: a longer silence starts the estimator anew.
         history_s: how far back states are kept, for what is known late.
     """
@@ -68,12 +68,12 @@ class LissajousParameters:
     omega_y_rad_s: float = 4.0 * math.tau / 120.0
     epsilon_rad_s: float = 1e-4
     orientation_rad: float = 0.5 * math.pi
-    centre_lat_deg: float = math.nan
-    centre_lon_deg: float = math.nan
+    centre_lat_deg: float | None = None
+    centre_lon_deg: float | None = None
     centre_north_m: float = 0.0
     centre_east_m: float = 0.0
-    position_sigma_m: float = 0.0
-    velocity_sigma_m_s: float = 0.0
+    position_sigma_m: float | None = None
+    velocity_sigma_m_s: float | None = None
     position_delay_s: float = 0.0
     acceleration_psd_m2_s3: float = 0.02
     frequency_walk_rad2_s3: float = 1e-8
@@ -91,8 +91,6 @@ class LissajousParameters:
             _require(name, getattr(self, name), above_zero=True)
         for name in (
             "epsilon_rad_s",
-            "position_sigma_m",
-            "velocity_sigma_m_s",
             "acceleration_psd_m2_s3",
             "frequency_walk_rad2_s3",
             "off_pattern_gate",
@@ -103,12 +101,15 @@ class LissajousParameters:
                 raise ValueError(f"{name} {getattr(self, name)} is not a finite number")
         if self.frequency and self.form is not Form.PROPOSED:
             raise ValueError(f"frequency with form={self.form}: correcting frequencies needs form=proposed")
-        if math.isnan(self.centre_lat_deg) != math.isnan(self.centre_lon_deg):
+        for name in ("position_sigma_m", "velocity_sigma_m_s"):
+            value = getattr(self, name)
+            if value is not None:
+                _require(name, value, above_zero=True)
+        if (self.centre_lat_deg is None) != (self.centre_lon_deg is None):
             raise ValueError("centre_lat_deg and centre_lon_deg go together; give both or neither")
-        if abs(self.centre_lat_deg) > 90.0 or abs(self.centre_lon_deg) > 180.0:
-            raise ValueError(
-                f"centre {self.centre_lat_deg:g},{self.centre_lon_deg:g} deg is not in -90..90, -180..180"
-            )
+        lat_deg, lon_deg = self.centre_lat_deg or 0.0, self.centre_lon_deg or 0.0
+        if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+            raise ValueError(f"centre {lat_deg:g},{lon_deg:g} deg is not in -90..90, -180..180")
 
     @property
     def sigmas(self) -> tuple[float, float]:
@@ -119,7 +120,7 @@ class LissajousParameters:
     @property
     def has_centre(self) -> bool:
         """Whether the pattern's centre is given by its coordinates."""
-        return not math.isnan(self.centre_lat_deg)
+        return self.centre_lat_deg is not None
 
 
 def _require(name: str, value: float, *, above_zero: bool) -> None:

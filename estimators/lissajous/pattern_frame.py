@@ -26,7 +26,7 @@ class PatternFrame:
     def __init__(self, parameters: LissajousParameters, home: GeodeticPosition) -> None:
         p = parameters
         place = home
-        if p.has_centre:
+        if p.centre_lat_deg is not None and p.centre_lon_deg is not None:
             place = GeodeticPosition(lat_deg=p.centre_lat_deg, lon_deg=p.centre_lon_deg, alt_m=home.alt_m)
         lat_deg, lon_deg, alt_m = LocalFrame(place).geodetic_from_ned(p.centre_north_m, p.centre_east_m, 0.0)
         self.frame = LocalFrame(GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m))

@@ -217,6 +217,11 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         """The targets that the newest detections have moved."""
         return self._estimates
 
+    @property
+    def origin(self) -> GeodeticPosition | None:
+        """The pattern's centre."""
+        return None if self._pattern is None else self._pattern.frame.origin
+
     def publish(self) -> Sequence[MAVLinkMessage]:
         """FOLLOW_TARGET for each: place, and in `position_cov` its one sigma, horizontal per axis."""
         messages = []
