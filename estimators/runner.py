@@ -225,11 +225,11 @@ class Runner:
                 f"{type(error).__name__}: {error}"
             ) from error
         self.outcomes[outcome] += 1
+        kinds, boot = self._kinds, self.boot
         for estimate in estimates:
-            table = self._kinds.get(type(estimate))
-            if table is None:
-                table = self._new_table(type(estimate))
-            table.append(estimate, self.boot)
+            kind = type(estimate)
+            table = kinds[kind] if kind in kinds else self._new_table(kind)
+            table.append(estimate, boot)
         return outcome
 
     def _new_table(self, kind: type[Any]) -> EstimateTable:

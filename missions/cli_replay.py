@@ -51,6 +51,7 @@ def replay(**given: Any) -> int:
     Exit codes: 0 done, 1 a log could not be read or lacks what the estimator needs, 2 usage.
     """
     from estimators.errors import EstimatorError
+    from estimators.logs import LogError
     from missions.errors import PlanError
     from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
     from missions.estimation.report import EstimationResult, table_lines
@@ -89,7 +90,7 @@ def replay(**given: Any) -> int:
         )
         check_out(request)
         results = replay_logs(request, on_done)
-    except (EstimatorError, PlanError) as error:
+    except (EstimatorError, LogError, PlanError) as error:
         raise click.UsageError(str(error)) from error
     done = [(label, result) for label, result in results if isinstance(result, EstimationResult)]
     for line in table_lines(done):

@@ -10,6 +10,7 @@ from estimators.errors import EstimatorError
 from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
 from estimators.logs import Log, LogError, open_log
+from estimators.logs.dialect import load_dialect
 from estimators.replay import replay
 from missions.errors import PlanError
 from missions.estimation.report import FAILED, EstimationResult, ReportRequest, report
@@ -67,10 +68,13 @@ def replay_logs(
 
     Raises:
         EstimatorError: no such estimator or parameter, or logs that are not of one team.
+        LogError: no such dialect.
         PlanError: a run folder can't be made.
     """
     found = estimator_class(request.estimator)
     parameters = parameters_from(found, request.settings)
+    if request.dialect is not None:
+        load_dialect(request.dialect)  # a wrong one is wrong for every log
 
     def make() -> Estimator[Any]:
         return found(parameters)

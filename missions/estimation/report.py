@@ -314,8 +314,9 @@ def table_lines(results: Sequence[tuple[str, EstimationResult]]) -> list[str]:
             for reference, figures in compared.figures.items():
                 for f in figures:
                     unit, square = _UNITS[f.unit]
+                    quantity = f.quantity + (" speed" if f.unit == "m_s" else "")
                     rows.append(
-                        (label, compared.label, reference, f.quantity, str(f.samples), f"{f.mean:.3f} {unit}",
+                        (label, compared.label, reference, quantity, str(f.samples), f"{f.mean:.3f} {unit}",
                          f"{f.rms:.3f} {unit}", f"{f.mse:.3f} {square}", f"{f.max:.3f} {unit}")
                     )  # fmt: skip
     if not rows:

@@ -128,6 +128,7 @@ def test_files_that_are_no_logs(tmp_path, capfd, content):
         (["{log}", "--from", "nan"], "not a finite number"),
         (["{log}", "--system-id", "0"], "is not in the range"),
         (["{log}", "--against", "moon"], "'moon' is not one of"),
+        (["{log}", "--dialect", "klingon"], "no MAVLink dialect 'klingon'"),
         ([], "Missing argument 'LOG...'"),
     ],
 )
