@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
 from estimators.logs.crc import Int
-from estimators.logs.scan import FrameIndex, MessageTable
+from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, scan
 from flightsim.kernels import kernel
 
 _UNKNOWN, _UNSUPPORTED, _BAD_CRC = range(3)
@@ -34,7 +34,8 @@ _FIGURES: Final = 9
 _OVERHEAD_V1: Final = 8
 _OVERHEAD_V2: Final = 12
 _SIGNATURE: Final = 13
-_PAGE: Final = 256
+_SAMPLE_BYTES: Final = 1 << 18
+_SAMPLE_FRAMES: Final = 16
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +61,28 @@ class GapFigures:
     junk_bytes: int
     torn_bytes: int
     unknown_starts: NDArray[np.int64]
+
+
+def find_lead(data: NDArray[np.uint8], table: MessageTable) -> int:
+    """Bytes before each frame: 8 where there are time stamps, 0 in captures without.
+
+    Whichever explains more of the beginning of the file.
+    """
+    size = _SAMPLE_BYTES
+    while True:
+        sample = data[:size]
+        plain = scan(sample, table, 0)
+        if len(plain.starts) >= _SAMPLE_FRAMES or size >= len(data):
+            break
+        size *= 8
+    stamped = scan(sample, table, STAMP_SIZE)
+    left_over = _left_over(sample, stamped, table) + STAMP_SIZE * stamped.unstamped
+    return STAMP_SIZE if left_over <= _left_over(sample, plain, table) else 0
+
+
+def _left_over(data: NDArray[np.uint8], index: FrameIndex, table: MessageTable) -> int:
+    figures = sort_gaps(data, index, table)
+    return figures.junk_bytes + figures.torn_bytes
 
 
 def sort_gaps(data: NDArray[np.uint8], index: FrameIndex, table: MessageTable) -> GapFigures:

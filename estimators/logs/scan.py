@@ -35,7 +35,6 @@ _HASH: Final = 0x9E3779B97F4A7C15  # Knuth's multiplicative hash
 FRAMES, LOST, LATE, LAST = range(4)
 # What `progress` holds from call to call.
 _AT, _FOUND, _GAPS, _STREAMS, _V1, _SIGNED, _UNSTAMPED, _FRAME_BYTES = range(8)
-_SAMPLE_BYTES: Final = 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,28 +99,14 @@ class FrameIndex:
     frame_bytes: int
 
 
-def scan(data: NDArray[np.uint8], table: MessageTable) -> FrameIndex:
-    """Find every valid frame."""
-    return _scan(data, table, _find_lead(data, table))
+def scan(data: NDArray[np.uint8], table: MessageTable, lead: int) -> FrameIndex:
+    """Find every valid frame.
 
-
-def _find_lead(data: NDArray[np.uint8], table: MessageTable) -> int:
-    """8 when most frames at the beginning of the file stand behind a gap long enough for a stamp, else 0."""
-    size = _SAMPLE_BYTES
-    while True:
-        sample = data[:size]
-        found = _scan(sample, table, 0)
-        if len(found.starts) > 1 or size >= len(data):
-            break
-        size *= 8
-    if len(found.starts) < 2:
-        return 0 if len(found.starts) == 1 and found.starts[0] < STAMP_SIZE else STAMP_SIZE
-    gaps = found.gaps[(found.gaps[:, 0] > 0) & (found.gaps[:, 1] < len(sample))]
-    stamped = int(np.count_nonzero(gaps[:, 1] - gaps[:, 0] >= STAMP_SIZE))
-    return STAMP_SIZE if 2 * stamped >= len(found.starts) - 1 else 0
-
-
-def _scan(data: NDArray[np.uint8], table: MessageTable, lead: int) -> FrameIndex:
+    Args:
+        data: bytes of the file.
+        table: messages to look for.
+        lead: bytes before each frame that belong to it, 8 or 0.
+    """
     progress = np.zeros(8, dtype=np.int64)
     sources = np.zeros((256 * 256, 4), dtype=np.int64)
     keys = np.zeros((1024, 3), dtype=np.int64)
@@ -249,6 +234,7 @@ def _scan_some(
     at: Int = progress[_AT]
     found = 0
     gap_count = 0
+    unstamped = signed = frames_v1 = frame_bytes = 0
     stream_count = progress[_STREAMS]
     mask = len(slots) - 1
     while at < size and found < len(starts) and gap_count < len(gaps) and 2 * stream_count < len(keys):
@@ -274,16 +260,16 @@ def _scan_some(
                 at = size
                 break
             if start - at < lead:
-                progress[_UNSTAMPED] += 1
+                unstamped += 1
         if data[start] == MAGIC_V2:
             sequence = np.int64(data[start + 4])
             sender = np.int64(data[start + 5]) * 256 + np.int64(data[start + 6])
-            progress[_SIGNED] += data[start + 2] & 1
+            signed += data[start + 2] & 1
         else:
             sequence = np.int64(data[start + 2])
             sender = np.int64(data[start + 3]) * 256 + np.int64(data[start + 4])
-            progress[_V1] += 1
-        progress[_FRAME_BYTES] += end - start
+            frames_v1 += 1
+        frame_bytes += end - start
         slot = _slot(message, sender, mask + 1)
         stream = slots[slot]
         while stream >= 0 and (
@@ -298,16 +284,15 @@ def _scan_some(
             keys[stream, 1] = sender >> 8
             keys[stream, 2] = sender & 0xFF
             stream_count += 1
-        source = sources[sender]
-        if source[FRAMES] == 0:
-            source[LAST] = (sequence - 1) & 0xFF
-        source[FRAMES] += 1
-        missed = (sequence - source[LAST] - 1) & 0xFF
+        if sources[sender, FRAMES] == 0:
+            sources[sender, LAST] = (sequence - 1) & 0xFF
+        sources[sender, FRAMES] += 1
+        missed = (sequence - sources[sender, LAST] - 1) & 0xFF
         if missed < 256 - MAX_LATE:
-            source[LOST] += missed
-            source[LAST] = sequence
+            sources[sender, LOST] += missed
+            sources[sender, LAST] = sequence
         else:
-            source[LATE] += 1
+            sources[sender, LATE] += 1
         starts[found] = start
         streams[found] = stream
         found += 1
@@ -316,3 +301,7 @@ def _scan_some(
     progress[_FOUND] = found
     progress[_GAPS] = gap_count
     progress[_STREAMS] = stream_count
+    progress[_UNSTAMPED] += unstamped
+    progress[_SIGNED] += signed
+    progress[_V1] += frames_v1
+    progress[_FRAME_BYTES] += frame_bytes

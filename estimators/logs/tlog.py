@@ -15,7 +15,7 @@ from estimators.logs.columns import Columns, decode_columns
 from estimators.logs.crc import Int
 from estimators.logs.dialect import Description, Dialect
 from estimators.logs.errors import LogError
-from estimators.logs.gaps import GapFigures, sort_gaps
+from estimators.logs.gaps import GapFigures, find_lead, sort_gaps
 from estimators.logs.scan import FRAMES, LATE, LOST, STAMP_SIZE, FrameIndex, Offsets, message_table, scan
 from estimators.logs.source import LogSource, Positions, SourceLoss, Stream, UnknownMessage
 from estimators.vehicle_time import UNIX_TIME_US, stamp_field, vehicle_times
@@ -47,7 +47,7 @@ class TlogSource(LogSource):
         self.dialect = dialect
         self.data = data
         self._table = message_table(dialect)
-        self.index: FrameIndex = scan(data, self._table)
+        self.index: FrameIndex = scan(data, self._table, find_lead(data, self._table))
         self.count = len(self.index.starts)
         if not self.count:
             raise LogError(

@@ -212,6 +212,18 @@ def test_capture_without_time_stamps():
     assert check_against_reference(record(items[0])).format == "tlog"
 
 
+@pytest.mark.parametrize("stamped", [True, False])
+def test_time_stamps_are_told_where_most_messages_are_unknown(stamped):
+    items = []
+    for index in range(40):
+        unknown = build(UNKNOWN_V2, bytes([1 + index % 200] * (index % 50 + 1)))
+        items += [unknown] * (index % 4) + [build(HEARTBEAT, bytes(range(1, 10)))]
+    source = check_against_reference(tlog(items) if stamped else b"".join(items))
+    assert source.index.lead == (8 if stamped else 0)
+    assert source.drops["unknown_messages"] == len(items) - 40
+    assert source.bytes_by_kind["junk"] == 0
+
+
 def test_log_that_begins_with_much_junk():
     noise = random.Random(2).randbytes(400_000)
     items = mixed_frames(30)
