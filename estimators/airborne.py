@@ -30,22 +30,31 @@ _Judge = Callable[[NDArray[Any]], NDArray[np.bool_]]
 def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple[Spans, str]:
     """When a vehicle was in the air.
 
-    EXTENDED_SYS_STATE tells it; where it doesn't know, a vehicle counts that is armed and more than 2 m above
-    home (or faster than 8 m/s through the air where no height is told; or armed, where neither is).
+    EXTENDED_SYS_STATE tells it, but some autopilots call a take-off run a flight: what comes before a vehicle
+    is 2 m above where it began, and after it was so much above where it ended, is left out. Where the state
+    isn't known, a vehicle counts that is armed and more than 2 m above home (or faster than 8 m/s through the
+    air where no height is told; or armed, where neither is).
 
     Returns:
         Spans, and what they are taken from; all time where the log tells nothing of it ("all of the log").
     """
 
-    def spans_of(name: str, field: str, judge: _Judge) -> Spans | None:
+    def column(name: str, field: str) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
         # Asked for by name only where it is: the log's dialect may not have it at all.
         if not any(key.name == name and key.system_id == system_id for key in log.keys):
             return None
         tables = log.tables(name, system_id=system_id, component_id=_AUTOPILOT, boot=boot)
-        return _spans(tables[0].time_us, judge(tables[0][field])) if tables else None
+        return (tables[0].time_us, tables[0][field]) if tables else None
+
+    def spans_of(name: str, field: str, judge: _Judge) -> Spans | None:
+        found = column(name, field)
+        return None if found is None else _spans(found[0], judge(found[1]))
 
     told = spans_of("EXTENDED_SYS_STATE", "landed_state", lambda state: np.isin(state, _IN_AIR))
     if told:
+        heights = column("GLOBAL_POSITION_INT", "relative_alt")
+        if heights is not None:
+            told = [_off_the_ground(span, *heights) for span in told]
         return told, "EXTENDED_SYS_STATE"
     armed = spans_of("HEARTBEAT", "base_mode", lambda mode: (mode & _ARMED) != 0)
     if armed is None:
@@ -87,6 +96,23 @@ def _spans(time_us: NDArray[np.int64], state: NDArray[np.bool_]) -> Spans:
         else:
             spans.append((start_us, end_us))
     return spans
+
+
+def _off_the_ground(
+    span: tuple[int, int], time_us: NDArray[np.int64], height_mm: NDArray[np.int32]
+) -> tuple[int, int]:
+    """A span without its time on the ground before and after; all of it where it never gets high."""
+    inside = (time_us >= span[0]) & (time_us < span[1])
+    times, heights = time_us[inside], height_mm[inside].astype(np.int64)
+    if not len(times):
+        return span
+    risen = np.flatnonzero(heights > heights[0] + _LEAST_HEIGHT_MM)
+    above = np.flatnonzero(heights > heights[-1] + _LEAST_HEIGHT_MM)
+    start_us = int(times[risen[0]]) if len(risen) else span[0]
+    # The log may end in the air: then the last height is none of the ground's.
+    landed = len(above) > 0 and heights[-1] <= heights[0] + 2 * _LEAST_HEIGHT_MM
+    end_us = int(times[above[-1]]) + 1 if landed else span[1]
+    return (start_us, end_us) if start_us < end_us else span
 
 
 def _both(first: Spans, second: Spans) -> Spans:

@@ -141,3 +141,24 @@ def test_comparison_over_two_boots(make_log, level):
     assert compared.figures["autopilot"][0].max == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(ValueError, match="'moon' is not accepted; there are autopilot, truth, both"):
         comparisons([opened], result.fleet.runners[1], "moon")
+
+
+def test_a_run_on_the_runway_is_no_flight(make_log):
+    """Some autopilots say that they fly as soon as they roll."""
+    log = make_log()
+    heights = [0.0] * 30 + [0.5 * k for k in range(41)] + [20.0 - 0.5 * k for k in range(41)] + [0.0] * 20
+    for k, height in enumerate(heights):
+        log.attitude(1.0 + 0.1 * k)
+        log.say(
+            dialect.MAVLink_global_position_int_message(
+                1000 + 100 * k, 1, 1, 0, round(1000 * height) - 40_000, 0, 0, 0, 0
+            )
+        )  # the field lies 40 m below home
+        if k % 5 == 0:
+            log.landed(2)
+    opened = open_log(log.close())
+    spans, _ = airborne_spans(opened, 1)
+    times = opened.table("ATTITUDE").time_us
+    inside = times[within(spans, times)]
+    assert inside.min() == 1_000_000 + 100_000 * (30 + 5)
+    assert inside.max() == 1_000_000 + 100_000 * (30 + 41 + 35)
