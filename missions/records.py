@@ -4,7 +4,6 @@ numpy.
 
 from collections import Counter
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import DEFINITIONS, definition
 from autopilot_bridge.tlog import TlogReader, TlogWriter
+from estimators.logs.columns import record_dtype
 
 SCORED_MESSAGES: Final = frozenset(
     definition(name).message_id
@@ -74,7 +74,7 @@ class FlightRecords:
             component_id: sender; None: any component of the system.
         """
         found = definition(name)
-        dtype = _dtype(found.message_id)
+        dtype = record_dtype(found)
         parts = [
             payload
             for (message_id, system, component), payloads in self._payloads.items()
@@ -83,19 +83,6 @@ class FlightRecords:
         ]
         size = dtype.itemsize
         return np.frombuffer(b"".join(p[:size].ljust(size, b"\0") for p in parts), dtype=dtype)
-
-
-@cache
-def _dtype(message_id: int) -> np.dtype[np.void]:
-    """The payload on the wire as a numpy record."""
-    found = DEFINITIONS[message_id]
-    names, formats, offsets = [], [], []
-    for field in found.wire_fields:
-        names.append(field.name)
-        base = f"S{field.length or 1}" if field.code == "s" else np.dtype(f"<{field.code}").str
-        formats.append(base if field.code == "s" or not field.length else f"{field.length}{base}")
-        offsets.append(field.offset)
-    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": found.size})
 
 
 class FlightRecorder:
