@@ -52,26 +52,28 @@ BETA: Final = 29
 """Sideslip, rad."""
 LIFT: Final = 30
 """Mean lift acceleration per square of airspeed, 1/m; 0: not yet known."""
-DRAG: Final = 31
+LIFT_SUM: Final = 31
+LIFT_WEIGHT: Final = 32
+CLIMB_WEIGHT: Final = 33
+"""Sums of the means that learn lift and angle of attack."""
+DRAG: Final = 34
 """Drag acceleration of a multirotor per speed, 1/s."""
-SPEED_SQUARE: Final = 32
+SPEED_SQUARE: Final = 35
 """Square of the speed, summed over time for learning the drag, m^2/s."""
-FORCE_SQUARE: Final = 33
+FORCE_SQUARE: Final = 36
 """The same of the sideways force, m^2/s^3."""
-SIDEWAYS: Final = 34
+SIDEWAYS: Final = 37
 """Smoothed forward and right specific force, m/s^2 (two places)."""
 
 # Rest
-AGE: Final = 36
+AGE: Final = 39
 """Time filtered since the start, s."""
-REST_TIME: Final = 37
+REST_TIME: Final = 40
 """How long nothing has moved, s."""
-REST_SUM: Final = 38
+REST_SUM: Final = 41
 """All rest so far that bears on the bias, s."""
-MEAN_RATE: Final = 39
+MEAN_RATE: Final = 42
 """Slow mean of the measured rate, rad/s."""
-MEAN_FORCE: Final = 42
-"""Slow mean of the specific force, m/s^2."""
 
 # The newest correction
 REFERENCE: Final = 45
@@ -80,14 +82,16 @@ LENGTH: Final = 48
 """Smoothed length of the reference, m/s^2."""
 WEIGHT: Final = 49
 """Trust in it, 0..1."""
-INNOVATION: Final = 50
+SLOW_INNOVATION: Final = 50
+"""Smoothed cross product of the directions of reference and estimate, FRD."""
+INNOVATION: Final = 53
 """Angle between reference and estimate, rad."""
 
 # Uncertainty
-ROLL_COVARIANCE: Final = 51
+ROLL_COVARIANCE: Final = 54
 """Six places, see `uncertainty`."""
-PITCH_COVARIANCE: Final = 57
-STATE_SIZE: Final = 63
+PITCH_COVARIANCE: Final = 60
+STATE_SIZE: Final = 66
 
 # Forms of the filter
 STILL: Final = 0

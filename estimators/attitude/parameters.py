@@ -54,7 +54,8 @@ class AttitudeParameters:
         airspeed: which airspeed.
         gain_1_s: k_p, of the reference on attitude.
         bias_gain_1_s2: k_I, of the accelerometer on the gyro bias.
-        rest_bias_time_s: of the longest mean by which the gyro bias is found at rest, disarmed.
+        rest_gain_1_s: in place of k_p while the vehicle is disarmed; k_I is a quarter of its square then.
+        rest_bias_time_s: of the longest mean by which the bias about the down axis is found at rest.
         reference_tolerance_m_s2: by how much the reference's length may differ from g to count for half.
         gap_max_s: longer silence of the inertial sensor starts the filter anew.
         airspeed_age_max_s: an older airspeed is not used.
@@ -91,6 +92,7 @@ class AttitudeParameters:
     airspeed: AirspeedSource = AirspeedSource.AUTO
     gain_1_s: float = 0.13
     bias_gain_1_s2: float = 0.003
+    rest_gain_1_s: float = 0.5
     rest_bias_time_s: float = 20.0
     reference_tolerance_m_s2: float = 3.0
     gap_max_s: float = 2.0
@@ -136,6 +138,7 @@ _RANGES: Final[dict[str, tuple[float, float]]] = {
     "imu_instance": (0, 255),
     "gain_1_s": (0.0, 50.0),
     "bias_gain_1_s2": (0.0, 10.0),
+    "rest_gain_1_s": (0.0, 50.0),
     "rest_bias_time_s": (0.1, 1e4),
     "reference_tolerance_m_s2": (0.01, float("inf")),
     "gap_max_s": (0.05, 60.0),
@@ -193,6 +196,7 @@ def _index(name: str) -> int:
 
 GAIN: Final = _index("gain_1_s")
 BIAS_GAIN: Final = _index("bias_gain_1_s2")
+REST_GAIN: Final = _index("rest_gain_1_s")
 REST_BIAS_TIME: Final = _index("rest_bias_time_s")
 TOLERANCE: Final = _index("reference_tolerance_m_s2")
 AIRSPEED_MIN: Final = _index("airspeed_min_m_s")

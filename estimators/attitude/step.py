@@ -62,25 +62,26 @@ def step(x: Array, p: Array) -> bool:
         0.5 * (x[at.RATE + 2] + wz) - bz,
     )
     x[at.RATE], x[at.RATE + 1], x[at.RATE + 2] = wx, wy, wz
-    disarmed = x[at.DISARMED] != 0.0
-    if disarmed:
+    k_p, k_i = p[par.GAIN], p[par.BIAS_GAIN]
+    if x[at.DISARMED] != 0.0:
         _still(x, ax, ay, az)
+        tilt.rest(x, p, dt, wx, wy, wz)
+        # Arming is told once a second only: a take-off run may have begun.
+        if tilt.agrees(x):
+            k_p = p[par.REST_GAIN]
+            k_i = 0.25 * k_p * k_p  # critically damped
     elif x[at.FORM] == at.WING and x[at.AIRSPEED] > 0.0:
         wing.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
     elif x[at.FORM] == at.ROTOR:
         rotor.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
     else:
         _still(x, ax, ay, az)
-    gain = tilt.correct(x, p, dt)
+    gain = tilt.correct(x, p, dt, k_p, k_i)
     error = _error(x, p, ax, ay, az)
-    learn = p[par.BIAS_GAIN] * x[at.WEIGHT] * dt
+    learn = k_i * x[at.WEIGHT] * dt
     fade = math.exp(-dt / p[par.REFERENCE_TIME])
     uncertainty.propagate(x, at.ROLL_COVARIANCE, p, dt, gain, learn, fade, error)
     uncertainty.propagate(x, at.PITCH_COVARIANCE, p, dt, gain, learn, fade, error)
-    found = tilt.rest(x, p, dt, disarmed, wx, wy, wz, ax, ay, az)
-    if found > 0.0:
-        uncertainty.rest(x, at.ROLL_COVARIANCE, found)
-        uncertainty.rest(x, at.PITCH_COVARIANCE, found)
     x[at.AGE] += dt
     return True
 
@@ -89,7 +90,6 @@ def step(x: Array, p: Array) -> bool:
 def _first(x: Array, wx: float, wy: float, wz: float, ax: float, ay: float, az: float) -> None:
     x[at.RATE], x[at.RATE + 1], x[at.RATE + 2] = wx, wy, wz
     x[at.MEAN_RATE], x[at.MEAN_RATE + 1], x[at.MEAN_RATE + 2] = wx, wy, wz
-    x[at.MEAN_FORCE], x[at.MEAN_FORCE + 1], x[at.MEAN_FORCE + 2] = ax, ay, az
     length = math.sqrt(ax * ax + ay * ay + az * az)
     if length > 1.0:
         x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2] = -ax / length, -ay / length, -az / length
@@ -106,7 +106,7 @@ def _still(x: Array, ax: float, ay: float, az: float) -> None:
 @kernel
 def _error(x: Array, p: Array, ax: float, ay: float, az: float) -> float:
     """Standard error of the reference's direction about an axis, rad."""
-    if x[at.REST_TIME] > 0.0:
+    if x[at.DISARMED] != 0.0:
         return p[par.REST_ERROR]
     # What motion adds to the force scales with it, and so do the errors of airspeed, incidence and drag.
     if x[at.FORM] == at.WING:

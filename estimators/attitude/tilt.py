@@ -18,11 +18,11 @@ Array = NDArray[np.float64]
 
 GRAVITY_M_S2 = 9.80665
 _LENGTH_MEAN_S = 0.3
+_SLOW_S = 0.5
+_AGREEMENT_RAD = 0.03
 _REST_MEAN_S = 0.5
-_REST_RATE_RAD_S = 0.02
-_REST_BIAS_RAD_S = 0.1
-_REST_FORCE_M_S2 = 0.3
-_REST_WEIGHT_M_S2 = 0.5
+_REST_NOISE_RAD_S = 0.02
+_REST_RATE_RAD_S = 0.1
 _REST_AFTER_S = 1.0
 _REST_PRIOR_S = 2.0
 _BIAS_MAX_RAD_S = 0.2
@@ -50,7 +50,7 @@ def rotate(x: Array, dt: float, wx: float, wy: float, wz: float) -> None:
 
 
 @kernel
-def correct(x: Array, p: Array, dt: float) -> float:
+def correct(x: Array, p: Array, dt: float, k_p: float, k_i: float) -> float:
     """Pull the direction down towards the reference (11)-(13), and learn the gyro bias (12).
 
     In the first seconds the gain is the one of a running mean, so that any start is forgotten.
@@ -59,6 +59,7 @@ def correct(x: Array, p: Array, dt: float) -> float:
         x: state; its REFERENCE, m/s^2, FRD.
         p: coefficients.
         dt: s.
+        k_p, k_i: gains, 1/s and 1/s^2.
 
     Returns:
         How much of the innovation went into the attitude, 0..1.
@@ -80,7 +81,7 @@ def correct(x: Array, p: Array, dt: float) -> float:
     ex, ey, ez = my * dz - mz * dy, mz * dx - mx * dz, mx * dy - my * dx
     along = mx * dx + my * dy + mz * dz
     x[at.INNOVATION] = math.atan2(math.sqrt(ex * ex + ey * ey + ez * ez), along)
-    gain = min(1.0, max(p[par.GAIN], 1.0 / (x[at.AGE] + dt)) * weight * dt)
+    gain = min(1.0, max(k_p, 1.0 / (x[at.AGE] + dt)) * weight * dt)
     dx += gain * (mx - along * dx)
     dy += gain * (my - along * dy)
     dz += gain * (mz - along * dz)
@@ -90,8 +91,12 @@ def correct(x: Array, p: Array, dt: float) -> float:
     x[at.DOWN] = dx / length
     x[at.DOWN + 1] = dy / length
     x[at.DOWN + 2] = dz / length
-    if gain <= p[par.GAIN] * dt:  # the mean of the start is over
-        bias = p[par.BIAS_GAIN] * weight * dt
+    slow = min(1.0, dt / _SLOW_S)
+    x[at.SLOW_INNOVATION] += slow * (ex - x[at.SLOW_INNOVATION])
+    x[at.SLOW_INNOVATION + 1] += slow * (ey - x[at.SLOW_INNOVATION + 1])
+    x[at.SLOW_INNOVATION + 2] += slow * (ez - x[at.SLOW_INNOVATION + 2])
+    if gain <= k_p * dt:  # the mean of the start is over
+        bias = k_i * weight * dt
         x[at.GYRO_BIAS] = _within(x[at.GYRO_BIAS] - bias * ex, _BIAS_MAX_RAD_S)
         x[at.GYRO_BIAS + 1] = _within(x[at.GYRO_BIAS + 1] - bias * ey, _BIAS_MAX_RAD_S)
         x[at.GYRO_BIAS + 2] = _within(x[at.GYRO_BIAS + 2] - bias * ez, _BIAS_MAX_RAD_S)
@@ -99,52 +104,42 @@ def correct(x: Array, p: Array, dt: float) -> float:
 
 
 @kernel
-def rest(
-    x: Array,
-    p: Array,
-    dt: float,
-    disarmed: bool,
-    wx: float,
-    wy: float,
-    wz: float,
-    ax: float,
-    ay: float,
-    az: float,
-) -> float:
-    """See whether the vehicle stands still; if so, what the gyro reads is its bias.
+def agrees(x: Array) -> bool:
+    """Whether the reference has agreed with the estimate of late, so that a vehicle thought at rest is."""
+    ex, ey, ez = x[at.SLOW_INNOVATION], x[at.SLOW_INNOVATION + 1], x[at.SLOW_INNOVATION + 2]
+    return ex * ex + ey * ey + ez * ez < _AGREEMENT_RAD * _AGREEMENT_RAD
+
+
+@kernel
+def rest(x: Array, p: Array, dt: float, wx: float, wy: float, wz: float) -> None:
+    """While a disarmed vehicle stands still, what the gyro reads about the down axis is its bias.
+
+    The accelerometer tells nothing of that one. It does tell the others, also while wind rocks the vehicle.
 
     Args:
         x: state.
         p: coefficients.
         dt: s.
-        disarmed: it can't be flying.
         wx, wy, wz: measured rate, rad/s, FRD.
-        ax, ay, az: specific force, m/s^2, FRD.
-
-    Returns:
-        Gain of the mean by which the bias was moved; 0 when not at rest.
     """
     slow = min(1.0, dt / _REST_MEAN_S)
-    still = abs(math.sqrt(ax * ax + ay * ay + az * az) - GRAVITY_M_S2) < _REST_WEIGHT_M_S2
-    for axis, rate, force in ((0, wx, ax), (1, wy, ay), (2, wz, az)):
-        x[at.MEAN_RATE + axis] += slow * (rate - x[at.MEAN_RATE + axis])
-        x[at.MEAN_FORCE + axis] += slow * (force - x[at.MEAN_FORCE + axis])
-        still = (
-            still
-            and abs(rate - x[at.MEAN_RATE + axis]) < _REST_RATE_RAD_S
-            and abs(x[at.MEAN_RATE + axis]) < _REST_BIAS_RAD_S
-            and abs(force - x[at.MEAN_FORCE + axis]) < _REST_FORCE_M_S2
-        )
-    x[at.REST_TIME] = x[at.REST_TIME] + dt if still and disarmed else 0.0
+    still = True
+    for axis, rate in ((0, wx), (1, wy), (2, wz)):
+        mean = x[at.MEAN_RATE + axis] + slow * (rate - x[at.MEAN_RATE + axis])
+        x[at.MEAN_RATE + axis] = mean
+        still = still and abs(rate - mean) < _REST_NOISE_RAD_S and abs(mean) < _REST_RATE_RAD_S
+    x[at.REST_TIME] = x[at.REST_TIME] + dt if still else 0.0
     if x[at.REST_TIME] < _REST_AFTER_S:
-        return 0.0
-    # The mean of all rest so far, zero counting for a moment of it: a gust that rocks the vehicle is no bias.
+        return
+    # The mean of all rest so far, zero counting for a moment of it.
     x[at.REST_SUM] = min(x[at.REST_SUM] + dt, p[par.REST_BIAS_TIME])
-    gain = min(1.0, dt / (_REST_PRIOR_S + x[at.REST_SUM]))
-    x[at.GYRO_BIAS] += gain * (wx - x[at.GYRO_BIAS])
-    x[at.GYRO_BIAS + 1] += gain * (wy - x[at.GYRO_BIAS + 1])
-    x[at.GYRO_BIAS + 2] += gain * (wz - x[at.GYRO_BIAS + 2])
-    return gain
+    dx, dy, dz = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
+    bx, by, bz = x[at.GYRO_BIAS], x[at.GYRO_BIAS + 1], x[at.GYRO_BIAS + 2]
+    turn = (wx - bx) * dx + (wy - by) * dy + (wz - bz) * dz
+    turn *= min(1.0, dt / (_REST_PRIOR_S + x[at.REST_SUM]))
+    x[at.GYRO_BIAS] = bx + turn * dx
+    x[at.GYRO_BIAS + 1] = by + turn * dy
+    x[at.GYRO_BIAS + 2] = bz + turn * dz
 
 
 @kernel

@@ -20,9 +20,6 @@ from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 
-_REST_RATE_NOISE_RAD_S = 5e-5
-"""What the bias is worth after a mean at rest."""
-
 
 @kernel
 def start(x: Array, at: int, p: Array) -> None:
@@ -63,12 +60,3 @@ def propagate(
     x[at + 3] = learn * b_t + b_b - learn * b_r + p[par.GYRO_BIAS_WALK] ** 2 * dt
     x[at + 4] = fade * b_r
     x[at + 5] = fade * fade * rr + (1.0 - fade * fade) * error * error
-
-
-@kernel
-def rest(x: Array, at: int, gain: float) -> None:
-    """The bias was moved towards the rate at rest by a gain."""
-    keep = 1.0 - gain
-    x[at + 1] *= keep
-    x[at + 3] = keep * keep * x[at + 3] + (1.0 - keep * keep) * _REST_RATE_NOISE_RAD_S**2
-    x[at + 4] *= keep

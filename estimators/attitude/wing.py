@@ -20,6 +20,7 @@ _MEAN_MAX_RAD = 0.2
 _BETA_MAX_RAD = 0.3
 _LEVEL_ENOUGH = 0.7
 _LIFT_LEAST = 1e-4
+_CLIMB_PRIOR_S = 2.0
 
 
 @kernel
@@ -85,11 +86,13 @@ def _learn_lift(x: Array, p: Array, dt: float, up: float) -> None:
     if p[par.LIFT_GIVEN] > 0.0:
         x[at.LIFT] = p[par.LIFT_GIVEN]
         return
+    # Least squares of lift by the square of the airspeed, forgetting: what wheels carry weighs little.
     square = x[at.AIRSPEED] * x[at.AIRSPEED]
-    if x[at.LIFT] == 0.0:
-        x[at.LIFT] = GRAVITY_M_S2 / square
-    x[at.LIFT] += min(1.0, dt / p[par.LIFT_TIME]) * (up / square - x[at.LIFT])
-    x[at.LIFT] = max(_LIFT_LEAST, x[at.LIFT])
+    fade = max(0.0, 1.0 - dt / p[par.LIFT_TIME])
+    x[at.LIFT_SUM] = fade * x[at.LIFT_SUM] + dt * up * square
+    x[at.LIFT_WEIGHT] = fade * x[at.LIFT_WEIGHT] + dt * square * square
+    if x[at.LIFT_WEIGHT] > 0.0:
+        x[at.LIFT] = max(_LIFT_LEAST, x[at.LIFT_SUM] / x[at.LIFT_WEIGHT])
 
 
 @kernel
@@ -118,5 +121,9 @@ def _attack(x: Array, p: Array, dt: float, pitch_rate: float) -> None:
     if math.isnan(climb) or down_z < _LEVEL_ENOUGH:
         return
     seen = -(down_x * math.cos(alpha) + down_y * x[at.BETA] + down_z * math.sin(alpha)) * airspeed
-    mean = x[at.ALPHA_MEAN] + min(1.0, dt / p[par.CLIMB_TIME]) * (seen - climb) / (airspeed * down_z)
+    # A mean weighted by the square of the airspeed, forgetting.
+    weight = dt * airspeed * airspeed
+    x[at.CLIMB_WEIGHT] = max(0.0, 1.0 - dt / p[par.CLIMB_TIME]) * x[at.CLIMB_WEIGHT] + weight
+    gain = weight / (x[at.CLIMB_WEIGHT] + _CLIMB_PRIOR_S * airspeed * airspeed)
+    mean = x[at.ALPHA_MEAN] + gain * (seen - climb) / (airspeed * down_z)
     x[at.ALPHA_MEAN] = min(_MEAN_MAX_RAD, max(-_MEAN_MAX_RAD, mean))
