@@ -220,8 +220,10 @@ def start_process(tmp_path, port, *arguments):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize(("arguments", "code"), [((), 0), (("--duration", "9999"), 130)])
+@pytest.mark.parametrize(
+    ("number", "arguments", "code"),
+    [(signal.SIGINT, (), 0), (signal.SIGTERM, ("--duration", "9999"), 130)],
+)
 def test_a_signal_ends_it_in_good_order(tmp_path, port, vehicle, number, arguments, code):
     vehicle()
     process, _ = start_process(tmp_path, port, *arguments)
