@@ -90,11 +90,11 @@ class AttitudeParameters:
     imu: ImuSource = ImuSource.AUTO
     imu_instance: int = 0
     airspeed: AirspeedSource = AirspeedSource.AUTO
-    gain_1_s: float = 0.13
+    gain_1_s: float = 0.11
     bias_gain_1_s2: float = 0.003
     rest_gain_1_s: float = 0.5
     rest_bias_time_s: float = 20.0
-    reference_tolerance_m_s2: float = 3.0
+    reference_tolerance_m_s2: float = 2.0
     gap_max_s: float = 2.0
     airspeed_age_max_s: float = 3.0
     airspeed_min_m_s: float = 6.0
