@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from missions.estimation.report import EstimationResult
 
 _FAILED = 1
+_SECONDS = FiniteRange(min=0.0, max=1e9)
 
 
 @click.command()
@@ -33,8 +34,8 @@ _FAILED = 1
     show_default=True,
     help="What the estimates are compared with; of both, the autopilot's word leads the summary.",
 )
-@click.option("--from", "from_s", type=FiniteRange(), metavar="S", help="Begin at this vehicle time, s.")
-@click.option("--to", "to_s", type=FiniteRange(), metavar="S", help="End at this vehicle time, s.")
+@click.option("--from", "from_s", type=_SECONDS, metavar="S", help="Begin at this vehicle time, s.")
+@click.option("--to", "to_s", type=_SECONDS, metavar="S", help="End at this vehicle time, s.")
 @click.option("--dialect", metavar="NAME|FILE.xml", help="Of the logs. [default: all of MAVLink's messages]")
 @click.option(
     "--out",
