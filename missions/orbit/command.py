@@ -30,7 +30,7 @@ def _place(text: str) -> tuple[float, float]:
 
 
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.orbit.options import OrbitOptions
+    from missions.orbit.options import AttitudeFrom, OrbitOptions
     from missions.scenario import TargetMotion
 
     heading, motion = given["entry_heading"], given["target_motion"]
@@ -52,6 +52,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         entry_heading_rad=None if heading is None else _degrees("entry-heading", heading),
         gps_fault=not given["no_gps_fault"],
         lost_limit_s=given["lost_limit"],
+        attitude=AttitudeFrom(given["attitude"]),
     )
 
 
@@ -93,6 +94,12 @@ COMMAND: Final = MissionCommand(
         option("--no-gps-fault", is_flag=True, help="Leave GPS on; the orbit doesn't use it."),
         option(
             "--lost-limit", type=float, default=30.0, help="Give up when the target is unseen so long, s."
+        ),
+        option(
+            "--attitude",
+            type=click.Choice(["autopilot", "filter"]),
+            default="autopilot",
+            help="Roll and pitch to fly with: the autopilot's, or our own filter's (docs/attitude.md).",
         ),
         option("--separation", type=float, default=20.0, help="Between the altitudes of a team, m."),
     ),

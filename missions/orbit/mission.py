@@ -14,9 +14,10 @@ from missions import telemetry
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.mission import Debriefing, Mission, WorldDefaults
-from missions.orbit.attitude import AutopilotAttitude
+from missions.orbit.attitude import AttitudeSource, AutopilotAttitude
+from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
-from missions.orbit.options import WANDERING_M, OrbitOptions
+from missions.orbit.options import WANDERING_M, AttitudeFrom, OrbitOptions
 from missions.orbit.tracker import TargetStatus, TargetTracker
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.scenario import Scenario, Setting, TargetMotion, TargetScenario
@@ -42,6 +43,9 @@ _CAPTURED_RAD: Final = math.radians(10.0)
 _CAPTURED_FOR_S: Final = 5.0
 _CAPTURE_LIMIT_S: Final = 240.0
 _GPS_BACK_S: Final = 12.0
+_INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
+_INERTIAL_HZ: Final = (25.0, 40.0)
+_FILTER_START_S: Final = 5.0
 
 
 class OrbitMission(Mission[OrbitOptions]):
@@ -121,8 +125,11 @@ class OrbitFlight:
         self._vehicle = vehicle
         self._options = options
         self._limits = limits
-        self._attitude = AutopilotAttitude()
-        self._tracker = TargetTracker(self._attitude)
+        self._told = AutopilotAttitude()
+        filtered = options.attitude is AttitudeFrom.FILTER
+        self._filter = FilterAttitude(vehicle.system_id) if filtered else None
+        attitude: AttitudeSource = self._filter or self._told
+        self._tracker = TargetTracker(attitude)
         bank_max = min(math.radians(50.0), 0.95 * limits.bank_max_rad)
         self._guidance = OrbitGuidance(
             OrbitParameters(radius_m=options.radius_m, direction=options.direction, bank_max_rad=bank_max)
@@ -158,17 +165,20 @@ class OrbitFlight:
         vehicle.payload.set_gimbal_rate(_GIMBAL_HZ)
         pilot = self._pilot = await vehicle.prepare_piloting()
         await pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
-        self._begin("takeoff")
-        await vehicle.takeoff(options.own_altitude_m)
         stops = self._listen()
-        looking = asyncio.get_running_loop().create_task(self._keep_looking())
         try:
-            self._begin("transit")
-            await self._fly_to_entry(looking)
-            await self._orbit_without_gps(looking)
+            await self._start_filter()
+            self._begin("takeoff")
+            await vehicle.takeoff(options.own_altitude_m)
+            looking = asyncio.get_running_loop().create_task(self._keep_looking())
+            try:
+                self._begin("transit")
+                await self._fly_to_entry(looking)
+                await self._orbit_without_gps(looking)
+            finally:
+                looking.cancel()
+                await asyncio.gather(looking, return_exceptions=True)
         finally:
-            looking.cancel()
-            await asyncio.gather(looking, return_exceptions=True)
             for stop in stops:
                 stop()
         self._begin("landing")
@@ -185,13 +195,34 @@ class OrbitFlight:
             if frame.system_id == own and frame.component_id == 1:
                 attitude = telemetry.attitude(decode(frame))
                 if attitude is not None:
-                    self._attitude.add(attitude)
+                    self._told.add(attitude)
 
+        if self._filter is not None:
+            listen, hear = vehicle.connection.listen, self._filter.hear
+            sources = [listen(name, hear) for name in sorted(self._filter.names)]
+        else:
+            sources = [vehicle.connection.listen("ATTITUDE", on_attitude)]
         return [
-            vehicle.connection.listen("ATTITUDE", on_attitude),
+            *sources,
             vehicle.payload.on_gimbal_attitude(tracker.gimbal),
             vehicle.payload.on_detection(tracker.detect),
         ]
+
+    async def _start_filter(self) -> None:
+        """Have our filter fed, where it is to be used: on the ground still, where it finds its biases."""
+        if self._filter is None:
+            return
+        vehicle = self._vehicle
+        for name in _INERTIAL:
+            for rate_hz in _INERTIAL_HZ:  # an autopilot that finds the second too fast has granted the first
+                await vehicle.set_message_rate(name, rate_hz)
+            await vehicle.clock.sleep(_FILTER_START_S)
+            if self._filter.newest is not None:
+                return
+        raise MissionError(
+            f"the attitude filter hears neither {' nor '.join(_INERTIAL)}; fly with --attitude autopilot; "
+            f"{vehicle.heard()}"
+        )
 
     async def _keep_looking(self) -> None:
         """Step the tracker, and keep the gimbal on the target, all the time."""
@@ -383,7 +414,9 @@ class OrbitFlight:
         if min(unseen_s, (now_us - entered_us) * 1e-6) > options.lost_limit_s:
             seen = "never seen" if math.isinf(unseen_s) else f"lost {unseen_s:.0f} s ago"
             raise MissionError(f"the target was {seen}; {self._vehicle.heard()}")
-        command = self._guidance.command(tracker.state(now_us), attitude.yaw_rad, attitude.roll_rad)
+        estimate = self._filter.newest if self._filter is not None else None
+        roll_rad = attitude.roll_rad if estimate is None else estimate.roll_rad
+        command = self._guidance.command(tracker.state(now_us), attitude.yaw_rad, roll_rad)
         self._command = command
         self._note(command, now_us, entered_us)
         return self._pilot.setpoint(now_us, command.roll_rad)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Final
 
 from missions.atmosphere import GRAVITY_M_S2
@@ -12,6 +13,14 @@ from missions.scenario import TargetMotion
 
 WANDERING_M: Final = 100.0
 """How far a target that wanders goes from its place: radius of its circle, half the side of its area."""
+
+
+class AttitudeFrom(StrEnum):
+    """Whose roll and pitch the orbit is flown with."""
+
+    AUTOPILOT = "autopilot"
+    FILTER = "filter"
+    """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +43,7 @@ class OrbitOptions(MissionOptions):
         entry_heading_rad: of the nose there; None: towards the target.
         gps_fault: GPS is switched off for the orbit (MAV_CMD_INJECT_FAILURE).
         lost_limit_s: the mission ends when the target was not seen for so long.
+        attitude: whose roll and pitch it is flown with; the yaw is the autopilot's.
     """
 
     altitude_m: float = 100.0
@@ -52,6 +62,7 @@ class OrbitOptions(MissionOptions):
     entry_heading_rad: float | None = None
     gps_fault: bool = True
     lost_limit_s: float = 30.0
+    attitude: AttitudeFrom = AttitudeFrom.AUTOPILOT
 
     def __post_init__(self) -> None:
         super(OrbitOptions, self).__post_init__()

@@ -1,0 +1,91 @@
+"""Attitude by a filter of ours: roll and pitch from inertial messages and airspeed, yaw from the autopilot.
+
+The filter is seed 004's self-pose estimation (docs/attitude.md); it knows no yaw.
+"""
+
+import math
+from collections import deque
+from typing import Final
+
+from autopilot_bridge.mavlink import Frame, decode
+from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
+from estimators.interface import Outcome
+from estimators.messages import read_message
+from estimators.needs import message_names
+from estimators.runner import ESTIMATOR_COMPONENTS, TRUTH_COMPONENT
+from estimators.vehicle_time import VehicleTime
+from missions import telemetry
+from missions.orbit.attitude import AutopilotAttitude
+from missions.rotation import Quaternion, from_euler, yaw_of
+
+__all__ = ["FilterAttitude"]
+
+_KEPT: Final = 512
+_STALE_US: Final = 500_000
+_ATTITUDE: Final = "ATTITUDE"
+
+
+class FilterAttitude:
+    """Attitude of one aircraft against time (an `AttitudeSource`).
+
+    Args:
+        system_id: of the aircraft.
+        parameters: of the filter; None: its defaults, for a fixed wing.
+
+    Attributes:
+        names: messages that it must be given.
+    """
+
+    def __init__(self, system_id: int, parameters: AttitudeParameters | None = None) -> None:
+        self._system_id = system_id
+        self._filter = AttitudeEstimator(parameters or AttitudeParameters(vehicle=VehicleKind.FIXED_WING))
+        self._time = VehicleTime()
+        self._yaw = AutopilotAttitude()
+        self._kept: deque[AttitudeEstimate] = deque(maxlen=_KEPT)
+        self.names = message_names(self._filter.needs) | {_ATTITUDE}
+
+    @property
+    def newest(self) -> AttitudeEstimate | None:
+        """The filter's newest estimate; None before the first."""
+        return self._kept[-1] if self._kept else None
+
+    def hear(self, frame: Frame) -> None:
+        """Take a frame. Those of other vehicles, of simulators and of estimators are left out."""
+        left_out = frame.component_id == TRUTH_COMPONENT or frame.component_id in ESTIMATOR_COMPONENTS
+        if frame.system_id != self._system_id or left_out:
+            return
+        message = read_message(frame)
+        time_us = self._time.stamp(message)
+        if message.name == _ATTITUDE:
+            attitude = telemetry.attitude(decode(frame)) if frame.component_id == 1 else None
+            if attitude is not None:
+                self._yaw.add(attitude)
+            return
+        outcome = self._filter.handle(time_us, message)
+        if outcome is Outcome.TIME_JUMP:
+            self._kept.clear()
+        elif outcome is Outcome.UPDATED:
+            self._kept.extend(self._filter.estimates)
+
+    def at(self, time_us: int) -> Quaternion | None:
+        """`q_ned_from_frd` at a vehicle time; None when filter or autopilot know nothing of it."""
+        heading = self._yaw.at(time_us)
+        if heading is None:
+            return None
+        later: AttitudeEstimate | None = None
+        for estimate in reversed(self._kept):
+            if estimate.time_us <= time_us:
+                if later is None:
+                    if time_us - estimate.time_us > _STALE_US:
+                        return None
+                    later = estimate
+                return _between(estimate, later, time_us, yaw_of(heading))
+            later = estimate
+        return None
+
+
+def _between(a: AttitudeEstimate, b: AttitudeEstimate, time_us: int, yaw_rad: float) -> Quaternion:
+    share = 0.0 if b.time_us == a.time_us else (time_us - a.time_us) / (b.time_us - a.time_us)
+    roll = a.roll_rad + share * math.remainder(b.roll_rad - a.roll_rad, math.tau)
+    pitch = a.pitch_rad + share * (b.pitch_rad - a.pitch_rad)
+    return from_euler(roll, pitch, yaw_rad)

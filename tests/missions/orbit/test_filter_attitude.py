@@ -1,0 +1,107 @@
+"""`FilterAttitude`: roll and pitch of our filter, yaw of the autopilot."""
+
+import math
+
+import pytest
+
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
+from missions.orbit.filter_attitude import FilterAttitude
+from missions.rotation import yaw_of
+
+ROLL, PITCH, YAW = 0.3, -0.1, 2.0
+G = 9.80665
+
+
+class Sender:
+    """Frames of an autopilot, or of somebody else."""
+
+    def __init__(self, system=1, component=1):
+        self._encoder = FrameEncoder(system, component)
+        self._parser = FrameParser()
+
+    def frame(self, message):
+        (frame,) = self._parser.feed(self._encoder.encode(message))
+        return frame
+
+    def imu(self, time_us, roll=ROLL, pitch=PITCH, roll_rate=0.0):
+        force = (
+            G * math.sin(pitch),
+            -G * math.cos(pitch) * math.sin(roll),
+            -G * math.cos(pitch) * math.cos(roll),
+        )
+        return self.frame(
+            dialect.MAVLink_highres_imu_message(
+                time_us, *force, roll_rate, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 63
+            )
+        )
+
+    def attitude(self, time_us, yaw=YAW):
+        return self.frame(dialect.MAVLink_attitude_message(time_us // 1000, 0.9, 0.9, yaw, 0.0, 0.0, 0.0))
+
+
+def euler(q):
+    w, x, y, z = q
+    return (
+        math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        math.asin(2.0 * (w * y - z * x)),
+        yaw_of(q),
+    )
+
+
+@pytest.fixture
+def fed():
+    source, sender = FilterAttitude(1), Sender()
+    for k in range(51):
+        source.hear(sender.imu(1_000_000 + k * 20_000))
+        if k % 5 == 0:
+            source.hear(sender.attitude(1_000_000 + k * 20_000))
+    return source
+
+
+def test_roll_and_pitch_are_the_filters_and_yaw_the_autopilots(fed):
+    assert euler(fed.at(1_970_000)) == pytest.approx((ROLL, PITCH, YAW), abs=1e-4)
+    assert fed.newest.time_us == 2_000_000
+
+
+def test_between_samples():
+    """A turn of 20 degrees a second, asked for half way between two samples."""
+    source, sender = FilterAttitude(1), Sender()
+    rate = math.radians(20.0)
+    for k in range(21):
+        t = 0.05 * k
+        source.hear(sender.imu(1_000_000 + k * 50_000, roll=rate * t, pitch=0.0, roll_rate=rate))
+        source.hear(sender.attitude(1_000_000 + k * 50_000))
+    assert euler(source.at(1_525_000))[0] == pytest.approx(rate * 0.525, abs=2e-4)
+
+
+@pytest.mark.parametrize("time_us", [999_000, 2_600_000])
+def test_nothing_is_known_before_and_long_after(fed, time_us):
+    assert fed.at(time_us) is None
+
+
+def test_no_yaw_no_attitude():
+    source, sender = FilterAttitude(1), Sender()
+    for k in range(10):
+        source.hear(sender.imu(1_000_000 + k * 20_000))
+    assert source.at(1_100_000) is None
+    assert source.newest is not None
+
+
+@pytest.mark.parametrize(("system", "component"), [(2, 1), (1, 25), (1, 191)])
+def test_others_are_left_out(system, component):
+    source, sender = FilterAttitude(1), Sender(system, component)
+    source.hear(sender.imu(1_000_000))
+    source.hear(sender.attitude(1_000_000))
+    assert source.newest is None
+    assert source.at(1_000_000) is None
+
+
+def test_names_are_what_must_be_listened_to():
+    assert {
+        "HIGHRES_IMU",
+        "RAW_IMU",
+        "HEARTBEAT",
+        "VFR_HUD",
+        "SCALED_PRESSURE",
+        "ATTITUDE",
+    } <= FilterAttitude(1).names
