@@ -23,7 +23,7 @@ import numpy as np
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from autopilot_bridge.mavlink import FrameParser
+from autopilot_bridge.mavlink import FrameParser, definition
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from autopilot_bridge.tlog import TlogWriter
@@ -51,6 +51,17 @@ from missions.together import together
 from missions.vehicle.vehicle import Vehicle
 
 FORMS = ("measurement", "kalman", "proposed", "frequency")
+HEARD = frozenset(
+    definition(name).message_id
+    for name in (
+        "GPS_RAW_INT",
+        "HOME_POSITION",
+        "ATTITUDE",
+        "GIMBAL_DEVICE_ATTITUDE_STATUS",
+        "LANDING_TARGET",
+        "SYSTEM_TIME",
+    )
+)
 ALTITUDE_M = 20.0
 TAG = 7
 
@@ -102,7 +113,7 @@ class Recorded:
     """A flight as it was heard, with the truth.
 
     Attributes:
-        frames: all that the vehicles said, in order.
+        frames: what the base station hears of the vehicles, in order.
         truth: (n, 3), time s, north and east of the target from the first vehicle's home.
         start_us, end_us: of the pattern, that part which both fly.
     """
@@ -127,15 +138,16 @@ class Ears:
 
 
 class Ear:
-    """One link's recorder."""
+    """One link's recorder: of several hundred messages a second it keeps what the base station listens to."""
 
     def __init__(self, ears: Ears) -> None:
         self._ears = ears
         self._parser = FrameParser()
 
     def record(self, frame: bytes, time_us: int) -> None:
-        for parsed in self._parser.feed(frame):
-            self._ears.take(frame, parsed, time_us)
+        if int.from_bytes(frame[7:10], "little") in HEARD:
+            for parsed in self._parser.feed(frame):
+                self._ears.take(frame, parsed, time_us)
 
 
 def paces(seed: int) -> tuple[float, float]:
@@ -244,7 +256,7 @@ def base_station(form: str, setting: Setting, **chosen: Any) -> TargetFusionEsti
             "epsilon_rad_s": setting.epsilon_rad_s,
             "position_sigma_m": 0.2,
             "velocity_sigma_m_s": 0.07,
-            "acceleration_psd_m2_s3": 2e-4,
+            "acceleration_psd_m2_s3": 3e-4,
             "size_sigma_rad": 0.0002,
             "yaw_sigma_rad": 0.02,
             "walk_m_sqrt_s": 3.0,

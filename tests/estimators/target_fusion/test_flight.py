@@ -65,7 +65,7 @@ def test_the_frequencies_that_were_flown_are_found(flights, vehicle: int) -> Non
             omega_x_rad_s=omega_x,
             omega_y_rad_s=omega_y,
             epsilon_rad_s=SETTING.epsilon_rad_s,
-            acceleration_psd_m2_s3=2e-4,
+            acceleration_psd_m2_s3=3e-4,
         )
     )
     runner = Runner(estimator, system_id=vehicle)
