@@ -40,7 +40,7 @@ def test_proposed_is_better_than_kalman_and_that_than_unfiltered(flights) -> Non
     means = {}
     for form in bench.FORMS:
         scores = [bench.score(flight, bench.base_station(form, SETTING)) for flight in flights]
-        assert all(score.detections > 1500 for score in scores)
+        assert all(score.detections > 1000 for score in scores)
         means[form] = statistics.fmean(score.rmse_m for score in scores)
     assert means["frequency"] < means["proposed"] < means["kalman"] < means["measurement"] < 1.5
 
@@ -65,6 +65,7 @@ def test_the_frequencies_that_were_flown_are_found(flights, vehicle: int) -> Non
             omega_x_rad_s=omega_x,
             omega_y_rad_s=omega_y,
             epsilon_rad_s=SETTING.epsilon_rad_s,
+            centre_east_m=-5.0 * (vehicle - 1),  # the first one's home; they stand 5 m apart
             acceleration_psd_m2_s3=3e-4,
         )
     )
