@@ -67,7 +67,8 @@ class AttitudeParameters:
         lift_slope_1_m_rad: lift slope over mass and square of airspeed; None: by the ratio below.
         lift_slope_ratio_1_rad: of lift slope to k_L, where the slope is not given.
         lift_time_s: of the mean by which k_L is learned.
-        climb_time_s: of the mean by which the rate of climb corrects the angle of attack.
+        climb_time_s: of the mean by which the rate of climb corrects the angle of attack; infinite: not
+            at all.
         thrust_m_s2: k_M / m, thrust acceleration at full throttle.
         thrust_loss_1_m: k_T / m, its loss per square of airspeed.
         throttle_trim: in place of the throttle where none is heard, 0..1.

@@ -118,7 +118,7 @@ def _attack(x: Array, p: Array, dt: float, pitch_rate: float) -> None:
     alpha = (alpha + dt * drive) / (1.0 + dt * (thrust + slope) / airspeed)  # implicit: stable at any rate
     x[at.ALPHA] = alpha = min(ALPHA_MAX_RAD, max(-ALPHA_MAX_RAD, alpha))
     climb = x[at.CLIMB]
-    if math.isnan(climb) or down_z < _LEVEL_ENOUGH:
+    if math.isnan(climb) or down_z < _LEVEL_ENOUGH or math.isinf(p[par.CLIMB_TIME]):
         return
     seen = -(down_x * math.cos(alpha) + down_y * x[at.BETA] + down_z * math.sin(alpha)) * airspeed
     # A mean weighted by the square of the airspeed, forgetting.
