@@ -165,11 +165,12 @@ class OrbitFlight:
         vehicle.payload.set_gimbal_rate(_GIMBAL_HZ)
         pilot = self._pilot = await vehicle.prepare_piloting()
         await pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
-        stops = self._listen()
+        stops = self._listen_to_attitude()
         try:
             await self._start_filter()
             self._begin("takeoff")
             await vehicle.takeoff(options.own_altitude_m)
+            stops += self._listen_to_payload()
             looking = asyncio.get_running_loop().create_task(self._keep_looking())
             try:
                 self._begin("transit")
@@ -187,9 +188,14 @@ class OrbitFlight:
 
     # the target
 
-    def _listen(self) -> list[Callable[[], None]]:
-        vehicle, tracker = self._vehicle, self._tracker
-        own = vehicle.system_id
+    def _listen_to_payload(self) -> list[Callable[[], None]]:
+        payload, tracker = self._vehicle.payload, self._tracker
+        return [payload.on_gimbal_attitude(tracker.gimbal), payload.on_detection(tracker.detect)]
+
+    def _listen_to_attitude(self) -> list[Callable[[], None]]:
+        listen, own = self._vehicle.connection.listen, self._vehicle.system_id
+        if self._filter is not None:
+            return [listen(name, self._filter.hear) for name in sorted(self._filter.names)]
 
         def on_attitude(frame: Any) -> None:
             if frame.system_id == own and frame.component_id == 1:
@@ -197,16 +203,7 @@ class OrbitFlight:
                 if attitude is not None:
                     self._told.add(attitude)
 
-        if self._filter is not None:
-            listen, hear = vehicle.connection.listen, self._filter.hear
-            sources = [listen(name, hear) for name in sorted(self._filter.names)]
-        else:
-            sources = [vehicle.connection.listen("ATTITUDE", on_attitude)]
-        return [
-            *sources,
-            vehicle.payload.on_gimbal_attitude(tracker.gimbal),
-            vehicle.payload.on_detection(tracker.detect),
-        ]
+        return [listen("ATTITUDE", on_attitude)]
 
     async def _start_filter(self) -> None:
         """Have our filter fed, where it is to be used: on the ground still, where it finds its biases."""
