@@ -62,7 +62,7 @@ def step(x: Array, p: Array) -> bool:
         0.5 * (x[at.RATE + 2] + wz) - bz,
     )
     x[at.RATE], x[at.RATE + 1], x[at.RATE + 2] = wx, wy, wz
-    k_p, k_i = p[par.GAIN], p[par.BIAS_GAIN]
+    k_p, k_i, tolerance = p[par.GAIN], p[par.BIAS_GAIN], p[par.TOLERANCE]
     if x[at.DISARMED] != 0.0:
         _still(x, ax, ay, az)
         tilt.rest(x, p, dt, wx, wy, wz)
@@ -73,10 +73,11 @@ def step(x: Array, p: Array) -> bool:
     elif x[at.FORM] == at.WING and x[at.AIRSPEED] > 0.0:
         wing.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
     elif x[at.FORM] == at.ROTOR:
+        tolerance = math.inf  # the length of its reference is g by construction, and tells nothing
         rotor.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
     else:
         _still(x, ax, ay, az)
-    gain = tilt.correct(x, p, dt, k_p, k_i)
+    gain = tilt.correct(x, dt, k_p, k_i, tolerance)
     error = _error(x, p, ax, ay, az)
     learn = k_i * x[at.WEIGHT] * dt
     fade = math.exp(-dt / p[par.REFERENCE_TIME])

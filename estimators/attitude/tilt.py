@@ -50,16 +50,16 @@ def rotate(x: Array, dt: float, wx: float, wy: float, wz: float) -> None:
 
 
 @kernel
-def correct(x: Array, p: Array, dt: float, k_p: float, k_i: float) -> float:
+def correct(x: Array, dt: float, k_p: float, k_i: float, tolerance: float) -> float:
     """Pull the direction down towards the reference (11)-(13), and learn the gyro bias (12).
 
     In the first seconds the gain is the one of a running mean, so that any start is forgotten.
 
     Args:
         x: state; its REFERENCE, m/s^2, FRD.
-        p: coefficients.
         dt: s.
         k_p, k_i: gains, 1/s and 1/s^2.
+        tolerance: difference of the reference's length from g at which it counts for half, m/s^2.
 
     Returns:
         How much of the innovation went into the attitude, 0..1.
@@ -72,7 +72,7 @@ def correct(x: Array, p: Array, dt: float, k_p: float, k_i: float) -> float:
     dx, dy, dz = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
     # Judged by its mean over a moment: vibration is no reason to trust it less.
     x[at.LENGTH] += min(1.0, dt / _LENGTH_MEAN_S) * (length - x[at.LENGTH])
-    off = (x[at.LENGTH] - GRAVITY_M_S2) / p[par.TOLERANCE]
+    off = (x[at.LENGTH] - GRAVITY_M_S2) / tolerance
     weight = 1.0 / (1.0 + off * off)
     mx /= length
     my /= length
