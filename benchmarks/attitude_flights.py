@@ -2,8 +2,8 @@
 
     python benchmarks/attitude_flights.py [--seeds 20] [--first-seed 1]
 
-Every flight is a whole one of the embedded Aerosonde with its sensors, the filter fed by its telemetry; errors
-are against the truth, in the air. Odd seeds fly with ArduPilot, and two of four in moderate turbulence.
+Every flight is a whole one of the embedded Aerosonde with its sensors, the filter fed by its telemetry; the
+errors are against the truth, in the air. Odd seeds fly with ArduPilot; two of four have moderate turbulence.
 """
 
 import argparse

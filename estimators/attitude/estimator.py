@@ -19,7 +19,7 @@ from estimators.attitude.parameters import (
     VehicleKind,
     coefficients,
 )
-from estimators.attitude.samples import DIFFERENTIAL_PRESSURE, SAMPLES, fields_given
+from estimators.attitude.samples import DIFFERENTIAL_PRESSURE, INERTIAL_FIELDS, SAMPLES
 from estimators.attitude.step import start, step
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -235,9 +235,10 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
     # Inertial messages
 
     def _highres_imu(self, time_us: int, message: Message) -> Outcome:
-        if message.id != self._instance or not fields_given(message.fields_updated):
+        updated = message.fields_updated  # a sender that marks nothing is believed
+        if message.id != self._instance or (updated & INERTIAL_FIELDS != INERTIAL_FIELDS and updated):
             return Outcome.IGNORED
-        if message.diff_pressure > 0.0 and message.fields_updated & DIFFERENTIAL_PRESSURE:
+        if updated & DIFFERENTIAL_PRESSURE and message.diff_pressure > 0.0:
             self._hear(time_us, self._air.by_pressure(time_us, message.diff_pressure))
         return self._imu(time_us, message)
 

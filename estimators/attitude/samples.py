@@ -11,7 +11,7 @@ from typing import Final
 from estimators.attitude.parameters import ImuSource
 from estimators.messages import Message
 
-__all__ = ["DIFFERENTIAL_PRESSURE", "SAMPLES", "Sample", "fields_given"]
+__all__ = ["DIFFERENTIAL_PRESSURE", "INERTIAL_FIELDS", "SAMPLES", "Sample"]
 
 Sample = tuple[float, float, float, float, float, float]
 """Angular rate in rad/s, specific force in m/s^2, FRD."""
@@ -19,9 +19,10 @@ Sample = tuple[float, float, float, float, float, float]
 STANDARD_GRAVITY_M_S2: Final = 9.80665
 _MILLI_G: Final = 1e-3 * STANDARD_GRAVITY_M_S2
 _MILLI: Final = 1e-3
-_INERTIAL_FIELDS: Final = 0b111111
+INERTIAL_FIELDS: Final = 0b111111
+"""Rates and forces in HIGHRES_IMU.fields_updated."""
 DIFFERENTIAL_PRESSURE: Final = 1 << 10
-"""Of HIGHRES_IMU.fields_updated."""
+"""The same in it."""
 
 
 def _si(m: Message) -> Sample:
@@ -49,8 +50,3 @@ SAMPLES: Final[Mapping[str, Callable[[Message], Sample]]] = MappingProxyType(
     }
 )
 """Sample of a message by its name; best first."""
-
-
-def fields_given(updated: int) -> bool:
-    """Whether HIGHRES_IMU.fields_updated has rates and forces; a sender that marks nothing is believed."""
-    return updated & _INERTIAL_FIELDS == _INERTIAL_FIELDS or updated == 0
