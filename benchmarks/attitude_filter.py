@@ -3,9 +3,9 @@
     python benchmarks/attitude_filter.py
 
 The same made flight (50 Hz; straight, with noise) goes through `AttitudeEstimator.handle`, message by message
-with all its checks and counters, and, gyro and accelerometer only, through the filters of `ahrs` from PyPI (`pip
-install ahrs`), sample by sample and as a whole array. A fixed wing hears its airspeed at 10 Hz between them, each
-of which counts as a sample. Best of several runs; processor time, so that a busy machine counts less.
+with all its checks and counters, and, gyro and accelerometer only, through the filters of `ahrs` from PyPI
+(`pip install ahrs`), sample by sample and as a whole array. A fixed wing hears its airspeed at 10 Hz between
+them, which counts as samples too. Best of several runs; processor time, so that a busy machine counts less.
 """
 
 import sys

@@ -13,10 +13,10 @@ DISARMED: Final = 1
 """1: the vehicle can't be flying."""
 ELAPSED: Final = 2
 """Since the sample before, s; nothing at the first."""
-SAMPLE_RATE: Final = 3
-"""Measured angular rate, rad/s, FRD."""
-SAMPLE_FORCE: Final = 6
+SAMPLE_FORCE: Final = 3
 """Specific force, m/s^2, FRD."""
+SAMPLE_RATE: Final = 6
+"""Measured angular rate, rad/s, FRD."""
 SAMPLE_FORMAT: Final = "9d"
 
 # Attitude

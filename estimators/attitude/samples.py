@@ -5,16 +5,18 @@ the others by itself. ArduPilot sends SCALED_IMU3 with zeros where there is no t
 """
 
 from collections.abc import Callable, Mapping
+from operator import itemgetter
 from types import MappingProxyType
 from typing import Final
 
+from autopilot_bridge.mavlink import definition
 from estimators.attitude.parameters import ImuSource
-from estimators.messages import Message
+from estimators.messages import Message, message_class
 
 __all__ = ["DIFFERENTIAL_PRESSURE", "INERTIAL_FIELDS", "SAMPLES", "Sample"]
 
 Sample = tuple[float, float, float, float, float, float]
-"""Angular rate in rad/s, specific force in m/s^2, FRD."""
+"""Specific force in m/s^2 and angular rate in rad/s, FRD."""
 
 STANDARD_GRAVITY_M_S2: Final = 9.80665
 _MILLI_G: Final = 1e-3 * STANDARD_GRAVITY_M_S2
@@ -25,28 +27,27 @@ DIFFERENTIAL_PRESSURE: Final = 1 << 10
 """The same in it."""
 
 
-def _si(m: Message) -> Sample:
-    return m.xgyro, m.ygyro, m.zgyro, m.xacc, m.yacc, m.zacc
+def _fields(name: str) -> Callable[[Message], Sample]:
+    """The six values as they lie in a message, one behind the other: x, y, z of acc, then of gyro."""
+    first = message_class(definition(name))._fields.index("xacc")
+    return itemgetter(slice(first, first + 6))
 
 
-def _milli(m: Message) -> Sample:
-    return (
-        m.xgyro * _MILLI,
-        m.ygyro * _MILLI,
-        m.zgyro * _MILLI,
-        m.xacc * _MILLI_G,
-        m.yacc * _MILLI_G,
-        m.zacc * _MILLI_G,
-    )
+def _scaled(name: str) -> Callable[[Message], Sample]:
+    fields = _fields(name)
+
+    def sample(message: Message) -> Sample:
+        ax, ay, az, wx, wy, wz = fields(message)
+        return ax * _MILLI_G, ay * _MILLI_G, az * _MILLI_G, wx * _MILLI, wy * _MILLI, wz * _MILLI
+
+    return sample
 
 
 SAMPLES: Final[Mapping[str, Callable[[Message], Sample]]] = MappingProxyType(
     {
-        ImuSource.HIGHRES_IMU.value: _si,
-        ImuSource.RAW_IMU.value: _milli,
-        ImuSource.SCALED_IMU.value: _milli,
-        ImuSource.SCALED_IMU2.value: _milli,
-        ImuSource.SCALED_IMU3.value: _milli,
+        source.value: _fields(source.value) if source is ImuSource.HIGHRES_IMU else _scaled(source.value)
+        for source in ImuSource
+        if source is not ImuSource.AUTO
     }
 )
 """Sample of a message by its name; best first."""

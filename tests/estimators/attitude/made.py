@@ -70,7 +70,7 @@ class Filter:
         self.x[at.AIRSPEED], self.x[at.AIRSPEED_FRESH], self.x[at.CLIMB] = airspeed_m_s, 1.0, climb_m_s
 
     def feed(self, rate, force, elapsed_s=STEP_S):
-        self.x[: at.SAMPLE_FORCE + 3] = self.form, float(self.disarmed), elapsed_s, *rate, *force
+        self.x[: at.SAMPLE_RATE + 3] = self.form, float(self.disarmed), elapsed_s, *force, *rate
         return step(self.x, self.p)
 
     @property
