@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 RATE_MAX_RAD_S = 70.0
 FORCE_MAX_M_S2 = 400.0
 _LOAD_MAX = 0.5
+_USUAL_AIRSPEED_M_S = 20.0
 
 
 @kernel
@@ -109,6 +110,12 @@ def _error(x: Array, p: Array, ax: float, ay: float, az: float) -> float:
     """Standard error of the reference's direction about an axis, rad."""
     if x[at.DISARMED] != 0.0:
         return p[par.REST_ERROR]
+    steady = p[par.FLIGHT_ERROR]
+    if x[at.FORM] == at.WING and not x[at.AIRSPEED] > 0.0:
+        # In a turn the force is along the wing's up at any bank: off by what a usual airspeed makes of it.
+        wx, wy, wz = x[at.SAMPLE_RATE], x[at.SAMPLE_RATE + 1], x[at.SAMPLE_RATE + 2]
+        blind = min(_LOAD_MAX, math.sqrt(wx * wx + wy * wy + wz * wz) * _USUAL_AIRSPEED_M_S / GRAVITY_M_S2)
+        return math.sqrt(steady * steady + blind * blind)
     # What motion adds to the force scales with it, and so do the errors of airspeed, incidence and drag.
     if x[at.FORM] == at.WING:
         mx = x[at.REFERENCE] + ax
@@ -118,5 +125,4 @@ def _error(x: Array, p: Array, ax: float, ay: float, az: float) -> float:
     else:
         load = math.sqrt(ax * ax + ay * ay) / GRAVITY_M_S2 + x[at.INNOVATION]
     manoeuvre = p[par.MANOEUVRE_ERROR] * min(_LOAD_MAX, load)
-    steady = p[par.FLIGHT_ERROR]
     return math.sqrt(steady * steady + manoeuvre * manoeuvre)

@@ -68,3 +68,13 @@ def test_less_is_known_in_a_turn_than_at_rest():
             turning.air(20.0)
         turning.feed((0.0, 0.35, 0.35), (0.0, 0.0, -1.4 * G))
     assert turning.x[at.ROLL_COVARIANCE] > 4.0 * still.x[at.ROLL_COVARIANCE]
+
+
+def test_a_wing_without_airspeed_knows_that_it_is_blind_in_turns():
+    seeing, blind = Filter(at.WING), Filter(at.WING)
+    for k in range(3000):
+        if k % 5 == 0:
+            seeing.air(20.0)
+        for found in (seeing, blind):
+            found.feed((0.0, 0.2, 0.3), (0.0, 0.0, -1.2 * G))
+    assert blind.x[at.ROLL_COVARIANCE] > 10.0 * seeing.x[at.ROLL_COVARIANCE]

@@ -1,12 +1,16 @@
 """`FilterAttitude`: roll and pitch of our filter, yaw of the autopilot."""
 
+import json
 import math
 
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
+from missions.library import find_mission
 from missions.orbit.filter_attitude import FilterAttitude
+from missions.orbit.options import AttitudeFrom, OrbitOptions
 from missions.rotation import yaw_of
+from missions.session import RunRequest, fly
 
 ROLL, PITCH, YAW = 0.3, -0.1, 2.0
 G = 9.80665
@@ -105,3 +109,27 @@ def test_names_are_what_must_be_listened_to():
         "SCALED_PRESSURE",
         "ATTITUDE",
     } <= FilterAttitude(1).names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_an_orbit_flown_with_it(tmp_path, autopilot):
+    """The circle is held as with the autopilot's attitude."""
+    result = fly(
+        find_mission("orbit"),
+        RunRequest(
+            options=OrbitOptions(duration_s=120.0, attitude=AttitudeFrom.FILTER),
+            autopilot=autopilot,
+            model="aerosonde",
+            seed=1,
+            wind_speed_m_s=4.0,
+            wind_from_deg=40.0,
+            turbulence="light",
+            out=tmp_path / "run",
+            picture=False,
+        ),
+    )
+    assert result.outcome == "completed", result.reason
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["radius_mean_error_percent"] == pytest.approx(0.0, abs=2.0)
+    assert summary["radius_std_m"] < 6.0
