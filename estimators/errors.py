@@ -1,6 +1,8 @@
 """The error tree of estimators. Messages name the value, what is accepted, and the next step."""
 
-__all__ = ["EstimatorError", "EstimatorFailure"]
+import traceback
+
+__all__ = ["EstimatorError", "EstimatorFailure", "described"]
 
 
 class EstimatorError(ValueError):
@@ -11,3 +13,12 @@ class EstimatorError(ValueError):
 
 class EstimatorFailure(RuntimeError):
     """An estimator raised an error of its own while it ran. The CLI prints the message and exits 1."""
+
+
+def described(error: BaseException) -> str:
+    """An error of somebody's code in one line: its class, what it says, and the line that raised it."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if not f.filename.startswith("<frozen")]
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    if isinstance(error, SyntaxError) or not frames:  # the first names its line itself
+        return text
+    return f"{text} ({frames[-1].filename}, line {frames[-1].lineno})"

@@ -44,10 +44,10 @@ class Fleet:
     ) -> None:
         self._make = make
         first = make()
+        self._spare: Runner | None = Runner(first)
         self.name = first.NAME
         self.team = first.TEAM
         self.needs = first.needs
-        self._spare: Runner | None = Runner(first)
         self.names = self._spare.names
         self.heard_names = self._spare.heard_names
         self.parameters = first.parameters
@@ -78,6 +78,10 @@ class Fleet:
         message = read_message(frame)
         time_us = self._vehicle_time.stamp(message)
         return self.take(time_us, message) if message.name in self.heard_names else None
+
+    def newest_us(self, system_id: int) -> int:
+        """Newest vehicle time that a system has told in the frames fed; 0: none yet."""
+        return self._vehicle_time.newest_us(system_id)
 
     def take(self, time_us: int, message: Message) -> tuple[Runner, Outcome] | None:
         """Take a message at its vehicle time; as `feed`.

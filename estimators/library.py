@@ -4,16 +4,17 @@ import importlib
 import importlib.util
 import inspect
 import math
+import re
 import sys
 import types
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
-from estimators.errors import EstimatorError
+from estimators.errors import EstimatorError, described
 from estimators.interface import Estimator
 
 __all__ = ["ESTIMATORS", "estimator_class", "make_estimator", "parameters_from"]
@@ -27,6 +28,7 @@ ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
 )
 """Module of each estimator that can be named; it is imported when somebody asks for it."""
 
+_NAME: Final = re.compile(r"[\w-]+")
 _TRUE: Final = ("1", "true", "yes", "on")
 _FALSE: Final = ("0", "false", "no", "off")
 
@@ -53,7 +55,7 @@ def estimator_class(name: str) -> type[Estimator[Any]]:
     """
     if name.endswith(".py"):
         path = Path(name)
-        return _the_one(_load(path), f"estimator file {path}")
+        return _checked(_the_one(_load(path), f"estimator file {path}"), path)
     if name not in ESTIMATORS:
         raise EstimatorError(
             f"estimator {name!r} is not known; there are {', '.join(ESTIMATORS)}, "
@@ -79,11 +81,9 @@ def _load(path: Path) -> types.ModuleType:
     sys.modules[label] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # a script that is no module may end itself
         del sys.modules[label]
-        raise EstimatorError(
-            f"estimator file {path} can't be loaded: {type(error).__name__}: {error}"
-        ) from error
+        raise EstimatorError(f"estimator file {path} can't be loaded: {described(error)}") from error
     return module
 
 
@@ -104,6 +104,29 @@ def _the_one(module: types.ModuleType, where: str) -> type[Estimator[Any]]:
         f"{where} holds {len(found)} estimators ({names}); leave one" if found
         else f"{where} holds no estimator; define a class on estimators.interface.Estimator"
     )  # fmt: skip
+
+
+def _checked(found: type[Estimator[Any]], path: Path) -> type[Estimator[Any]]:
+    """A user's class has what the command line needs of it."""
+    name = getattr(found, "NAME", None)
+    if not (isinstance(name, str) and _NAME.fullmatch(name)):
+        raise EstimatorError(
+            f"estimator file {path}: {found.__name__}.NAME is {name!r}; give letters, digits, '-' and '_', "
+            "for run folders are named after it"
+        )
+    if not is_dataclass(getattr(found, "PARAMETERS", None)):
+        raise EstimatorError(f"estimator file {path}: {found.__name__}.PARAMETERS is no dataclass; name one")
+    try:
+        complete = hasattr(found(), "parameters")
+    except Exception as error:
+        raise EstimatorError(
+            f"estimator file {path}: {found.__name__}() failed: {described(error)}"
+        ) from error
+    if not complete:
+        raise EstimatorError(
+            f"estimator file {path}: {found.__name__}.__init__ does not call super().__init__(parameters)"
+        )
+    return found
 
 
 def parameters_from(found: type[Estimator[Any]], settings: Iterable[str]) -> Any:

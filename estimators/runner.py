@@ -6,16 +6,16 @@ same messages in the same order give the same estimates, bit for bit.
 
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.mavlink import DEFINITIONS, Frame
-from estimators.errors import EstimatorError, EstimatorFailure
+from autopilot_bridge.mavlink import DEFINITIONS, Frame, FrameEncoder, MAVLinkMessage
+from estimators.errors import EstimatorError, EstimatorFailure, described
 from estimators.input_guard import NEW_BOOT_US
-from estimators.interface import Estimate, Estimator, Outcome
+from estimators.interface import Estimate, Estimator, Need, Outcome
 from estimators.messages import Message, read_message
 from estimators.needs import message_names
 from estimators.team_time import TeamTime
@@ -43,45 +43,53 @@ class EstimateTable:
         columns: names of the values, unit-suffixed.
     """
 
-    __slots__ = ("_boots", "_subjects", "_times", "_values", "columns", "name")
+    __slots__ = ("_keys", "_values", "columns", "name")
 
     def __init__(self, kind: type[Estimate]) -> None:
         self.name = kind.__name__
         self.columns: tuple[str, ...] = tuple(kind.COLUMNS)
-        self._times = array("q")
-        self._subjects = array("q")
-        self._boots = array("q")
+        self._keys = array("q")  # time, subject and boot of each
         self._values = array("d")
 
     def append(self, estimate: Estimate, boot: int) -> None:
-        """Take one estimate, of the boot with this number."""
-        self._times.append(estimate.time_us)
-        self._subjects.append(estimate.subject)
-        self._boots.append(boot)
-        self._values.extend(estimate.row())
+        """Take one estimate, of the boot with this number; whole or not at all.
+
+        Raises:
+            TypeError, ValueError: its row is not as long as `columns`, or it has something that is no number.
+        """
+        values = array("d", estimate.row())
+        if len(values) != len(self.columns):
+            raise ValueError(
+                f"{self.name}.row() gives {len(values)} values, and COLUMNS names {len(self.columns)}"
+            )
+        self._keys.extend(array("q", (estimate.time_us, estimate.subject, boot)))
+        self._values.extend(values)
 
     def __len__(self) -> int:
-        return len(self._times)
+        return len(self._keys) // 3
+
+    def _key(self, number: int) -> NDArray[np.int64]:
+        return np.array(self._keys, dtype=np.int64).reshape(-1, 3)[:, number].copy()
 
     @property
     def time_us(self) -> NDArray[np.int64]:
         """Vehicle time of each; of a team, the time common to it."""
-        return np.array(self._times, dtype=np.int64)
+        return self._key(0)
 
     @property
     def subject(self) -> NDArray[np.int64]:
         """System id that each is about; 0 for a target."""
-        return np.array(self._subjects, dtype=np.int64)
+        return self._key(1)
 
     @property
     def boot(self) -> NDArray[np.int64]:
         """Boot of the vehicle that each was made in; 0 is the first that was heard."""
-        return np.array(self._boots, dtype=np.int64)
+        return self._key(2)
 
     @property
     def values(self) -> NDArray[np.float64]:
         """One row per estimate, as `columns` names them."""
-        return np.array(self._values, dtype=np.float64).reshape(len(self._times), len(self.columns))
+        return np.array(self._values, dtype=np.float64).reshape(len(self), len(self.columns))
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
         if column not in self.columns:
@@ -115,7 +123,7 @@ class Runner:
 
     def __init__(self, estimator: Estimator[Any], *, system_id: int | None = None) -> None:
         self.estimator = estimator
-        self.names = message_names(estimator.needs)
+        self.names = message_names(_needs_of(estimator))
         forbidden = sorted(self.names & TRUTH_MESSAGES)
         if forbidden:
             raise EstimatorError(
@@ -133,6 +141,7 @@ class Runner:
         self.tables: dict[str, EstimateTable] = {}
         self._kinds: dict[type[Any], EstimateTable] = {}
         self._vehicle_time = VehicleTime()
+        self._trial = FrameEncoder(1, 1)  # what can't be packed is to be the estimator's failure
         self._team_time = TeamTime() if estimator.TEAM else None
         self._newest_us: int | None = None
 
@@ -144,7 +153,25 @@ class Runner:
     @property
     def remarks(self) -> Mapping[str, float | str]:
         """Further figures of the estimator's own."""
-        return self.estimator.remarks()
+        try:
+            return dict(self.estimator.remarks())
+        except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+            return {"remarks_failed": described(error)}
+
+    def publish(self) -> tuple[MAVLinkMessage, ...]:
+        """Messages that tell the newest estimates.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error, or what it gave can't be sent.
+        """
+        estimator = self.estimator
+        try:
+            messages = tuple(estimator.publish())
+            for message in messages:
+                self._trial.encode(message)
+        except Exception as error:
+            raise EstimatorFailure(f"{estimator.NAME}.publish() failed: {described(error)}") from error
+        return messages
 
     def feed(self, frame: Frame) -> Outcome | None:
         """Take a frame of a link; every one that was heard, in order, for the time is told by all of them.
@@ -209,30 +236,48 @@ class Runner:
         return time_us if self._team_time is None else self._team_time.common_us(time_us, system_id)
 
     def start_boot(self) -> None:
-        """The vehicle has booted anew: what the estimator knew is of no use."""
+        """The vehicle has booted anew: what the estimator knew is of no use.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error.
+        """
         self.boot += 1
-        self.estimator.reset()
+        try:
+            self.estimator.reset()
+        except Exception as error:
+            raise EstimatorFailure(f"{self.estimator.NAME}.reset() failed: {described(error)}") from error
 
     def _handle(self, time_us: int, message: Message) -> Outcome:
         estimator = self.estimator
         try:
             outcome = estimator.handle(time_us, message)
-            # A jump in time starts an estimator anew from this message: there may be an estimate at once.
-            estimates = estimator.estimates if outcome is Outcome.UPDATED else ()
+            if outcome is Outcome.UPDATED:
+                kinds, boot = self._kinds, self.boot
+                for estimate in estimator.estimates:
+                    kind = type(estimate)
+                    table = kinds[kind] if kind in kinds else self._new_table(kind)
+                    table.append(estimate, boot)
+            elif outcome.__class__ is not Outcome:
+                raise TypeError(f"handle gave {outcome!r}, which is no Outcome")
         except Exception as error:
             raise EstimatorFailure(
-                f"{estimator.NAME} failed at {message.name} of {time_us * 1e-6:.3f} s: "
-                f"{type(error).__name__}: {error}"
+                f"{estimator.NAME} failed at {message.name} of {time_us * 1e-6:.3f} s: {described(error)}"
             ) from error
         self.outcomes[outcome] += 1
-        kinds, boot = self._kinds, self.boot
-        for estimate in estimates:
-            kind = type(estimate)
-            table = kinds[kind] if kind in kinds else self._new_table(kind)
-            table.append(estimate, boot)
         return outcome
 
     def _new_table(self, kind: type[Any]) -> EstimateTable:
+        if not hasattr(kind, "COLUMNS"):
+            raise TypeError(f"estimates holds {kind.__name__}, which has no COLUMNS")
         table = self._kinds[kind] = EstimateTable(kind)
         self.tables[table.name] = table
         return table
+
+
+def _needs_of(estimator: Estimator[Any]) -> Sequence[Need]:
+    needs: object = estimator.needs
+    if isinstance(needs, Sequence) and needs and all(isinstance(need, Need) for need in needs):
+        return needs
+    raise EstimatorError(
+        f"needs of {estimator.NAME} is {needs!r}; give one or more of estimators.interface.Need"
+    )

@@ -114,6 +114,11 @@ class VehicleTime:
             system.by_message[key] = own
         return system.newest_us
 
+    def newest_us(self, system_id: int) -> int:
+        """Newest time of a system; 0 before it has told one."""
+        found = self._systems.get(system_id)
+        return 0 if found is None else found.newest_us
+
     def boot(self, system_id: int) -> int:
         """How often the time of a system has started anew."""
         found = self._systems.get(system_id)

@@ -46,7 +46,8 @@ class LiveRequest:
         estimator: its name, or the path of a user's file.
         connect: connection string of the link.
         settings: parameters as NAME=VALUE.
-        duration_s: vehicle time from the first that was heard; None: until it is stopped.
+        duration_s: vehicle time since the vehicle was heard (wall time of one that tells none); None: until
+            it is stopped.
         system_id: of the vehicle; None: the first that is heard.
         component_id: own.
         publish: whether estimates are told on the link.
@@ -113,6 +114,7 @@ class _Process:
         self._look_us = 0
         self._stop = asyncio.Event()
         self._met = False
+        self._keeps_time = False
         self.stopped = False
         self.reason = ""
         self.connection = Connection(
@@ -141,14 +143,19 @@ class _Process:
         request, clock, tap = self._request, self._clock, self._tap
         async with self.connection:
             heard, heard_wall_s = 0, wall_time_s()
-            first_us: int | None = None  # vehicle time when the vehicle first told it
+            first_us: int | None = None  # when the vehicle was first heard, or first told its time
+            timed = False
             while not self.stopped:
                 wall_s = wall_time_s()
                 newest = sum(tap.autopilots[system_id] for system_id in self._vehicles())
                 if newest != heard:
                     heard, heard_wall_s = newest, wall_s
                     self._meet()
-                if first_us is None and clock.vehicle_time_us is not None:
+                    self._keep_time()
+                if first_us is None and heard:
+                    first_us = clock.time_us
+                if not timed and clock.vehicle_time_us is not None:
+                    timed = True
                     first_us = self._look_us = clock.time_us
                     self._watch.restart()
                 if tap.failure:
@@ -186,6 +193,18 @@ class _Process:
         if not self._met and vehicles and not self._fleet.team:
             self.connection.speak_as(vehicles[0], self._request.component_id)
         self._met = bool(self._fleet.runners)
+
+    def _keep_time(self) -> None:
+        """Set the clock by whatever the vehicle stamps, where the connection finds nothing to set it by.
+
+        An autopilot may send no more than what it was asked for, such as HIGHRES_IMU.
+        """
+        if self._clock.vehicle_time_us is not None and not self._keeps_time:
+            return
+        time_us = self._fleet.newest_us(self._vehicles()[0])
+        if time_us > 0 and time_us != self._clock.vehicle_time_us:
+            self._keeps_time = True
+            self._clock.observe(time_us)
 
     def _look(self, now_us: int) -> None:
         """Measure rates, and ask for more where they are too low."""

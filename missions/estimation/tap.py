@@ -66,11 +66,10 @@ class EstimatorTap:
             return
         try:
             result = self.fleet.feed(taken)
+            if result is not None and result[1] is Outcome.UPDATED and self._on_estimate is not None:
+                self._on_estimate(result[0], time_us)
         except EstimatorFailure as failure:
             self.failure = str(failure)
-            return
-        if result is not None and result[1] is Outcome.UPDATED and self._on_estimate is not None:
-            self._on_estimate(result[0], time_us)
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
         """Record a frame of truth: not for estimators, but it has its place in the order of the log."""
@@ -107,15 +106,19 @@ class Publisher:
         self.sent = 0
 
     def on_estimate(self, runner: Runner, time_us: int) -> None:
-        """A runner has a new estimate at a vehicle time."""
+        """A runner has a new estimate at a vehicle time.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error, or what it gave is no message.
+        """
         system_id = runner.system_id or 0
         due_us = self._due_us.get(system_id)
         if due_us is not None and due_us - self._period_us <= time_us < due_us:
             return
         self._due_us[system_id] = time_us + self._period_us
-        messages = runner.estimator.publish()
+        messages = runner.publish()
         if messages:
-            asyncio.get_running_loop().call_soon(self._publish, system_id, tuple(messages))
+            asyncio.get_running_loop().call_soon(self._publish, system_id, messages)
 
     def _publish(self, system_id: int, messages: Sequence[MAVLinkMessage]) -> None:
         for message in messages:

@@ -98,3 +98,24 @@ def test_parameters_from_text(level, setting, value):
 def test_wrong_parameters_are_named_with_what_is_accepted(level, setting, told):
     with pytest.raises(EstimatorError, match=told):
         make_estimator(level, [setting])
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('NAME = "level"', "pass", "NAME is None; give letters"),
+        ('NAME = "level"', 'NAME = "../level"', "NAME is '../level'; give letters"),
+        ("PARAMETERS = LevelParameters", "pass", "PARAMETERS is no dataclass"),
+        ("super().__init__(parameters)", "pass", "does not call super().__init__"),
+        ("super().__init__(parameters)", "1 / 0", "LevelEstimator() failed: ZeroDivisionError"),
+        ("class Shape(", "raise SystemExit(4)\nclass Shape(", "can't be loaded: SystemExit: 4"),
+    ],
+)
+def test_what_an_estimator_file_lacks_is_told(tmp_path, level, old, new, told):
+    path = tmp_path / "mine.py"
+    text = Path(level).read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(EstimatorError) as raised:
+        make_estimator(str(path))
+    assert told in str(raised.value) and str(path) in str(raised.value)

@@ -1,6 +1,8 @@
 """The one loop: who is heard, boots, columns, failures; frames and logs give the same."""
 
 import random
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -40,6 +42,19 @@ def columns(fleet):
 def make(level):
     found = estimator_class(level)
     return lambda: found()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wrong:
+    """An estimate of anything."""
+
+    COLUMNS: ClassVar[tuple[str, ...]] = ("roll_rad",)
+    time_us: Any
+    values: Any
+    subject: int = 1
+
+    def row(self):
+        return self.values
 
 
 def test_estimates_become_columns(make_log, make):
@@ -174,3 +189,46 @@ def test_an_error_of_the_estimator_names_message_and_time(make_log, make):
     result = replay(open_log(path), broken)
     assert result.partial
     assert "oops" in result.failure
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"handle": lambda *_: None}, "handle gave None, which is no Outcome"),
+        ({"handle": lambda *_: "updated"}, "handle gave 'updated', which is no Outcome"),
+        ({"estimates": property(lambda _: [1.0])}, "estimates holds float, which has no COLUMNS"),
+        ({"estimates": property(lambda _: 1.0)}, "TypeError: 'float' object is not iterable"),
+        ({"estimates": property(lambda _: [Wrong(time_us=1, values=(1.0, 2.0))])}, "gives 2 values"),
+        ({"estimates": property(lambda _: [Wrong(time_us=1, values=("a",))])}, "must be real number"),
+        ({"estimates": property(lambda _: [Wrong(time_us=0.5, values=(1.0,))])}, "'float' object"),
+    ],
+)
+def test_what_is_no_estimate_is_the_estimators_failure(make_log, make, changes, told):
+    log = make_log()
+    for k in range(30):
+        log.attitude(2.5 + 0.05 * k)
+    found = replay(open_log(log.close()), type("Odd", (type(make()),), changes))
+    assert told in found.failure and "level failed at ATTITUDE of 2.500 s" in found.failure
+    for table in found.fleet.runners[1].tables.values():
+        assert len(table) == len(table.values) == 0
+
+
+@pytest.mark.parametrize("needs", [None, (), [("ATTITUDE", 20.0)]])
+def test_needs_that_are_none_are_refused(make, needs):
+    with pytest.raises(EstimatorError, match=r"needs of level is .*; give one or more"):
+        Fleet(type("Odd", (type(make()),), {"needs": needs}))
+
+
+def test_what_can_not_be_published_is_the_estimators_failure(make):
+    def too_large(_self):
+        return [dialect.MAVLink_attitude_message(-1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]
+
+    for publish, told in ((too_large, "time_boot_ms"), (lambda _: [3], "int"), (lambda _: 1 / 0, "division")):
+        runner = Runner(type("Odd", (type(make()),), {"publish": publish})())
+        with pytest.raises(EstimatorFailure, match=rf"level\.publish\(\) failed.*{told}"):
+            runner.publish()
+
+
+def test_remarks_that_fail_lose_nothing_else(make):
+    runner = Runner(type("Odd", (type(make()),), {"remarks": lambda _: 1 / 0})())
+    assert "division by zero" in runner.remarks["remarks_failed"]

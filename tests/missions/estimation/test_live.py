@@ -23,18 +23,32 @@ ROOT = Path(__file__).parents[3]
 LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
 
 
+def attitude(ms):
+    return dialect.MAVLink_attitude_message(ms, math.sin(ms / 3000), 0.1, 0, 0, 0, 0)
+
+
+def imu(ms):
+    return dialect.MAVLink_highres_imu_message(ms * 1000, 0, 0, -9.81, *(0.0,) * 10, 0)
+
+
+def untimed(ms):
+    return dialect.MAVLink_vfr_hud_message(0, 0, 0, 0, math.sin(ms / 3000), 0)
+
+
 class ScriptedVehicle(threading.Thread):
     """Says HEARTBEAT and ATTITUDE to a UDP port, up to ten times as fast as real time, and hears the answers.
 
     It knows no message interval of its own: ATTITUDE comes at 2 Hz until somebody asks for more.
     """
 
-    def __init__(self, port, *, seconds=math.inf, system=1, willing=True, garbage=False, repeat=False):
+    def __init__(
+        self, port, *, seconds=math.inf, system=1, willing=True, garbage=False, repeat=False, says=attitude
+    ):
         super().__init__(daemon=True)
         self.heard = []
         self.done = threading.Event()
         self._port, self._seconds, self._system = port, seconds, system
-        self._willing, self._garbage, self._repeat = willing, garbage, repeat
+        self._willing, self._garbage, self._repeat, self._says = willing, garbage, repeat, says
         self._period_ms = 500
 
     def run(self):
@@ -48,8 +62,7 @@ class ScriptedVehicle(threading.Thread):
                 if ms % 1000 == 0:
                     data += encoder.encode(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
                 if ms % self._period_ms == 0:
-                    attitude = dialect.MAVLink_attitude_message(ms, math.sin(ms / 3000), 0.1, 0, 0, 0, 0)
-                    frame = encoder.encode(attitude)
+                    frame = encoder.encode(self._says(ms))
                     data += frame + (frame if self._repeat and chance.random() < 0.2 else b"")
                 if self._garbage:
                     data += chance.randbytes(chance.randrange(40))
@@ -64,7 +77,7 @@ class ScriptedVehicle(threading.Thread):
 
     def _hear(self, message):
         self.heard.append(message)
-        if message.get_type() == "COMMAND_LONG" and message.param1 == 30 and self._willing:
+        if message.get_type() == "COMMAND_LONG" and message.param1 == self._says(0).id and self._willing:
             self._period_ms = max(10, round(message.param2 / 1e4) * 10)
 
 
@@ -91,11 +104,11 @@ def vehicle(port):
         thread.join()
 
 
-def estimate(tmp_path, port, *arguments):
+def estimate(tmp_path, port, *arguments, estimator=LEVEL):
     return run_command_line(
         [
             "estimate",
-            LEVEL,
+            str(estimator),
             "--connect",
             f"udpin:127.0.0.1:{port}",
             "--out",
@@ -154,6 +167,21 @@ def test_what_the_link_lacks_is_told_and_nothing_is_published(tmp_path, port, ve
     assert summary_of(tmp_path)["partial"]
     assert [m for m in there.heard if m.get_type() == "COMMAND_LONG"]
     assert not [m for m in there.heard if m.get_type() == "ATTITUDE"]
+
+
+@pytest.mark.parametrize(("says", "seconds"), [(imu, "15"), (untimed, "1.5")])
+def test_its_duration_ends_on_a_vehicle_that_says_little(tmp_path, port, vehicle, says, seconds):
+    """Nothing but what was asked for, as ArduPilot does; or nothing that tells a time: wall time counts."""
+    vehicle(says=says)
+    own, name = tmp_path / "own.py", says(0).get_type()
+    text = Path(LEVEL).read_text().replace('"ATTITUDE"', f'"{name}"')
+    own.write_text(text.replace("message.roll", "1.0").replace("message.pitch", "0.0"))
+    assert estimate(tmp_path, port, "--duration", seconds, "--no-picture", estimator=own) == 0
+    recorded = open_log(tmp_path / "run" / "flight.tlog")
+    assert {key.name for key in recorded.keys if key.component_id == 1} == {"HEARTBEAT", name}
+    if says is imu:
+        times = recorded.table(name).time_us
+        assert 14.0 < (times[-1] - times[0]) * 1e-6 < 25.0
 
 
 def test_garbage_on_the_link_is_counted_and_harms_nothing(tmp_path, port, vehicle):
