@@ -14,7 +14,7 @@ from missions.cli import command_line
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^    (flightstack .*?)(?:  +#.*)?$", README, re.MULTILINE)
-MISSIONS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+SQUARE, HEADINGS, CLIMB = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 def parse(line: str) -> None:
@@ -56,15 +56,16 @@ def fly(mission: str, folder: Path, *arguments: str) -> str:
     return done.stdout
 
 
-def test_the_mission_flies(tmp_path: Path) -> None:
-    square, _ = MISSIONS
-    assert fly(square, tmp_path, "--altitude", "15").count("battery") == 4
+def test_the_mission_flies_and_the_estimator_with_it(tmp_path: Path) -> None:
+    (tmp_path / "climb.py").write_text(CLIMB, encoding="utf-8")
+    said = fly(SQUARE, tmp_path, "--altitude", "15", "--estimator", str(tmp_path / "climb.py"))
+    assert said.count("battery") == 4
+    assert re.search(r"climb, vehicle 1: \d+ estimates: alt [01]\.\d+ m RMS off autopilot", said)
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
 def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
-    _, headings = MISSIONS
-    fly(headings, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
+    fly(HEADINGS, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
 
 
 @pytest.mark.parametrize("link", re.findall(r"\]\(([^)h][^)]*)\)", README))
