@@ -168,13 +168,15 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         )
 
     def remarks(self) -> Mapping[str, float | str]:
-        """Mean squared normalised innovation (4 when the noise is as it is believed), and the frequencies."""
+        """Mean squared normalised innovation (4 when the noise is as it is believed), the share of samples
+        that were off the pattern, and the frequencies.
+        """
         omega_x, omega_y = self.track.filter.omega_rad_s
         mean = self._distance_sum / self._distance_count if self._distance_count else math.nan
         return {
             "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),
             "normalised_innovation": mean,
-            "restarts": float(self.track.filter.restarts),
+            "off_pattern": self.track.filter.off_pattern,
             "omega_x_rad_s": omega_x,
             "omega_y_rad_s": omega_y,
         }

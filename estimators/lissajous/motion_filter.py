@@ -37,17 +37,20 @@ class MotionFilter:
         time_us: of the newest sample; None before the first.
         state, covariance: (4,), (4, 4), or with frequencies (6,), (6, 6).
         distance: squared Mahalanobis distance of the newest sample from its prediction.
-        restarts: how often a sample lay so far off that the filter began anew.
+        samples: how many there were.
+        restarts: how often one lay so far off that the filter began anew.
     """
 
     def __init__(self, parameters: LissajousParameters) -> None:
         p = self.parameters = parameters
         self.time_us: int | None = None
         self.distance = 0.0
+        self.samples = 0
         self.restarts = 0
         size = AUGMENTED if p.frequency else MOTION
         self.state: Array = np.zeros(size)
         self.covariance: Array = np.zeros((size, size))
+        self._max_gap_us = round(1e6 * p.max_gap_s)
         self._nominal = (p.omega_x_rad_s, p.omega_y_rad_s)
         position_m, velocity_m_s = p.sigmas
         self._noise: Array = np.diag([position_m**2, velocity_m_s**2, position_m**2, velocity_m_s**2])
@@ -74,6 +77,13 @@ class MotionFilter:
         self._covariances.clear()
 
     @property
+    def off_pattern(self) -> float:
+        """Share of the samples that lay so far off that the filter began anew: 0 on the pattern, a few per
+        cent with the way there and back, and near 1 where the pattern is not as it was told.
+        """
+        return self.restarts / self.samples if self.samples else 0.0
+
+    @property
     def omega_rad_s(self) -> tuple[float, float]:
         """The frequencies as they are believed now."""
         if self.parameters.frequency and self.time_us is not None:
@@ -83,8 +93,12 @@ class MotionFilter:
     def take(self, time_us: int, x: float, vx: float, y: float, vy: float) -> None:
         """Predict to a sample's time and correct by it. Velocities that are NaN were not measured.
 
-        Times must not go back.
+        Times must not go back. After a silence longer than `max_gap_s` (a receiver that had lost its fix says
+        nothing here, though its messages come) the sample is the first of a new beginning.
         """
+        if self.time_us is not None and time_us - self.time_us > self._max_gap_us:
+            self.reset()
+        self.samples += 1
         measured, noise = self._measured, self._noise
         measured[:] = x, vx, y, vy
         if math.isnan(vx) or math.isnan(vy):
@@ -118,13 +132,14 @@ class MotionFilter:
         return self.parameters.form is not Form.MEASUREMENT or self.time_us >= time_us
 
     def at(self, time_us: int) -> tuple[Array, Array] | None:
-        """State and covariance at a time, from the samples up to then; None before the oldest that is kept.
+        """State and covariance at a time, from the samples up to then; None before the oldest that is kept,
+        and longer than `max_gap_s` after the newest.
 
         A filter predicts from the sample before. Unfiltered samples are interpolated, or where none has come
         after, moved on at constant velocity.
         """
         found = bisect_right(self._times, time_us) - 1
-        if found < 0:
+        if found < 0 or time_us - self._times[found] > self._max_gap_us:
             return None
         state, covariance = self._states[found].copy(), self._covariances[found].copy()
         dt_s = 1e-6 * (time_us - self._times[found])

@@ -35,7 +35,7 @@ _SIGMAS: Final = {Source.GPS: (0.3, 0.1), Source.GLOBAL: (0.15, 0.08), Source.LO
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LissajousParameters:
-    """Parameters of `LissajousEstimator`; the frequencies are of `fly lissajous --pattern L3 --period 120`.
+    """Parameters of `LissajousEstimator`; the frequencies are of `fly lissajous --pattern L3 --period 150`.
 
     Attributes:
         form: which of the paper's three estimators.
@@ -64,8 +64,8 @@ class LissajousParameters:
     form: Form = Form.PROPOSED
     frequency: bool = False
     source: Source = Source.GPS
-    omega_x_rad_s: float = 3.0 * math.tau / 120.0
-    omega_y_rad_s: float = 4.0 * math.tau / 120.0
+    omega_x_rad_s: float = 3.0 * math.tau / 150.0
+    omega_y_rad_s: float = 4.0 * math.tau / 150.0
     epsilon_rad_s: float = 1e-4
     orientation_rad: float = 0.5 * math.pi
     centre_lat_deg: float | None = None

@@ -9,7 +9,7 @@ import numpy as np
 from autopilot_bridge.geodesy import GeodeticPosition
 from estimators.input_guard import InputGuard
 from estimators.interface import Outcome
-from estimators.lissajous.model import Array, course, course_variance
+from estimators.lissajous.model import VX, VY, Array, course, course_variance
 from estimators.lissajous.pattern_frame import Track
 from estimators.lissajous.positions import PositionReader, values_of
 from estimators.messages import Message
@@ -169,7 +169,8 @@ class Drone:
     def placed(self, detection: Detection) -> Array | None:
         """A detection on the ground, (x, y, xx, xy, yy) in the pattern's frame (equations 31 to 34).
 
-        None when there was no position or attitude near its time, or its line of sight has no length.
+        None when there was no position or attitude near its time, when its line of sight has no length, or
+        when the nose may point anywhere because the drone was too slow to have a course.
         """
         p = self.parameters
         known = self.track.filter.at(detection.time_us)
@@ -182,6 +183,8 @@ class Drone:
             return None
         state, covariance = known
         if p.heading is Heading.COURSE:
+            if math.hypot(state[VX], state[VY]) < p.min_speed_m_s:
+                return None
             heading_rad = course(state)
             variance = course_variance(state, covariance) + p.yaw_sigma_rad**2
         else:

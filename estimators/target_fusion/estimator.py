@@ -115,7 +115,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         updated, detected = self._place_pending(drone)
         if updated:
             self._estimates = tuple(updated.values())
-            return outcome if outcome is Outcome.TIME_JUMP else Outcome.UPDATED
+            return Outcome.UPDATED
         return detected if name == "LANDING_TARGET" and detected is not None else outcome
 
     def _on_position(self, time_us: int, drone: Drone, message: Message) -> Outcome:
@@ -245,11 +245,14 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         return messages
 
     def remarks(self) -> Mapping[str, float | str]:
-        """How many detections were fused, lay outside the gate, or could not be placed."""
+        """How many detections were fused, lay outside the gate, or could not be placed; of the drone that
+        was off the pattern most, in which share of its samples.
+        """
         return {
             "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),
             "drones": float(len(self.drones)),
             "targets": float(sum(belief.confirmed for belief in self.beliefs.values())),
+            "off_pattern": max((d.track.filter.off_pattern for d in self.drones.values()), default=0.0),
             "detections_fused": float(self._fused),
             "detections_outside_the_gate": float(sum(belief.gated for belief in self.beliefs.values())),
             "detections_not_placed": float(self._unplaced),

@@ -46,6 +46,8 @@ class TargetFusionParameters(LissajousParameters):
     Attributes:
         centre_vehicle: whose home the pattern's centre is counted from, unless it is given by coordinates.
         heading: which way a drone's nose points.
+        min_speed_m_s: with `heading=course`, what a drone sees while it is slower is not placed: who hovers,
+            climbs or lands may point anywhere, and its course is noise.
         mount: how the camera is carried.
         mount_roll_rad, mount_pitch_rad, mount_yaw_rad: of a fixed camera against the body; -pi/2: down.
         distance: where the range comes from.
@@ -67,6 +69,7 @@ class TargetFusionParameters(LissajousParameters):
 
     centre_vehicle: int = 1
     heading: Heading = Heading.COURSE
+    min_speed_m_s: float = 0.5
     mount: Mount = Mount.GIMBAL
     mount_roll_rad: float = 0.0
     mount_pitch_rad: float = -0.5 * math.pi
@@ -108,7 +111,14 @@ class TargetFusionParameters(LissajousParameters):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} {value:g} is not accepted: a number above 0 is")
-        for name in ("target_size_m", "height_sigma_m", "yaw_sigma_rad", "walk_m_sqrt_s", "max_delay_s"):
+        for name in (
+            "min_speed_m_s",
+            "target_size_m",
+            "height_sigma_m",
+            "yaw_sigma_rad",
+            "walk_m_sqrt_s",
+            "max_delay_s",
+        ):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"{name} {value:g} is not accepted: 0 or a number above it is")

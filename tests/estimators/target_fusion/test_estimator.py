@@ -195,7 +195,8 @@ def rms(off):
 @pytest.mark.parametrize("camera", ["vehicle frame", "earth frame", "fixed"])
 def test_without_noise_the_place_is_right(heading: str, camera: str) -> None:
     flight = Flight(noise=0.0, earth=camera == "earth frame", fixed=camera == "fixed")
-    estimator = station(heading=heading, mount="fixed" if camera == "fixed" else "gimbal")
+    mount = "fixed" if camera == "fixed" else "gimbal"
+    estimator = station(heading=heading, mount=mount, min_speed_m_s=0.0)  # the pattern has a slow corner
     off = run(estimator, flight.messages(20.0))
     assert len(off) > 300
     assert np.abs(off).max() < 0.3  # cog in hundredths of a degree, vel in cm/s
@@ -207,6 +208,26 @@ def test_yaw_serves_where_the_nose_does_not_lead() -> None:
     assert rms(run(station(heading="yaw"), messages)) < 0.1
     by_course = station(heading="course", confirmations=1)
     assert rms(run(by_course, messages)) > 5.0
+
+
+def test_who_is_too_slow_to_have_a_course_places_nothing() -> None:
+    """At its slowest the pattern is flown at 0.4 m/s; a hovering drone's course is noise."""
+    messages = Flight(noise=0.0).messages(20.0)
+    placed = [len(run(station(min_speed_m_s=limit), messages)) for limit in (0.0, 0.5, 20.0)]
+    assert placed[0] > placed[1] > 0.8 * placed[0]
+    assert placed[2] == 0
+    assert len(run(station(min_speed_m_s=20.0, heading="yaw"), messages)) == placed[0]
+
+
+def test_nothing_is_placed_long_after_the_last_fix() -> None:
+    """A receiver without a fix goes on telling so; the pattern is not believed in for ever."""
+    messages = [
+        (t, m._replace(fix_type=0, lat=0, lon=0) if m.name == "GPS_RAW_INT" and t > 25_000_000 else m)
+        for t, m in Flight(noise=0.0).messages(20.0)
+    ]
+    estimator = station(max_gap_s=2.0)
+    times = [t for t, m in messages if estimator.handle(t, m) is Outcome.UPDATED]
+    assert 26_900_000 < times[-1] < 27_500_000
 
 
 def test_filters_are_better_than_samples_and_two_drones_than_one() -> None:
