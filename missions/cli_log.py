@@ -255,12 +255,16 @@ def play(path: Path, dialect: str | None, link: str, speed: str, loop: bool, **g
                 click.echo(f"\r{played.log_s:8.1f} s  {played.frames} frames", err=True, nl=False)
 
         connection = open_link(address)
+        if not connection.peers:
+            click.echo(f"waiting for somebody on {connection.description}", err=True)
         try:
             played = send(opened, selections, connection, speed=factor, loop=loop, on_progress=show)
         finally:
             connection.close()
             if terminal:
                 click.echo(err=True)
-        click.echo(f"played: {played.frames} frames, {played.log_s:.1f} s of the log, to {address}")
+        lost = connection.counters.dropped
+        but = f" ({lost} dropped: nobody there, or too slow)" if lost else ""
+        click.echo(f"played: {played.frames} frames{but}, {played.log_s:.1f} s of the log, to {address}")
 
     _run(work)

@@ -12,6 +12,8 @@ from estimators.logs.iterate import Selection
 from estimators.logs.raw_records import positions, read_records
 
 MIN_SPEED: Final = 0.1
+_MOMENT_US: Final = 20_000
+_IDLE_MOMENTS: Final = 10
 _LONGEST_WAIT_US: Final = 200_000  # of log time, so that the link is looked after and progress is shown
 
 
@@ -20,7 +22,7 @@ class Played:
     """How far it is.
 
     Attributes:
-        frames: sent.
+        frames: sent, or dropped by a link whose reader is too slow or gone (`Link.counters`).
         log_s: seconds of the log behind us, since the first record that is played.
         rounds: times that the end was reached.
     """
@@ -41,7 +43,9 @@ def play(
 ) -> Played:
     """Send the frames of a log when their time has come; blocks until all are sent.
 
-    What the link brings is read and dropped: a log answers nobody.
+    Begins when there is somebody to send to: a server (tcpin, udpin) waits for its first client. As fast as
+    possible is as fast as a stream's reader takes it. What the link brings is read and dropped: a log answers
+    nobody.
 
     Args:
         log: an open telemetry log.
@@ -60,6 +64,9 @@ def play(
     if not len(order):
         raise LogError(f"nothing of {log.path} is selected; choose other messages, sources or conditions")
     played = Played()
+    while not link.peers:
+        link.receive()
+        _wait()
     while True:
         pace = None if math.isinf(speed) else RealTimeClock(speed, max_lag_s=math.inf)
         first_us: int | None = None
@@ -74,13 +81,36 @@ def play(
                 _tell(played, now_us, on_progress)
             if pace is None and played.frames % 1000 == 0:
                 link.receive()
+                _tell(played, due_us, on_progress)
+            while pace is None and link.congested:
+                link.receive()
+                _wait()
             link.send(frame)
             played.frames += 1
             played.log_s = due_us * 1e-6
         played.rounds += 1
         _tell(played, round(played.log_s * 1e6), on_progress)
         if not loop:
+            _drain(link)
             return played
+
+
+def _wait() -> None:
+    """A moment of wall time, for what a link does at its own pace."""
+    clock = RealTimeClock()
+    clock.wait_until(0)
+    clock.wait_until(_MOMENT_US)
+
+
+def _drain(link: Link) -> None:
+    """Let a slow stream take what it was sent, as long as it takes anything."""
+    counters = link.counters
+    idle = 0
+    while idle < _IDLE_MOMENTS and link.peers:
+        before = counters.bytes_out
+        link.receive()
+        idle = 0 if counters.bytes_out != before else idle + 1
+        _wait()
 
 
 def _tell(played: Played, now_us: int, on_progress: Callable[[Played], None] | None) -> None:

@@ -1,5 +1,6 @@
 """`flightstack log`: what a person types, and what is said of it."""
 
+import contextlib
 import json
 import socket
 import threading
@@ -96,6 +97,34 @@ def test_play_to_a_link(log, flight):
     assert code == 0 and "played: 205 frames" in out
     expected = [frame.raw for _, frame in TlogReader(flight) if frame.message_id in (0, 30)]
     assert [frame.raw for frame in heard[:150]] == expected[-205:][:150]
+
+
+def test_play_as_a_server_waits_for_a_client_and_loses_nothing(log, flight):
+    """As fast as the client reads, though its window is small and it reads in bits."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    parser, heard = FrameParser(), []
+
+    def listen():
+        deadline = threading.Event()
+        for _ in range(500):
+            with contextlib.suppress(ConnectionRefusedError):
+                client = socket.create_connection(("127.0.0.1", port))
+                break
+            deadline.wait(0.02)
+        with client:
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            while data := client.recv(1500):
+                heard.extend(frame.raw for frame in parser.feed(data))
+
+    listener = threading.Thread(target=listen)
+    listener.start()
+    code, out, err = log("play", flight, "--link", f"tcpin:127.0.0.1:{port}", "--speed", "max")
+    listener.join()
+    expected = [frame.raw for _, frame in TlogReader(flight)]
+    assert code == 0 and heard == expected
+    assert f"played: {len(expected)} frames, " in out and "waiting for somebody" in err
 
 
 @pytest.mark.parametrize(

@@ -77,7 +77,7 @@ class ScriptedVehicle(threading.Thread):
 
     def _hear(self, message):
         self.heard.append(message)
-        if message.get_type() == "COMMAND_LONG" and message.param1 == self._says(0).id and self._willing:
+        if message.get_type() == "COMMAND_LONG" and message.param1 == type(self._says(0)).id and self._willing:
             self._period_ms = max(10, round(message.param2 / 1e4) * 10)
 
 
