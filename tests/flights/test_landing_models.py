@@ -19,7 +19,13 @@ def lands(model: str, flavour: str, turbulence: Turbulence, climbed_m: float, se
     air = Environment.from_wind(
         speed_m_s=0.0 if calm else 6.0, from_deg=heading_deg + 20.0, turbulence=turbulence
     )
-    flight = AircraftFlight(flavour, seed=seed, model=model, environment=air)
+    flight = AircraftFlight(
+        flavour,
+        seed=seed,
+        model=model,
+        environment=air,
+        parameters={"RTL_AUTOLAND": 2.0} if flavour == "ardupilot" else None,
+    )
     slope_m = climbed_m + 18.0 * flight.vehicle.autopilot.context.fixed_wing.airspeed_trim_m_s
     land = flight.on_runway(slope_m + HEIGHT_M / math.tan(math.radians(4.95)))
     items = (

@@ -260,7 +260,10 @@ class TakeoffTask(AircraftTask):
         return TaskStatus.DONE if self.phase is TakeoffPhase.REACHED else TaskStatus.RUNNING
 
     def _climb_to_height(self, p: FixedWingFlightParameters, remaining_m: float) -> None:
-        """Full power, the pitch holds the airspeed; near the height the energy control takes over."""
+        """Full power, the pitch holds the airspeed; near the height the energy control takes over.
+
+        What is still slow gathers speed on its way up: low over the ground nobody dives for it.
+        """
         state, command = self._state, self._command
         command.airspeed_m_s = p.takeoff_airspeed_m_s
         climb = max(p.climb_rate_m_s, _CLIMB_SHARE * p.climb_max_m_s)
@@ -271,3 +274,5 @@ class TakeoffTask(AircraftTask):
             command.height_rate_m_s = climb
         else:
             command.throttle = p.takeoff_throttle_max
+            if self.phase is TakeoffPhase.CLIMB and state.airspeed_m_s > p.airspeed_min_m_s:
+                command.pitch_min_rad = p.takeoff_pitch_min_rad

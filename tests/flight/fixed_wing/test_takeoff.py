@@ -74,6 +74,20 @@ def test_a_place_is_flown_to_and_circled() -> None:
     assert task.place_ned_m[0:2] == pytest.approx([600.0, 300.0])
 
 
+def test_who_is_slow_at_the_clearance_height_climbs_on_and_does_not_dive_for_speed() -> None:
+    rig = aircraft("runway", takeoff_airspeed_m_s=34.0, takeoff_clearance_m=8.0)  # far more than it has
+    task = TakeoffTask(60.0, np.array([900.0, 0.0, 0.0]))
+    rig.fly(task)
+    start = rig.nav[n.POS_NED_M].copy()
+    rig.run_until(lambda: task.phase is TakeoffPhase.CLIMB, 30.0)
+    rig.run(6.0)
+    log = np.array(rig.log)
+    climbed = start[2] - log[:, 12]
+    gained = np.maximum.accumulate(climbed)
+    assert np.max(gained - climbed) < 0.3
+    assert climbed[-1] > 20.0
+
+
 def test_disarmed_it_does_nothing_and_armed_again_it_starts_anew() -> None:
     rig = aircraft("runway")
     task = TakeoffTask(50.0)
