@@ -102,11 +102,13 @@ def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> N
         )
     except ValueError as error:
         raise PlanError(str(error)) from error
-    adapter = ADAPTERS[request.autopilot, VehicleKind.FIXED_WING]()
-    limits = adapter.limits(sitl.parameters(0, list(adapter.limiting_parameters)))
-    ground_alt_m = sitl.home.alt_m
-    sitl.close()
-    sitl.loop.close()
+    try:
+        adapter = ADAPTERS[request.autopilot, VehicleKind.FIXED_WING]()
+        limits = adapter.limits(sitl.parameters(0, list(adapter.limiting_parameters)))
+        ground_alt_m = sitl.home.alt_m
+    finally:
+        sitl.close()
+        sitl.loop.close()
     _check_with(mission, request, index, limits, ground_alt_m)
 
 
