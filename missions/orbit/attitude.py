@@ -1,6 +1,6 @@
 """Where the attitude of the aircraft comes from.
 
-The autopilot's own estimate today; a filter of ours can stand in its place by having the same method.
+The autopilot's own estimate here; what has the same method can stand in its place (`filter_attitude`).
 """
 
 import math
