@@ -4,7 +4,7 @@ import importlib.util
 import inspect
 import math
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
-from missions.mission import Mission
+from missions.mission import Debriefing, Mission
 from missions.occupancy.mission import OccupancyMission
 from missions.options import FlightOptions
 from missions.orbit.mission import OrbitMission
@@ -74,6 +74,24 @@ class PatternMission(Mission[FlightOptions]):
         from missions.pattern_flight import fly_pattern
 
         await fly_pattern(vehicle, options, self.curve(options))
+
+    def estimator_settings(self, options: FlightOptions) -> Mapping[str, float]:
+        if options.period_s is None:
+            return {}  # at a speed, the motion is not harmonic
+        from missions.pattern_flight import pattern_frequencies
+
+        x_rad_s, y_rad_s = pattern_frequencies(self.curve(options), options.period_s)
+        return {"omega_x_rad_s": x_rad_s, "omega_y_rad_s": y_rad_s}
+
+    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
+        assert isinstance(debriefing.options, FlightOptions)
+        return self.estimator_settings(debriefing.options)
+
+    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+        if "omega_x_rad_s" not in summary:
+            return ()
+        x, y = summary["omega_x_rad_s"], summary["omega_y_rad_s"]
+        return (f"frequencies: omega_x_rad_s={x:.6g} (east), omega_y_rad_s={y:.6g} (north)",)
 
     def title(self, options: FlightOptions) -> str:
         parts = [self.name]

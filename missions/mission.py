@@ -95,6 +95,13 @@ class Mission(Generic[AnyOptions]):
         """Fly all vehicles of a team, each ready to arm; called instead of `fly` when `together`."""
         raise PlanError(f"mission {self.name} flies no team")
 
+    def estimator_settings(self, options: AnyOptions) -> Mapping[str, float]:
+        """Parameters of estimators that follow from what is flown, by name.
+
+        An estimator that is taken along gets those that it has and nobody has set.
+        """
+        return {}
+
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         """What `summary.json` has beside the figures of every flight."""
         return {}

@@ -17,7 +17,7 @@ from missions.options import FlightOptions, Via
 from missions.patterns.curve import ArcLengthTable, Array, Curve
 from missions.patterns.polyline import Polyline
 from missions.planning.limits import FixedWingLimits, Limits, MulticopterLimits
-from missions.planning.natural import is_lissajous, natural_trajectory
+from missions.planning.natural import is_lissajous, natural_frequencies, natural_trajectory
 from missions.planning.trajectory import (
     Trajectory,
     TrajectoryPoint,
@@ -58,10 +58,9 @@ def plan_pattern(curve: Curve, options: FlightOptions, limits: MulticopterLimits
     if options.period_s is not None:
         if not is_lissajous(curve):
             raise PlanError("--period is for lissajous patterns; choose --speed for this one")
-        period_s = options.period_s * math.tau / _once_round(curve)
         return natural_trajectory(
             curve,
-            fundamental_period_s=period_s,
+            fundamental_period_s=_fundamental_period_s(curve, options.period_s),
             altitude_m=altitude_m,
             limits=limits,
             duration_s=options.search_time_s,
@@ -75,9 +74,14 @@ def plan_pattern(curve: Curve, options: FlightOptions, limits: MulticopterLimits
     )
 
 
-def _once_round(curve: Curve) -> float:
+def _fundamental_period_s(curve: Curve, period_s: float) -> float:
     inner: Curve = getattr(curve, "curve", curve)
-    return inner.end if inner.closed else math.tau
+    return period_s * math.tau / (inner.end if inner.closed else math.tau)
+
+
+def pattern_frequencies(curve: Curve, period_s: float) -> tuple[float, float]:
+    """Frequencies east and north, rad/s, of a Lissajous pattern that is flown in its own time law."""
+    return natural_frequencies(curve, _fundamental_period_s(curve, period_s))
 
 
 async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> None:

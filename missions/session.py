@@ -103,7 +103,7 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
             f"{len(request.connect)} connections for {request.options.vehicles} vehicles; "
             "give --connect once for each vehicle"
         )
-    estimators = estimators_of(request)
+    estimators = estimators_of(request, mission.estimator_settings(request.options))
     made = _missing_folders(request.out or RUNS)
     folder = create_run_folder(request.out, mission.name)
     stage = None

@@ -44,6 +44,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         self._estimates: tuple[LissajousEstimate, ...] = ()
         self._distance_sum = 0.0
         self._distance_count = 0
+        self._surest: LissajousEstimate | None = None
         self._start()
 
     def _start(self) -> None:
@@ -121,12 +122,16 @@ class LissajousEstimator(Estimator[LissajousParameters]):
                 covariance=covariance,
             ),
         )
+        best = self._surest
+        if best is None or sum(sigmas) < best.omega_x_sigma_rad_s + best.omega_y_sigma_rad_s:
+            self._surest = self._estimates[0]
 
     def reset(self) -> None:
         """Forget all but parameters and counters."""
         self._guard.reset()
         self._estimates = ()
         self._distance_sum, self._distance_count = 0.0, 0
+        self._surest = None
         self._start()
 
     @property
@@ -169,9 +174,13 @@ class LissajousEstimator(Estimator[LissajousParameters]):
 
     def remarks(self) -> Mapping[str, float | str]:
         """Mean squared normalised innovation (4 when the noise is as it is believed), the share of samples
-        that were off the pattern, and the frequencies.
+        that were off the pattern, and the frequencies when they were known best: at the end the vehicle has
+        left the pattern.
         """
-        omega_x, omega_y = self.track.filter.omega_rad_s
+        best = self._surest
+        omega_x, omega_y = (
+            self.track.filter.omega_rad_s if best is None else (best.omega_x_rad_s, best.omega_y_rad_s)
+        )
         mean = self._distance_sum / self._distance_count if self._distance_count else math.nan
         return {
             "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),

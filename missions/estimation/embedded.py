@@ -1,9 +1,11 @@
 """Estimators in a flight: the same loop as in a process of their own, on the flight's vehicle time."""
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import fields
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from autopilot_bridge.mavlink import FrameEncoder, MAVLinkMessage, dialect
@@ -50,6 +52,8 @@ class FlightEstimators:
         name: of the estimator, or the path of a user's file.
         settings: its parameters as NAME=VALUE.
         component_id: own.
+        known: parameters that follow from the mission, by name: for an estimator that has them, where
+            `settings` does not say otherwise.
 
     Attributes:
         fleet: their runners.
@@ -58,8 +62,18 @@ class FlightEstimators:
         EstimatorError: no such estimator or parameter.
     """
 
-    def __init__(self, name: str, settings: Sequence[str] = (), *, component_id: int = COMPONENT_ID) -> None:
+    def __init__(
+        self,
+        name: str,
+        settings: Sequence[str] = (),
+        *,
+        component_id: int = COMPONENT_ID,
+        known: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
         found = estimator_class(name)
+        has = {field.name for field in fields(found.PARAMETERS)}
+        # a setting that comes later counts
+        settings = [*(f"{name}={value!r}" for name, value in known.items() if name in has), *settings]
         parameters = parameters_from(found, settings)
 
         def make() -> Estimator[Any]:

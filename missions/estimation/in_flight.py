@@ -1,5 +1,6 @@
 """The estimators that a flight is asked to take along; what they need is imported only then."""
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from missions.errors import PlanError
@@ -9,8 +10,12 @@ if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators
 
 
-def estimators_of(request: RunRequest) -> "FlightEstimators | None":
+def estimators_of(request: RunRequest, known: Mapping[str, float]) -> "FlightEstimators | None":
     """The estimators of a flight; None where none is asked for.
+
+    Args:
+        request: of the flight.
+        known: parameters that follow from its mission.
 
     Raises:
         PlanError: no such estimator or parameter.
@@ -27,6 +32,8 @@ def estimators_of(request: RunRequest) -> "FlightEstimators | None":
     # A mission on board may have the first id of an onboard computer itself.
     component_id = COMPONENT_ID + (request.identity[1] == COMPONENT_ID)
     try:
-        return FlightEstimators(request.estimator, request.estimator_settings, component_id=component_id)
+        return FlightEstimators(
+            request.estimator, request.estimator_settings, component_id=component_id, known=known
+        )
     except EstimatorError as error:
         raise PlanError(str(error)) from error

@@ -115,6 +115,13 @@ def _rate_limited(course: Array, largest_step: float) -> Array:
     return np.array(out)
 
 
+def natural_frequencies(curve: Curve, fundamental_period_s: float) -> tuple[float, float]:
+    """Frequencies east and north, rad/s, of a curve that `is_lissajous` in its own time law."""
+    inner = getattr(curve, "curve", curve)
+    rate = math.tau / fundamental_period_s
+    return inner.ratio_x * rate, inner.ratio_y * rate
+
+
 def is_lissajous(curve: Curve) -> bool:
     """Whether a curve has a time law of its own."""
     inner = getattr(curve, "curve", curve)

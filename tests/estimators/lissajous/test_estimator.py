@@ -120,6 +120,10 @@ def test_wrong_frequencies_are_allowed_for_and_corrected() -> None:
     assert e.omega_x_rad_s == pytest.approx(omega[0], rel=2e-3)
     assert e.omega_y_rad_s == pytest.approx(omega[1], rel=2e-3)
     assert abs(e.omega_x_rad_s - omega[0]) < 4.0 * e.omega_x_sigma_rad_s
+    # where the flight ends the pattern is over, and what was learned is lost
+    estimator.handle(300_000_000, gps(300.0, (0.0, 0.0, 0.0, 0.0)))
+    assert estimator.estimates[0].omega_x_rad_s == OMEGA_X
+    assert estimator.remarks()["omega_x_rad_s"] == pytest.approx(omega[0], rel=2e-3)
 
 
 def test_the_estimator_is_the_kernels() -> None:

@@ -11,10 +11,11 @@ import pytest
 from estimators.logs import open_log
 from missions.cli import run_command_line
 from missions.errors import PlanError
+from missions.estimation.in_flight import estimators_of
 from missions.estimation.over_logs import ReplayRequest, replay_logs
 from missions.kind import VehicleKind
 from missions.library import find_mission
-from missions.options import FlightOptions
+from missions.options import FlightOptions, Via
 from missions.session import RunRequest, fly
 
 LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
@@ -69,6 +70,27 @@ def test_flight_and_replay_of_its_log_agree_to_the_last_bit(scripted, tmp_path, 
     )
     assert len(same_estimates(result.folder, again.folder)) == vehicles
     assert json.loads((result.folder / "summary.json").read_text())["estimator"]["samples"] > 100
+
+
+@pytest.mark.parametrize(
+    ("estimator", "chosen", "settings"),
+    [
+        ("lissajous", (), ["omega_x_rad_s=0.0419", "omega_y_rad_s=0.0838"]),
+        ("lissajous", ("omega_y_rad_s=0.1",), ["omega_x_rad_s=0.0419", "omega_y_rad_s=0.1"]),
+        ("attitude", (), []),
+    ],
+)
+def test_what_a_pattern_says_of_an_estimators_parameters_is_set(estimator, chosen, settings):
+    """`fly lissajous --period 150` knows its frequencies; what was chosen with --set counts all the same."""
+    options = FlightOptions(pattern="L2", period_s=150.0, via=Via.SETPOINTS)
+    known = find_mission("lissajous").estimator_settings(options)
+    request = RunRequest(options=options, estimator=estimator, estimator_settings=chosen)
+    found = estimators_of(request, known).fleet.parameters
+    for setting in settings:
+        name, value = setting.split("=")
+        assert getattr(found, name) == pytest.approx(float(value), rel=2e-3)
+    assert settings or not hasattr(found, "omega_x_rad_s")
+    assert find_mission("lissajous").estimator_settings(FlightOptions()) == {}
 
 
 def test_estimates_are_told_on_the_link_and_logged_as_a_component_of_the_vehicle(scripted, tmp_path):
