@@ -1,6 +1,7 @@
 """Two quadrotors on Lissajous patterns localise a ground target: unfiltered, Kalman filter, proposed.
 
     python benchmarks/target_fusion.py [--seeds 20] [--first 0] [--epsilon 3e-5] [--heading course]
+                                         [--workers N]
 
 Every seed is a flight in an embedded world (PX4, iris): both vehicles fly the pattern in its natural time
 law, at a pace of their own that differs from the nominal one by chance, as the paper's drones do (variance
@@ -47,6 +48,7 @@ from missions.pattern_flight import fly_pattern
 from missions.patterns.curve import Lap
 from missions.patterns.lissajous import Lissajous
 from missions.run import EPOCH_UNIX_US
+from missions.studies.pool import processors, work_through
 from missions.together import together
 from missions.vehicle.vehicle import Vehicle
 
@@ -298,6 +300,23 @@ def score(recorded: Recorded, estimator: Estimator[Any]) -> Score:
     )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One seed's flight, and how it is looked at."""
+
+    seed: int
+    setting: Setting
+    heading: str
+
+
+def flown(task: Task) -> tuple[dict[str, Score], float]:
+    """Every form's score on one flight, and the seconds that it took."""
+    started_s = wall_time_s()
+    recorded = fly(task.seed, task.setting)
+    scores = {form: score(recorded, base_station(form, task.setting, heading=task.heading)) for form in FORMS}
+    return scores, wall_time_s() - started_s
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -306,28 +325,31 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--epsilon", type=float, default=Setting().epsilon_rad_s)
     parser.add_argument("--heading", choices=["course", "yaw"], default="course")
+    parser.add_argument("--workers", type=int, default=processors(), help="processes")
     arguments = parser.parse_args()
-    if arguments.seeds < 1 or arguments.first < 0 or not 0.0 <= arguments.epsilon <= 0.01:
-        parser.error("--seeds from 1, --first from 0, --epsilon from 0 to 0.01")
+    if min(arguments.seeds, arguments.workers) < 1 or arguments.first < 0:
+        parser.error("--seeds and --workers from 1, --first from 0")
+    if not 0.0 <= arguments.epsilon <= 0.01:
+        parser.error("--epsilon from 0 to 0.01")
     setting = Setting(epsilon_rad_s=arguments.epsilon)
     found: dict[str, list[float]] = {form: [] for form in FORMS}
     say(f"{'seed':>5}" + "".join(f"{form:>13}" for form in FORMS) + f"{'detections':>12}{'wall s':>8}")
-    for seed in range(arguments.first, arguments.first + arguments.seeds):
-        started_s = wall_time_s()
-        recorded = fly(seed, setting)
-        scores = {
-            form: score(recorded, base_station(form, setting, heading=arguments.heading)) for form in FORMS
-        }
-        for form, value in scores.items():
-            found[form].append(value.rmse_m)
-        line = "".join(f"{scores[form].rmse_m:13.3f}" for form in FORMS)
-        say(f"{seed:5d}{line}{scores['proposed'].detections:12d}{wall_time_s() - started_s:8.1f}")
+    seeds = range(arguments.first, arguments.first + arguments.seeds)
+    tasks = [Task(seed=seed, setting=setting, heading=arguments.heading) for seed in seeds]
+    done: dict[int, tuple[dict[str, Score], float]] = {}
+    for task, result in work_through(flown, tasks, arguments.workers):
+        done[task.seed] = result
+        while (seed := arguments.first + len(found["proposed"])) in done:  # in order, as far as they are
+            scores, took_s = done[seed]
+            for form, value in scores.items():
+                found[form].append(value.rmse_m)
+            line = "".join(f"{scores[form].rmse_m:13.3f}" for form in FORMS)
+            say(f"{seed:5d}{line}{scores['proposed'].detections:12d}{took_s:8.1f}")
     means = {form: statistics.fmean(values) for form, values in found.items()}
     say(f"{'mean':>5}" + "".join(f"{means[form]:13.3f}" for form in FORMS))
-    ordered = [
-        a < b < c for a, b, c in zip(found["proposed"], found["kalman"], found["measurement"], strict=True)
-    ]
-    say(f"proposed < kalman < measurement in {sum(ordered)} of {len(ordered)} flights")
+    for order in (("proposed", "kalman", "measurement"), ("proposed", "kalman"), ("kalman", "measurement")):
+        rising = [list(errors) == sorted(errors) for errors in zip(*(found[f] for f in order), strict=True)]
+        say(f"{' < '.join(order)} in {sum(rising)} of {len(rising)} flights")
     return 0 if means["proposed"] < means["kalman"] < means["measurement"] else 1
 
 
