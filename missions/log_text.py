@@ -15,7 +15,10 @@ def report_lines(report: LogReport) -> Iterator[str]:
     """The report as lines of text."""
     yield f"{report.path}: {report.format}, {report.size_bytes / 1e6:.2f} MB, {report.messages} messages"
     started = "" if report.start_unix_us is None else f", from {_date(report.start_unix_us)}"
-    yield f"duration {report.duration_s:.1f} s{started}; dialect {report.dialect}"
+    dialect = (
+        "" if report.dialect == report.format else f"; dialect {report.dialect}"
+    )  # onboard logs have none
+    yield f"duration {report.duration_s:.1f} s{started}{dialect}"
     yield "bytes: " + _counts(report.bytes_by_kind)
     if any(report.drops.values()):
         yield "dropped: " + _counts(report.drops)

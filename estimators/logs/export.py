@@ -200,8 +200,8 @@ def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> li
             }
             writer.add_message(
                 channel_id=channels[key],
-                log_time=(log_time_us or time_us) * 1000,
-                publish_time=time_us * 1000,
+                log_time=_nanoseconds(log_time_us or time_us),
+                publish_time=_nanoseconds(time_us),
                 sequence=counts[key],
                 data=json.dumps(fields).encode(),
             )
@@ -214,6 +214,11 @@ def _log_times(log: Log, selections: Sequence[Selection]) -> list[int]:
     order = np.sort(np.concatenate([np.asarray(stream.order[rows], np.int64) for stream, rows in selections]))
     times: list[int] = log.source.log_time_us(order).tolist()
     return times
+
+
+def _nanoseconds(time_us: int) -> int:
+    """As far as the format's 64 bits go: damaged time stamps can be anything."""
+    return min(max(time_us, 0) * 1000, (1 << 64) - 1)
 
 
 def _json_type(code: str, length: int) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """What lies between the valid frames of a log: every byte of it gets a reason.
 
 A whole record (time stamp and something of the shape of a frame) that is followed by another, or by the end
-of the gap, is one reason: its message is unknown, its flags are unsupported, or its checksum is wrong. What is left
-is junk, or, behind the last whole record of a file, the torn record of a writer that was killed.
+of the gap, is one reason: its message is unknown, its flags are unsupported, or its checksum is wrong. What
+is left is junk, or, behind the last whole record of a file, the torn record of a writer that was killed.
 """
 
 from dataclasses import dataclass

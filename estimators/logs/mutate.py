@@ -25,6 +25,10 @@ _GLOBAL: Final = frozenset({"lat", "lon"})
 
 Rows = NDArray[np.int64]
 
+_LONGEST_STEP: Final = 10.0
+"""Spells of an intermittent message that a pause of the log is worth at most."""
+_LAST_US: Final = np.iinfo(np.int64).max
+
 
 def mutated_records(
     log: Log, selections: Sequence[Selection], faults: Sequence[Fault], *, seed: int = 0
@@ -80,7 +84,7 @@ def mutated_records(
         kept = np.setdiff1d(kept, np.concatenate(gone), assume_unique=True)
     times = record_times_us(log, kept)
     for row, position in enumerate(kept.tolist()):
-        times[row] += later.get(position, 0)
+        times[row] = min(int(times[row]) + later.get(position, 0), _LAST_US)
     sorting = np.argsort(times, kind="stable") if later else np.arange(len(kept))
     ordered = kept[sorting]
     for position, time_us, (_, frame) in zip(
@@ -111,13 +115,14 @@ def _lost(fault: Fault, times_s: NDArray[np.float64], rng: np.random.Generator) 
             return np.flatnonzero((np.arange(count) + 1) % factor != 0)
         case FaultKind.INTERMITTENT:
             assert fault.value is not None
-            edges: list[float] = [float(times_s[0])]
-            heard: list[bool] = []
-            while edges[-1] <= times_s[-1]:
+            # Stamps may go back, or (damaged) far away: that takes no time, and no more than some spells.
+            steps_s = np.clip(np.diff(times_s, prepend=times_s[0]), 0.0, _LONGEST_STEP * fault.value)
+            elapsed_s = np.cumsum(steps_s)
+            edges = [0.0]
+            while edges[-1] <= elapsed_s[-1]:
                 edges.append(edges[-1] + max(1e-3, float(rng.exponential(fault.value))))
-                heard.append(len(heard) % 2 == 1)  # silent first
-            spell = np.searchsorted(np.array(edges), times_s, side="right") - 1
-            return np.flatnonzero(~np.array(heard)[np.clip(spell, 0, len(heard) - 1)])
+            spell = np.searchsorted(np.array(edges), elapsed_s, side="right") - 1
+            return np.flatnonzero(spell % 2 == 0)  # silent first
     return None
 
 

@@ -1,11 +1,13 @@
 """PX4's onboard logs (.ulg), read with `pyulog`."""
 
+import contextlib
+import io
 import re
+from importlib import metadata
 from pathlib import Path
 from typing import Final
 
 import numpy as np
-import pyulog
 from pyulog.core import ULog
 
 from estimators.logs.errors import LogError
@@ -24,7 +26,8 @@ def open_ulog(path: Path) -> MappedSource:
         LogError: it can't be read, or holds no message.
     """
     try:
-        log = ULog(str(path), disable_str_exceptions=True)
+        with contextlib.redirect_stdout(io.StringIO()):  # it prints what it finds odd
+            log = ULog(str(path), disable_str_exceptions=True)
     except Exception as error:  # pyulog raises whatever a damaged file leads it to
         raise LogError(
             f"{path} can't be read as a PX4 .ulg: {type(error).__name__} {error}; is it whole?"
@@ -61,7 +64,7 @@ def open_ulog(path: Path) -> MappedSource:
         remarks={
             "dropout_ms": int(sum(item.duration for item in log.dropouts)),
             "corrupt": int(bool(log.file_corruption)),
-            "pyulog": str(getattr(pyulog, "__version__", "")),
+            "pyulog": metadata.version("pyulog"),
         },
     )
 

@@ -14,6 +14,11 @@ from estimators.logs.mapped import Array, Part, mavlink_part, newest
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
 _SECOND_US: Final = 1_000_000
+_TYPE_OF_CLASS: Final = {  # VEHICLE_TYPE of vehicle_status
+    1: dialect.MAV_TYPE_QUADROTOR,
+    2: dialect.MAV_TYPE_FIXED_WING,
+    3: dialect.MAV_TYPE_GROUND_ROVER,
+}
 _ARMED: Final = 2  # vehicle_status: ARMING_STATE_ARMED
 _MAIN_MANUAL, _MAIN_ALTITUDE, _MAIN_POSITION, _MAIN_AUTO, _MAIN_ACRO, _MAIN_OFFBOARD, _MAIN_STABILIZED = (
     range(1, 8)
@@ -264,7 +269,7 @@ def _state(topics: Topics) -> list[Part]:
         modes = np.array(
             [_custom_mode(int(state)) for state in status.columns["nav_state"]], dtype=np.float64
         )
-        kind = status.columns.get("system_type", np.zeros(len(status.time_us)))
+        kind = _mav_types(status)
         found.append(
             mavlink_part(
                 "HEARTBEAT",
@@ -322,6 +327,14 @@ def _severity(log_level: Any) -> int:
     number = ord(log_level) if isinstance(log_level, (str, bytes)) and len(log_level) == 1 else int(log_level)
     number = number - ord("0") if number >= ord("0") else number
     return min(max(number, 0), dialect.MAV_SEVERITY_DEBUG)
+
+
+def _mav_types(status: Topic) -> Array:
+    """MAV_TYPE of each vehicle_status; of the class of the vehicle where an old log has no system_type."""
+    if "system_type" in status.columns:
+        return status.columns["system_type"]
+    classes = status.columns.get("vehicle_type", np.zeros(len(status.time_us), dtype=np.int64))
+    return np.array([_TYPE_OF_CLASS.get(int(item), dialect.MAV_TYPE_GENERIC) for item in classes])
 
 
 def _custom_mode(nav_state: int) -> int:

@@ -115,8 +115,16 @@ def _modes(
     table: Table, boot_of: NDArray[np.int64], autopilot: int, vehicle_type: int
 ) -> tuple[ModeSpan, ...]:
     custom, base = table["custom_mode"], table["base_mode"]
-    # PX4's name of a mode depends on the base mode too, but not on whether it is armed.
-    firsts, ends = _spans(custom, base & ~np.uint8(_ARMED), boot_of)
+    # PX4's name of a mode depends on the base mode too, but not on whether it is armed; and other flags of it
+    # change in flight without another mode.
+    pairs, which = np.unique(
+        np.stack((custom.astype(np.int64), (base & ~np.uint8(_ARMED)).astype(np.int64)), axis=1),
+        axis=0,
+        return_inverse=True,
+    )
+    names = [mode_name(autopilot, vehicle_type, int(b), int(c)) for c, b in pairs]
+    named = np.array([names.index(name) for name in names])[which.reshape(-1)]
+    firsts, ends = _spans(custom, named, boot_of)
     return tuple(
         ModeSpan(
             mode=mode_name(autopilot, vehicle_type, int(base[first]), int(custom[first])),

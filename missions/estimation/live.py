@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
+from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, ReplayLog, open_link, parse_address
 from autopilot_bridge.mavlink import MAVLinkMessage
 from autopilot_bridge.tlog import TlogWriter
@@ -99,6 +100,26 @@ class LiveProgress:
     lacking: Sequence[str]
 
 
+class _Recorder:
+    """A recorder that a full disk ends in good order.
+
+    Attributes:
+        failure: why the log could not be written; nothing more is recorded then. "" while all is well.
+    """
+
+    def __init__(self, recorder: FlightRecorder) -> None:
+        self.failure = ""
+        self._record = recorder.record
+
+    def record(self, frame: bytes, time_us: int) -> None:
+        """Record a good frame."""
+        if not self.failure:
+            try:
+                self._record(frame, time_us)
+            except TlogError as error:
+                self.failure = str(error)
+
+
 class _Process:
     """One run on an open link."""
 
@@ -107,7 +128,8 @@ class _Process:
         self._link = link
         self._fleet = fleet
         self._clock = TelemetryClock()
-        recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
+        recorder = _Recorder(FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us))
+        self._recorder = recorder
         self._publisher = Publisher(self._say)
         self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None)
         self._watch = RateWatch(fleet.needs, self._tap.heard)
@@ -158,8 +180,8 @@ class _Process:
                     timed = True
                     first_us = self._look_us = clock.time_us
                     self._watch.restart()
-                if tap.failure:
-                    self.reason = tap.failure
+                if tap.failure or self._recorder.failure:
+                    self.reason = tap.failure or self._recorder.failure
                     return
                 if wall_s - heard_wall_s > request.silence_s:
                     self.reason = self._silence(heard)
@@ -269,7 +291,7 @@ def estimate(
     try:
         folder = create_run_folder(request.out, fleet.name)
         begun_wall_s = wall_time_s()
-        with TlogWriter(folder / LOG_NAME) as log:
+        with suppress(TlogError), TlogWriter(folder / LOG_NAME) as log:
             loop = asyncio.new_event_loop()
             process = _Process(request, link, fleet, log)
             with _ending(loop, process.stop):

@@ -2,7 +2,8 @@
 
 import csv
 import enum
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -15,7 +16,7 @@ from estimators.logs import Log, LogError, open_log
 from estimators.needs import Supply
 from estimators.replay import log_supplies, missing_of, vehicles_in
 from estimators.runner import EstimateTable, Runner
-from missions.run import versions, write_summary
+from missions.run import SUMMARY_NAME, versions, write_summary
 
 __all__ = [
     "COMPLETED",
@@ -138,16 +139,30 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
         "command": request.command,
         **request.more,
     }
-    write_estimates(request.folder, fleet)
-    if request.picture and any(c.references for c in compared):
-        from missions.estimation.picture import draw_errors
+    try:
+        if summary_file:
+            write_summary(request.folder, summary)
+        write_estimates(request.folder, fleet)
+        if request.picture and any(c.references for c in compared):
+            from missions.estimation.picture import draw_errors
 
-        draw_errors(request.folder / PICTURE_NAME, _title(fleet.name, logs, summary), compared)
-    if summary_file:
-        write_summary(request.folder, summary)
+            draw_errors(request.folder / PICTURE_NAME, _title(fleet.name, logs, summary), compared)
+    except OSError as error:
+        outcome, reason = FAILED, f"can't write all of {request.folder}: {error.strerror}; check the disk"
+        summary |= {"outcome": outcome, "reason": reason, "partial": True}
+        if summary_file:
+            _rewrite_summary(request.folder, summary)
     return EstimationResult(
         outcome=outcome, reason=reason, folder=request.folder, summary=summary, compared=compared
     )
+
+
+def _rewrite_summary(folder: Path, summary: Mapping[str, Any]) -> None:
+    """Say in the summary that something beside it is missing, if the disk takes as much."""
+    path = folder / SUMMARY_NAME
+    with suppress(OSError), _whole(path):
+        path.unlink(missing_ok=True)
+        write_summary(folder, summary)
 
 
 def _opened(logs: Sequence[Log] | Path) -> tuple[Sequence[Log], str]:
@@ -269,15 +284,25 @@ def write_estimates(folder: Path, fleet: Fleet) -> list[Path]:
     return written
 
 
+@contextmanager
+def _whole(path: Path) -> Iterator[None]:
+    """Leave no half of a file on a full disk."""
+    try:
+        yield
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
+
+
 def _write_table(folder: Path, name: str, table: EstimateTable) -> list[Path]:
     time_us, boot, subject, values = table.time_us, table.boot, table.subject, table.values
     columns = {"time_us": time_us, "boot": boot, "subject": subject}
     columns |= dict(zip(table.columns, values.T, strict=True))
     arrays = folder / f"{name}.npz"
-    with arrays.open("xb") as file:
+    with _whole(arrays), arrays.open("xb") as file:
         np.savez_compressed(file, **columns)  # type: ignore[arg-type]  # names of columns, not options
     text = folder / f"{name}.csv"
-    with text.open("x", encoding="utf-8", newline="") as lines:
+    with _whole(text), text.open("x", encoding="utf-8", newline="") as lines:
         writer = csv.writer(lines)
         writer.writerow(["time_s", "boot", "subject", *table.columns])
         for time, number, about, row in zip(

@@ -7,6 +7,7 @@ import pytest
 from mcap.reader import make_reader
 from pyarrow import csv, parquet
 
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from estimators.logs import LogError, open_log
 from estimators.logs.export import FORMATS, export
 from estimators.logs.new_file import new_file
@@ -115,3 +116,15 @@ def test_a_file_is_whole_or_not_there(tmp_path):
         part.write_text("ours")
         path.write_text("somebody was faster")
     assert path.read_text() == "somebody was faster" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_mcap_takes_any_time_stamp(tmp_path):
+    path = tmp_path / "flight.tlog"
+    frame = FrameEncoder(1, 1).encode(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
+    stamps = [*range(EPOCH_US, EPOCH_US + 100), 10**17, 2**61 - 1]
+    path.write_bytes(b"".join(stamp.to_bytes(8, "big") + frame for stamp in stamps))
+    log = open_log(path)
+    (written,) = export(log, log.select(), tmp_path / "flight.mcap", "mcap")
+    with written.open("rb") as file:
+        times = [message.log_time for _, _, message in make_reader(file).iter_messages()]
+    assert sorted(times) == [stamp * 1000 for stamp in stamps[:100]] + [2**64 - 1] * 2

@@ -1,6 +1,7 @@
 """What may be asked of a log, and what it answers when the question or the file is wrong."""
 
 import json
+from itertools import pairwise
 import math
 
 import numpy as np
@@ -265,6 +266,7 @@ def test_recorded_logs_have_one_boot_and_one_flight(path):
     (flight,) = vehicle.flights
     assert 100e6 < flight.end_us - flight.start_us < 360e6
     assert not any(span.mode.startswith("MODE") for span in vehicle.modes)
+    assert all(one.mode != next_one.mode for one, next_one in pairwise(vehicle.modes))  # one boot
     assert report.gaps == ()
     rate = next(item.rate_hz for item in report.streams if item.name == "ATTITUDE")
     assert rate == pytest.approx(100.0 if vehicle.autopilot == "PX4" else 50.0, rel=0.02)

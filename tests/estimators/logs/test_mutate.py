@@ -1,6 +1,7 @@
 """Parts of logs, and logs with faults: every record that is not meant stays as it is."""
 
 import math
+import struct
 from itertools import pairwise
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.tlog import TlogReader
 from estimators.logs import LogError, open_log
 from estimators.logs.faults import UNITS, FaultKind, parse_fault
@@ -117,6 +119,20 @@ def test_losses(mutate):
     assert 0.2 * COUNT < len(heard) < 0.8 * COUNT
     assert max(b - a for a, b in pairwise(heard.tolist())) > 200_000
     assert heard[0] > 5_000_000  # it is silent first
+
+
+@pytest.mark.parametrize("fault", ["ATTITUDE:intermittent=0.5", "ATTITUDE:delayed=2", "ATTITUDE:drop=0.5"])
+def test_stamps_that_go_back_or_far_away(tmp_path, fault):
+    """A damaged stamp is no reason for millions of years of spells, nor for a time that doesn't fit."""
+    message = dialect.MAVLink_attitude_message(1000, 0.1, 0, 0, 0, 0, 0)
+    times = [EPOCH_US + k * 100_000 for k in range(50)]
+    times[10:20], times[25], times[30] = times[10:20][::-1], 2**63 - 1, EPOCH_US // 2
+    path = tmp_path / "flight.tlog"
+    encoder = FrameEncoder(1, 1)
+    path.write_bytes(b"".join(struct.pack(">Q", t) + encoder.encode(message) for t in times))
+    log, out = open_log(path), tmp_path / "out.tlog"
+    count = write_records(out, mutated_records(log, log.select(), [parse_fault(fault)]))
+    assert count == (50 if "delayed" in fault else len(open_log(out))) and 5 < count <= 50
 
 
 def test_delayed_messages_come_later_with_their_own_stamps(mutate):

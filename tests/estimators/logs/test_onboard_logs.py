@@ -296,3 +296,24 @@ def test_values_that_do_not_fit_are_clipped():
     assert part.columns["heading"].tolist() == [360] * 3
     with pytest.raises(ValueError, match="no field wings"):
         mavlink_part("VFR_HUD", np.array([1]), wings=2)
+
+
+@pytest.mark.parametrize(("number", "name"), [(1, "QUADROTOR"), (2, "FIXED_WING"), (0, "GENERIC")])
+def test_ulog_without_a_system_type_has_one_of_its_class(tmp_path, number, name):
+    writer = UlogWriter(
+        vehicle_status="uint64_t timestamp;uint8_t arming_state;uint8_t nav_state;uint8_t vehicle_type;"
+    )
+    writer.subscribe("vehicle_status")
+    for second in range(3):
+        writer.add("vehicle_status", "QBBB", (second + 1) * 1_000_000, 1, 3, number)
+    (vehicle,) = open_log(writer.save(tmp_path / "flight.ulg")).report().vehicles
+    assert vehicle.type == name
+
+
+def test_what_pyulog_prints_is_not_said(ulog, tmp_path, capfd):
+    path = ulog.save(tmp_path / "flight.ulg")
+    data = bytearray(path.read_bytes())
+    data[7] = 77  # the version of the format
+    path.write_bytes(data)
+    assert len(open_log(path)) > 0
+    assert capfd.readouterr() == ("", "")

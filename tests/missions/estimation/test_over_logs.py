@@ -1,5 +1,6 @@
 """`flightstack replay` as a user runs it: tables, folders, exit codes, bad input."""
 
+import errno
 import json
 import shutil
 from pathlib import Path
@@ -183,3 +184,17 @@ def test_attitude_on_a_real_flight(tmp_path, monkeypatch, capfd):
             summary["against"][against]
         )
     assert summary["counters"]["updated"] == summary["samples"]
+
+
+def test_a_full_disk_is_told_and_leaves_no_half_files(tmp_path, monkeypatch, capfd):
+    def full(*_args, **_columns):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    log = write_log(tmp_path / "flight.tlog")
+    out = tmp_path / "out"
+    assert replay(log, "--estimator", LEVEL, "--out", out) == 1
+    assert "No space left on device; check the disk; results in" in capfd.readouterr().err
+    assert {path.name for path in out.iterdir()} == {"summary.json"}
+    summary = summary_of(out)
+    assert summary["outcome"] == "failed" and summary["partial"] and summary["samples"] == 200
