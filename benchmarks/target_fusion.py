@@ -249,23 +249,20 @@ def fly(seed: int, setting: Setting, log: Path | None = None) -> Recorded:
 def base_station(form: str, setting: Setting, **chosen: Any) -> TargetFusionEstimator:
     """The estimator as it would be set for this pattern. All forms believe in the same noise."""
     omega_x, omega_y = setting.omega_rad_s
-    parameters = TargetFusionParameters(
-        **{
-            "form": "proposed" if form == "frequency" else form,
-            "frequency": form == "frequency",
-            "omega_x_rad_s": omega_x,
-            "omega_y_rad_s": omega_y,
-            "epsilon_rad_s": setting.epsilon_rad_s,
-            "position_sigma_m": 0.2,
-            "velocity_sigma_m_s": 0.07,
-            "acceleration_psd_m2_s3": 3e-4,
-            "size_sigma_rad": 0.0002,
-            "yaw_sigma_rad": 0.02,
-            "walk_m_sqrt_s": 3.0,
-        }
-        | chosen
-    )
-    return TargetFusionEstimator(parameters)
+    values: dict[str, Any] = {
+        "form": "proposed" if form == "frequency" else form,
+        "frequency": form == "frequency",
+        "omega_x_rad_s": omega_x,
+        "omega_y_rad_s": omega_y,
+        "epsilon_rad_s": setting.epsilon_rad_s,
+        "position_sigma_m": 0.2,
+        "velocity_sigma_m_s": 0.07,
+        "acceleration_psd_m2_s3": 3e-4,
+        "size_sigma_rad": 0.0002,
+        "yaw_sigma_rad": 0.02,
+        "walk_m_sqrt_s": 3.0,
+    } | chosen
+    return TargetFusionEstimator(TargetFusionParameters(**values))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

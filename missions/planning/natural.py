@@ -118,6 +118,7 @@ def _rate_limited(course: Array, largest_step: float) -> Array:
 def natural_frequencies(curve: Curve, fundamental_period_s: float) -> tuple[float, float]:
     """Frequencies east and north, rad/s, of a curve that `is_lissajous` in its own time law."""
     inner = getattr(curve, "curve", curve)
+    assert isinstance(inner, Lissajous)
     rate = math.tau / fundamental_period_s
     return inner.ratio_x * rate, inner.ratio_y * rate
 
