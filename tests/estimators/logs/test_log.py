@@ -1,8 +1,8 @@
 """What may be asked of a log, and what it answers when the question or the file is wrong."""
 
 import json
-from itertools import pairwise
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
