@@ -49,6 +49,11 @@ class FilterAttitude:
         """The filter's newest estimate; None before the first."""
         return self._kept[-1] if self._kept else None
 
+    def roll_rad(self, time_us: int) -> float | None:
+        """The newest roll; None when that is old at a vehicle time."""
+        newest = self.newest
+        return None if newest is None or time_us - newest.time_us > _STALE_US else newest.roll_rad
+
     def hear(self, frame: Frame) -> None:
         """Take a frame. Those of other vehicles, of simulators and of estimators are left out."""
         left_out = frame.component_id == TRUTH_COMPONENT or frame.component_id in ESTIMATOR_COMPONENTS

@@ -16,6 +16,8 @@ from missions.records import FlightRecords
 
 Array = NDArray[np.float64]
 
+ORBIT: Final = "orbit"
+"""Name of the phase that is scored."""
 TARGET_SYSTEM: Final = 251
 """MAVLink system of the simulated targets' truth; the first is component 1."""
 
@@ -138,7 +140,7 @@ def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
 
 
 def _window(notes: FlightNotes) -> tuple[int, int] | None:
-    phase = notes.phase("orbit")
+    phase = notes.phase(ORBIT)
     return None if phase is None else (phase.start_us, phase.end_us)
 
 

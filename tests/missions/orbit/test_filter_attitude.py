@@ -67,6 +67,12 @@ def test_roll_and_pitch_are_the_filters_and_yaw_the_autopilots(fed):
     assert fed.newest.time_us == 2_000_000
 
 
+def test_an_old_roll_is_none(fed):
+    assert fed.roll_rad(2_400_000) == pytest.approx(ROLL, abs=1e-4)
+    assert fed.roll_rad(2_600_000) is None
+    assert FilterAttitude(1).roll_rad(0) is None
+
+
 def test_between_samples():
     """A turn of 20 degrees a second, asked for half way between two samples."""
     source, sender = FilterAttitude(1), Sender()

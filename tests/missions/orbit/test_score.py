@@ -4,8 +4,9 @@ import pytest
 
 from missions.mission import Debriefing
 from missions.notes import FlightNotes
-from missions.orbit.mission import ORBIT, OrbitMission
+from missions.orbit.mission import OrbitMission
 from missions.orbit.options import OrbitOptions
+from missions.orbit.score import ORBIT
 from missions.records import FlightRecords
 from missions.score import score
 
