@@ -67,6 +67,7 @@ def test_whole_flight_from_runway_to_runway(wind: tuple[float, float, float]) ->
     """6 m/s of wind and moderate turbulence: cross-track RMS under 5 m, height under 2, airspeed under 1."""
     turbulence = "moderate" if any(wind) else "none"
     rig = Aircraft(environment=Environment(wind_ned_m_s=wind, turbulence=turbulence))
+    rig.rangefinder = True  # as the aircraft has it
     corners: list[Place] = [
         (700.0, 0.0, 80.0),
         (700.0, 700.0, 80.0),
