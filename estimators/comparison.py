@@ -117,6 +117,8 @@ def _compared(
     wanted: Sequence[str],
 ) -> Comparison:
     time_us, boot = table.time_us[rows], table.boot[rows]
+    if subject:  # a team's common time; the log has the vehicle's own
+        time_us = time_us - runner.common_us(0, subject)
     estimates = dict(zip(table.columns, table.values[rows].T.copy(), strict=True))
     compared = [name for name in COMPARED if name in estimates]
     counted = np.zeros(len(rows), dtype=np.bool_)

@@ -10,9 +10,11 @@ from estimators.messages import Message, read_message
 from estimators.runner import Runner
 from estimators.vehicle_time import VehicleTime, stamp_field
 
-__all__ = ["AUTOPILOT_COMPONENT", "MAX_VEHICLES", "Fleet"]
+__all__ = ["AUTOPILOT_COMPONENT", "GROUND_SYSTEM", "MAX_VEHICLES", "Fleet"]
 
 AUTOPILOT_COMPONENT: Final = 1
+GROUND_SYSTEM: Final = 200
+"""System ids from here on are ground stations and simulated targets, by custom."""
 MAX_VEHICLES: Final = 64
 """Runners at most: anybody can send with any system id."""
 
@@ -101,6 +103,7 @@ class Fleet:
         system_id = message.src_system
         if (
             message.src_component != AUTOPILOT_COMPONENT
+            or system_id >= GROUND_SYSTEM
             or message.name not in self.names
             or (self._system_ids is not None and system_id not in self._system_ids)
             or len(self._runners) >= self._limit

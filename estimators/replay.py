@@ -6,20 +6,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from estimators.errors import EstimatorError, EstimatorFailure
-from estimators.fleet import Fleet
+from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Estimator, Need
 from estimators.messages import Message
 from estimators.needs import Supply, supplies
-from estimators.runner import ESTIMATOR_COMPONENTS, TRUTH_COMPONENT
+from estimators.runner import why_unheard
 
 if TYPE_CHECKING:
     from estimators.logs import Log
 
 __all__ = ["Replay", "log_rate_hz", "log_supplies", "replay", "vehicles_in"]
 
-_AUTOPILOT = 1
-_GROUND = 200
-"""System ids from here on are ground stations and simulated targets."""
 _LEARNT_FROM = 20
 """SYSTEM_TIMEs of each vehicle that are looked at before several logs are put in order."""
 
@@ -94,7 +91,7 @@ def vehicles_in(log: "Log", needs: Sequence[Need]) -> list[int]:
         {
             key.system_id
             for key in log.keys
-            if key.component_id == _AUTOPILOT and key.name in names and key.system_id < _GROUND
+            if key.component_id == AUTOPILOT_COMPONENT and key.name in names and key.system_id < GROUND_SYSTEM
         }
     )
 
@@ -108,8 +105,7 @@ def log_rate_hz(log: "Log", system_id: int, name: str) -> float:
         for key in log.keys
         if key.name == name
         and key.system_id == system_id
-        and key.component_id != TRUTH_COMPONENT
-        and key.component_id not in ESTIMATOR_COMPONENTS
+        and why_unheard(name, key.component_id) is None
     ]
     if not components:
         return 0.0

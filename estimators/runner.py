@@ -21,15 +21,50 @@ from estimators.needs import message_names
 from estimators.team_time import TeamTime
 from estimators.vehicle_time import VehicleTime
 
-__all__ = ["ESTIMATOR_COMPONENTS", "TRUTH_COMPONENT", "TRUTH_MESSAGES", "EstimateTable", "Runner"]
+__all__ = [
+    "ESTIMATE_MESSAGES",
+    "ESTIMATOR_COMPONENTS",
+    "TRUTH_COMPONENT",
+    "TRUTH_MESSAGES",
+    "EstimateTable",
+    "Runner",
+    "why_unheard",
+]
 
 TRUTH_COMPONENT: Final = 25
 """The simulator in an embedded SITL (MAV_COMP_ID_USER1)."""
 TRUTH_MESSAGES: Final = frozenset({"SIMSTATE", "SIM_STATE", "HIL_STATE", "HIL_STATE_QUATERNION"})
 ESTIMATOR_COMPONENTS: Final = frozenset(range(191, 195))
-"""Onboard computers: what estimators publish. None hears itself, in flight or in the log of it."""
+"""Onboard computers: where estimators run, and what works with cameras and other sensors of its own."""
+ESTIMATE_MESSAGES: Final = frozenset(
+    {
+        "ATTITUDE",
+        "ATTITUDE_QUATERNION",
+        "ATTITUDE_QUATERNION_COV",
+        "FOLLOW_TARGET",
+        "GLOBAL_POSITION_INT",
+        "GLOBAL_POSITION_INT_COV",
+        "HEARTBEAT",
+        "LOCAL_POSITION_NED",
+        "LOCAL_POSITION_NED_COV",
+        "ODOMETRY",
+        "WIND_COV",
+    }
+)
+"""What estimators publish: none hears these of an onboard computer, in flight or in the log of it, and so none
+hears itself. What else comes from there was measured: a LANDING_TARGET, say.
+"""
 
 _SYSTEM_TIME: Final = "SYSTEM_TIME"
+
+
+def why_unheard(name: str, component_id: int) -> str | None:
+    """Why estimators don't hear a component's message; None when they do."""
+    if component_id == TRUTH_COMPONENT:
+        return "truth"
+    if component_id in ESTIMATOR_COMPONENTS and name in ESTIMATE_MESSAGES:
+        return "from an estimator"
+    return None
 
 
 class EstimateTable:
@@ -198,11 +233,8 @@ class Runner:
         if name not in self.names:
             return None
         component = message.src_component
-        if component == TRUTH_COMPONENT:
-            self.left_out["truth"] += 1
-            return None
-        if component in ESTIMATOR_COMPONENTS:
-            self.left_out["from an estimator"] += 1
+        if component != 1 and (reason := why_unheard(name, component)):
+            self.left_out[reason] += 1
             return None
         if team_time is not None:
             time_us = team_time.common_us(time_us, message.src_system)

@@ -11,9 +11,9 @@ from typing import Final
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage
 from estimators.errors import EstimatorFailure
-from estimators.fleet import Fleet
+from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Outcome
-from estimators.runner import ESTIMATOR_COMPONENTS, TRUTH_COMPONENT, Runner
+from estimators.runner import Runner, why_unheard
 from missions.connection import Recorder
 
 __all__ = ["PUBLISH_RATE_HZ", "EstimatorTap", "Publisher"]
@@ -24,10 +24,7 @@ PUBLISH_RATE_HZ: Final = 10.0
 TEAM_SYSTEM: Final = 255
 """Who tells the estimates of a team: a process at the base station."""
 
-_UNHEARD: Final = ESTIMATOR_COMPONENTS | {TRUTH_COMPONENT}
 _MAGIC_V2: Final = 0xFD
-_GROUND: Final = 200
-"""System ids from here on are ground stations and the simulated targets, by custom."""
 
 
 class EstimatorTap:
@@ -58,9 +55,9 @@ class EstimatorTap:
         """Record a good frame, and let the estimators hear it."""
         self._record(frame, time_us)
         taken = _frame(frame)
-        if taken.system_id < _GROUND and taken.component_id not in _UNHEARD:
+        if taken.system_id < GROUND_SYSTEM and not why_unheard(taken.definition.name, taken.component_id):
             self.heard[taken.system_id, taken.message_id] += 1
-            if taken.component_id == 1:
+            if taken.component_id == AUTOPILOT_COMPONENT:
                 self.autopilots[taken.system_id] += 1
         if self.failure:
             return

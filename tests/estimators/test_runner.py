@@ -14,8 +14,9 @@ from estimators.fleet import MAX_VEHICLES, Fleet
 from estimators.interface import Need, Outcome
 from estimators.library import estimator_class
 from estimators.logs import open_log
-from estimators.replay import replay
+from estimators.replay import log_rate_hz, replay
 from estimators.runner import Runner
+from estimators.target_fusion import TargetFusionEstimator, TargetFusionParameters
 
 
 def feed(path, fleet):
@@ -87,6 +88,29 @@ def test_truth_and_estimators_are_not_heard(make_log, make):
     assert runner.outcomes == {Outcome.UPDATED: 20}
     assert runner.left_out == {"from an estimator": 20, "truth": 20}
     assert np.allclose(runner.tables["Level"]["roll_rad"], 0.1)
+
+
+def test_what_an_onboard_computer_measures_is_heard(make_log):
+    """A camera's software on a companion computer is heard, estimates from there are not."""
+    log = make_log()
+    for k in range(50):
+        t = 1.0 + 0.1 * k
+        log.attitude(t)
+        log.attitude(t, component=191)
+        place = 473977400, 85455900, 500000
+        log.say(dialect.MAVLink_gps_raw_int_message(round(t * 1e6), 3, *place, 1, 1, 500, 0, 9))
+        log.say(
+            dialect.MAVLink_home_position_message(*place, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+        )
+        seen = dialect.MAVLink_landing_target_message(round(t * 1e6), 3, 12, 0.1, 0.1, 20.0, 0.02, 0.02)
+        log.say(seen, component=191)
+    opened = open_log(log.close())
+    done = replay(
+        [opened], lambda: TargetFusionEstimator(TargetFusionParameters(mount="fixed", heading="yaw"))
+    )
+    assert log_rate_hz(opened, 1, "LANDING_TARGET") > 9.0
+    assert done.fleet.runners[0].left_out == {"from an estimator": 50}
+    assert done.fleet.runners[0].tables["TargetEstimate"]["target"][0] == 3.0
 
 
 def test_each_vehicle_has_a_runner_and_one_can_be_chosen(make_log, make):
