@@ -43,7 +43,9 @@ class Outcome(Enum):
     IMPLAUSIBLE = "implausible"
     """Outside what the sensor can give, or rejected by a statistical test."""
     TIME_JUMP = "time jump"
-    """After a gap too long to bridge, or time went back: the estimator has started anew from this message."""
+    """After a gap too long to bridge, or time went back: the estimator has started anew from this message.
+    Its first estimate comes with the next UPDATED.
+    """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -51,7 +51,7 @@ ESTIMATE_MESSAGES: Final = frozenset(
         "WIND_COV",
     }
 )
-"""What estimators publish: none hears these of an onboard computer, in flight or in the log of it, and so none
+"""What estimators publish: none hears these of an onboard computer, in flight or in its log, and so none
 hears itself. What else comes from there was measured: a LANDING_TARGET, say.
 """
 
