@@ -94,21 +94,30 @@ def load_dialect(name: str | Path | None = None) -> Dialect:
     """A dialect.
 
     Args:
-        name: one of `dialect_names`, or the path of an XML definition file, whose includes are read too;
-            None: every message of MAVLink's public definitions.
+        name: one of `dialect_names`, or the path of an XML definition file, whose includes are read too (one
+            of `dialect_names`, such as common.xml, need not be there as a file); None: every message of
+            MAVLink's public definitions.
 
     Raises:
         LogError: there is no such dialect, or the file can't be read or is not a definition file.
     """
     text = DEFAULT_DIALECT if name is None else str(name)
     if isinstance(name, Path) or re.search(r"[/\\]|\.xml$", text, re.IGNORECASE):
-        return Dialect(text, _described(text, (_from_text(item) for item in read_definitions(Path(text)))))
+        return Dialect(text, _of_file(Path(text)))
     if text not in dialect_names():
         raise LogError(
             f"no MAVLink dialect {text!r}; accepted: {', '.join(dialect_names())}, "
             "or the path of an .xml definition file"
         )
     return _pymavlink_dialect(text)
+
+
+def _of_file(path: Path) -> Mapping[int, Description]:
+    """Messages of a file; those of the file come before those of pymavlink's dialects that it includes."""
+    messages, named = read_definitions(path, dialect_names())
+    included = {number: item for name in named for number, item in _pymavlink_dialect(name).messages.items()}
+    both = included | _described(str(path), (_from_text(item) for item in messages))
+    return MappingProxyType(dict(sorted(both.items())))
 
 
 @cache

@@ -5,7 +5,7 @@ CRC_EXTRA as in the MAVLink guide, "Serialization" (field reordering, CRC_EXTRA 
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -86,8 +86,17 @@ class MessageText:
         return (crc & 0xFF) ^ (crc >> 8)
 
 
-def read_definitions(path: Path) -> tuple[MessageText, ...]:
+def read_definitions(
+    path: Path, known: Collection[str] = ()
+) -> tuple[tuple[MessageText, ...], tuple[str, ...]]:
     """All messages of a definition file and of those that it includes.
+
+    Args:
+        path: the file.
+        known: dialects that need not be there as files: "common".
+
+    Returns:
+        The messages, and which of the known dialects are included without being there as files.
 
     Raises:
         LogError: a file can't be read, is no definition file, or two messages have one id or name.
@@ -95,8 +104,12 @@ def read_definitions(path: Path) -> tuple[MessageText, ...]:
     messages: list[MessageText] = []
     seen: set[Path] = set()
     waiting = [path]
+    named: list[str] = []
     while waiting:
         file = waiting.pop()
+        if file != path and file.stem in known and not file.exists():
+            named.append(file.stem)
+            continue
         if (resolved := file.resolve()) in seen:
             continue
         seen.add(resolved)
@@ -114,9 +127,9 @@ def read_definitions(path: Path) -> tuple[MessageText, ...]:
                 f"{path}: messages {item.name} ({item.message_id}) and {other.name} ({other.message_id}) "
                 "clash; each id and each name may be used once"
             )
-    if not messages:
+    if not messages and not named:
         raise LogError(f"{path} defines no message; give a MAVLink definition file")
-    return tuple(messages)
+    return tuple(messages), tuple(named)
 
 
 def _root(path: Path) -> ElementTree.Element:

@@ -49,7 +49,7 @@ BASE = """<mavlink><messages>
 def test_definition_files_as_pymavlink_parses_them(path):
     with contextlib.redirect_stdout(io.StringIO()):
         theirs = mavparse.MAVXML(str(path), mavparse.PROTOCOL_2_0)
-    ours = {item.message_id: item for item in read_definitions(path)}
+    ours = {item.message_id: item for item in read_definitions(path)[0]}
     for item in theirs.message:
         found = ours[item.id]
         assert (found.name, found.crc_extra) == (item.name, item.crc_extra)
@@ -170,7 +170,7 @@ def test_dialects_that_are_none(tmp_path, name, content, words):
 def test_files_that_include_each_other_are_read_once(tmp_path):
     (tmp_path / "a.xml").write_text(BASE.replace("<messages>", "<include>b.xml</include><messages>"))
     (tmp_path / "b.xml").write_text("<mavlink><include>a.xml</include></mavlink>")
-    assert len(read_definitions(tmp_path / "a.xml")) == 1
+    assert len(read_definitions(tmp_path / "a.xml")[0]) == 1
 
 
 def test_units_of_every_definition_are_known():
@@ -207,3 +207,17 @@ def test_units(unit, value, si, si_unit):
     factor, name = to_si(unit)
     assert value * factor == pytest.approx(si)
     assert name == si_unit
+
+
+def test_an_include_that_is_not_there_may_be_one_of_pymavlinks(tmp_path):
+    path = tmp_path / "mine.xml"
+    path.write_text(
+        "<mavlink><include>common.xml</include><messages><message id='8' name='MY_LINK'>"
+        "<field type='uint64_t' name='stamp' units='ms'>x</field></message></messages></mavlink>"
+    )
+    dialect = load_dialect(path)
+    assert list(dialect.messages) == sorted({*load_dialect("common").messages, 8})
+    assert dialect.find("MY_LINK").definition.size == 8
+    path.write_text(path.read_text().replace("common.xml", "no_such.xml"))
+    with pytest.raises(LogError, match=r"no_such\.xml: No such file"):
+        load_dialect(path)
