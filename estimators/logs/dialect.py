@@ -116,7 +116,7 @@ def _of_file(path: Path) -> Mapping[int, Description]:
     """Messages of a file; those of the file come before those of pymavlink's dialects that it includes."""
     messages, named = read_definitions(path, dialect_names())
     included = {number: item for name in named for number, item in _pymavlink_dialect(name).messages.items()}
-    both = included | _described(str(path), (_from_text(item) for item in messages))
+    both = {**included, **_described(str(path), (_from_text(item) for item in messages))}
     return MappingProxyType(dict(sorted(both.items())))
 
 

@@ -107,6 +107,14 @@ class Fault:
     to_s: float = math.inf
 
 
+_MEANINGS: Final = {
+    FaultKind.DROP: ", the share of the messages that is lost",
+    FaultKind.SLOW: ": one message of so many is left",
+    FaultKind.DELAYED: " s",
+    FaultKind.INTERMITTENT: " s",
+}
+
+
 def parse_fault(text: str) -> Fault:
     """A fault from text.
 
@@ -171,7 +179,8 @@ def _value(text: str, kind: FaultKind, value_text: str | None) -> float | None:
         FaultKind.GARBAGE: (0.0, math.inf),
     }.get(kind, (-math.inf, math.inf))
     if not low <= value <= high:
-        raise LogError(f"fault {text!r}: {value:g} is not in {low:g}..{high:g}")
+        meaning = _MEANINGS.get(kind, "")
+        raise LogError(f"fault {text!r}: {value:g} is not in {low:g}..{high:g}{meaning}")
     return value
 
 
