@@ -51,7 +51,8 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._coefficients = coefficients(p)
         self._state = np.empty(at.STATE_SIZE)
         self._sample = self._state.data
-        self._guard = InputGuard(max_gap_us=round(p.gap_max_s * 1e6))
+        self._gap_max_us = round(p.gap_max_s * 1e6)
+        self._guard = InputGuard(max_gap_us=self._gap_max_us)
         self._instance = p.imu_instance
         self._airspeed_age_us = round(p.airspeed_age_max_s * 1e6)
         self._air = AirData(p.airspeed, self._airspeed_age_us)
@@ -265,6 +266,9 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             self._subject = message.src_system
         elif time_us <= before_us:
             return Outcome.LATE if time_us < before_us else Outcome.REPEATED
+        elif time_us - before_us > self._gap_max_us:  # what came since was of no use
+            self._restart()
+            refused, elapsed_s = Outcome.TIME_JUMP, 0.0
         else:
             elapsed_s = (time_us - before_us) * 1e-6
         state = self._state

@@ -169,6 +169,16 @@ def test_jumps_of_time_start_anew(time_us):
     assert (estimate.time_us, estimate.roll_rad) == (time_us, 0.0)
 
 
+def test_nothing_is_integrated_across_samples_of_no_use():
+    """The sensor sends, but nothing that could be, for longer than can be bridged."""
+    found = started()
+    for k in range(51, 500):
+        assert found.handle(k * STEP_US, highres(k * STEP_US, force=(0.0, 0.0, -9e9))) is Outcome.IMPLAUSIBLE
+    assert found.handle(500 * STEP_US, highres(500 * STEP_US)) is Outcome.UPDATED
+    estimate = newest(found)
+    assert (estimate.time_us, estimate.roll_rad) == (500 * STEP_US, 0.0)
+
+
 def test_a_gap_of_one_second_is_bridged():
     found = started()
     assert found.handle(2_000_000, highres(2_000_000, force=FORCE)) is Outcome.UPDATED
