@@ -20,7 +20,7 @@ def new_file(path: Path) -> Iterator[Path]:
     part = path.with_name(f".{path.name}.part{os.getpid()}")
     try:
         yield part
-        os.link(part, path)  # unlike a rename, it fails when somebody else was faster
+        _put(part, path)
     except FileExistsError as error:
         raise LogError(f"{path} exists and is not overwritten; choose another path or remove it") from error
     except OSError as error:
@@ -30,3 +30,14 @@ def new_file(path: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             part.unlink()
+
+
+def _put(part: Path, path: Path) -> None:
+    """Give a file its name; a FileExistsError when somebody else was faster, which a rename does not see."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without hard links, such as a memory card's: the name is taken first
+        path.open("xb").close()
+        part.replace(path)

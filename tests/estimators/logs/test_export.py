@@ -118,6 +118,23 @@ def test_a_file_is_whole_or_not_there(tmp_path):
     assert path.read_text() == "somebody was faster" and len(list(tmp_path.iterdir())) == 1
 
 
+def test_files_without_hard_links(tmp_path, monkeypatch):
+    """As on a memory card."""
+
+    def refuse(*_):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr("os.link", refuse)
+    path = tmp_path / "new"
+    with new_file(path) as part:
+        part.write_text("whole")
+    assert path.read_text() == "whole" and len(list(tmp_path.iterdir())) == 1
+    with pytest.raises(LogError, match="exists"), new_file(tmp_path / "other") as part:
+        part.write_text("ours")
+        (tmp_path / "other").write_text("somebody was faster")
+    assert (tmp_path / "other").read_text() == "somebody was faster"
+
+
 def test_mcap_takes_any_time_stamp(tmp_path):
     path = tmp_path / "flight.tlog"
     frame = FrameEncoder(1, 1).encode(dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3))
