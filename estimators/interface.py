@@ -151,5 +151,8 @@ class Estimator(ABC, Generic[P]):
         return ()
 
     def remarks(self) -> Mapping[str, float | str]:
-        """Further figures for the summary: innovations, biases, what was rejected."""
+        """Further figures for the summary: innovations, biases, what was rejected.
+
+        A text under "warning" is said to the user as well.
+        """
         return {}

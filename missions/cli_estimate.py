@@ -81,7 +81,7 @@ def estimate(**given: Any) -> int:
     from missions.errors import PlanError
     from missions.estimation.live import LiveRequest
     from missions.estimation.live import estimate as run_estimator
-    from missions.estimation.report import FAILED, INTERRUPTED, table_lines
+    from missions.estimation.report import FAILED, INTERRUPTED, table_lines, warnings_of
 
     teller = _Teller()
     try:
@@ -109,6 +109,8 @@ def estimate(**given: Any) -> int:
         teller.end()
     for line in table_lines([(given["connect"], result)]):
         click.echo(line)
+    for warning in warnings_of(result.summary):
+        click.echo(f"flightstack: {warning}", err=True)
     if result.outcome == FAILED:
         click.echo(f"flightstack: {result.reason}; results in {result.folder} are partial", err=True)
         return _FAILED

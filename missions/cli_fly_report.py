@@ -90,6 +90,8 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
 
 def _tell_estimator(summary: Mapping[str, Any]) -> int:
     """Say what the estimator of the flight has done; the exit code."""
+    from missions.estimation.report import warnings_of
+
     name = summary["estimator"]
     for block in summary["vehicles"]:
         for subject in block["subjects"]:
@@ -103,6 +105,8 @@ def _tell_estimator(summary: Mapping[str, Any]) -> int:
             click.echo(
                 f"{summary['estimator']}, {subject['subject']}: {subject['estimates']} estimates{told}"
             )
+    for warning in warnings_of(summary):
+        click.echo(f"flightstack: {name}: {warning}", err=True)
     if summary["outcome"] == "completed":
         return 0
     click.echo(f"flightstack: {name}: {summary['reason']}; results are partial", err=True)

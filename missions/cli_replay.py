@@ -55,7 +55,7 @@ def replay(**given: Any) -> int:
     from estimators.logs import LogError
     from missions.errors import PlanError
     from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
-    from missions.estimation.report import EstimationResult, table_lines
+    from missions.estimation.report import EstimationResult, table_lines, warnings_of
 
     for path in given["logs"]:
         if path.is_dir():
@@ -97,6 +97,8 @@ def replay(**given: Any) -> int:
     for line in table_lines(done):
         click.echo(line)
     for label, result in done:
+        for warning in warnings_of(result.summary):
+            click.echo(f"flightstack: {label}: {warning}", err=True)
         samples, speed = result.summary["samples"], result.summary["wall_time_s"]
         click.echo(f"{label}: {result.outcome}, {samples} estimates in {speed:.2f} s; run: {result.folder}")
     return _FAILED if any(failed(result) for _, result in results) else 0

@@ -113,7 +113,11 @@ def _lissajous_localization(
 
     started_s = wall_time_s()
     bar.say("starting (the first start compiles the estimators, some ten seconds)")
-    compile_study()
+    try:
+        compile_study()
+    except KeyboardInterrupt:
+        folder.rmdir()  # there is nothing to keep yet
+        raise
     request = StudyRequest(runs=runs, seed=seed, workers=workers, equations=equations)
     result = run_study(request, bar)
     bar.end()

@@ -13,6 +13,7 @@ from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.estimate import LissajousEstimate
 from estimators.lissajous.model import MOTION, course, course_variance
+from estimators.lissajous.motion_filter import off_pattern_remarks
 from estimators.lissajous.parameters import Form, LissajousParameters
 from estimators.lissajous.pattern_frame import PatternFrame, Track
 from estimators.lissajous.positions import PositionReader, values_of
@@ -185,7 +186,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         return {
             "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),
             "normalised_innovation": mean,
-            "off_pattern": self.track.filter.off_pattern,
+            **off_pattern_remarks(self.track.filter.off_pattern),
             "omega_x_rad_s": omega_x,
             "omega_y_rad_s": omega_y,
         }

@@ -20,11 +20,23 @@ from estimators.lissajous.model import (
 )
 from estimators.lissajous.parameters import Form, LissajousParameters
 
-__all__ = ["MotionFilter"]
+__all__ = ["MotionFilter", "off_pattern_remarks"]
 
 _EXACT = int(Discretisation.EXACT)
 _UNKNOWN_VELOCITY_M_S = 1e3
+_TOO_OFTEN = 0.1
 _SLOWEST, _FASTEST = 0.2, 5.0  # share of the nominal frequency that a corrected one may have
+
+
+def off_pattern_remarks(share: float) -> dict[str, float | str]:
+    """What the summary has of a filter's `off_pattern`: the share, and a warning where it is large."""
+    remarks: dict[str, float | str] = {"off_pattern": share}
+    if share > _TOO_OFTEN:
+        remarks["warning"] = (
+            f"off the pattern in {100.0 * share:.0f} % of the samples: check omega_x_rad_s, omega_y_rad_s, "
+            "orientation_rad and centre_*, or set form=measurement"
+        )
+    return remarks
 
 
 class MotionFilter:

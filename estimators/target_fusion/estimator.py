@@ -12,6 +12,7 @@ from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.model import Array
+from estimators.lissajous.motion_filter import off_pattern_remarks
 from estimators.lissajous.pattern_frame import PatternFrame
 from estimators.lissajous.positions import MESSAGES
 from estimators.messages import Message
@@ -252,7 +253,9 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
             "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),
             "drones": float(len(self.drones)),
             "targets": float(sum(belief.confirmed for belief in self.beliefs.values())),
-            "off_pattern": max((d.track.filter.off_pattern for d in self.drones.values()), default=0.0),
+            **off_pattern_remarks(
+                max((drone.track.filter.off_pattern for drone in self.drones.values()), default=0.0)
+            ),
             "detections_fused": float(self._fused),
             "detections_outside_the_gate": float(sum(belief.gated for belief in self.beliefs.values())),
             "detections_not_placed": float(self._unplaced),

@@ -26,6 +26,7 @@ __all__ = [
     "ReportRequest",
     "report",
     "table_lines",
+    "warnings_of",
     "write_estimates",
 ]
 
@@ -219,6 +220,16 @@ def _block(
         "subjects": [_subject(c) for c in own],
     }
     return block
+
+
+def warnings_of(summary: Mapping[str, Any]) -> list[str]:
+    """What the estimators of a summary warn of."""
+    found = []
+    for block in summary["vehicles"]:
+        if "warning" in block["remarks"]:
+            which = "" if block["system_id"] is None else f"vehicle {block['system_id']}: "
+            found.append(which + block["remarks"]["warning"])
+    return found
 
 
 def _by_value(item: tuple[Any, int]) -> str:

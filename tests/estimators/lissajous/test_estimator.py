@@ -247,6 +247,18 @@ def test_leaving_the_pattern_restarts_the_filter() -> None:
     e = estimator.estimates[0]
     assert (e.north_m, e.east_m) == pytest.approx((80.0, 80.0), abs=0.02)
     assert estimator.remarks()["off_pattern"] == pytest.approx(1.0 / 101.0)
+    assert "warning" not in estimator.remarks()
+
+
+def test_a_pattern_that_is_not_flown_is_warned_of() -> None:
+    """Round a circle of 300 m at 25 m/s, about a place 400 m off."""
+    estimator = LissajousEstimator(parameters())
+    estimator.handle(0, home())
+    for k in range(200):
+        t, w = 0.2 * k, 25.0 / 300.0
+        c, s = math.cos(w * t), math.sin(w * t)
+        estimator.handle(round(1e6 * t), gps(t, (400.0 + 300.0 * c, -25.0 * s, 300.0 * s, 25.0 * c)))
+    assert "check omega_x_rad_s" in estimator.remarks()["warning"]
 
 
 @pytest.mark.parametrize(

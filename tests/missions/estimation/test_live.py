@@ -17,6 +17,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from estimators.logs import open_log
+from estimators.target_fusion.orientation import from_euler
 from missions.cli import run_command_line
 
 ROOT = Path(__file__).parents[3]
@@ -33,6 +34,37 @@ def imu(ms):
 
 def untimed(ms):
     return dialect.MAVLink_vfr_hud_message(0, 0, 0, 0, math.sin(ms / 3000), 0)
+
+
+def team(seconds):
+    """What two drones say that fly to and fro along a meridian and see a target 30 m east of its middle."""
+    home, height_m, east_m, omega = (473977400, 85455900, 500000), 20.0, 30.0, 0.1
+    for ms in range(1000, 1000 + 1000 * seconds, 100):
+        for system, side in ((1, 1.0), (2, -1.0)):
+            north_m = side * 50.0 * math.cos(omega * ms / 1000)
+            speed_m_s = -side * 50.0 * omega * math.sin(omega * ms / 1000)
+            nose = 0.0 if speed_m_s > 0.0 else math.pi
+            level_m = math.hypot(north_m, east_m)
+            pitch, yaw = -math.atan2(height_m, level_m), math.atan2(east_m, -north_m) - nose
+            gps = 3, home[0] + round(north_m / 0.01112), home[1], 520000, 1, 1, round(100 * abs(speed_m_s))
+            for component, message in (
+                (1, dialect.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)),
+                (1, dialect.MAVLink_home_position_message(*home, 0, 0, 0, (1, 0, 0, 0), 0, 0, 0)),
+                (1, dialect.MAVLink_gps_raw_int_message(1000 * ms, *gps, round(nose / math.pi * 18000), 9)),
+                (
+                    154,
+                    dialect.MAVLink_gimbal_device_attitude_status_message(
+                        0, 0, ms, 32, from_euler(0.0, pitch, yaw), 0, 0, 0, 0
+                    ),
+                ),
+                (
+                    100,
+                    dialect.MAVLink_landing_target_message(
+                        1000 * ms, 7, 12, 0, 0, math.hypot(level_m, height_m), 0.02, 0.02
+                    ),
+                ),
+            ):
+                yield system, component, message
 
 
 class ScriptedVehicle(threading.Thread):
@@ -77,7 +109,11 @@ class ScriptedVehicle(threading.Thread):
 
     def _hear(self, message):
         self.heard.append(message)
-        if message.get_type() == "COMMAND_LONG" and message.param1 == type(self._says(0)).id and self._willing:
+        if (
+            message.get_type() == "COMMAND_LONG"
+            and message.param1 == type(self._says(0)).id
+            and self._willing
+        ):
             self._period_ms = max(10, round(message.param2 / 1e4) * 10)
 
 
@@ -150,6 +186,38 @@ def test_it_asks_hears_tells_and_its_log_gives_the_same_estimates(tmp_path, port
     assert ("ATTITUDE", system, 191) in said and ("HEARTBEAT", system, 191) in said
     log = open_log(tmp_path / "run" / "flight.tlog")
     assert not any(loss.lost for loss in log.source.losses)
+
+
+def test_a_base_station_hears_a_team_on_one_link(tmp_path, port):
+    done = threading.Event()
+
+    def say():
+        encoders = {}
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            for system, component, message in team(600):
+                encoder = encoders.setdefault((system, component), FrameEncoder(system, component))
+                link.sendto(encoder.encode(message), ("127.0.0.1", port))
+                if done.wait(0.0005):
+                    return
+
+    there = threading.Thread(target=say, daemon=True)
+    there.start()
+    settings = ("--set", "omega_y_rad_s=0.1")
+    code = estimate(tmp_path, port, "--duration", "15", *settings, estimator="target-fusion")
+    done.set()
+    there.join()
+    assert code == 0
+    (block,) = summary_of(tmp_path)["vehicles"]
+    assert block["remarks"]["drones"] == 2.0 and block["remarks"]["detections_fused"] > 100.0
+    ours = np.load(tmp_path / "run" / "estimates.npz")
+    assert np.abs(ours["east_m"] - 30.0).max() < 2.0 and np.abs(ours["north_m"]).max() < 2.0
+    assert set(ours["vehicle"].tolist()) == {1.0, 2.0} and set(ours["target"].tolist()) == {7.0}
+    told = open_log(tmp_path / "run" / "flight.tlog").table("FOLLOW_TARGET", system_id=255, component_id=191)
+    assert len(told) > 20
+    arguments = ["--estimator", "target-fusion", *settings, "--no-picture", "--out", str(tmp_path / "again")]
+    assert run_command_line(["replay", str(tmp_path / "run" / "flight.tlog"), *arguments]) == 0
+    theirs = np.load(tmp_path / "again" / "estimates.npz")
+    assert all(ours[column].tobytes() == theirs[column].tobytes() for column in ours)
 
 
 def test_it_can_be_silent(tmp_path, port, vehicle):
