@@ -80,11 +80,10 @@ class FilterAttitude:
         later: AttitudeEstimate | None = None
         for estimate in reversed(self._kept):
             if estimate.time_us <= time_us:
-                if later is None:
-                    if time_us - estimate.time_us > _STALE_US:
-                        return None
-                    later = estimate
-                return _between(estimate, later, time_us, yaw_of(heading))
+                until_us = time_us if later is None else later.time_us
+                if until_us - estimate.time_us > _STALE_US:
+                    return None
+                return _between(estimate, later or estimate, time_us, yaw_of(heading))
             later = estimate
         return None
 
