@@ -7,6 +7,7 @@ from typing import ClassVar
 import pytest
 
 from autopilot_bridge.tlog import TlogReader
+from estimators.comparison import comparisons
 from estimators.errors import EstimatorError
 from estimators.fleet import Fleet
 from estimators.interface import Estimator, Need, Outcome
@@ -114,6 +115,9 @@ def test_team_time_takes_every_vehicle_to_one_time(make_log):
     tables = [result.fleet.runners[0].tables["Heard"] for result in (together, merged)]
     assert tables[0].time_us.tolist() == tables[1].time_us.tolist()
     assert tables[0].subject.tolist() == tables[1].subject.tolist()
+    for compared in comparisons(merged.logs, merged.fleet.runners[0]):  # with each one's log, in its own time
+        errors = compared.errors("autopilot", "roll_rad")
+        assert len(errors) == 400 and abs(errors).max() < 1e-12
     steps = set((tables[0].time_us[1:] - tables[0].time_us[:-1]).tolist())
     assert max(steps) <= 51_000 and min(steps) >= 0
     live = Fleet(Ears)

@@ -118,6 +118,7 @@ def test_each_vehicle_has_a_runner_and_one_can_be_chosen(make_log, make):
     for k in range(20):
         log.attitude(1.0 + 0.05 * k, system=1)
         log.attitude(300.0 + 0.05 * k, system=7, roll=0.2)
+        log.attitude(1.0 + 0.05 * k, system=230)  # of a ground station: no vehicle
     path = log.close()
     assert set(feed(path, Fleet(make)).runners) == {1, 7}
     assert set(feed(path, Fleet(make, single=True)).runners) == {1}
