@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import re
 from importlib import metadata
 from pathlib import Path
@@ -15,8 +16,32 @@ from estimators.logs.mapped import Array, MappedSource, Part, own_part
 from estimators.logs.ulog_mapping import Topic, map_topics
 
 _TIME: Final = "timestamp"
+_MOST_RETURNS: Final = 2000
+"""Steps back to where the reader was before, at most: looking for a sync mark takes a few."""
 _MAX_TIME_US: Final = 10**13
 _ELEMENT: Final = re.compile(r"(.+)\[(\d+)\]")
+
+
+class _Onward(io.BufferedReader):
+    """A file in which nobody goes round in circles.
+
+    pyulog goes on one byte behind a message that it does not know. Where that is cut off by the end of the
+    file it steps back too far, and would do so for ever.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path))
+        self._furthest = -1
+        self._returns = 0
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
+        if whence == os.SEEK_CUR and offset < 0:
+            target = self.tell() + offset
+            self._returns += target <= self._furthest
+            self._furthest = max(self._furthest, target)
+            if self._returns > _MOST_RETURNS:
+                raise ValueError("the file makes no sense")
+        return super().seek(offset, whence)
 
 
 def open_ulog(path: Path) -> MappedSource:
@@ -27,7 +52,7 @@ def open_ulog(path: Path) -> MappedSource:
     """
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # it prints what it finds odd
-            log = ULog(str(path), disable_str_exceptions=True)
+            log = ULog(_Onward(path), disable_str_exceptions=True)
     except Exception as error:  # pyulog raises whatever a damaged file leads it to
         raise LogError(
             f"{path} can't be read as a PX4 .ulg: {type(error).__name__} {error}; is it whole?"

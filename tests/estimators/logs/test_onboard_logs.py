@@ -1,6 +1,8 @@
 """ArduPilot .bin and PX4 .ulg files give the messages that estimators ask for, in MAVLink's units."""
 
+import contextlib
 import math
+import random
 
 import numpy as np
 import pytest
@@ -317,3 +319,13 @@ def test_what_pyulog_prints_is_not_said(ulog, tmp_path, capfd):
     path.write_bytes(data)
     assert len(open_log(path)) > 0
     assert capfd.readouterr() == ("", "")
+
+
+def test_ulog_of_junk_ends(tmp_path):
+    """pyulog alone runs for ever on some of these."""
+    choose = random.Random(1)
+    for _ in range(30):
+        path = tmp_path / "flight.ulg"
+        path.write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + choose.randbytes(choose.randrange(3000)))
+        with contextlib.suppress(LogError):
+            open_log(path).report()
