@@ -32,6 +32,7 @@ WANTED_RATE_HZ: Final = 50.0
 _SLOWEST_US: Final = int(1e6 / (0.9 * LEAST_RATE_HZ))
 _GONE_US: Final = 4 * _SLOWEST_US
 _write_sample: Final = Struct(at.SAMPLE_FORMAT).pack_into
+_AUTOPILOT: Final = dialect.MAV_COMP_ID_AUTOPILOT1
 _IMU_NAMES: Final = tuple(SAMPLES)
 _AIRSPEED_NAMES: Final = ("VFR_HUD", "AIRSPEED", "SCALED_PRESSURE")
 
@@ -93,7 +94,8 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         return inertial, heartbeat, air
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        handler = self._handlers.get(message.name)
+        # Others may have inertial sensors of their own.
+        handler = self._handlers.get(message.name) if message.src_component == _AUTOPILOT else None
         outcome = Outcome.IGNORED if handler is None else handler(time_us, message)
         self.counters[outcome] += 1
         return outcome
@@ -176,8 +178,6 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
     # Slow messages
 
     def _heartbeat(self, time_us: int, message: Message) -> Outcome:
-        if message.src_component != dialect.MAV_COMP_ID_AUTOPILOT1:
-            return Outcome.IGNORED
         form = FORM_OF_TYPE.get(message.type)
         if form is None:
             return Outcome.IGNORED

@@ -185,6 +185,12 @@ def test_a_gap_of_one_second_is_bridged():
     assert newest(found).roll_rad == pytest.approx(ROLL, abs=1e-6)
 
 
+def test_what_is_not_the_autopilots_is_ignored():
+    found = started()
+    other = highres(51 * STEP_US)._replace(src_component=191)
+    assert found.handle(51 * STEP_US, other) is Outcome.IGNORED
+
+
 def test_reset_forgets():
     found = AttitudeEstimator()
     found.handle(0, heartbeat(kind=2))
