@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimators.lissajous.model import Array
-from estimators.target_fusion.orientation import Quaternion, rotated
+from estimators.rotation import Quaternion, rotate
 from estimators.target_fusion.parameters import Range, TargetFusionParameters
 
 __all__ = ["Detection", "Seen", "place_in_level_frame"]
@@ -68,7 +68,7 @@ def place_in_level_frame(
     """
     x, y = math.tan(detection.angle_x_rad), math.tan(detection.angle_y_rad)
     norm = math.sqrt(1.0 + x * x + y * y)
-    forward, right, down = rotated(q_level_from_camera, (1.0 / norm, x / norm, y / norm))
+    forward, right, down = rotate(q_level_from_camera, (1.0 / norm, x / norm, y / norm))
     level = math.hypot(forward, right)
     measured = _range(detection, height_m, down, p)
     if measured is None:

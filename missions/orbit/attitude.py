@@ -7,7 +7,7 @@ import math
 from collections import deque
 from typing import Final, Protocol
 
-from missions.rotation import Quaternion, between, from_euler
+from estimators.rotation import Quaternion, between, from_euler
 from missions.telemetry import Attitude
 
 _KEPT: Final = 256

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
+from estimators.rotation import from_euler
 from missions.errors import PlanError
-from missions.rotation import from_euler
 from missions.vehicle.setpoint import Vector
 
 _IGNORE_RATES: Final = 0x07

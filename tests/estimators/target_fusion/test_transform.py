@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from estimators.rotation import from_euler, product, rotate, yaw_of
 from estimators.target_fusion import Range, TargetFusionParameters
-from estimators.target_fusion.orientation import from_euler, product, rotated, yaw_of
 from estimators.target_fusion.sight import Detection, place_in_level_frame
 from estimators.target_fusion.transform import INFORMATION, add_information, belief_of, ground_target
 
@@ -81,7 +81,7 @@ def test_rotations_are_yaw_pitch_roll(angles: tuple[float, float, float]) -> Non
     parts = product(from_euler(0, 0, yaw), product(from_euler(0, pitch, 0), from_euler(roll, 0, 0)))
     assert whole == pytest.approx(parts)
     assert yaw_of(from_euler(roll, 0.0, yaw)) == pytest.approx(yaw)
-    assert rotated(from_euler(0.0, pitch, 0.0), (1.0, 0.0, 0.0)) == pytest.approx(
+    assert rotate(from_euler(0.0, pitch, 0.0), (1.0, 0.0, 0.0)) == pytest.approx(
         (math.cos(pitch), 0.0, -math.sin(pitch))
     )
 

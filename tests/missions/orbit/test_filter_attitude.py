@@ -6,10 +6,10 @@ import math
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
+from estimators.rotation import yaw_of
 from missions.library import find_mission
 from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.options import AttitudeFrom, OrbitOptions
-from missions.rotation import yaw_of
 from missions.session import RunRequest, fly
 
 ROLL, PITCH, YAW = 0.3, -0.1, 2.0

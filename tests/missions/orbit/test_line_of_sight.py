@@ -8,13 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from estimators.rotation import between, conjugate, from_euler, rotate, yaw_of
 from missions.orbit.line_of_sight import (
     gimbal_angles,
     gimbal_from_camera,
     line_of_sight_of_gimbal,
     pointing_angles,
 )
-from missions.rotation import between, conjugate, from_euler, rotate, yaw_of
 from missions.vehicle.payload import GimbalAttitude
 
 angles = st.floats(-3.1, 3.1)

@@ -1,4 +1,4 @@
-"""Rotations of single vectors, in plain numbers: a mission turns a few vectors per image.
+"""Rotations of single vectors, in plain numbers: an estimator or a mission turns a few vectors per image.
 
 Quaternions are Hamilton, (w, x, y, z), and named `q_a_from_b`.
 """
@@ -18,6 +18,18 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
         vx + w * tx + y * tz - z * ty,
         vy + w * ty + z * tx - x * tz,
         vz + w * tz + x * ty - y * tx,
+    )
+
+
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation by b, then by a: `q_a_from_c` of `q_a_from_b` and `q_b_from_c`."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
     )
 
 
