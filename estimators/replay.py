@@ -103,9 +103,7 @@ def log_rate_hz(log: "Log", system_id: int, name: str) -> float:
     components = [
         key.component_id
         for key in log.keys
-        if key.name == name
-        and key.system_id == system_id
-        and why_unheard(name, key.component_id) is None
+        if key.name == name and key.system_id == system_id and why_unheard(name, key.component_id) is None
     ]
     if not components:
         return 0.0
