@@ -6,6 +6,7 @@ fields sorted by size, extension fields last (MAVLink guide, "Serialization", fi
 """
 
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -63,7 +64,8 @@ class MessageDefinition:
         message_id: 24-bit id.
         name: as in the definition files, "HEARTBEAT".
         crc_extra: the byte that makes the checksum depend on the definition.
-        message_class: pymavlink's class; its constructor takes `field_names` in order.
+        message_class: pymavlink's class, whose constructor takes `field_names` in order; None where it has
+            none.
         field_names: in the order of the definition file.
         wire_fields: in the order on the wire.
         wire: struct of the whole payload, one value per array element (strings: one value).
@@ -84,23 +86,35 @@ class MessageDefinition:
     target_component_offset: int | None
 
 
-def _define(message_class: Any) -> MessageDefinition:
-    names = tuple(message_class.fieldnames)
-    types = dict(zip(names, message_class.fieldtypes, strict=True))
+def define(
+    *,
+    message_id: int,
+    name: str,
+    crc_extra: int,
+    field_names: tuple[str, ...],
+    wire_fields: Iterable[tuple[str, str, int]],
+    message_class: Any = None,
+) -> MessageDefinition:
+    """The definition of a message, of this dialect or another one.
+
+    Args:
+        message_id, name, crc_extra, field_names, message_class: as in `MessageDefinition`.
+        wire_fields: in the order on the wire: name, C type, length of the array or 0.
+    """
     fields = []
     offset = 0
-    for name, length in zip(message_class.ordered_fieldnames, message_class.array_lengths, strict=True):
-        code = _STRUCT_CODES[types[name]]
+    for field, kind, length in wire_fields:
+        code = _STRUCT_CODES[kind]
         size = struct.calcsize(f"<{length or 1}{code}")
-        fields.append(WireField(name, types[name], length, offset, size, code))
+        fields.append(WireField(field, kind, length, offset, size, code))
         offset += size
     offsets = {field.name: field.offset for field in fields}
     return MessageDefinition(
-        message_id=message_class.id,
-        name=message_class.msgname,
-        crc_extra=message_class.crc_extra,
+        message_id=message_id,
+        name=name,
+        crc_extra=crc_extra,
         message_class=message_class,
-        field_names=names,
+        field_names=field_names,
         wire_fields=tuple(fields),
         wire=struct.Struct("<" + "".join(_field_format(field) for field in fields)),
         size=offset,
@@ -109,11 +123,28 @@ def _define(message_class: Any) -> MessageDefinition:
     )
 
 
+def define_class(message_class: Any) -> MessageDefinition:
+    """The definition of one of pymavlink's classes, of any dialect."""
+    names = tuple(message_class.fieldnames)
+    types = dict(zip(names, message_class.fieldtypes, strict=True))
+    lengths = zip(message_class.ordered_fieldnames, message_class.array_lengths, strict=True)
+    return define(
+        message_id=message_class.id,
+        name=message_class.msgname,
+        crc_extra=message_class.crc_extra,
+        field_names=names,
+        wire_fields=[(name, types[name], length) for name, length in lengths],
+        message_class=message_class,
+    )
+
+
 def _field_format(field: WireField) -> str:
     return f"{field.length or 1}{field.code}" if field.length or field.code == "s" else field.code
 
 
-DEFINITIONS: Final = MappingProxyType({key: _define(value) for key, value in dialect.mavlink_map.items()})
+DEFINITIONS: Final = MappingProxyType(
+    {key: define_class(value) for key, value in dialect.mavlink_map.items()}
+)
 """Every message of the dialect by id."""
 
 _BY_NAME: Final = MappingProxyType({item.name: item for item in DEFINITIONS.values()})

@@ -3,7 +3,6 @@
 import importlib
 import pkgutil
 import re
-import struct
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -13,26 +12,13 @@ from typing import Any, Final
 
 import pymavlink.dialects.v20
 
-from autopilot_bridge.mavlink import DEFINITIONS, MessageDefinition, WireField
+from autopilot_bridge.mavlink import DEFINITIONS, MessageDefinition
+from autopilot_bridge.mavlink.definitions import define, define_class
 from estimators.logs.errors import LogError
 from estimators.logs.xml_definitions import FieldText, MessageText, read_definitions
 from estimators.messages import message_class
 
 DEFAULT_DIALECT: Final = "all"
-
-_CODES: Final = {
-    "char": "s",
-    "uint8_t": "B",
-    "int8_t": "b",
-    "uint16_t": "H",
-    "int16_t": "h",
-    "uint32_t": "I",
-    "int32_t": "i",
-    "uint64_t": "Q",
-    "int64_t": "q",
-    "float": "f",
-    "double": "d",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +138,13 @@ def describe(number: int, name: str, fields: Sequence[FieldText], units: Mapping
         fields: in the order of the file.
         units: of the fields that have one.
     """
-    definition = _define(number, name, 0, tuple(field.name for field in fields), fields, None)
+    definition = define(
+        message_id=number,
+        name=name,
+        crc_extra=0,
+        field_names=tuple(field.name for field in fields),
+        wire_fields=_wire(fields),
+    )
     return Description(definition, MappingProxyType(dict(units)), None, message_class(definition))
 
 
@@ -161,49 +153,20 @@ def _layout(found: MessageDefinition) -> tuple[object, ...]:
 
 
 def _from_class(made: Any) -> tuple[MessageDefinition, Mapping[str, str], str | None]:
-    types = dict(zip(made.fieldnames, made.fieldtypes, strict=True))
-    fields = tuple(
-        FieldText(name, types[name], length)
-        for name, length in zip(made.ordered_fieldnames, made.array_lengths, strict=True)
-    )
-    definition = _define(made.id, made.msgname, made.crc_extra, tuple(made.fieldnames), fields, made)
-    return definition, made.fieldunits_by_name, made.instance_field
+    return define_class(made), made.fieldunits_by_name, made.instance_field
 
 
 def _from_text(item: MessageText) -> tuple[MessageDefinition, Mapping[str, str], str | None]:
-    names = tuple(field.name for field in item.fields)
-    definition = _define(item.message_id, item.name, item.crc_extra, names, item.wire_order, None)
+    definition = define(
+        message_id=item.message_id,
+        name=item.name,
+        crc_extra=item.crc_extra,
+        field_names=tuple(field.name for field in item.fields),
+        wire_fields=_wire(item.wire_order),
+    )
     units = {field.name: field.units for field in item.fields if field.units}
     return definition, units, next((field.name for field in item.fields if field.instance), None)
 
 
-def _define(
-    message_id: int,
-    name: str,
-    crc_extra: int,
-    field_names: tuple[str, ...],
-    ordered: Iterable[FieldText],
-    made: Any,
-) -> MessageDefinition:
-    fields: list[WireField] = []
-    formats = "<"
-    offset = 0
-    for field in ordered:
-        code = _CODES[field.type]
-        size = struct.calcsize(f"<{field.length or 1}{code}")
-        fields.append(WireField(field.name, field.type, field.length, offset, size, code))
-        formats += f"{field.length or 1}{code}" if field.length or code == "s" else code
-        offset += size
-    offsets = {field.name: field.offset for field in fields}
-    return MessageDefinition(
-        message_id=message_id,
-        name=name,
-        crc_extra=crc_extra,
-        message_class=made,
-        field_names=field_names,
-        wire_fields=tuple(fields),
-        wire=struct.Struct(formats),
-        size=offset,
-        target_system_offset=offsets.get("target_system"),
-        target_component_offset=offsets.get("target_component"),
-    )
+def _wire(fields: Iterable[FieldText]) -> list[tuple[str, str, int]]:
+    return [(field.name, field.type, field.length) for field in fields]
