@@ -162,8 +162,8 @@ class TlogCounters:
 class TlogReader:
     """Reads a log, one record after the other; damage is skipped and counted.
 
-    A whole record that is no good (a wrong checksum, an unknown message) is skipped as one where another follows:
-    what might begin inside it is not looked for. `estimators.logs` does that, and is much faster.
+    A whole record that is no good (a wrong checksum, an unknown message) is skipped as one where another
+    follows: what might begin inside it is not looked for. `estimators.logs` does that, and is much faster.
 
     Args:
         path: the log.

@@ -35,21 +35,6 @@ def rotate_inverse(q: Array, v: Array, out: Array) -> None:
 
 
 @kernel
-def matrix_from_quaternion(q: Array, out: Array) -> None:
-    """out (3, 3) = R(q)."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    out[0, 1] = 2.0 * (x * y - w * z)
-    out[0, 2] = 2.0 * (x * z + w * y)
-    out[1, 0] = 2.0 * (x * y + w * z)
-    out[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    out[1, 2] = 2.0 * (y * z - w * x)
-    out[2, 0] = 2.0 * (x * z - w * y)
-    out[2, 1] = 2.0 * (y * z + w * x)
-    out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
-
-
-@kernel
 def multiply(a: Array, b: Array, out: Array) -> None:
     """out = a (x) b (Hamilton product). `out` may not alias `a` or `b`."""
     out[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]

@@ -24,12 +24,10 @@ class Played:
     Attributes:
         frames: sent, or dropped by a link whose reader is too slow or gone (`Link.counters`).
         log_s: seconds of the log behind us, since the first record that is played.
-        rounds: times that the end was reached.
     """
 
     frames: int = 0
     log_s: float = 0.0
-    rounds: int = 0
 
 
 def play(
@@ -88,7 +86,6 @@ def play(
             link.send(frame)
             played.frames += 1
             played.log_s = due_us * 1e-6
-        played.rounds += 1
         _tell(played, round(played.log_s * 1e6), on_progress)
         if not loop:
             _drain(link)
