@@ -75,7 +75,10 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
     for block in summary["vehicles"]:
         if "waypoints" in block:
             w = block["waypoints"]
-            click.echo(f"waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}")
+            whose = f"vehicle {block['system_id']}: " if len(summary["vehicles"]) > 1 else ""
+            click.echo(
+                f"{whose}waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}"
+            )
     for told in mission.said(summary):
         click.echo(told)
     for block in summary["vehicles"]:

@@ -43,8 +43,9 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
     _draw_from_above(above, flights)
     _draw_altitude(altitude, flights)
     for error in rest:  # there is a curve to be off from
-        altitude.sharex(error)
+        error.sharex(altitude)  # whose times there always are, also of a flight that never came to its curve
         _draw_error(error, flights)
+        altitude.tick_params(labelbottom=False)
     for axes in (above, altitude, *rest):
         tidy(axes)
     (rest or [altitude])[0].set_xlabel("vehicle time, s", fontsize=9, color=_INK)
@@ -219,7 +220,6 @@ def _draw_altitude(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) ->
                 style = _truth_style(colour, team) if is_truth else _estimate_style(colour, team)
                 axes.plot(shown.time_s, -shown.pos_ned_m[:, 2], **style)
     axes.set_ylabel("height above\nhome, m", fontsize=9, color=_INK)
-    axes.tick_params(labelbottom=False)
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
 
 
@@ -236,6 +236,11 @@ def _draw_error(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) -> No
         axes.annotate(
             f"RMS {rms:.2f} m", (1.0, rms), xycoords=("axes fraction", "data"), xytext=(-4, 3 + 9 * k),
             textcoords="offset points", ha="right", fontsize=8, color=colour,
+        )  # fmt: skip
+    if not any(len(score.error_m) for _, score in flights):
+        axes.text(
+            0.5, 0.5, "the path was not flown", transform=axes.transAxes, ha="center", va="center",
+            fontsize=9, color=_INK,
         )  # fmt: skip
     axes.set_ylim(bottom=0.0)
     reference = flights[0][1].reference
