@@ -291,7 +291,8 @@ def estimate(
     try:
         folder = create_run_folder(request.out, fleet.name)
         begun_wall_s = wall_time_s()
-        with suppress(TlogError), TlogWriter(folder / LOG_NAME) as log:
+        log = TlogWriter(folder / LOG_NAME)
+        with suppress(TlogError), log:  # what a full disk has refused is told as the reason
             loop = asyncio.new_event_loop()
             process = _Process(request, link, fleet, log)
             with _ending(loop, process.stop):
