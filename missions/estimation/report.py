@@ -300,6 +300,8 @@ def _whole(path: Path) -> Iterator[None]:
     """Leave no half of a file on a full disk."""
     try:
         yield
+    except FileExistsError:  # somebody else's, and whole
+        raise
     except OSError:
         path.unlink(missing_ok=True)
         raise
