@@ -16,6 +16,7 @@ from estimators.logs.mapped import Array, Part, mavlink_part, newest
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
 _SECOND_US: Final = 1_000_000
 _EV_ARMED, _EV_DISARMED = 10, 11
+_HOME: Final = 1  # ORGN.Type
 _TYPES: Final = {
     "ArduCopter": dialect.MAV_TYPE_QUADROTOR,
     "ArduPlane": dialect.MAV_TYPE_FIXED_WING,
@@ -62,6 +63,7 @@ def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None) -> l
         *_attitude(tables),
         *_air(tables),
         *_positions(tables),
+        *_home(tables),
         *_gps(tables),
         *_state(tables),
     ]
@@ -211,6 +213,24 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
             )
         )
     return found
+
+
+def _home(tables: Mapping[str, Records]) -> list[Part]:
+    """Its place in the local frame is not told."""
+    places = tables.get("ORGN")
+    if places is None or not places.has("Type", "Lat", "Lng", "Alt"):
+        return []
+    home = places.where(places.columns["Type"] == _HOME)
+    return [
+        mavlink_part(
+            "HOME_POSITION",
+            home.time_us,
+            latitude=home.columns["Lat"] * 1e7,
+            longitude=home.columns["Lng"] * 1e7,
+            altitude=home.columns["Alt"] * 1e3,
+            **dict.fromkeys(("x", "y", "z", "approach_x", "approach_y", "approach_z", "q"), np.nan),
+        )
+    ]
 
 
 def _gps(tables: Mapping[str, Records]) -> list[Part]:

@@ -76,6 +76,7 @@ def map_topics(topics: Topics, texts: Iterable[Any], unix_offset_us: int | None)
         *_attitude(topics),
         *_air(topics),
         *_positions(topics),
+        *_home(topics),
         *_gps(topics),
         *_state(topics),
         *_truth(topics),
@@ -210,7 +211,7 @@ def _positions(topics: Topics) -> list[Part]:
     place = _find(topics, ("vehicle_global_position",), "lat", "lon", "alt")
     if place is not None:
         c, times = place.columns, place.time_us
-        home = _find(topics, ("home_position",), "alt")
+        home = _valid_home(topics)
         base = _at(home, "alt", times, float(c["alt"][0]))
         found.append(
             mavlink_part(
@@ -225,6 +226,32 @@ def _positions(topics: Topics) -> list[Part]:
             )
         )
     return found
+
+
+def _home(topics: Topics) -> list[Part]:
+    home = _valid_home(topics)
+    if home is None:
+        return []
+    c = home.columns
+    return [
+        mavlink_part(
+            "HOME_POSITION",
+            home.time_us,
+            latitude=c["lat"] * 1e7,
+            longitude=c["lon"] * 1e7,
+            altitude=c["alt"].astype(np.float64) * 1e3,
+            **{axis: c.get(axis, np.nan) for axis in "xyz"},
+            **dict.fromkeys(("approach_x", "approach_y", "approach_z", "q"), np.nan),
+        )
+    ]
+
+
+def _valid_home(topics: Topics) -> Topic | None:
+    home = _find(topics, ("home_position",), "lat", "lon", "alt")
+    if home is None or not home.has("valid_hpos"):
+        return home
+    known = home.columns["valid_hpos"] != 0
+    return Topic(home.time_us[known], {name: column[known] for name, column in home.columns.items()})
 
 
 def _gps(topics: Topics) -> list[Part]:

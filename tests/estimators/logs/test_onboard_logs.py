@@ -27,6 +27,7 @@ def dataflash(tmp_path):
         BARO=("QBfffc", "TimeUS,I,Alt,Press,Junk,Temp"),
         GPS=("QBBIHBcLLeffff", "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ,Yaw"),
         POS=("QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt"),
+        ORGN=("QBLLe", "TimeUS,Type,Lat,Lng,Alt"),
         XKF1=("QBffffff", "TimeUS,C,VN,VE,VD,PN,PE,PD"),
         CTUN=("Qf", "TimeUS,ThO"),
         MODE=("QMBB", "TimeUS,Mode,ModeNum,Rsn"),
@@ -36,6 +37,8 @@ def dataflash(tmp_path):
     )
     writer.add("MSG", 500_000, "ArduPlane V4.6.3 (3fc7011a)")
     writer.add("MODE", 600_000, 0, 0, 1)
+    writer.add("ORGN", 800_000, 0, -35.0, 149.0, 500.0)  # of the EKF
+    writer.add("ORGN", 900_000, 1, -35.36, 149.16, 584.2)
     writer.add("GPS", 700_000, 0, 3, 100_000_000, 2300, 11, 0.8, -35.36, 149.16, 584.2, 15.0, 90.0, -0.5, 0.0)
     for tick in range(50 * SECONDS):
         time_us = 1_000_000 + tick * 20_000
@@ -111,6 +114,13 @@ def test_dataflash_gives_the_messages_of_estimators(bin_log):
         2000,
     )
     assert bin_log.table("LOCAL_POSITION_NED")["z"][0] == -100.0
+    home = bin_log.table("HOME_POSITION")
+    assert len(home) == 1 and math.isnan(home["x"][0])
+    assert (home["latitude"][0], home["longitude"][0], home["altitude"][0]) == (
+        -353600000,
+        1491600000,
+        584_200,
+    )
     gps = bin_log.table("GPS_RAW_INT")
     assert (gps["fix_type"][0], gps["vel"][0], gps["cog"][0], gps["eph"][0]) == (3, 1500, 9000, 80)
 
@@ -175,6 +185,9 @@ def ulog(tmp_path):
             "uint64_t timestamp;float x;float y;float z;float vx;float vy;float vz;float heading;"
         ),
         vehicle_global_position="uint64_t timestamp;double lat;double lon;float alt;",
+        home_position=(
+            "uint64_t timestamp;double lat;double lon;float alt;float x;float y;float z;bool valid_hpos;"
+        ),
         airspeed_validated="uint64_t timestamp;float calibrated_airspeed_m_s;",
         vehicle_air_data="uint64_t timestamp;float baro_pressure_pa;float baro_temp_celcius;",
         vehicle_gps_position=(
@@ -192,6 +205,7 @@ def ulog(tmp_path):
         "vehicle_angular_velocity",
         "vehicle_local_position",
         "vehicle_global_position",
+        "home_position",
         "airspeed_validated",
         "vehicle_air_data",
         "vehicle_gps_position",
@@ -205,6 +219,8 @@ def ulog(tmp_path):
     writer.add("vehicle_status", "QBBB", 1_000_000, 1, 0, 1)
     writer.add("vehicle_land_detected", "Q?", 1_000_000, True)
     writer.text(6, 1_100_000, "Ready for takeoff!")
+    writer.add("home_position", "Qdd4f?", 1_100_000, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
+    writer.add("home_position", "Qdd4f?", 1_150_000, 47.39, 8.54, 488.0, 1.0, 2.0, -0.5, True)
     gps = (1_700_000_000_000_000, 47.39, 8.54, 488.0, 15.0, 1.5, 0.8, 3, 12)
     writer.add("vehicle_gps_position", "QQdddfffBB", 1_200_000, *gps)
     for tick in range(100 * SECONDS):
@@ -255,6 +271,10 @@ def test_ulog_gives_the_messages_of_estimators(ulg_log):
     assert ulg_log.table("SCALED_PRESSURE")["press_abs"][0] == 945.0
     assert ulg_log.table("GLOBAL_POSITION_INT")["lat"][0] == 473900000
     assert ulg_log.table("LOCAL_POSITION_NED")["vx"][0] == 3.0
+    home = ulg_log.table("HOME_POSITION")
+    assert (home["latitude"].tolist(), home["altitude"].tolist()) == ([473900000], [488_000])
+    assert (home["x"][0], home["z"][0]) == (1.0, -0.5)
+    assert ulg_log.table("GLOBAL_POSITION_INT")["relative_alt"][-1] == 100_000
     gps = ulg_log.table("GPS_RAW_INT")
     assert (gps["lat"][0], gps["vel"][0], gps["fix_type"][0], gps["satellites_visible"][0]) == (
         473900000,
