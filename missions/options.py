@@ -222,7 +222,7 @@ def parse_pair(text: str, name: str, separators: str) -> tuple[float, float]:
     except ValueError:
         numbers = []
     if len(numbers) not in (1, 2) or not all(math.isfinite(n) for n in numbers):
-        raise PlanError(f"{name} {text!r} is not one or two numbers, for example 3{separators[0]}4")
+        raise PlanError(f"{name} {text!r} is not one or two numbers without units, such as 3{separators[0]}4")
     return numbers[0], numbers[-1]
 
 
