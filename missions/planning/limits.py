@@ -62,7 +62,7 @@ class _Limits:
         if not distance_m <= self.reach_m:
             raise PlanError(
                 f"the pattern reaches {distance_m:.0f} m from home, more than {self.reach_m:g} m; "
-                "choose a simpler --pattern (L1) or --ratio, lower --speed, or a smaller --size"
+                "ask for a smaller --size or a lower --speed, or for a simpler --pattern (L1)"
             )
 
 
