@@ -12,6 +12,9 @@ from autopilot_bridge.errors import BridgeError
 from missions.cli_types import SLOWEST, FiniteRange
 from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
 
+_LOG_RATE_HZ = 4
+_LOGGER = 255, 190  # MAV_COMP_ID_MISSIONPLANNER of a ground station
+
 
 def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...], count: int):  # type: ignore[no-untyped-def]
     """Links per vehicle from the options; None when the flavour's own are to be opened."""
@@ -40,6 +43,14 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
         "COM_OF_LOSS_T": min(speedup, 60.0),
         "COM_OBC_LOSS_T": min(5.0 * speedup, 60.0),
     }
+
+
+def _request_streams() -> bytes:
+    """All of ArduPilot's streams, to every vehicle, at the rate that MAVProxy asks for."""
+    from autopilot_bridge.mavlink import FrameEncoder, dialect
+
+    request = dialect.MAVLink_request_data_stream_message(0, 0, dialect.MAV_DATA_STREAM_ALL, _LOG_RATE_HZ, 1)
+    return FrameEncoder(*_LOGGER).encode(request)
 
 
 def _scenario(
@@ -224,7 +235,9 @@ def sitl(
         recorder = None if log is None else TlogWriter(log)
         opened = server.open(ports)
         if recorder is not None:
-            world.record(recorder)
+            for listener in world.record(recorder):
+                if autopilot == "ardupilot":  # which sends what it is asked for only
+                    listener.send(_request_streams())
     except (ValueError, OSError, BridgeError) as error:
         raise click.UsageError(str(error)) from error
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}

@@ -65,3 +65,14 @@ def test_signature_off_the_map_is_refused_by_name(survey_map):
     result = sitl(*LINK, "--map", str(survey_map), "--map-target", "9000,0")
     assert result.exit_code == 2
     assert "target 1 at north 9000 m, east 0 m is outside the magnetic map" in result.output
+
+
+@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+def test_the_log_has_what_every_vehicle_says(tmp_path, autopilot):
+    log = tmp_path / "said.tlog"
+    result = sitl("--autopilot", autopilot, "--no-wait", "--count", "2", "--duration", "6", "--log", str(log))
+    assert result.exit_code == 0, result.output
+    heard = Counter((f.system_id, DEFINITIONS[f.message_id].name) for _, f in TlogReader(log))
+    for system_id in (1, 2):
+        assert heard[system_id, "ATTITUDE"] >= 15
+        assert heard[system_id, "HIL_STATE_QUATERNION"] > 250
