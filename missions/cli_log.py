@@ -88,6 +88,10 @@ def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
             component_id=given["source_component"] or None,
             condition=condition,
         )
+        there = {stream.name for stream, _ in selections}
+        missing = [name for name in names if name.upper() not in {key.name.upper() for key in log.keys}]
+        if there and missing:
+            click.echo(f"{log.path} has no {', '.join(missing)}", err=True)
         return window(log, selections, given["from_s"], given["to_s"])
     except BridgeError as error:
         raise click.UsageError(str(error)) from error

@@ -54,6 +54,11 @@ def test_export(log, flight, tmp_path):
     assert code == 1 and "overwritten" in err
 
 
+def test_what_is_not_there_is_told(log, flight, tmp_path):
+    code, _, err = log("cut", flight, tmp_path / "part.tlog", "--types", "ATTITUDE,HIGHRES_IMU")
+    assert code == 0 and err.endswith("flight.tlog has no HIGHRES_IMU\n")
+
+
 def test_cut_by_time_and_condition(log, flight, tmp_path):
     out = tmp_path / "guided.tlog"
     code, said, _ = log("cut", flight, out, "--condition", "HEARTBEAT.custom_mode == 4", "--to", 8)
