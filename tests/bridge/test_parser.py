@@ -1,7 +1,6 @@
 """The parser: every good frame is found, every byte is accounted for, nothing raises."""
 
 import random
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -10,11 +9,11 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as pymavlink_dialect
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
+from tests.recorded_logs import recorded_log
 
 HEARTBEAT = pymavlink_dialect.MAVLink_heartbeat_message(2, 12, 81, 65536, 3, 3)
 ATTITUDE = pymavlink_dialect.MAVLink_attitude_message(1, 0.5, 0.25, -1.0, 0, 0, 0)
 TEXT = pymavlink_dialect.MAVLink_statustext_message(6, b"Ready \xfd\xfe for takeoff")
-LOGS = Path(__file__).parents[3] / "shared" / "tlogs"
 
 
 def frames_of(count, system_id=1, version=2):
@@ -259,9 +258,7 @@ def test_hundred_thousand_mutated_frames():
 
 @pytest.mark.parametrize("name", ["px4_quad_offboard.tlog", "arducopter_guided.tlog"])
 def test_real_streams_as_pymavlink_reads_them(name, tmp_path):
-    path = LOGS / name
-    if not path.is_file():
-        pytest.skip("recorded flight logs are not here")
+    path = recorded_log(name)
     head = path.read_bytes()[:400_000]
     (tmp_path / name).write_bytes(head)
     log = mavutil.mavlink_connection(str(tmp_path / name), dialect="all")

@@ -1,7 +1,6 @@
 """Logs through estimators: what is lacking, parts of logs, teams and their common time, real logs."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -15,8 +14,8 @@ from estimators.library import estimator_class
 from estimators.logs import open_log
 from estimators.replay import replay
 from estimators.team_time import TeamTime
+from tests.recorded_logs import each_recorded_log
 
-SHARED = sorted((Path(__file__).parents[3] / "shared" / "tlogs").glob("*.tlog"))
 UNIX_S = 1.7e9
 
 
@@ -163,8 +162,7 @@ def test_a_team_lacks_what_one_of_its_vehicles_lacks(make_log):
     assert result.partial
 
 
-@pytest.mark.skipif(not SHARED, reason="no recorded logs beside the checkout")
-@pytest.mark.parametrize("path", SHARED, ids=lambda path: path.stem)
+@each_recorded_log
 def test_frames_and_columns_of_real_logs_give_the_same_bits(path):
     """What a link would have brought, and what the log's columns give, through the attitude filter."""
     found = estimator_class("attitude")

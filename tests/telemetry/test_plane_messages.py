@@ -2,7 +2,6 @@
 
 import functools
 import math
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -38,8 +37,8 @@ from flightsim import interface
 from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 from flightsim.rotations import quaternion_from_euler
+from tests.recorded_logs import recorded_log
 
-LOGS = Path(__file__).parents[3] / "shared" / "tlogs"
 ORIGIN = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.0)
 NORTH, EAST, DOWN = 300.0, -40.0, -95.0
 
@@ -284,12 +283,9 @@ def test_arduplane_refuses_rates_beyond_its_loop(rate_hz: float, result: int) ->
 @functools.cache
 def recorded(file: str) -> list[Any]:
     """Messages of a recorded flight that the tests below look at, in order."""
-    path = LOGS / file
-    if not path.exists():
-        pytest.skip(f"{file}, a recorded flight, is not here")
     return [
         decode(frame)
-        for _, frame in TlogReader(path)
+        for _, frame in TlogReader(recorded_log(file))
         if frame.definition.name in _LOOKED_AT and frame.system_id != 255
     ]
 

@@ -11,13 +11,11 @@ from estimators.attitude import AttitudeEstimator
 from estimators.comparison import comparisons
 from estimators.logs import open_log
 from estimators.replay import replay
+from tests.recorded_logs import recorded_log
 
-LOGS = Path(__file__).resolve().parents[4] / "shared" / "tlogs"
 REFERENCES = Path(__file__).parents[1] / "references" / "attitude.json"
 EVERY_S = 5.0
 TOLERANCE_RAD = math.radians(0.05)
-
-needs_logs = pytest.mark.skipif(not LOGS.is_dir(), reason=f"no recorded logs in {LOGS}")
 
 # Mean squares of roll and pitch error, deg^2, against the autopilot: of the issue, and what is measured
 # (docs/attitude.md) with something to spare.
@@ -35,7 +33,7 @@ def replays():
 
     def run(name):
         if name not in made:
-            found = replay(open_log(LOGS / f"{name}.tlog"), AttitudeEstimator)
+            found = replay(open_log(recorded_log(f"{name}.tlog")), AttitudeEstimator)
             (runner,) = found.fleet.runners.values()
             (compared,) = comparisons(found.logs, runner)
             made[name] = runner, compared
@@ -44,7 +42,6 @@ def replays():
     return run
 
 
-@needs_logs
 @pytest.mark.parametrize("name", CASES)
 def test_errors_against_the_autopilot(replays, name):
     _, compared = replays(name)
@@ -56,7 +53,6 @@ def test_errors_against_the_autopilot(replays, name):
         assert mean_square < measured
 
 
-@needs_logs
 @pytest.mark.parametrize("name", CASES)
 def test_uncertainty_covers_the_errors(replays, name):
     """Normalised error squared: not above one on average, which would be a covariance that boasts."""
@@ -67,7 +63,6 @@ def test_uncertainty_covers_the_errors(replays, name):
         assert 0.02 < np.nanmean(normalised[compared.counted]) < 1.2
 
 
-@needs_logs
 @pytest.mark.parametrize("name", CASES)
 def test_references(replays, name):
     """Roll and pitch every five seconds, as stored by `write_references`."""
@@ -84,7 +79,7 @@ def write_references() -> None:
     """Store what the filter says now, after a change that is meant."""
     stored = {}
     for name in CASES:
-        found = replay(open_log(LOGS / f"{name}.tlog"), AttitudeEstimator)
+        found = replay(open_log(recorded_log(f"{name}.tlog")), AttitudeEstimator)
         (runner,) = found.fleet.runners.values()
         table = runner.tables["AttitudeEstimate"]
         time_us = table.time_us

@@ -1,20 +1,11 @@
 """Frames and logs for tests, and a reader of them that is slow, plain and exact."""
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
-import pytest
 from pymavlink.dialects.v20 import all as dialect
 from pymavlink.generator.mavcrc import x25crc
 
 EPOCH_US = 1_700_000_000_000_000
-SHARED = sorted((Path(__file__).parents[4] / "shared" / "tlogs").glob("*.tlog"))
-
-each_recorded_log = pytest.mark.parametrize(
-    "path",
-    SHARED or [pytest.param(None, marks=pytest.mark.skip("recorded logs of real firmware are not here"))],
-    ids=lambda path: path.stem if path else "none",
-)
 
 
 def checksum(data):

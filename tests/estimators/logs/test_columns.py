@@ -13,7 +13,8 @@ from estimators.logs import open_log
 from estimators.logs.columns import record_dtype
 from estimators.messages import read_message
 from estimators.vehicle_time import VehicleTime
-from tests.estimators.logs.reference import build, each_recorded_log, tlog
+from tests.estimators.logs.reference import build, tlog
+from tests.recorded_logs import each_recorded_log
 
 ROWS = 200
 """Messages compared of each stream; the slow test compares all."""

@@ -10,7 +10,8 @@ from pymavlink.dialects.v20 import all as dialect
 
 from estimators.logs import LogError, open_log
 from estimators.logs.condition import Condition
-from tests.estimators.logs.reference import EPOCH_US, build, each_recorded_log, pack, record, tlog
+from tests.estimators.logs.reference import EPOCH_US, build, pack, record, tlog
+from tests.recorded_logs import each_recorded_log
 
 ARMED, CUSTOM = dialect.MAV_MODE_FLAG_SAFETY_ARMED, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 

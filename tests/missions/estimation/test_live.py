@@ -3,7 +3,6 @@
 import contextlib
 import json
 import math
-import os
 import random
 import signal
 import socket
@@ -315,7 +314,6 @@ def start_process(tmp_path, port, *arguments):
     raise AssertionError(f"nothing was logged: {process.communicate()}")
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize(
     ("number", "arguments", "code"),
     [(signal.SIGINT, (), 0), (signal.SIGTERM, ("--duration", "9999"), 130)],
@@ -332,7 +330,6 @@ def test_a_signal_ends_it_in_good_order(tmp_path, port, vehicle, number, argumen
     assert_replay_is_the_same(tmp_path)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_killed_process_leaves_a_log_that_can_be_replayed(tmp_path, port, vehicle):
     vehicle()
     process, log = start_process(tmp_path, port)

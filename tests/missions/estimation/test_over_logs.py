@@ -11,9 +11,9 @@ import pytest
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.tlog import TlogWriter
 from missions.cli import run_command_line
+from tests.recorded_logs import recorded_log
 
 LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
-SHARED = Path(__file__).parents[4] / "shared" / "tlogs"
 FILES = {"summary.json", "estimates.npz", "estimates.csv", "errors.png"}
 
 
@@ -171,11 +171,10 @@ def test_two_vehicles_in_a_log_have_a_row_and_a_file_each(tmp_path, capfd):
     assert "vehicle 2  truth" in capfd.readouterr().out
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="no recorded logs beside the checkout")
 def test_attitude_on_a_real_flight(tmp_path, monkeypatch, capfd):
     """The table of errors that the estimator is judged by, from a real firmware's log."""
     monkeypatch.chdir(tmp_path)
-    shutil.copy(SHARED / "px4_plane_mission.tlog", "flight.tlog")
+    shutil.copy(recorded_log("px4_plane_mission.tlog"), "flight.tlog")
     assert replay("flight.tlog", "--estimator", "attitude", "--no-picture") == 0
     summary = summary_of(tmp_path / "runs" / "attitude-1")
     assert 290.0 < summary["airborne_s"] < 310.0
