@@ -7,8 +7,9 @@ it: the replay of that log gives the same estimates, bit for bit.
 import asyncio
 import math
 import signal
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+import threading
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -295,8 +296,8 @@ def estimate(
         with suppress(TlogError), log:  # what a full disk has refused is told as the reason
             loop = asyncio.new_event_loop()
             process = _Process(request, link, fleet, log)
-            with _ending(loop, process.stop):
-                run(process.run(on_progress), loop)
+            _end_on_signals(loop, process.stop)
+            run(process.run(on_progress), loop)
     finally:
         link.close()
     reason = process.reason
@@ -318,11 +319,11 @@ def estimate(
     )
 
 
-@contextmanager
-def _ending(loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> Iterator[None]:
-    """Ctrl-C and SIGTERM end the run in good order, where the system and the thread allow to say so."""
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    for number in numbers:
-        with suppress(NotImplementedError, ValueError, RuntimeError):
+def _end_on_signals(loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> None:
+    """Ctrl-C and SIGTERM end the run in good order, until the loop is closed.
+
+    Only a program's main thread may be told of signals: in another one whoever started it stops it.
+    """
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, stop)
-    yield
