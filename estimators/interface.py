@@ -5,7 +5,6 @@ same numbers: it sees nothing but messages and the vehicle time that they carry.
 """
 
 from abc import ABC, abstractmethod
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -107,7 +106,6 @@ class Estimator(ABC, Generic[P]):
         NAME: as on the command line.
         PARAMETERS: frozen dataclass of the parameters, with unit-suffixed fields and checks.
         TEAM: takes the messages of all vehicles.
-        counters: how often `handle` gave which outcome.
     """
 
     NAME: ClassVar[str]
@@ -116,7 +114,6 @@ class Estimator(ABC, Generic[P]):
 
     def __init__(self, parameters: P | None = None) -> None:
         self.parameters: P = self.PARAMETERS() if parameters is None else parameters
-        self.counters: Counter[Outcome] = Counter()
 
     @property
     @abstractmethod
@@ -125,7 +122,7 @@ class Estimator(ABC, Generic[P]):
 
     @abstractmethod
     def handle(self, time_us: int, message: Message) -> Outcome:
-        """Take one message. Never raises for what a message says.
+        """Take one message. Never raises for what a message says; the outcome tells, and `Runner` counts.
 
         Args:
             time_us: vehicle time of the message; for a team, on the time base common to all.
@@ -134,7 +131,7 @@ class Estimator(ABC, Generic[P]):
 
     @abstractmethod
     def reset(self) -> None:
-        """Forget everything but the parameters and the counters."""
+        """Forget everything but the parameters."""
 
     @property
     @abstractmethod

@@ -96,9 +96,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
     def handle(self, time_us: int, message: Message) -> Outcome:
         # Others may have inertial sensors of their own.
         handler = self._handlers.get(message.name) if message.src_component == _AUTOPILOT else None
-        outcome = Outcome.IGNORED if handler is None else handler(time_us, message)
-        self.counters[outcome] += 1
-        return outcome
+        return Outcome.IGNORED if handler is None else handler(time_us, message)
 
     def reset(self) -> None:
         self._guard.reset()

@@ -66,11 +66,6 @@ class LissajousEstimator(Estimator[LissajousParameters]):
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         """Take one message; only the autopilot's own count."""
-        outcome = self._handle(time_us, message)
-        self.counters[outcome] += 1
-        return outcome
-
-    def _handle(self, time_us: int, message: Message) -> Outcome:
         name = type(message).name
         if message.src_component != _AUTOPILOT or name not in (self._reader.message, "HOME_POSITION"):
             return Outcome.IGNORED

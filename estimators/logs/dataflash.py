@@ -13,9 +13,9 @@ from typing import Any, Final
 import numpy as np
 from pymavlink import DFReader
 
-from estimators.logs.dataflash_mapping import Records, map_messages
+from estimators.logs.dataflash_mapping import map_messages
 from estimators.logs.errors import LogError
-from estimators.logs.mapped import Array, MappedSource, Part, own_part
+from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
 
 _HEADER: Final = 3
 _META: Final = frozenset({"FMT", "FMTU", "UNIT", "MULT"})

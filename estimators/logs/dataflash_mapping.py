@@ -5,16 +5,14 @@ degrees, pressures in pascal, IMU in SI.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
-from estimators.logs.mapped import Array, Part, mavlink_part, newest
+from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, newest, value_at
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
-_SECOND_US: Final = 1_000_000
 _EV_ARMED, _EV_DISARMED = 10, 11
 _HOME: Final = 1  # ORGN.Type
 _TYPES: Final = {
@@ -24,31 +22,6 @@ _TYPES: Final = {
     "Rover": dialect.MAV_TYPE_GROUND_ROVER,
     "ArduSub": dialect.MAV_TYPE_SUBMARINE,
 }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Records:
-    """All messages of one name.
-
-    Attributes:
-        time_us: (n,) vehicle time.
-        columns: fields by name.
-    """
-
-    time_us: Array
-    columns: Mapping[str, Array]
-
-    def has(self, *fields: str) -> bool:
-        """Whether there are these fields."""
-        return all(field in self.columns for field in fields)
-
-    def where(self, rows: Array) -> "Records":
-        """Some of them."""
-        return Records(self.time_us[rows], {name: column[rows] for name, column in self.columns.items()})
-
-    def instance(self, field: str, number: int) -> "Records":
-        """Those of one instance; all of them when there is no such field."""
-        return self.where(self.columns[field] == number) if field in self.columns else self
 
 
 def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None) -> list[Part]:
@@ -68,21 +41,9 @@ def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None) -> l
         *_state(tables),
     ]
     if unix_offset_us is not None:
-        times = _seconds(tables)
+        times = each_second(tables.values())
         found.append(mavlink_part("SYSTEM_TIME", times, time_unix_usec=times + unix_offset_us))
     return [part for part in found if len(part.time_us)]
-
-
-def _seconds(tables: Mapping[str, Records]) -> Array:
-    first = min(int(table.time_us.min()) for table in tables.values())
-    last = max(int(table.time_us.max()) for table in tables.values())
-    return np.arange(first, last + 1, _SECOND_US, dtype=np.int64)
-
-
-def _at(table: Records | None, field: str, times: Array, before: float = 0.0) -> Array:
-    if table is None or not table.has(field):
-        return np.full(len(times), before)
-    return newest(table.time_us, table.columns[field], times, before)
 
 
 def _imu(tables: Mapping[str, Records]) -> list[Part]:
@@ -118,9 +79,9 @@ def _attitude(tables: Mapping[str, Records]) -> list[Part]:
                 times,
                 **{axis: np.radians(attitude.columns[axis.capitalize()]) for axis in ("roll", "pitch")},
                 yaw=_wrapped(np.radians(attitude.columns["Yaw"])),
-                rollspeed=np.radians(_at(rates, "R", times)),
-                pitchspeed=np.radians(_at(rates, "P", times)),
-                yawspeed=np.radians(_at(rates, "Y", times)),
+                rollspeed=np.radians(value_at(rates, "R", times)),
+                pitchspeed=np.radians(value_at(rates, "P", times)),
+                yawspeed=np.radians(value_at(rates, "Y", times)),
             )
         )
     truth = tables.get("SIM")
@@ -160,11 +121,11 @@ def _air(tables: Mapping[str, Records]) -> list[Part]:
                 "VFR_HUD",
                 times,
                 airspeed=first.columns["Airspeed"],
-                groundspeed=_at(_first(tables.get("GPS")), "Spd", times),
-                heading=np.mod(_at(tables.get("ATT"), "Yaw", times), 360.0),
-                throttle=_at(tables.get("CTUN"), "ThO", times),
-                alt=_at(tables.get("POS"), "Alt", times),
-                climb=-_at(_first(ekf, "C"), "VD", times),
+                groundspeed=value_at(_first(tables.get("GPS")), "Spd", times),
+                heading=np.mod(value_at(tables.get("ATT"), "Yaw", times), 360.0),
+                throttle=value_at(tables.get("CTUN"), "ThO", times),
+                alt=value_at(tables.get("POS"), "Alt", times),
+                climb=-value_at(_first(ekf, "C"), "VD", times),
             )
         )
     if baro is not None and baro.has("Press"):
@@ -175,7 +136,7 @@ def _air(tables: Mapping[str, Records]) -> list[Part]:
                 "SCALED_PRESSURE",
                 times,
                 press_abs=first.columns["Press"] / 100.0,
-                press_diff=_at(_first(airspeed), "DiffPress", times) / 100.0,
+                press_diff=value_at(_first(airspeed), "DiffPress", times) / 100.0,
                 temperature=100.0 * first.columns.get("Temp", np.zeros(len(times))),
             )
         )
@@ -206,10 +167,10 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
                 lon=c["Lng"] * 1e7,
                 alt=c["Alt"] * 1e3,
                 relative_alt=c.get("RelHomeAlt", np.zeros(len(times))) * 1e3,
-                vx=100.0 * _at(ekf, "VN", times),
-                vy=100.0 * _at(ekf, "VE", times),
-                vz=100.0 * _at(ekf, "VD", times),
-                hdg=100.0 * np.mod(_at(tables.get("ATT"), "Yaw", times), 360.0),
+                vx=100.0 * value_at(ekf, "VN", times),
+                vy=100.0 * value_at(ekf, "VE", times),
+                vz=100.0 * value_at(ekf, "VD", times),
+                hdg=100.0 * np.mod(value_at(tables.get("ATT"), "Yaw", times), 360.0),
             )
         )
     return found
@@ -271,7 +232,7 @@ def _state(tables: Mapping[str, Records]) -> list[Part]:
     if mode is None or not mode.has("ModeNum"):
         return found
     armed_us, armed = _armed(tables)
-    times = np.union1d(_seconds(tables), np.concatenate((mode.time_us, armed_us)))
+    times = np.union1d(each_second(tables.values()), np.concatenate((mode.time_us, armed_us)))
     times = times[times >= int(mode.time_us.min())]
     is_armed = newest(armed_us, armed, times).astype(bool)
     found.append(

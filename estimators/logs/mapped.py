@@ -4,7 +4,7 @@ Every table of the file stays readable under its own name. What estimators ask f
 messages too, in MAVLink's units.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -23,6 +23,8 @@ Array = NDArray[Any]
 
 SYSTEM_ID: Final = 1
 """A flight controller's own log is of one vehicle, which it does not number."""
+
+_SECOND_US: Final = 1_000_000
 
 _TYPES: Final = MappingProxyType(
     {
@@ -53,6 +55,44 @@ class Part:
     description: Description
     time_us: NDArray[np.int64]
     columns: Mapping[str, Array]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Records:
+    """All messages of one kind and instance in a file.
+
+    Attributes:
+        time_us: (n,) vehicle time.
+        columns: fields by name; arrays are (n, length).
+    """
+
+    time_us: Array
+    columns: Mapping[str, Array]
+
+    def has(self, *fields: str) -> bool:
+        """Whether there are these fields."""
+        return all(field in self.columns for field in fields)
+
+    def where(self, rows: Array) -> "Records":
+        """Some of them."""
+        return Records(self.time_us[rows], {name: column[rows] for name, column in self.columns.items()})
+
+    def instance(self, field: str, number: int) -> "Records":
+        """Those of one instance; all of them when there is no such field."""
+        return self.where(self.columns[field] == number) if field in self.columns else self
+
+
+def value_at(records: Records | None, field: str, at_us: Array, before: float = 0.0) -> Array:
+    """The newest value of a field at each time; `before` until the first, and without the field."""
+    if records is None or not records.has(field):
+        return np.full(len(at_us), before)
+    return newest(records.time_us, records.columns[field], at_us, before)
+
+
+def each_second(found: Iterable[Records]) -> Array:
+    """Times from the first message of all to the last, a second apart."""
+    spans = [(int(records.time_us.min()), int(records.time_us.max())) for records in found]
+    return np.arange(min(first for first, _ in spans), max(last for _, last in spans) + 1, _SECOND_US)
 
 
 def mavlink_part(name: str, time_us: Array, **columns: Any) -> Part:

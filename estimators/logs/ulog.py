@@ -12,8 +12,8 @@ import numpy as np
 from pyulog.core import ULog
 
 from estimators.logs.errors import LogError
-from estimators.logs.mapped import Array, MappedSource, Part, own_part
-from estimators.logs.ulog_mapping import Topic, map_topics
+from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
+from estimators.logs.ulog_mapping import map_topics
 
 _TIME: Final = "timestamp"
 _MOST_RETURNS: Final = 2000
@@ -57,7 +57,7 @@ def open_ulog(path: Path) -> MappedSource:
         raise LogError(
             f"{path} can't be read as a PX4 .ulg: {type(error).__name__} {error}; is it whole?"
         ) from error
-    topics: dict[tuple[str, int], Topic] = {}
+    topics: dict[tuple[str, int], Records] = {}
     parts: list[Part] = []
     names_taken: dict[str, int] = {}
     for number, data in enumerate(sorted(log.data_list, key=lambda item: (item.name, item.multi_id))):
@@ -66,7 +66,7 @@ def open_ulog(path: Path) -> MappedSource:
         columns = _arrays({name: np.asarray(column)[good] for name, column in data.data.items()})
         if not columns or not np.any(good):
             continue
-        topic = Topic(times[good].astype(np.int64), columns)
+        topic = Records(times[good].astype(np.int64), columns)
         topics.setdefault((data.name, data.multi_id), topic)
         # Instances of a topic are tables of their own: sensor_accel, sensor_accel_1, ...
         name = data.name if not data.multi_id else f"{data.name}_{data.multi_id}"
@@ -113,7 +113,7 @@ def _arrays(columns: dict[str, Array]) -> dict[str, Array]:
     return {name: column for name, column in named.items() if name.isidentifier()}
 
 
-def _unix_offset_us(topics: dict[tuple[str, int], Topic]) -> int | None:
+def _unix_offset_us(topics: dict[tuple[str, int], Records]) -> int | None:
     """Unix time at boot, by the first time that the GPS told."""
     for name in ("vehicle_gps_position", "sensor_gps"):
         topic = topics.get((name, 0))

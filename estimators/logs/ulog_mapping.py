@@ -4,16 +4,14 @@ Source: PX4's message definitions (docs.px4.io, "uORB message reference", 1.12 t
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
-from estimators.logs.mapped import Array, Part, mavlink_part, newest
+from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, newest, value_at
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
-_SECOND_US: Final = 1_000_000
 _TYPE_OF_CLASS: Final = {  # VEHICLE_TYPE of vehicle_status
     1: dialect.MAV_TYPE_QUADROTOR,
     2: dialect.MAV_TYPE_FIXED_WING,
@@ -42,24 +40,7 @@ _CUSTOM_MODES: Final = {  # NAVIGATION_STATE of vehicle_status: PX4's main and s
 _LANDED, _IN_AIR = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Topic:
-    """All messages of one topic and instance.
-
-    Attributes:
-        time_us: (n,) vehicle time.
-        columns: fields by name; arrays are (n, length).
-    """
-
-    time_us: Array
-    columns: Mapping[str, Array]
-
-    def has(self, *fields: str) -> bool:
-        """Whether there are these fields."""
-        return all(field in self.columns for field in fields)
-
-
-Topics = Mapping[tuple[str, int], Topic]
+Topics = Mapping[tuple[str, int], Records]
 """By name and instance."""
 
 
@@ -83,26 +64,14 @@ def map_topics(topics: Topics, texts: Iterable[Any], unix_offset_us: int | None)
         *_texts(texts),
     ]
     if unix_offset_us is not None:
-        times = _seconds(topics)
+        times = each_second(topics.values())
         found.append(mavlink_part("SYSTEM_TIME", times, time_unix_usec=times + unix_offset_us))
     return [part for part in found if len(part.time_us)]
 
 
-def _find(topics: Topics, names: Iterable[str], *fields: str) -> Topic | None:
+def _find(topics: Topics, names: Iterable[str], *fields: str) -> Records | None:
     """The first of these topics that there is, with these fields."""
     return next((t for name in names if (t := topics.get((name, 0))) is not None and t.has(*fields)), None)
-
-
-def _at(topic: Topic | None, field: str, times: Array, before: float = 0.0) -> Array:
-    if topic is None or not topic.has(field):
-        return np.full(len(times), before)
-    return newest(topic.time_us, topic.columns[field], times, before)
-
-
-def _seconds(topics: Topics) -> Array:
-    first = min(int(topic.time_us.min()) for topic in topics.values())
-    last = max(int(topic.time_us.max()) for topic in topics.values())
-    return np.arange(first, last + 1, _SECOND_US, dtype=np.int64)
 
 
 def _imu(topics: Topics) -> list[Part]:
@@ -117,7 +86,7 @@ def _imu(topics: Topics) -> list[Part]:
         if rates is None or forces is None or not (rates.has("x", "y", "z") and forces.has("x", "y", "z")):
             continue
         gyro = np.column_stack([rates.columns[axis] for axis in "xyz"])
-        force = np.column_stack([_at(forces, axis, rates.time_us, np.nan) for axis in "xyz"])
+        force = np.column_stack([value_at(forces, axis, rates.time_us, np.nan) for axis in "xyz"])
         known = np.isfinite(force).all(axis=1)
         samples.append((rates.time_us[known], gyro[known], force[known], number))
     if not samples:
@@ -165,7 +134,7 @@ def _air(topics: Topics) -> list[Part]:
         if airspeed is not None and np.isfinite(airspeed.columns[field]).any():
             good = np.isfinite(airspeed.columns[field])
             times = airspeed.time_us[good]
-            heading = np.degrees(_at(local, "heading", times))
+            heading = np.degrees(value_at(local, "heading", times))
             thrust = _find(topics, ("vehicle_thrust_setpoint",), "xyz")
             throttle = 0.0 if thrust is None else newest(thrust.time_us, thrust.columns["xyz"][:, 0], times)
             found.append(
@@ -173,11 +142,11 @@ def _air(topics: Topics) -> list[Part]:
                     "VFR_HUD",
                     times,
                     airspeed=airspeed.columns[field][good],
-                    groundspeed=np.hypot(_at(local, "vx", times), _at(local, "vy", times)),
+                    groundspeed=np.hypot(value_at(local, "vx", times), value_at(local, "vy", times)),
                     heading=np.mod(heading, 360.0),
                     throttle=100.0 * np.clip(throttle, 0.0, 1.0),
-                    alt=_at(place, "alt", times),
-                    climb=-_at(local, "vz", times),
+                    alt=value_at(place, "alt", times),
+                    climb=-value_at(local, "vz", times),
                 )
             )
             break
@@ -193,8 +162,8 @@ def _air(topics: Topics) -> list[Part]:
                 "SCALED_PRESSURE",
                 times,
                 press_abs=pressure.columns[field] / 100.0,
-                press_diff=_at(difference, "differential_pressure_pa", times) / 100.0,
-                temperature=100.0 * _at(pressure, "baro_temp_celcius", times),
+                press_diff=value_at(difference, "differential_pressure_pa", times) / 100.0,
+                temperature=100.0 * value_at(pressure, "baro_temp_celcius", times),
             )
         )
     return found
@@ -212,7 +181,7 @@ def _positions(topics: Topics) -> list[Part]:
     if place is not None:
         c, times = place.columns, place.time_us
         home = _valid_home(topics)
-        base = _at(home, "alt", times, float(c["alt"][0]))
+        base = value_at(home, "alt", times, float(c["alt"][0]))
         found.append(
             mavlink_part(
                 "GLOBAL_POSITION_INT",
@@ -221,8 +190,8 @@ def _positions(topics: Topics) -> list[Part]:
                 lon=c["lon"] * 1e7,
                 alt=c["alt"].astype(np.float64) * 1e3,
                 relative_alt=(c["alt"] - base) * 1e3,
-                **{axis: 100.0 * _at(local, axis, times) for axis in ("vx", "vy", "vz")},
-                hdg=100.0 * np.mod(np.degrees(_at(local, "heading", times)), 360.0),
+                **{axis: 100.0 * value_at(local, axis, times) for axis in ("vx", "vy", "vz")},
+                hdg=100.0 * np.mod(np.degrees(value_at(local, "heading", times)), 360.0),
             )
         )
     return found
@@ -246,12 +215,12 @@ def _home(topics: Topics) -> list[Part]:
     ]
 
 
-def _valid_home(topics: Topics) -> Topic | None:
+def _valid_home(topics: Topics) -> Records | None:
     home = _find(topics, ("home_position",), "lat", "lon", "alt")
     if home is None or not home.has("valid_hpos"):
         return home
     known = home.columns["valid_hpos"] != 0
-    return Topic(home.time_us[known], {name: column[known] for name, column in home.columns.items()})
+    return Records(home.time_us[known], {name: column[known] for name, column in home.columns.items()})
 
 
 def _gps(topics: Topics) -> list[Part]:
@@ -290,9 +259,9 @@ def _state(topics: Topics) -> list[Part]:
     found = []
     status = _find(topics, ("vehicle_status",), "nav_state", "arming_state")
     if status is not None:
-        times = np.union1d(_seconds(topics), status.time_us)
+        times = np.union1d(each_second(topics.values()), status.time_us)
         times = times[times >= int(status.time_us.min())]
-        armed = _at(status, "arming_state", times) == _ARMED
+        armed = value_at(status, "arming_state", times) == _ARMED
         modes = np.array(
             [_custom_mode(int(state)) for state in status.columns["nav_state"]], dtype=np.float64
         )
@@ -312,9 +281,9 @@ def _state(topics: Topics) -> list[Part]:
         )
     landed = _find(topics, ("vehicle_land_detected",), "landed")
     if landed is not None:
-        times = _seconds(topics)
+        times = each_second(topics.values())
         times = np.union1d(times[times >= int(landed.time_us.min())], landed.time_us)
-        on_ground = _at(landed, "landed", times) != 0
+        on_ground = value_at(landed, "landed", times) != 0
         state = np.where(on_ground, _LANDED, _IN_AIR)
         found.append(mavlink_part("EXTENDED_SYS_STATE", times, landed_state=state))
     return found
@@ -332,10 +301,10 @@ def _truth(topics: Topics) -> list[Part]:
             "HIL_STATE_QUATERNION",
             times,
             attitude_quaternion=attitude.columns["q"],
-            lat=1e7 * _at(place, "lat", times),
-            lon=1e7 * _at(place, "lon", times),
-            alt=1e3 * _at(place, "alt", times),
-            **{axis: 100.0 * _at(local, axis, times) for axis in ("vx", "vy", "vz")},
+            lat=1e7 * value_at(place, "lat", times),
+            lon=1e7 * value_at(place, "lon", times),
+            alt=1e3 * value_at(place, "alt", times),
+            **{axis: 100.0 * value_at(local, axis, times) for axis in ("vx", "vy", "vz")},
         )
     ]
 
@@ -356,7 +325,7 @@ def _severity(log_level: Any) -> int:
     return min(max(number, 0), dialect.MAV_SEVERITY_DEBUG)
 
 
-def _mav_types(status: Topic) -> Array:
+def _mav_types(status: Records) -> Array:
     """MAV_TYPE of each vehicle_status; of the class of the vehicle where an old log has no system_type."""
     if "system_type" in status.columns:
         return status.columns["system_type"]

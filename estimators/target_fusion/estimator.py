@@ -95,11 +95,6 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         """Take one message of any drone."""
-        outcome = self._handle(time_us, message)
-        self.counters[outcome] += 1
-        return outcome
-
-    def _handle(self, time_us: int, message: Message) -> Outcome:
         name = type(message).name
         handler = self._handlers.get(name)
         if handler is None:

@@ -153,7 +153,6 @@ def test_what_is_no_sample_changes_nothing(time_us, values, outcome):
     before = newest(found)
     assert found.handle(time_us, highres(time_us, **values)) is outcome
     assert newest(found) == before
-    assert found.counters[outcome] == 1
     assert found.handle(1_040_000, highres(1_040_000, force=FORCE)) is Outcome.UPDATED
     assert newest(found).roll_rad == pytest.approx(ROLL, abs=1e-6)
 
@@ -195,11 +194,9 @@ def test_reset_forgets():
     found = AttitudeEstimator()
     found.handle(0, heartbeat(kind=2))
     found.handle(0, highres(0))
-    counted = dict(found.counters)
     found.reset()
     assert found.estimates == ()
     assert found.handle(0, highres(0)) is Outcome.WAITING
-    assert found.counters[Outcome.USED] == counted[Outcome.USED]
 
 
 def test_same_messages_same_estimates():
