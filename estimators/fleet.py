@@ -91,13 +91,23 @@ class Fleet:
         Raises:
             EstimatorFailure: the estimator raised an error.
         """
+        runner = self._runner_of(message)
+        outcome = None if runner is None else runner.take(time_us, message)
+        return None if runner is None or outcome is None else (runner, outcome)
+
+    def pass_over(self, time_us: int, message: Message) -> None:
+        """Leave a message out that is not asked for; the boots of its vehicle are counted all the same.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error.
+        """
+        runner = self._runner_of(message)
+        if runner is not None:
+            runner.pass_over(time_us, message)
+
+    def _runner_of(self, message: Message) -> Runner | None:
         runner = self._runners.get(0 if self.team else message.src_system)
-        if runner is None:
-            runner = self._new_runner(message)
-            if runner is None:
-                return None
-        outcome = runner.take(time_us, message)
-        return None if outcome is None else (runner, outcome)
+        return self._new_runner(message) if runner is None else runner
 
     def _new_runner(self, message: Message) -> Runner | None:
         system_id = message.src_system

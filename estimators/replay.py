@@ -79,6 +79,8 @@ def replay(
             for time_us, message in _messages(opened, fleet, system_id):
                 if (from_us is None or time_us >= from_us) and (to_us is None or time_us <= to_us):
                     fleet.take(time_us, message)
+                else:
+                    fleet.pass_over(time_us, message)
         except EstimatorFailure as error:
             failure = str(error)
     return Replay(logs=opened, fleet=fleet, supplies=served, lacking=lacking, failure=failure)

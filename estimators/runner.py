@@ -238,19 +238,27 @@ class Runner:
             return None
         if team_time is not None:
             time_us = team_time.common_us(time_us, message.src_system)
-        elif message.src_system != self.system_id:
-            if self.system_id is not None or component != 1:
-                self.left_out["of another vehicle"] += 1
-                return None
-            self.system_id = message.src_system
-        if team_time is None:
-            newest_us = self._newest_us
-            if newest_us is None or time_us > newest_us:
-                self._newest_us = time_us
-            elif time_us < newest_us - NEW_BOOT_US:
-                self.start_boot()
-                self._newest_us = time_us
+        elif self._is_own(message):
+            self._watch_boots(time_us)
+        else:
+            self.left_out["of another vehicle"] += 1
+            return None
         return self._handle(time_us, message)
+
+    def pass_over(self, time_us: int, message: Message) -> None:
+        """Leave a message out that is not asked for; its vehicle's boots are counted all the same.
+
+        Raises:
+            EstimatorFailure: the estimator raised an error.
+        """
+        if self._team_time is None and message.name in self.names and self._is_own(message):
+            self._watch_boots(time_us)
+
+    def _is_own(self, message: Message) -> bool:
+        """Whether it is of the one vehicle that counts: of the first autopilot heard, if none was named."""
+        if self.system_id is None and message.src_component == 1:
+            self.system_id = message.src_system
+        return bool(message.src_system == self.system_id)
 
     def learn_times(self, system_times: Iterable[tuple[int, Message]]) -> None:
         """Learn when the vehicles of a team booted, before their messages come.
@@ -266,6 +274,14 @@ class Runner:
     def common_us(self, time_us: int, system_id: int) -> int:
         """The time common to a team of a vehicle's time; of one vehicle it is its own."""
         return time_us if self._team_time is None else self._team_time.common_us(time_us, system_id)
+
+    def _watch_boots(self, time_us: int) -> None:
+        newest_us = self._newest_us
+        if newest_us is None or time_us > newest_us:
+            self._newest_us = time_us
+        elif time_us < newest_us - NEW_BOOT_US:
+            self.start_boot()
+            self._newest_us = time_us
 
     def start_boot(self) -> None:
         """The vehicle has booted anew: what the estimator knew is of no use.

@@ -152,6 +152,25 @@ def test_several_logs_are_for_teams(make_log, make):
         replay([open_log(log.close()) for log in logs], make)
 
 
+def test_a_boot_that_is_left_out_is_counted_all_the_same(make_log, make):
+    """Of three boots the first is over before the part that is asked for begins."""
+    log = make_log()
+    for seconds, roll in ((4, 0.1), (20, 0.2), (20, 0.3)):
+        for k in range(seconds * 20):
+            log.attitude(1.0 + 0.05 * k, roll=roll)
+            log.truth(1.0 + 0.05 * k, roll=roll)
+            if k % 20 == 0:
+                log.heartbeat()
+    opened = open_log(log.close())
+    whole, part = replay(opened, make), replay(opened, make, from_us=10_000_000)
+    assert [runner.boot for runner in (whole.fleet.runners[1], part.fleet.runners[1])] == [2, 2]
+    (compared,) = comparisons(part.logs, part.fleet.runners[1], "truth")
+    rolls = compared.references["truth"]["roll_rad"]
+    assert set(compared.boot.tolist()) == {1, 2}
+    assert rolls[compared.boot == 1] == pytest.approx(0.2, abs=1e-6)
+    assert rolls[compared.boot == 2] == pytest.approx(0.3, abs=1e-6)
+
+
 def test_a_team_lacks_what_one_of_its_vehicles_lacks(make_log):
     log = make_log()
     for k in range(40):
