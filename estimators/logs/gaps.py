@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
 from estimators.logs.crc import Int
-from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, scan
+from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, frame_end, message_row, scan
 from flightsim.kernels import kernel
 
 _UNKNOWN, _UNSUPPORTED, _BAD_CRC = range(3)
@@ -30,9 +30,6 @@ _UNKNOWN, _UNSUPPORTED, _BAD_CRC = range(3)
     _B_TORN,
 ) = range(9)
 _FIGURES: Final = 9
-_OVERHEAD_V1: Final = 8
-_OVERHEAD_V2: Final = 12
-_SIGNATURE: Final = 13
 _SAMPLE_BYTES: Final = 1 << 18
 _SAMPLE_FRAMES: Final = 16
 
@@ -118,25 +115,17 @@ def _shape(
     size = len(data)
     if at >= size:
         return -2, -1
-    if data[at] == MAGIC_V2:
-        if at + 3 > size:
-            return -2, -1
-        flags = data[at + 2]
-        end = at + _OVERHEAD_V2 + np.int64(data[at + 1]) + (_SIGNATURE if flags & 1 else 0)
-        if end > size:
-            return -2, -1
-        if flags > 1:
-            return end, _UNSUPPORTED
-        page = np.int64(data[at + 8]) | np.int64(data[at + 9]) << 8
-        return end, (_BAD_CRC if rows[pages[page], data[at + 7]] >= 0 else _UNKNOWN)
-    if data[at] == MAGIC_V1:
-        if at + 2 > size:
-            return -2, -1
-        end = at + _OVERHEAD_V1 + np.int64(data[at + 1])
-        if end > size:
-            return -2, -1
-        return end, (_BAD_CRC if rows[pages[0], data[at + 5]] >= 0 else _UNKNOWN)
-    return -1, -1
+    v2 = data[at] == MAGIC_V2
+    if not v2 and data[at] != MAGIC_V1:
+        return -1, -1
+    if at + (3 if v2 else 2) > size:
+        return -2, -1
+    end = frame_end(data, at)
+    if end > size:
+        return -2, -1
+    if v2 and data[at + 2] > 1:
+        return end, _UNSUPPORTED
+    return end, (_BAD_CRC if message_row(data, at, pages, rows) >= 0 else _UNKNOWN)
 
 
 @kernel

@@ -71,7 +71,8 @@ def mutated_records(
                 streams[key] = (stream, rows[keep])
             elif fault.kind is FaultKind.DELAYED:
                 assert fault.value is not None
-                later |= dict.fromkeys(order[hit].tolist(), round(fault.value * 1e6))
+                for position in order[hit].tolist():
+                    later[position] = later.get(position, 0) + round(fault.value * 1e6)
             else:
                 changed |= _changed(log, stream, rows[hit], times_s[hit], fault, rng, changed)
         if not touched:

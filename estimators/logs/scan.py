@@ -173,6 +173,26 @@ def _insert(keys: NDArray[np.int64], slots: NDArray[np.int32], number: int) -> N
 
 
 @kernel
+def frame_end(data: NDArray[np.uint8], at: Int) -> Int:
+    """End of what begins at `at` as a frame does, by its length and flags; its head lies in the file."""
+    length = np.int64(data[at + 1])
+    if data[at] != MAGIC_V2:
+        return at + _OVERHEAD_V1 + length
+    return at + _OVERHEAD_V2 + length + (_SIGNATURE if data[at + 2] & 1 else 0)
+
+
+@kernel
+def message_row(
+    data: NDArray[np.uint8], at: Int, pages: NDArray[np.int16], rows: NDArray[np.int16]
+) -> np.int64:
+    """Number of the message in the frame at `at`; below 0: the dialect does not know it."""
+    if data[at] == MAGIC_V2:
+        page = np.int64(data[at + 8]) | np.int64(data[at + 9]) << 8
+        return np.int64(rows[pages[page], data[at + 7]])
+    return np.int64(rows[pages[0], data[at + 5]])
+
+
+@kernel
 def valid_frame(
     data: NDArray[np.uint8],
     at: Int,
@@ -184,27 +204,19 @@ def valid_frame(
     size = len(data)
     magic = data[at]
     if magic == MAGIC_V2:
-        if at + _OVERHEAD_V2 > size:
+        if at + _OVERHEAD_V2 > size or data[at + 2] > 1:
             return -1, -1
-        flags = data[at + 2]
-        if flags > 1:
-            return -1, -1
-        crc_at = at + 10 + np.int64(data[at + 1])
-        end = crc_at + 2 + (_SIGNATURE if flags else 0)
-        if end > size:
-            return -1, -1
-        page = np.int64(data[at + 8]) | np.int64(data[at + 9]) << 8
-        message = np.int64(rows[pages[page], data[at + 7]])
+        crc_at = at + _OVERHEAD_V2 - 2 + np.int64(data[at + 1])
     elif magic == MAGIC_V1:
         if at + _OVERHEAD_V1 > size:
             return -1, -1
-        crc_at = at + 6 + np.int64(data[at + 1])
-        end = crc_at + 2
-        if end > size:
-            return -1, -1
-        message = np.int64(rows[pages[0], data[at + 5]])
+        crc_at = at + _OVERHEAD_V1 - 2 + np.int64(data[at + 1])
     else:
         return -1, -1
+    end = frame_end(data, at)
+    if end > size:
+        return -1, -1
+    message = message_row(data, at, pages, rows)
     if message < 0:
         return -1, -1
     if checksum(data, at + 1, crc_at, extras[message]) != (

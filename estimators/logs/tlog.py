@@ -12,11 +12,20 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, MAGIC_V2
 from estimators.logs.columns import Columns, decode_columns
-from estimators.logs.crc import Int
 from estimators.logs.dialect import Description, Dialect
 from estimators.logs.errors import LogError
 from estimators.logs.gaps import GapFigures, find_lead, sort_gaps
-from estimators.logs.scan import FRAMES, LATE, LOST, STAMP_SIZE, FrameIndex, Offsets, message_table, scan
+from estimators.logs.scan import (
+    FRAMES,
+    LATE,
+    LOST,
+    STAMP_SIZE,
+    FrameIndex,
+    Offsets,
+    frame_end,
+    message_table,
+    scan,
+)
 from estimators.logs.source import LogSource, Positions, SourceLoss, Stream, UnknownMessage
 from estimators.vehicle_time import UNIX_TIME_US, stamp_field, vehicle_times
 from flightsim.kernels import kernel
@@ -277,17 +286,9 @@ def _group(streams: NDArray[np.int32], places: NDArray[np.int64], grouped: Posit
 
 
 @kernel
-def _frame_end(data: NDArray[np.uint8], start: Int) -> Int:
-    length = np.int64(data[start + 1])
-    if data[start] != MAGIC_V2:
-        return start + 8 + length
-    return start + 12 + length + (13 if data[start + 2] & 1 else 0)
-
-
-@kernel
 def _frame_ends(data: NDArray[np.uint8], starts: NDArray[np.int64], ends: NDArray[np.int64]) -> None:
     for index in range(len(starts)):
-        ends[index] = _frame_end(data, starts[index])
+        ends[index] = frame_end(data, starts[index])
 
 
 @kernel
@@ -302,7 +303,7 @@ def _log_times(
         position = order[index]
         while position >= 0:
             start = starts[position]
-            before = _frame_end(data, starts[position - 1]) if position > 0 else 0
+            before = frame_end(data, starts[position - 1]) if position > 0 else 0
             if start - before >= STAMP_SIZE:
                 value = np.uint64(0)
                 for byte in range(STAMP_SIZE):

@@ -144,6 +144,12 @@ def test_delayed_messages_come_later_with_their_own_stamps(mutate):
     assert set(late.tolist()) == {0, 120_000} and np.count_nonzero(late) == 120
 
 
+def test_delays_add_up(mutate):
+    imu = mutate("RAW_IMU:delayed=0.12", "RAW_IMU:delayed=0.3").table("RAW_IMU")
+    late = imu.log_time_us - EPOCH_US - (imu["time_usec"].astype(np.int64) - 5_000_000)
+    assert set(late.tolist()) == {420_000}
+
+
 def test_faults_add_up_and_a_seed_makes_one_log(mutate):
     both = mutate("ATTITUDE.roll:wrong=1", "ATTITUDE.roll:wrong=2", "ATTITUDE.pitch:wrong=0.5")
     assert both.table("ATTITUDE", system_id=2)["roll"][0] == pytest.approx(2.5)
