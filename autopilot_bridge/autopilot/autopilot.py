@@ -6,13 +6,14 @@ clock.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.firmware import FIRMWARES, PAYLOAD_ROLE
+from autopilot_bridge.autopilot.microservices import microservices
 from autopilot_bridge.autopilot.status import NavigationJudgement, StatusReport
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.commander import Commander
@@ -31,6 +32,7 @@ from autopilot_bridge.services.commands import CommandService
 from autopilot_bridge.services.file_transfer import FileTransferService
 from autopilot_bridge.services.manual import ManualService
 from autopilot_bridge.services.message_interval import MessageIntervalService
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.mission import MissionService, new_stores
 from autopilot_bridge.services.parameters import ParameterService
 from autopilot_bridge.services.setpoints import SetpointService
@@ -55,6 +57,7 @@ _COMPONENT: Final = 1
 _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
 
 FailureHook = Callable[[int, int, int], Result]
+EntryT = TypeVar("EntryT")
 
 
 class AutopilotChannel(Channel, Protocol):
@@ -185,12 +188,29 @@ class Autopilot:
         self._status = StatusReport(flavour, self.commander)
         self._view = TelemetryView(self.context, self.navigation.state, readings)
         self._messages = self._build_messages(unix_epoch_us)
-        self._cache = PayloadCache(self._messages.builders())
+        self._more = microservices(
+            AutopilotParts(
+                flavour=flavour,
+                system_id=system_id,
+                commander=self.commander,
+                navigation=self.navigation,
+                parameters=self.parameters,
+                readings=readings,
+                stores=stores,
+                broadcast=self,
+                announce=self._texts.announce,
+            )
+        )
+        self._cache = PayloadCache(merged(self._messages.builders(), *(more.builders for more in self._more)))
         self._tables: dict[str, StreamTable] = {}
         self._table_list: list[StreamTable] = []
         self._ports: list[StreamTable] = []  # those for clients: SR0_* is the first
         self.intervals = MessageIntervalService(
-            firmware.intervals, self._tables, self._cache, self._texts.announce, self._on_demand()
+            firmware.intervals,
+            self._tables,
+            self._cache,
+            self._texts.announce,
+            merged(self._on_demand(), *(more.on_demand for more in self._more)),
         )
         hooks = CommandHooks(
             intervals=self.intervals,
@@ -206,7 +226,12 @@ class Autopilot:
             self,
             on_list=lambda channel: self._texts.banner(channel),
         )
-        self._timed: tuple[TimedService, ...] = (parameter_service, self.missions, self.intervals)
+        self._timed: tuple[TimedService, ...] = (
+            parameter_service,
+            self.missions,
+            *(more for more in self._more if type(more).tick is not Microservice.tick),
+            self.intervals,
+        )
         self._services: tuple[Service, ...] = (
             SetpointService(flavour.name, self.commander),
             ManualService(
@@ -215,12 +240,17 @@ class Autopilot:
                 gcs_system_id=255 if flavour.name == "ardupilot" else None,
             ),
             CommandService.for_flavour(
-                flavour.name, self.commander, hooks, flavour.command_address(system_id)
+                flavour.name,
+                self.commander,
+                hooks,
+                flavour.command_address(system_id),
+                merged(*(more.commands for more in self._more)),
             ),
             parameter_service,
             self.missions,
             TimeSyncService(answers_ping=firmware.answers_ping),
             FileTransferService(),
+            *self._more,
             self.intervals,
             self._texts,
         )
@@ -316,6 +346,8 @@ class Autopilot:
     def _follow(self, event: events.Event) -> None:
         """What the rest of the autopilot makes of something that happened to the vehicle."""
         self._texts.tell(event)
+        for more in self._more:
+            more.follow(event)
         match event:
             case events.MissionItemReached(index=index):
                 self.missions.item_reached(index)
@@ -413,3 +445,8 @@ class Autopilot:
                 channel.send(
                     mavlink.MAVLink_available_modes_message(len(modes), number, 0, custom_mode, 0, name[:34])
                 )
+
+
+def merged(*tables: Mapping[int, EntryT]) -> dict[int, EntryT]:
+    """One table of several, by number; of the same number in two, the later one."""
+    return {number: entry for table in tables for number, entry in table.items()}

@@ -10,7 +10,12 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.services.channel import AddressRule, MavlinkMessage, Source
 from autopilot_bridge.services.command_arducopter import ArduCopterCommands
 from autopilot_bridge.services.command_arduplane import ArduPlaneCommands
-from autopilot_bridge.services.command_common import CommandHandlers, CommandHooks, command_from_message
+from autopilot_bridge.services.command_common import (
+    CommandHandlers,
+    CommandHooks,
+    Handler,
+    command_from_message,
+)
 from autopilot_bridge.services.command_px4 import Px4Commands
 from autopilot_bridge.services.command_px4_plane import Px4PlaneCommands
 from autopilot_bridge.services.vehicle_class import is_aircraft
@@ -34,19 +39,28 @@ class CommandService:
     Args:
         handlers: the flavour's commands.
         address: which targets are this autopilot.
+        more: commands of other services, by MAV_CMD; they go before the flavour's own.
     """
 
-    def __init__(self, handlers: CommandHandlers, address: AddressRule) -> None:
+    def __init__(
+        self, handlers: CommandHandlers, address: AddressRule, more: Mapping[int, Handler] | None = None
+    ) -> None:
         self._handlers = handlers
         self._address = address
+        self._more = dict(more or {})
 
     @classmethod
     def for_flavour(
-        cls, name: str, commander: Commander, hooks: CommandHooks, address: AddressRule
+        cls,
+        name: str,
+        commander: Commander,
+        hooks: CommandHooks,
+        address: AddressRule,
+        more: Mapping[int, Handler] | None = None,
     ) -> "CommandService":
         """The command service of a flavour, by name, for the commander's class of vehicle."""
         handlers = _AIRCRAFT if is_aircraft(commander) else _MULTICOPTERS
-        return cls(handlers[name](commander, hooks), address)
+        return cls(handlers[name](commander, hooks), address, more)
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL or SET_MODE; never raises on contents."""
@@ -67,7 +81,8 @@ class CommandService:
         command = command_from_message(message)
         if command.id in self._handlers.double_ack:
             _acknowledge(command.id, Result.ACCEPTED, source)
-        result = self._handlers.execute(command, source)
+        handler = self._more.get(command.id)
+        result = self._handlers.execute(command, source) if handler is None else handler(command, source)
         if result is not None:
             _acknowledge(command.id, result, source)
 

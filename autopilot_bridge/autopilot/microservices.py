@@ -1,0 +1,8 @@
+"""Which microservices an autopilot has, beyond those that it is built around."""
+
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+
+
+def microservices(parts: AutopilotParts) -> tuple[Microservice, ...]:
+    """Those of one autopilot, in the order in which they are asked."""
+    return ()

@@ -1,0 +1,80 @@
+"""What a MAVLink microservice may bring along besides answering messages, and what it may reach.
+
+`autopilot.microservices` makes those of an autopilot; a new one is a class here and a line there.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.events import Event
+from autopilot_bridge.flavours.flavour import Flavour
+from autopilot_bridge.mission_plan import MissionStore, MissionType
+from autopilot_bridge.navigation import NavigationFilter
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.channel import Announce, Broadcast, Channel, MavlinkMessage, Source
+from autopilot_bridge.services.command_common import Handler
+from autopilot_bridge.telemetry.streams import Builder
+from flightsim.interface import SensorReadings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AutopilotParts:
+    """What microservices may reach.
+
+    Attributes:
+        flavour: which firmware is emulated.
+        system_id: the vehicle's.
+        commander: modes, arming, guidance.
+        navigation: the filter; `navigation.state` is in `navigation.layout`.
+        parameters: the parameter store.
+        readings: the sensors.
+        stores: the uploaded plans, by type.
+        broadcast: all channels.
+        announce: sends a STATUSTEXT.
+    """
+
+    flavour: Flavour
+    system_id: int
+    commander: Commander
+    navigation: NavigationFilter
+    parameters: ParameterStore
+    readings: SensorReadings
+    stores: Mapping[MissionType, MissionStore]
+    broadcast: Broadcast
+    announce: Announce
+
+
+class Microservice:
+    """One microservice; by default it does nothing.
+
+    Everything is called between two steps of the autopilot, and never raises for what a message holds.
+    """
+
+    @property
+    def commands(self) -> Mapping[int, Handler]:
+        """MAV_CMDs it carries out, before the flavour's own table is asked. Read once."""
+        return {}
+
+    @property
+    def builders(self) -> Mapping[int, Builder]:
+        """Messages that can be requested and streamed: message id -> field values, packed payload, or None.
+
+        Read once.
+        """
+        return {}
+
+    @property
+    def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
+        """Messages that are sent on REQUEST_MESSAGE only, with its param2. Read once."""
+        return {}
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Take one message; True when it belonged to this service and no other need see it."""
+        return False
+
+    def tick(self, time_us: int) -> None:
+        """Timers and queues, at 50 Hz of vehicle time."""
+
+    def follow(self, event: Event) -> None:
+        """Something happened to the vehicle."""
