@@ -35,16 +35,19 @@ from autopilot_bridge.services.message_interval import MessageIntervalService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.mission import MissionService, new_stores
 from autopilot_bridge.services.parameters import ParameterService
+from autopilot_bridge.services.radio import RadioService
 from autopilot_bridge.services.setpoints import SetpointService
 from autopilot_bridge.services.status_text import StatusTextService
 from autopilot_bridge.services.timesync import TimeSyncService
 from autopilot_bridge.telemetry.ardupilot import STREAM_RATE_PARAMETERS, ArdupilotMessages
 from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
+from autopilot_bridge.telemetry.line import LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.px4 import Px4Messages
 from autopilot_bridge.telemetry.px4_plane import Px4PlaneMessages
 from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
+from autopilot_bridge.telemetry.throttle import StreamThrottle
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
@@ -68,6 +71,10 @@ class AutopilotChannel(Channel, Protocol):
     """
 
     motion: MotionMessages | None
+
+    @property
+    def line(self) -> LineBudget | None:
+        """What the channel's line can carry; None: whatever there is."""
 
     def send_payload(self, message_id: int, payload: bytes) -> None:
         """Frame the payload and send it."""
@@ -205,6 +212,7 @@ class Autopilot:
         self._tables: dict[str, StreamTable] = {}
         self._table_list: list[StreamTable] = []
         self._ports: list[StreamTable] = []  # those for clients: SR0_* is the first
+        self._throttles: dict[str, StreamThrottle] = {}  # of channels on slow lines
         self.intervals = MessageIntervalService(
             firmware.intervals,
             self._tables,
@@ -249,6 +257,7 @@ class Autopilot:
             parameter_service,
             self.missions,
             TimeSyncService(answers_ping=firmware.answers_ping),
+            RadioService(self._throttle),
             FileTransferService(),
             *self._more,
             self.intervals,
@@ -297,6 +306,7 @@ class Autopilot:
             rates_hz,
             physics_step_us=self._step_us,
             motion_bits=self._messages.motion.bits,
+            line=channel.line,
         )
         channel.motion = self._messages.motion
         first_us = max(self._time_us, round(self.flavour.policy.heartbeat_start_s * 1e6))
@@ -307,11 +317,14 @@ class Autopilot:
         if role != PAYLOAD_ROLE:
             self._ports.append(table)
             self._apply_stream_rates(len(self._ports) - 1)
+        if channel.line is not None:
+            self._throttle(channel)
 
     def remove_channel(self, channel: AutopilotChannel) -> None:
         """Stop everything on a channel."""
         self.channels.remove(channel)
         table = self._tables.pop(channel.name)
+        self._throttles.pop(channel.name, None)
         self._table_list = list(self._tables.values())
         self._ports = [port for port in self._ports if port is not table]
 
@@ -338,6 +351,8 @@ class Autopilot:
         self.controller.set_ground_contact(context.ground_contact)
         navigation.vehicle_at_rest = context.on_ground and not self.commander.tasks.lifting_off
         self._view.advance(time_us)
+        for throttle in self._throttles.values():
+            throttle.advance(time_us)
         for service in self._timed:
             service.tick(time_us)
         for event in self.commander.drain_events():
@@ -362,6 +377,19 @@ class Autopilot:
                 self._push_position()
             case events.Armed() if self._firmware.position_pushed_at_arm:
                 self._push_position()
+
+    def _throttle(self, channel: Channel) -> StreamThrottle | None:
+        """What thins the streams of a channel, from now on; None when it has no streams."""
+        table = self._tables.get(channel.name)
+        if table is None:
+            return None
+        throttle = self._throttles.get(channel.name)
+        if throttle is None:
+            line: LineBudget | None = getattr(channel, "line", None)
+            throttle = StreamThrottle(table, line, self._firmware.flow_control)
+            throttle.advance(self._time_us)
+            self._throttles[channel.name] = throttle
+        return throttle
 
     def _push(self, message_id: int) -> None:
         """Send a message on every channel at once, streams aside."""

@@ -23,6 +23,7 @@ from autopilot_bridge.services.parameters import (
     ParameterPolicy,
 )
 from autopilot_bridge.telemetry import ardupilot, ardupilot_plane, px4, px4_plane
+from autopilot_bridge.telemetry.line import ARDUPILOT_FLOW_CONTROL, PX4_FLOW_CONTROL, FlowControl
 from flightsim.airframe import AirframeKind
 
 _ARDUPILOT_MAX_RATE_HZ: Final = 0.8 * 400.0  # of SCHED_LOOP_RATE
@@ -44,6 +45,7 @@ class Firmware:
         parameters, missions, intervals: habits of the services.
         rates_hz: streams that run from the start, by role of the channel.
         answers_ping: PING requests are answered.
+        flow_control: how streams follow a radio's transmit buffer.
         position_pushed_at_arm: HOME_POSITION and GPS_GLOBAL_ORIGIN are sent once more at every arming.
     """
 
@@ -53,6 +55,7 @@ class Firmware:
     intervals: IntervalPolicy
     rates_hz: Mapping[str, Mapping[int, float]]
     answers_ping: bool
+    flow_control: FlowControl
     position_pushed_at_arm: bool
 
 
@@ -71,6 +74,7 @@ _PX4: Final = Firmware(
         {"onboard": px4.ONBOARD_RATES_HZ, "gcs": px4.GCS_RATES_HZ, PAYLOAD_ROLE: PAYLOAD_RATES_HZ}
     ),
     answers_ping=True,
+    flow_control=PX4_FLOW_CONTROL,
     position_pushed_at_arm=False,
 )
 _ARDUPILOT: Final = Firmware(
@@ -91,6 +95,7 @@ _ARDUPILOT: Final = Firmware(
         {"onboard": ardupilot.START_RATES_HZ, "gcs": ardupilot.START_RATES_HZ, PAYLOAD_ROLE: PAYLOAD_RATES_HZ}
     ),
     answers_ping=False,
+    flow_control=ARDUPILOT_FLOW_CONTROL,
     position_pushed_at_arm=True,
 )
 

@@ -14,7 +14,9 @@ from autopilot_bridge.links.link import MAX_READS, LinkCounters, PeerId, SendQue
 
 REOPEN_INTERVAL_S: Final = 1.0
 _READ_SIZE: Final = 4096
-_MAX_BACKLOG_BYTES: Final = 32 * 1024  # about 3 s at 115200 baud
+_BITS_PER_BYTE: Final = 10  # start bit, eight data bits, stop bit
+_BACKLOG_S: Final = 0.5  # what is older than that is not worth sending
+_LEAST_BACKLOG_BYTES: Final = 4096  # room for the answers of a slow line
 
 
 class SerialLink:
@@ -36,11 +38,18 @@ class SerialLink:
         self._closed = False
         self.description = str(address)
         self.counters = LinkCounters()
-        self._queue = SendQueue(self.counters, _MAX_BACKLOG_BYTES)
+        self._queue = SendQueue(
+            self.counters, max(_LEAST_BACKLOG_BYTES, round(_BACKLOG_S * self.bytes_per_s))
+        )
         try:
             self._port: serial.Serial | None = self._open()
         except (serial.SerialException, OSError, ValueError, termios.error) as error:
             raise _open_error(address, error) from error
+
+    @property
+    def bytes_per_s(self) -> float:
+        """What the line carries in a second, one way."""
+        return self._address.baud / _BITS_PER_BYTE
 
     @property
     def connected(self) -> bool:

@@ -7,6 +7,7 @@ from typing import Final
 from autopilot_bridge.links import Link, PeerId
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, ParserCounters
 from autopilot_bridge.services.channel import MavlinkMessage
+from autopilot_bridge.telemetry.line import LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
 
 _MAX_PARSERS: Final = 64
@@ -21,16 +22,26 @@ class LinkChannel:
         name: how the channel is called in tables and reports; unique per autopilot.
         link: where bytes go and come from.
         system_id, component_id: the autopilot's.
+        line: what the link can carry; None: whatever there is.
 
     Attributes:
         motion: set by the autopilot that the channel is added to.
     """
 
-    __slots__ = ("_encoder", "_parsers", "_retired", "link", "motion", "name")
+    __slots__ = ("_encoder", "_parsers", "_retired", "line", "link", "motion", "name")
 
-    def __init__(self, name: str, link: Link, *, system_id: int, component_id: int = 1) -> None:
+    def __init__(
+        self,
+        name: str,
+        link: Link,
+        *,
+        system_id: int,
+        component_id: int = 1,
+        line: LineBudget | None = None,
+    ) -> None:
         self.name = name
         self.link = link
+        self.line = line
         self.motion: MotionMessages | None = None
         self._encoder = FrameEncoder(system_id, component_id)
         self._parsers: dict[PeerId, FrameParser] = {}
@@ -39,7 +50,7 @@ class LinkChannel:
     @property
     def congested(self) -> bool:
         """The link's queue is filling: lists should pause."""
-        return self.link.congested
+        return self.link.congested or (self.line is not None and self.line.congested)
 
     @property
     def counters(self) -> ParserCounters:
@@ -56,26 +67,31 @@ class LinkChannel:
 
     def send(self, message: MavlinkMessage) -> None:
         """Frame a message and send it."""
-        self.link.send(self._encoder.encode(message))
+        self._send(self._encoder.encode(message))
 
     def send_payload(self, message_id: int, payload: bytes) -> None:
         """Frame an already packed payload and send it."""
-        self.link.send(self._encoder.encode_payload(message_id, payload))
+        self._send(self._encoder.encode_payload(message_id, payload))
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Send what is due together, a packet of a network at most at a time."""
         packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
         for frame in self._encoder.encode_payloads(payloads) if payloads else ():
             if len(packet) + len(frame) > _MAX_PACKET:
-                self.link.send(packet)
+                self._send(packet)
                 packet = b""
             packet += frame
         if packet:
-            self.link.send(packet)
+            self._send(packet)
 
     def send_frame(self, raw: bytes) -> None:
         """Forward somebody else's frame as it is."""
-        self.link.send(raw)
+        self._send(raw)
+
+    def _send(self, data: bytes) -> None:
+        if self.line is not None:
+            self.line.add(len(data))
+        self.link.send(data)
 
     def receive(self) -> list[Frame]:
         """Every good frame that has arrived."""

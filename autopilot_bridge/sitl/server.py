@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.clock import RealTimeClock
-from autopilot_bridge.links import open_link
+from autopilot_bridge.links import Link, open_link
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
 
@@ -43,6 +43,7 @@ class SitlServer:
     def __init__(self, sitl: Sitl, *, speedup: float | None, monotonic: Callable[[], float]) -> None:
         self.sitl = sitl
         self._monotonic = monotonic
+        self._speedup = speedup
         self._clock = (
             None if speedup is None else RealTimeClock(speedup, monotonic=monotonic, wait=self._wait)
         )
@@ -70,10 +71,15 @@ class SitlServer:
                 )
                 for port in chosen:
                     link = open_link(port.address, monotonic=self._monotonic)
-                    vehicle.open(link, role=port.role)
+                    vehicle.open(link, role=port.role, bytes_per_s=self._capacity(link))
                     opened.append((vehicle, port, link.description))
             undo.pop_all()
         return opened
+
+    def _capacity(self, link: Link) -> float | None:
+        """Bytes that a link carries in a second of vehicle time: a serial line does not know of a speedup."""
+        capacity: float | None = getattr(link, "bytes_per_s", None)
+        return None if capacity is None or self._speedup is None else capacity / self._speedup
 
     def wait_for_client(self, stopped: Callable[[], bool]) -> bool:
         """Wait for somebody on the first link (ArduPilot's `tcp:0:wait`); False when stopped."""

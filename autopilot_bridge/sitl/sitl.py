@@ -19,6 +19,7 @@ from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecif
 from autopilot_bridge.sitl.failures import FailureInjector
 from autopilot_bridge.sitl.launch_crew import LaunchCrew
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder, TruthEncoder
+from autopilot_bridge.telemetry.line import LineBudget
 from autopilot_bridge.tlog import TlogWriter
 from flightsim.airframe import Airframe, AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
@@ -142,16 +143,25 @@ class SitlVehicle:
             for channel in self.channels:
                 channel.send_frame(text)
 
-    def open(self, link: Link, *, name: str | None = None, role: str = "onboard") -> LinkChannel:
+    def open(
+        self,
+        link: Link,
+        *,
+        name: str | None = None,
+        role: str = "onboard",
+        bytes_per_s: float | None = None,
+    ) -> LinkChannel:
         """Give the autopilot one more link.
 
         Args:
             name: unique per vehicle; None: made from the link.
             role: which default streams run on it ("onboard", "gcs" or "payload").
+            bytes_per_s: what the link carries in a second of vehicle time; streams are thinned to fit.
         """
         if name is None:
             name = f"{role}{len(self.channels)} {link.description}"
-        channel = LinkChannel(name, link, system_id=self.specification.system_id)
+        line = None if bytes_per_s is None else LineBudget(bytes_per_s)
+        channel = LinkChannel(name, link, system_id=self.specification.system_id, line=line)
         self.channels.append(channel)
         self._router.add(channel)
         self.autopilot.add_channel(channel, role=role)
@@ -290,11 +300,13 @@ class Sitl:
         self._poll_us = max(self._step_us, interval_us)
         self._next_poll_us = self._time_us + self._poll_us
 
-    def connect(self, index: int, *, role: str = "onboard") -> MemoryLink:
+    def connect(
+        self, index: int, *, role: str = "onboard", bytes_per_s: float | None = None
+    ) -> MemoryLink:
         """A memory link to vehicle `index`; the returned end is the client's."""
         vehicle = self.vehicles[index]
         ours, theirs = memory_pair(f"vehicle{index + 1}", f"client{index + 1}")
-        channel = vehicle.open(ours, role=role)
+        channel = vehicle.open(ours, role=role, bytes_per_s=bytes_per_s)
         ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
 

@@ -2,7 +2,8 @@
 
 A `StreamTable` belongs to one channel. Every stream keeps its own due time, so any rate is exact on average
 on the physics grid; the payload of a message that several channels send in the same step is built once
-(`PayloadCache`).
+(`PayloadCache`). On a line of limited capacity streams are thinned (`thin`), and one that is due waits for
+room: only its number waits, the message is built when it goes out.
 """
 
 from bisect import insort
@@ -12,6 +13,7 @@ from itertools import count
 from typing import Final, Protocol
 
 from autopilot_bridge.mavlink.definitions import definition
+from autopilot_bridge.telemetry.line import LineBudget, thinned_us
 from autopilot_bridge.telemetry.packing import values_packer
 
 Values = tuple[object, ...]
@@ -21,6 +23,9 @@ Builder = Callable[[], Values | bytes | None]
 MICROSECONDS: Final = 1_000_000
 GRID_US: Final = 10_000
 """Streams of 50 Hz and slower are sent on this grid of vehicle time; their rate stays exact on average."""
+HEARTBEAT: Final = 0
+"""Never thinned, never waits."""
+FRAME_OVERHEAD: Final = 12  # header and checksum
 
 
 class PayloadSink(Protocol):
@@ -72,15 +77,17 @@ class _Group:
     """Streams that are always due together: one interval, one phase.
 
     Attributes:
-        interval_us, due_us: time between two messages, and when the next ones are due.
+        interval_us, due_us: time between two messages as asked for, and when the next ones are due.
+        step_us: time between two messages as sent: longer where streams are thinned.
         message_ids: the streams, in rising order, without those of `motion`.
         motion: bits of the motion messages among them.
     """
 
-    __slots__ = ("due_us", "interval_us", "message_ids", "motion")
+    __slots__ = ("due_us", "interval_us", "message_ids", "motion", "step_us")
 
     def __init__(self, interval_us: int, due_us: int) -> None:
         self.interval_us = interval_us
+        self.step_us = interval_us
         self.due_us = due_us
         self.message_ids: list[int] = []
         self.motion = 0
@@ -89,7 +96,7 @@ class _Group:
     def wake_us(self) -> int:
         """When they are sent: the slower ones wait for the grid, to share a packet with others."""
         due_us = self.due_us
-        return due_us if self.interval_us < 2 * GRID_US else -(-due_us // GRID_US) * GRID_US
+        return due_us if self.step_us < 2 * GRID_US else -(-due_us // GRID_US) * GRID_US
 
 
 class StreamTable:
@@ -101,6 +108,7 @@ class StreamTable:
         rates_hz: message id -> rate of the streams that run from the start.
         physics_step_us: no stream runs faster than the physics.
         motion_bits: messages that the sink frames by itself, and their bits.
+        line: what the channel's line can carry; None: whatever there is.
     """
 
     __slots__ = (
@@ -109,10 +117,14 @@ class StreamTable:
         "_groups",
         "_heap",
         "_intervals_us",
+        "_line",
         "_motion_bits",
         "_serials",
         "_sink",
+        "_sizes",
         "_step_us",
+        "_thinning",
+        "_waiting",
         "next_due_us",
     )
 
@@ -126,8 +138,13 @@ class StreamTable:
         *,
         physics_step_us: int,
         motion_bits: Mapping[int, int] | None = None,
+        line: LineBudget | None = None,
     ) -> None:
         self._cache = cache
+        self._line = line
+        self._thinning: tuple[float, float, int] = (1.0, 1.0, 0)
+        self._waiting: dict[int, None] = {}  # due and not sent: those that wait longest come first
+        self._sizes: dict[int, int] = {}  # frames as last sent
         self._motion_bits = motion_bits or {}
         self._sink = sink
         self._step_us = physics_step_us
@@ -175,6 +192,23 @@ class StreamTable:
             self._defaults_us.pop(message_id, None)
         self.set_interval(message_id, interval_us, time_us)
 
+    def loads(self) -> list[tuple[int, float]]:
+        """Interval as asked for (us) and size (bytes of a frame) of the streams that may be thinned."""
+        sizes = self._sizes
+        return [
+            (interval_us, sizes.get(number, FRAME_OVERHEAD + definition(number).size))
+            for number, interval_us in self._intervals_us.items()
+            if number != HEARTBEAT
+        ]
+
+    def thin(self, multiplier: float, stretch: float, slowdown_us: int) -> None:
+        """Send all streams but the heartbeat more slowly than asked for (`line.thinned_us`)."""
+        thinning = (multiplier, stretch, slowdown_us)
+        if thinning != self._thinning:
+            self._thinning = thinning
+            for _, _, group in self._heap:
+                self._pace(group)
+
     def tick(self, time_us: int) -> None:
         """Send what is due."""
         heap, cache = self._heap, self._cache
@@ -182,15 +216,18 @@ class StreamTable:
         woken: list[tuple[int, list[int]]] = []
         while heap and heap[0][0] <= time_us:
             wake_us, serial, group = heap[0]
-            next_us = group.due_us + group.interval_us
+            next_us = group.due_us + group.step_us
             if next_us <= time_us:  # a stream never bursts to catch up
-                next_us = time_us + group.interval_us
+                next_us = time_us + group.step_us
             group.due_us = next_us
             heapreplace(heap, (group.wake_us, serial, group))
             motion |= group.motion
             if group.message_ids:
                 woken.append((wake_us, group.message_ids))
         self.next_due_us = heap[0][0] if heap else self.NEVER
+        if self._line is not None:
+            self._send_within(self._line, motion, woken, time_us)
+            return
         due: list[tuple[int, bytes]] = []
         if woken:
             payloads = cache.at(time_us)
@@ -201,13 +238,63 @@ class StreamTable:
         if motion or due:
             self._sink.send_streams(motion, due)
 
+    def _send_within(
+        self, line: LineBudget, motion: int, woken: list[tuple[int, list[int]]], time_us: int
+    ) -> None:
+        """Send what the line has room for; what is due beside it waits, each stream once."""
+        waiting = self._waiting
+        for message_id, bit in self._motion_bits.items():
+            if motion & bit:
+                waiting[message_id] = None
+        for message_id in _in_order(woken):
+            waiting[message_id] = None
+        room = line.stream_room_bytes
+        bits = 0
+        due: list[tuple[int, bytes]] = []
+        if HEARTBEAT in waiting:
+            room -= self._take(HEARTBEAT, due, time_us)
+        while waiting and room > 0.0:
+            message_id = next(iter(waiting))
+            if message_id not in self._motion_bits:
+                size = self._take(message_id, due, time_us)
+            else:
+                del waiting[message_id]
+                bits |= self._motion_bits[message_id]
+                size = FRAME_OVERHEAD + definition(message_id).size
+            room -= size
+            line.spend_share(size)
+        if waiting:
+            self.next_due_us = min(self.next_due_us, time_us + GRID_US)
+        if bits or due:
+            self._sink.send_streams(bits, due)
+
+    def _take(self, message_id: int, due: list[tuple[int, bytes]], time_us: int) -> int:
+        """Build a message that waited; gives its size as a frame, 0 when there was nothing to say."""
+        del self._waiting[message_id]
+        payload = self._cache.payload(message_id, time_us)
+        size = 0
+        if payload is not None:
+            due.append((message_id, payload))
+            size = FRAME_OVERHEAD + len(payload.rstrip(b"\0"))
+        self._sizes[message_id] = size
+        return size
+
+    def _pace(self, group: _Group) -> None:
+        thinned = HEARTBEAT not in group.message_ids
+        group.step_us = thinned_us(group.interval_us, *self._thinning) if thinned else group.interval_us
+
     def _start(self, message_id: int, interval_us: int, due_us: int) -> None:
         self._intervals_us[message_id] = interval_us
+        alone = message_id == HEARTBEAT
         for _, _, group in self._heap:
-            if (group.interval_us, group.due_us) == (interval_us, due_us):
+            if (group.interval_us, group.due_us) == (interval_us, due_us) and not (
+                alone or HEARTBEAT in group.message_ids
+            ):
                 break
         else:
             group = _Group(interval_us, due_us)
+            if not alone:
+                group.step_us = thinned_us(interval_us, *self._thinning)
             heappush(self._heap, (group.wake_us, next(self._serials), group))
             self.next_due_us = self._heap[0][0]
         self._groups[message_id] = group
@@ -218,6 +305,7 @@ class StreamTable:
 
     def _stop(self, message_id: int) -> None:
         self._intervals_us.pop(message_id, None)
+        self._waiting.pop(message_id, None)
         group = self._groups.pop(message_id, None)
         if group is None:
             return

@@ -1,0 +1,51 @@
+"""One channel's streams, fitted to what its line and its radio take."""
+
+from typing import Final
+
+from autopilot_bridge.telemetry.line import MICROSECONDS, USED_SHARE, FlowControl, LineBudget, RadioFlow, fit
+from autopilot_bridge.telemetry.streams import StreamTable
+
+_EVERY_US: Final = MICROSECONDS
+_LEAST_MULTIPLIER: Final = 0.05
+"""To this share of their rates a radio slows down the fast streams; below, all streams (PX4's least)."""
+
+
+class StreamThrottle:
+    """Thins the streams of a table.
+
+    Args:
+        table: the channel's streams.
+        line: what its line can carry; None: only a radio limits it.
+        control: how the firmware follows a radio's buffer.
+
+    Attributes:
+        radio: what a radio on the channel has told.
+    """
+
+    __slots__ = ("_due_us", "_line", "_table", "radio")
+
+    def __init__(self, table: StreamTable, line: LineBudget | None, control: FlowControl) -> None:
+        self.radio = RadioFlow(control)
+        self._table = table
+        self._line = line
+        self._due_us = 0
+
+    def advance(self, time_us: int) -> None:
+        """Let the line carry on, and now and then look anew at what fits. Called at 50 Hz."""
+        if self._line is not None:
+            self._line.advance(time_us)
+        if time_us < self._due_us:
+            return
+        self._due_us = time_us + _EVERY_US
+        self.radio.advance(time_us)
+        self.fit()
+
+    def fit(self) -> None:
+        """Set the rates."""
+        multiplier, stretch = 1.0, 1.0
+        if self._line is not None:
+            multiplier, stretch = fit(self._table.loads(), USED_SHARE * self._line.bytes_per_s)
+        radio = self.radio.multiplier
+        if radio < multiplier:
+            multiplier, stretch = radio, max(stretch, _LEAST_MULTIPLIER / radio)
+        self._table.thin(multiplier, stretch, self.radio.slowdown_us)
