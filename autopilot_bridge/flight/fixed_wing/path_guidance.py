@@ -10,8 +10,23 @@ unstable. Turning the course into a heading in the wind is the control laws' par
 import math
 from typing import Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from flightsim.kernels import compiled_for, kernel
+
+Array = NDArray[np.float64]
+
+# Parameters of the law.
+_PERIOD: Final = 0
+_DAMPING: Final = 1
+_SAFETY: Final = 2
+_LOWER_BOUND: Final = 3  # 0: not kept
+_UPPER_BOUND: Final = 4  # 0: not kept
+_ROLL_TIME: Final = 5
+_LAW_SIZE: Final = 6
 
 _EPSILON: Final = 1e-6
 _AIRSPEED_BUFFER_M_S: Final = 1.5  # wind this much below the airspeed begins to count as infeasible
@@ -35,13 +50,10 @@ class PathGuidance:
     """
 
     __slots__ = (
-        "_damping",
-        "_lower_bound",
-        "_nominal_period_s",
-        "_roll_time_constant_s",
-        "_safety",
+        "_found",
+        "_guide",
+        "_law",
         "_switch_multiplier",
-        "_upper_bound",
         "course_rad",
         "feasibility",
         "lateral_acceleration_m_s2",
@@ -51,24 +63,27 @@ class PathGuidance:
     )
 
     def __init__(self, parameters: FixedWingFlightParameters) -> None:
+        self._law: Array = np.zeros(_LAW_SIZE)
+        self._found: Array = np.zeros(6)
+        zeros = (0.0,) * 11
+        self._guide = compiled_for(_guide, self._law, *zeros, self._found)
         self.set_parameters(parameters)
         self.course_rad = 0.0
         self.lateral_acceleration_m_s2 = 0.0
         self.track_error_m = 0.0
         self.feasibility = 1.0
-        self.period_s = self._nominal_period_s
-        speed = parameters.airspeed_trim_m_s
-        self.track_error_bound_m = speed * self.period_s * self._damping
+        self.period_s = parameters.guidance_period_s
+        self.track_error_bound_m = parameters.airspeed_trim_m_s * self.period_s * parameters.guidance_damping
 
     def set_parameters(self, parameters: FixedWingFlightParameters) -> None:
         """Fly by other parameters from now on."""
         p = parameters
-        self._nominal_period_s = p.guidance_period_s
-        self._damping = p.guidance_damping
-        self._safety = p.guidance_period_safety
-        self._lower_bound = p.guidance_period_lower_bound
-        self._upper_bound = p.guidance_period_upper_bound
-        self._roll_time_constant_s = p.roll_time_constant_s
+        self._law[_PERIOD] = p.guidance_period_s
+        self._law[_DAMPING] = p.guidance_damping
+        self._law[_SAFETY] = p.guidance_period_safety
+        self._law[_LOWER_BOUND] = p.guidance_period_lower_bound
+        self._law[_UPPER_BOUND] = p.guidance_period_upper_bound
+        self._law[_ROLL_TIME] = p.roll_time_constant_s
         self._switch_multiplier = p.switch_distance_multiplier
 
     @property
@@ -118,79 +133,130 @@ class PathGuidance:
             tangent_north, tangent_east: unit direction of the path there.
             curvature_1_m: of the path there, positive clockwise seen from above.
         """
-        vel_north, vel_east = state.vel_north_m_s, state.vel_east_m_s
-        wind_north, wind_east = state.wind_north_m_s, state.wind_east_m_s
-        ground_speed = state.ground_speed_m_s
-        airspeed = max(state.true_airspeed_m_s, _EPSILON)
-        wind = math.hypot(wind_north, wind_east)
-        error = tangent_north * (state.east_m - east_m) - tangent_east * (state.north_m - north_m)
-        wind_cross = wind_north * tangent_east - wind_east * tangent_north
-        wind_along = wind_north * tangent_north + wind_east * tangent_east
-        on_track = _feasibility(wind_cross, wind_along, airspeed, wind)
-        period = self._adapted_period(ground_speed, airspeed, wind, abs(error), curvature_1_m, on_track)
-        bound = _error_bound(ground_speed, period * self._damping)
-        look_ahead = _look_ahead(abs(error), bound)
-        proximity = math.sin(look_ahead) ** 2
-        # from the path's normal (towards the path) to its tangent
-        side = -1.0 if error > 0.0 else 1.0
-        c, s = side * math.cos(look_ahead), math.sin(look_ahead)
-        bearing_north = -c * tangent_east + s * tangent_north
-        bearing_east = c * tangent_north + s * tangent_east
-        feasible = _feasibility(
-            wind_north * bearing_east - wind_east * bearing_north,
-            wind_north * bearing_north + wind_east * bearing_east,
-            airspeed,
-            wind,
+        self._guide(
+            self._law,
+            state.north_m - north_m,
+            state.east_m - east_m,
+            state.vel_north_m_s,
+            state.vel_east_m_s,
+            state.ground_speed_m_s,
+            state.true_airspeed_m_s,
+            state.wind_north_m_s,
+            state.wind_east_m_s,
+            tangent_north,
+            tangent_east,
+            curvature_1_m,
+            self._found,
         )
-        self.course_rad = math.atan2(bearing_east, bearing_north)
-        self.track_error_m = error
-        self.track_error_bound_m = bound
-        self.period_s = period
-        self.feasibility = feasible
-        acceleration = 0.0
-        if curvature_1_m != 0.0:
-            # of the parallel curve the aircraft is on
-            frame = curvature_1_m / max(1.0 - curvature_1_m * error, abs(curvature_1_m) * _MIN_RADIUS_M)
-            along = max(0.0, vel_north * tangent_north + vel_east * tangent_east)
-            projected = math.sqrt(max(0.0, airspeed * airspeed - wind_cross * wind_cross))
-            ratio = 1.0 + wind_along / max(projected, _EPSILON)
-            # airspeed times speed ratio instead of ground speed: the turn is flown relative to the air
-            acceleration = airspeed * proximity * feasible * ratio * frame * along
-        self.lateral_acceleration_m_s2 = acceleration
+        (
+            self.course_rad,
+            self.lateral_acceleration_m_s2,
+            self.track_error_m,
+            self.track_error_bound_m,
+            self.period_s,
+            self.feasibility,
+        ) = self._found.tolist()
 
-    def _adapted_period(
-        self,
-        ground_speed: float,
-        airspeed: float,
-        wind: float,
-        error: float,
-        curvature: float,
-        on_track: float,
-    ) -> float:
-        """The nominal period, not below what the roll response allows, not above what the curve in the wind
-        asks for."""
-        period, roll_time, damping = self._nominal_period_s, self._roll_time_constant_s, self._damping
-        if not self._lower_bound:
-            return period
-        turn_rate = abs(curvature * airspeed)
-        wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind / airspeed)))
-        straight = math.pi * roll_time / damping
-        curved = straight
-        windy_curve = turn_rate * wind_factor > _EPSILON
-        if windy_curve and damping >= 0.5:
-            curved = 4.0 * math.pi * roll_time * damping * on_track + (1.0 - on_track) * straight
-        straight *= self._safety
-        curved *= self._safety
-        proximity = math.sin(_look_ahead(error, _error_bound(ground_speed, straight * damping))) ** 2
-        lowest = curved * proximity + straight * (1.0 - proximity)
-        period = max(period, lowest)
-        if self._upper_bound and windy_curve and on_track > _EPSILON:
-            highest = 4.0 * math.pi * damping / (turn_rate * wind_factor * on_track)
-            if period > highest:
-                period = max(lowest, highest) * proximity + (1.0 - proximity) * period
+
+@kernel
+def _guide(
+    law: Array,
+    off_north: float,
+    off_east: float,
+    vel_north: float,
+    vel_east: float,
+    ground_speed: float,
+    airspeed: float,
+    wind_north: float,
+    wind_east: float,
+    tangent_north: float,
+    tangent_east: float,
+    curvature: float,
+    found: Array,
+) -> None:
+    """One update of the law: `found` gets course, acceleration, track error, its bound, period, feasibility.
+
+    Args:
+        law: the parameters, in the order of `_PERIOD`, ...
+        off_north, off_east: from the path's closest point to the aircraft, m.
+        vel_north, vel_east, ground_speed, airspeed, wind_north, wind_east: of the aircraft, m/s.
+        tangent_north, tangent_east, curvature: of the path.
+        found: (6,).
+    """
+    airspeed = max(airspeed, _EPSILON)
+    wind = math.hypot(wind_north, wind_east)
+    error = tangent_north * off_east - tangent_east * off_north
+    wind_cross = wind_north * tangent_east - wind_east * tangent_north
+    wind_along = wind_north * tangent_north + wind_east * tangent_east
+    on_track = _feasibility(wind_cross, wind_along, airspeed, wind)
+    period = _adapted_period(law, ground_speed, airspeed, wind, abs(error), curvature, on_track)
+    bound = _error_bound(ground_speed, period * law[_DAMPING])
+    look_ahead = _look_ahead(abs(error), bound)
+    # from the path's normal (towards the path) to its tangent
+    side = -1.0 if error > 0.0 else 1.0
+    c, s = side * math.cos(look_ahead), math.sin(look_ahead)
+    bearing_north = -c * tangent_east + s * tangent_north
+    bearing_east = c * tangent_north + s * tangent_east
+    feasible = _feasibility(
+        wind_north * bearing_east - wind_east * bearing_north,
+        wind_north * bearing_north + wind_east * bearing_east,
+        airspeed,
+        wind,
+    )
+    acceleration = 0.0
+    if curvature != 0.0:
+        # of the parallel curve the aircraft is on
+        frame = curvature / max(1.0 - curvature * error, abs(curvature) * _MIN_RADIUS_M)
+        along = max(0.0, vel_north * tangent_north + vel_east * tangent_east)
+        projected = math.sqrt(max(0.0, airspeed * airspeed - wind_cross * wind_cross))
+        ratio = 1.0 + wind_along / max(projected, _EPSILON)
+        # airspeed times speed ratio instead of ground speed: the turn is flown relative to the air
+        acceleration = airspeed * s * s * feasible * ratio * frame * along
+    found[0] = math.atan2(bearing_east, bearing_north)
+    found[1] = acceleration
+    found[2] = error
+    found[3] = bound
+    found[4] = period
+    found[5] = feasible
+
+
+@kernel
+def _adapted_period(
+    law: Array,
+    ground_speed: float,
+    airspeed: float,
+    wind: float,
+    error: float,
+    curvature: float,
+    on_track: float,
+) -> float:
+    """The nominal period, not below what the roll response allows, not above what the curve in the wind
+    asks for.
+    """
+    period, damping, roll_time = law[_PERIOD], law[_DAMPING], law[_ROLL_TIME]
+    if law[_LOWER_BOUND] == 0.0:
         return period
+    turn_rate = abs(curvature * airspeed)
+    wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind / airspeed)))
+    straight = math.pi * roll_time / damping
+    curved = straight
+    windy_curve = turn_rate * wind_factor > _EPSILON
+    if windy_curve and damping >= 0.5:
+        curved = 4.0 * math.pi * roll_time * damping * on_track + (1.0 - on_track) * straight
+    straight *= law[_SAFETY]
+    curved *= law[_SAFETY]
+    sine = math.sin(_look_ahead(error, _error_bound(ground_speed, straight * damping)))
+    proximity = sine * sine
+    lowest = curved * proximity + straight * (1.0 - proximity)
+    period = max(period, lowest)
+    if law[_UPPER_BOUND] != 0.0 and windy_curve and on_track > _EPSILON:
+        highest = 4.0 * math.pi * damping / (turn_rate * wind_factor * on_track)
+        if period > highest:
+            period = max(lowest, highest) * proximity + (1.0 - proximity) * period
+    return period
 
 
+@kernel
 def _error_bound(ground_speed_m_s: float, time_constant_s: float) -> float:
     """Track error at which the bearing is square to the path; grows with the speed over ground."""
     if ground_speed_m_s > 1.0:
@@ -198,16 +264,19 @@ def _error_bound(ground_speed_m_s: float, time_constant_s: float) -> float:
     return 0.5 * time_constant_s * (ground_speed_m_s * ground_speed_m_s + 1.0)
 
 
+@kernel
 def _look_ahead(error_m: float, bound_m: float) -> float:
     """Angle of the bearing off the path's normal: 0 far away, pi/2 (along the path) on it."""
     share = min(1.0, error_m / bound_m) - 1.0
     return 0.5 * math.pi * share * share
 
 
+@kernel
 def _feasibility(wind_cross: float, wind_along: float, airspeed: float, wind: float) -> float:
     """1 where a bearing can be held with room to spare, 0 where the wind across (or against) is too much."""
     across = wind if wind_along < 0.0 else abs(wind_cross)
     if airspeed - across >= _AIRSPEED_BUFFER_M_S:
         return 1.0
     share = max(0.0, (airspeed - across) / _AIRSPEED_BUFFER_M_S)
-    return math.sin(0.5 * math.pi * share) ** 2
+    sine = math.sin(0.5 * math.pi * share)
+    return sine * sine
