@@ -25,3 +25,7 @@ class ClockError(BridgeError, RuntimeError):
 
 class TlogError(BridgeError, OSError):
     """A telemetry log could not be created or read; the message names the path and what to do."""
+
+
+class SigningKeyError(BridgeError, ValueError):
+    """A signing key is not one of the accepted forms; the message never holds the key."""

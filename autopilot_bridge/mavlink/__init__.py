@@ -15,16 +15,24 @@ from autopilot_bridge.mavlink.definitions import (
 )
 from autopilot_bridge.mavlink.encoder import FrameEncoder
 from autopilot_bridge.mavlink.frame import Frame
+from autopilot_bridge.mavlink.intake import Intake
 from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters, SourceCounters
+from autopilot_bridge.mavlink.signing import LinkSigning, LinkSigningPolicy, SigningState
+from autopilot_bridge.mavlink.signing_key import SigningKey
 
 __all__ = [
     "DEFINITIONS",
     "Frame",
     "FrameEncoder",
     "FrameParser",
+    "Intake",
+    "LinkSigning",
+    "LinkSigningPolicy",
     "MAVLinkMessage",
     "MessageDefinition",
     "ParserCounters",
+    "SigningKey",
+    "SigningState",
     "SourceCounters",
     "WireField",
     "decode",

@@ -23,7 +23,7 @@ class Frame(NamedTuple):
         system_id, component_id: who sent it.
         sequence: the sender's frame counter, 0..255.
         version: 1 or 2.
-        signed: the frame carries a signature (which the parser does not verify).
+        signed: the frame carries a signature (which the parser does not verify; `LinkSigning.admit` does).
     """
 
     raw: bytes

@@ -105,7 +105,7 @@ class FrameParser:
     more than the damaged frame. A frame of an unknown message is skipped whole when another frame or the
     end of the data follows it; otherwise it is taken for junk. Frames with incompatibility flags other
     than "signed" are dropped, as the MAVLink guide demands ("Incompatibility Flags"). Signatures are
-    passed over unverified.
+    passed over unverified (`signing.LinkSigning` checks them).
     """
 
     __slots__ = ("_pending", "counters")

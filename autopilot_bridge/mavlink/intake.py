@@ -1,0 +1,197 @@
+"""Frames from the peers of one link, with bounded work for each of them: nobody can starve the others.
+
+What has arrived waits in an inbox for each peer. Every call of `take` serves the peers in turn, each with a
+limited amount of work, so that a flood costs its sender, not the vehicle or its other clients.
+"""
+
+from collections import deque
+from collections.abc import Callable, Hashable, Iterable
+from dataclasses import fields
+from typing import Final
+
+from autopilot_bridge.mavlink.frame import Frame
+from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
+
+MAX_PEERS: Final = 64
+INBOX_BYTES: Final = 256 * 1024
+"""What may wait for one peer."""
+SHARE: Final = 768
+"""Work for one peer in one `take`, in units of about a microsecond."""
+TOTAL: Final = 2048
+"""Work for all peers in one `take`."""
+_FRAME_WORK: Final = 20  # to decode and handle a frame
+_FAILURE_WORK: Final = 1  # to find that something is no frame
+_BYTES_OF_WORK: Final = 64
+_SLICE_BYTES: Final = 512
+_SILENT_TAKES: Final = 5000  # 20 s of polls
+
+Admit = Callable[[list[Frame]], list[Frame]]
+
+
+class _Inbox:
+    """What one peer has sent.
+
+    Attributes:
+        parser: finds the frames.
+        pieces: waiting; `size` bytes in all.
+        understood: a frame of it was taken once.
+        heard_at: number of the `take` that last brought something.
+    """
+
+    __slots__ = ("heard_at", "parser", "pieces", "size", "understood")
+
+    def __init__(self) -> None:
+        self.parser = FrameParser()
+        self.pieces: deque[bytes] = deque()
+        self.size = 0
+        self.understood = False
+        self.heard_at = 0
+
+
+class Intake:
+    """The inboxes of one link.
+
+    Args:
+        admit: which frames are believed (`LinkSigning.admit`); None: all.
+
+    Attributes:
+        overrun_bytes: dropped unread, because a peer had too much waiting.
+    """
+
+    __slots__ = ("_admit", "_inboxes", "_retired", "_takes", "_waiting", "overrun_bytes")
+
+    def __init__(self, admit: Admit | None = None) -> None:
+        self.overrun_bytes = 0
+        self._admit = admit
+        self._inboxes: dict[Hashable, _Inbox] = {}
+        self._waiting: deque[Hashable] = deque()
+        self._retired = ParserCounters()
+        self._takes = 0
+
+    @property
+    def counters(self) -> ParserCounters:
+        """Where every byte that was looked at went, over all peers ever heard; `sources` is left out."""
+        total = ParserCounters()
+        for counters in (self._retired, *(inbox.parser.counters for inbox in self._inboxes.values())):
+            add_counters(total, counters)
+        return total
+
+    @property
+    def pending_bytes(self) -> int:
+        """Bytes of frames that are not complete yet."""
+        return sum(inbox.parser.pending_bytes for inbox in self._inboxes.values())
+
+    @property
+    def waiting(self) -> bool:
+        """Something was not looked at yet."""
+        return bool(self._waiting)
+
+    def understood(self, peer: Hashable) -> bool:
+        """A frame of this peer was taken once, and it is not forgotten."""
+        inbox = self._inboxes.get(peer)
+        return inbox is not None and inbox.understood
+
+    def parse(self, peer: Hashable, data: bytes) -> list[Frame]:
+        """The frames in bytes of one peer, at once and whatever they cost: for memory links."""
+        inbox = self._inbox(peer)
+        frames = inbox.parser.feed(data)
+        if self._admit is not None and frames:
+            frames = self._admit(frames)
+        if frames:
+            inbox.understood = True
+        return frames
+
+    def take(self, arrived: Iterable[tuple[Hashable, bytes]]) -> list[tuple[Hashable, list[Frame]]]:
+        """Put what has arrived into the inboxes, and give the frames there is time for, by peer."""
+        for peer, data in arrived:
+            self._put(peer, data)
+        self._takes += 1
+        served: list[tuple[Hashable, list[Frame]]] = []
+        left = TOTAL
+        for _ in range(len(self._waiting)):
+            if left <= 0:
+                break
+            peer = self._waiting.popleft()
+            inbox = self._inboxes.get(peer)
+            if inbox is None:
+                continue
+            frames, work = self._serve(inbox, min(SHARE, left))
+            left -= work
+            if inbox.pieces:
+                self._waiting.append(peer)
+            if frames:
+                served.append((peer, frames))
+        return served
+
+    def _put(self, peer: Hashable, data: bytes) -> None:
+        if not data:
+            return
+        inbox = self._inbox(peer)
+        if inbox.size + len(data) > INBOX_BYTES:
+            self.overrun_bytes += len(data)
+            return
+        if not inbox.pieces:
+            self._waiting.append(peer)
+        inbox.size += len(data)
+        inbox.heard_at = self._takes
+        if len(data) <= _SLICE_BYTES:
+            inbox.pieces.append(data)
+        else:
+            inbox.pieces += [data[at : at + _SLICE_BYTES] for at in range(0, len(data), _SLICE_BYTES)]
+
+    def _serve(self, inbox: _Inbox, share: int) -> tuple[list[Frame], int]:
+        """Frames of one inbox, and the work they were."""
+        frames: list[Frame] = []
+        work = 0
+        counters, pieces = inbox.parser.counters, inbox.pieces
+        while pieces and work < share:
+            piece = pieces.popleft()
+            inbox.size -= len(piece)
+            before = counters.bad_crc + counters.unsupported_flags + counters.unknown_message
+            found = inbox.parser.feed(piece)
+            failures = counters.bad_crc + counters.unsupported_flags + counters.unknown_message - before
+            work += 1 + len(piece) // _BYTES_OF_WORK + failures * _FAILURE_WORK
+            if found:
+                work += len(found) * (1 if self._admit is None else 2)
+                if self._admit is not None:
+                    found = self._admit(found)
+                work += len(found) * _FRAME_WORK
+                frames += found
+        if frames:
+            inbox.understood = True
+        return frames, work
+
+    def _inbox(self, peer: Hashable) -> _Inbox:
+        inbox = self._inboxes.get(peer)
+        if inbox is None:
+            if len(self._inboxes) >= MAX_PEERS:
+                self._retire()
+            inbox = self._inboxes[peer] = _Inbox()
+        return inbox
+
+    def _retire(self) -> None:
+        """Forget a peer: one that was never understood, else one that is silent, else the newest.
+
+        So whoever has talked for a while is not pushed out by a thousand others.
+        """
+        inboxes = self._inboxes
+        stranger = next((peer for peer, inbox in inboxes.items() if not inbox.understood), None)
+        silent = min(inboxes, key=lambda peer: inboxes[peer].heard_at)
+        if stranger is not None:
+            gone = stranger
+        elif self._takes - inboxes[silent].heard_at > _SILENT_TAKES:
+            gone = silent
+        else:
+            gone = next(reversed(inboxes))
+        inbox = inboxes.pop(gone)
+        add_counters(self._retired, inbox.parser.counters)
+        self._retired.bytes_junk += inbox.parser.pending_bytes
+        self.overrun_bytes += inbox.size
+
+
+def add_counters(total: ParserCounters, more: ParserCounters) -> None:
+    """Add the numbers of `more`; `sources` are left as they are."""
+    for field in fields(ParserCounters):
+        value = getattr(more, field.name)
+        if isinstance(value, int):
+            setattr(total, field.name, getattr(total, field.name) + value)

@@ -1,0 +1,280 @@
+"""MAVLink 2 message signing, without I/O (https://mavlink.io/en/guide/message_signing.html).
+
+A signed frame has the incompatibility flag 0x01 and 13 bytes more: link id, 48 bits of time in units of 10 us
+since 2015-01-01, and the first 48 bits of SHA-256 over the key and all that comes before.
+
+One `SigningState` belongs to a device: key, newest timestamp and the streams heard are the same on all of its
+links, so that what was recorded on one can't be played on another. A `LinkSigning` is one link of it.
+"""
+
+import hmac
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import StrEnum
+from hashlib import sha256
+from typing import Final
+
+from fastcrc.crc16 import mcrf4xx
+
+from autopilot_bridge.mavlink.definitions import DEFINITIONS
+from autopilot_bridge.mavlink.frame import (
+    CHECKSUM_SIZE,
+    HEADER_SIZE_V2,
+    INCOMPAT_SIGNED,
+    SIGNATURE_SIZE,
+    Frame,
+)
+from autopilot_bridge.mavlink.signing_key import SigningKey
+
+SIGNING_EPOCH_UNIX_US: Final = 1_420_070_400_000_000
+"""2015-01-01T00:00:00Z."""
+TIMESTAMP_UNIT_US: Final = 10
+MAX_TIMESTAMP: Final = (1 << 48) - 1
+MINUTE: Final = 6_000_000
+"""Timestamp units in a minute: how far behind a new stream may begin."""
+MAX_STREAMS: Final = 256
+SETUP_SIGNING: Final = 256
+"""Id of the message that brings a key: never forwarded, never logged."""
+_SAVE_EVERY: Final = MINUTE // 2
+_TIMESTAMP_SIZE: Final = 6
+_DIGEST_SIZE: Final = 6
+_FRAME_OVERHEAD: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
+_RADIO_MESSAGES: Final = frozenset({109, 166})  # RADIO_STATUS, RADIO: a telemetry radio has no key
+
+
+def signing_time(unix_us: int) -> int:
+    """The timestamp of a moment of the Unix epoch (microseconds); 0 before 2015."""
+    return min(max(0, (unix_us - SIGNING_EPOCH_UNIX_US) // TIMESTAMP_UNIT_US), MAX_TIMESTAMP)
+
+
+class Refusal(StrEnum):
+    """Why a frame is not taken."""
+
+    UNSIGNED = "unsigned"
+    BAD_SIGNATURE = "bad signature"
+    REPLAYED = "replayed"
+    OLD = "old"
+    TOO_MANY_STREAMS = "too many streams"
+
+
+class SigningState:
+    """Key, time and streams of one device.
+
+    Args:
+        key: None: nothing is signed or checked.
+        clock: the device's time as a timestamp (`signing_time`).
+        timestamp: no frame is signed with an earlier one, as after a restart.
+        on_save: called with the state when key or time ought to be stored: at a new key, and while frames are
+            signed each half minute of timestamps.
+    """
+
+    __slots__ = ("_clock", "_key", "_newest", "_on_save", "_save_at", "_seed", "_streams")
+
+    def __init__(
+        self,
+        key: SigningKey | None = None,
+        *,
+        clock: Callable[[], int],
+        timestamp: int = 0,
+        on_save: "Callable[[SigningState], None] | None" = None,
+    ) -> None:
+        self._clock = clock
+        self._newest = 0
+        self._streams: dict[tuple[int, int, int], int] = {}
+        self._on_save: Callable[[SigningState], None] | None = None
+        self._save_at = 0
+        self.set_key(key, timestamp)
+        self._on_save = on_save
+
+    @property
+    def key(self) -> SigningKey | None:
+        """The key; None: signing is off."""
+        return self._key
+
+    @property
+    def active(self) -> bool:
+        """There is a key."""
+        return self._key is not None
+
+    @property
+    def timestamp(self) -> int:
+        """The newest timestamp there was: sent, received, stored, or by the clock."""
+        return min(max(self._newest, self._clock()), MAX_TIMESTAMP)
+
+    def set_key(self, key: SigningKey | None, timestamp: int = 0) -> None:
+        """Take another key, or none; time never goes back, whatever `timestamp` says."""
+        self._key = key
+        self._seed = sha256(b"" if key is None else key.secret)
+        self._streams.clear()
+        self._newest = max(self._newest, min(timestamp, MAX_TIMESTAMP))
+        self._save()
+
+    def sign(self, frame: bytes, link_id: int) -> bytes:
+        """A MAVLink 2 frame that has no signature, with one."""
+        newest = self.timestamp + (self._newest >= self._clock())
+        self._newest = newest = min(newest, MAX_TIMESTAMP)
+        if newest >= self._save_at:
+            self._save()
+        head = b"%c%b\x01%b" % (frame[0], frame[1:2], frame[3:-CHECKSUM_SIZE])
+        message_id = frame[7] | frame[8] << 8 | frame[9] << 16
+        checksum = mcrf4xx(head[1:] + bytes((DEFINITIONS[message_id].crc_extra,)))
+        signed = b"%b%b%c%b" % (
+            head,
+            checksum.to_bytes(CHECKSUM_SIZE, "little"),
+            link_id,
+            newest.to_bytes(_TIMESTAMP_SIZE, "little"),
+        )
+        return signed + self._digest(signed)
+
+    def verify(self, frame: Frame) -> Refusal | None:
+        """Check a signed frame against key and streams, and remember its time; None: it is good.
+
+        Nothing is remembered of a frame whose signature is wrong: otherwise one forged frame with a late
+        timestamp would shut the true sender out.
+        """
+        raw = frame.raw
+        if not hmac.compare_digest(self._digest(raw[:-_DIGEST_SIZE]), raw[-_DIGEST_SIZE:]):
+            return Refusal.BAD_SIGNATURE
+        timestamp = int.from_bytes(raw[-SIGNATURE_SIZE + 1 : -_DIGEST_SIZE], "little")
+        stream = (raw[-SIGNATURE_SIZE], frame.system_id, frame.component_id)
+        last = self._streams.get(stream)
+        if last is not None:
+            if timestamp <= last:
+                return Refusal.REPLAYED
+        elif timestamp + MINUTE < self.timestamp:
+            return Refusal.OLD
+        elif len(self._streams) >= MAX_STREAMS:
+            return Refusal.TOO_MANY_STREAMS
+        self._streams[stream] = timestamp
+        self._newest = max(self._newest, timestamp)
+        return None
+
+    def _digest(self, data: bytes) -> bytes:
+        digest = self._seed.copy()
+        digest.update(data)
+        return digest.digest()[:_DIGEST_SIZE]
+
+    def _save(self) -> None:
+        self._save_at = self.timestamp + _SAVE_EVERY
+        if self._on_save is not None:
+            self._on_save(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkSigningPolicy:
+    """What one link takes and sends while there is a key.
+
+    Attributes:
+        accept_unsigned: frames without signature, MAVLink 1 included.
+        accept_bad_signature: frames whose signature is wrong or not new; they count as unsigned. For a link
+            that nobody else can reach, so that a device whose key was lost can be found again.
+        sign: own frames are signed.
+        unsigned_messages: taken without signature anyway, as from telemetry radios.
+    """
+
+    accept_unsigned: bool
+    accept_bad_signature: bool = False
+    sign: bool = True
+    unsigned_messages: frozenset[int] = _RADIO_MESSAGES
+
+
+REQUIRED: Final = LinkSigningPolicy(accept_unsigned=False)
+"""Signatures are required."""
+UNSIGNED_TOO: Final = LinkSigningPolicy(accept_unsigned=True)
+"""Unsigned frames are taken too, but no wrong signature."""
+TRUSTED: Final = LinkSigningPolicy(accept_unsigned=True, accept_bad_signature=True)
+"""A link that only its owner can reach, such as USB: everything is taken (MAVLink guide, "Accepting Unsigned
+Packets")."""
+INTERNAL: Final = LinkSigningPolicy(accept_unsigned=True, accept_bad_signature=True, sign=False)
+"""Between parts of one device: nothing is signed or checked."""
+
+
+@dataclass(slots=True)
+class SigningCounters:
+    """What was signed, and what was refused, while there was a key.
+
+    Attributes:
+        sent: frames signed.
+        verified: frames with a good signature.
+        tolerated: frames taken without one, as the policy says.
+        refused: frames that were dropped, by reason.
+    """
+
+    sent: int = 0
+    verified: int = 0
+    tolerated: int = 0
+    refused: dict[Refusal, int] = field(default_factory=lambda: dict.fromkeys(Refusal, 0))
+
+    @property
+    def refused_frames(self) -> int:
+        """Frames that were dropped, for any reason."""
+        return sum(self.refused.values())
+
+
+class LinkSigning:
+    """Signs what goes out on one link and checks what comes in.
+
+    Args:
+        state: the device's.
+        link_id: number of the link, 0..255; different for the links of one device.
+        policy: what the link takes.
+    """
+
+    __slots__ = ("counters", "link_id", "policy", "state")
+
+    def __init__(self, state: SigningState, *, link_id: int, policy: LinkSigningPolicy = REQUIRED) -> None:
+        if not 0 <= link_id <= 255:
+            raise ValueError(f"link id {link_id} is not in 0..255")
+        self.state = state
+        self.link_id = link_id
+        self.policy = policy
+        self.counters = SigningCounters()
+
+    @property
+    def signs(self) -> bool:
+        """What goes out is to be signed."""
+        return self.state.active and self.policy.sign
+
+    def sign(self, packet: bytes) -> bytes:
+        """The frames of a packet (whole MAVLink 2 frames without signatures) with signatures."""
+        state, link_id = self.state, self.link_id
+        first = _FRAME_OVERHEAD + packet[1]
+        if first == len(packet):
+            self.counters.sent += 1
+            return state.sign(packet, link_id)
+        signed, start, size = [], 0, len(packet)
+        while start < size:
+            end = start + _FRAME_OVERHEAD + packet[start + 1]
+            signed.append(state.sign(packet[start:end], link_id))
+            start = end
+        self.counters.sent += len(signed)
+        return b"".join(signed)
+
+    def admit(self, frames: list[Frame]) -> list[Frame]:
+        """Those of the frames that may be believed; after it, `Frame.signed` means verified."""
+        if not self.state.active or self.policy is INTERNAL:
+            return frames
+        policy, counters, state = self.policy, self.counters, self.state
+        admitted = []
+        for frame in frames:
+            if frame.signed:
+                refusal = state.verify(frame)
+                if refusal is None:
+                    counters.verified += 1
+                    admitted.append(frame)
+                    continue
+                tolerated = policy.accept_bad_signature
+            else:
+                refusal = Refusal.UNSIGNED
+                tolerated = policy.accept_unsigned or frame.message_id in policy.unsigned_messages
+            if tolerated:
+                counters.tolerated += 1
+                admitted.append(frame._replace(signed=False) if frame.signed else frame)
+            else:
+                counters.refused[refusal] += 1
+        return admitted
+
+
+def is_unsigned_v2(raw: bytes) -> bool:
+    """The frame could be given a signature."""
+    return raw[0] == 0xFD and not raw[2] & INCOMPAT_SIGNED
