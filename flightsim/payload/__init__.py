@@ -6,6 +6,7 @@ map with targets' signatures in it. All read the vehicle's truth and give measur
 
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal, gimbal_from_camera
+from flightsim.payload.camera_view import CameraView, TargetView
 from flightsim.payload.detection import CameraFrame, Detection, DetectionModel, ResolutionDetection
 from flightsim.payload.gimbal import LEVEL, Gimbal, GimbalFlags, GimbalParameters
 from flightsim.payload.home_frame import HomeFrame
@@ -36,6 +37,7 @@ __all__ = [
     "Camera",
     "CameraFrame",
     "CameraParameters",
+    "CameraView",
     "Circle",
     "ConstantVelocity",
     "Detection",
@@ -65,6 +67,7 @@ __all__ = [
     "SurveyMagnetometerParameters",
     "SyntheticMapParameters",
     "TargetMotion",
+    "TargetView",
     "Trajectory",
     "camera_from_gimbal",
     "gimbal_from_camera",

@@ -13,12 +13,13 @@ from flightsim import truth as t
 from flightsim.home import Home
 from flightsim.payload import camera_kernel as k
 from flightsim.payload.camera_model import PinholeModel
+from flightsim.payload.camera_view import CameraView, TargetView
 from flightsim.payload.checks import require_finite
 from flightsim.payload.detection import CameraFrame, Detection, DetectionModel, ResolutionDetection
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.targets import NO_TAG, GroundTargets
-from flightsim.rotations import quaternion_from_euler
+from flightsim.rotations import multiply, quaternion_from_euler, rotate
 from flightsim.sensors.checks import require_not_negative, require_positive, require_rate
 from flightsim.sensors.schedule import steps_per_sample
 
@@ -46,6 +47,10 @@ class CameraParameters:
         false_size_px: (least, most) size of a false detection, uniform.
         mount_roll_rad, mount_pitch_rad, mount_yaw_rad: of a camera without gimbal, against the body.
         position_frd_m: place on the vehicle, from its centre of gravity.
+        max_zoom: longest focal length, in focal lengths of the model.
+        blur_px_m: of the lens at zoom 1: diameter of the circle of confusion in pixels, for each 1/m between
+            what is in focus and what is looked at. Pictures show it; the detector is not bothered.
+        min_focus_m: nearest distance that can be focused on.
     """
 
     model: PinholeModel = field(default_factory=PinholeModel)
@@ -63,16 +68,22 @@ class CameraParameters:
     mount_pitch_rad: float = -0.5 * math.pi
     mount_yaw_rad: float = 0.0
     position_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    max_zoom: float = 6.0
+    blur_px_m: float = 2.0
+    min_focus_m: float = 0.5
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(max_range_m=self.max_range_m)
+        require_positive(max_range_m=self.max_range_m, min_focus_m=self.min_focus_m)
+        if not 1.0 <= self.max_zoom < math.inf:
+            raise ValueError(f"max_zoom = {self.max_zoom!r} is not accepted: a number from 1 is")
         require_not_negative(
             latency_s=self.latency_s,
             pixel_noise_px=self.pixel_noise_px,
             size_noise=self.size_noise,
             min_depression_rad=self.min_depression_rad,
             false_detections_per_frame=self.false_detections_per_frame,
+            blur_px_m=self.blur_px_m,
         )
         require_finite(
             mount_roll_rad=self.mount_roll_rad,
@@ -94,6 +105,7 @@ class Camera:
     Attributes:
         parameters: as given.
         frame: newest delivered frame; None before the first.
+        focus_distance_m: what is sharp in a picture; None: whatever lies in its middle (autofocus).
     """
 
     __slots__ = (
@@ -116,6 +128,8 @@ class Camera:
         "_vehicle_ned_m",
         "_view",
         "_waiting",
+        "_zoom",
+        "focus_distance_m",
         "frame",
         "parameters",
     )
@@ -158,6 +172,8 @@ class Camera:
         self._q_frd_from_mount: Array = np.zeros(4)
         quaternion_from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad, self._q_frd_from_mount)
         self._focal_px = p.model.focal_px
+        self._zoom = 1.0
+        self.focus_distance_m: float | None = None
         self._constants: Array = np.zeros(k.CONSTANTS)
         self._constants[k.FOCAL_PX] = p.model.focal_px
         self._constants[k.WIDTH_PX] = p.model.width_px
@@ -179,6 +195,52 @@ class Camera:
         self._row = _BLOCK
         self._waiting: deque[CameraFrame] = deque()
         self.frame: CameraFrame | None = None
+
+    @property
+    def zoom(self) -> float:
+        """Focal length against the model's, 1 to `max_zoom`; set beyond, it stays at the end."""
+        return self._zoom
+
+    @zoom.setter
+    def zoom(self, zoom: float) -> None:
+        p = self.parameters
+        self._zoom = min(p.max_zoom, max(1.0, zoom))
+        self._focal_px = self._constants[k.FOCAL_PX] = p.model.focal_px * self._zoom
+
+    def view(self, time_us: int) -> CameraView:
+        """What a picture of this moment is made from; changes nothing."""
+        truth, gimbal = self._truth, self._gimbal
+        q_ned_from_frd, arm, q = truth[t.Q_NED_FROM_FRD], np.zeros(3), np.zeros(4)
+        multiply(q_ned_from_frd, self._q_frd_from_mount if gimbal is None else gimbal.q_frd_from_gimbal, q)
+        rotate(q_ned_from_frd, self._constants[k.POSITION_FRD_M], arm)
+        place = self._home_frame.position_ned_m(truth)
+        eye = (place[0] + float(arm[0]), place[1] + float(arm[1]), place[2] + float(arm[2]))
+        w, x, y, z = q.tolist()
+        focus_m = self.focus_distance_m
+        if focus_m is None:
+            sine = 2.0 * (x * z - w * y)  # of the optical axis below the horizon
+            focus_m = max(0.0, -eye[2]) / sine if sine > 0.0 else math.inf
+        targets = self._targets
+        if time_us > targets.time_us:
+            targets.step(time_us)
+        return CameraView(
+            time_us=time_us,
+            eye_ned_m=eye,
+            q_ned_from_mount=(w, x, y, z),
+            zoom=self._zoom,
+            focus_distance_m=max(self.parameters.min_focus_m, focus_m),
+            covered=gimbal is not None and gimbal.retracted,
+            targets=tuple(
+                TargetView(
+                    position_ned_m=(float(north_m), float(east_m), float(down_m)),
+                    size_m=target.parameters.size_m,
+                    tag_id=target.parameters.tag_id,
+                )
+                for target, (north_m, east_m, down_m) in zip(
+                    targets.targets, targets.positions_ned_m.tolist(), strict=True
+                )
+            ),
+        )
 
     def step(self, time_us: int) -> CameraFrame | None:
         """One physics step; the frame that is delivered on it, if there is one."""

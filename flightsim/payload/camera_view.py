@@ -1,0 +1,43 @@
+"""Where a camera is and looks at one moment, and what stands before it: all that a picture is made from."""
+
+from dataclasses import dataclass
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TargetView:
+    """One ground target at the moment of the picture.
+
+    Attributes:
+        position_ned_m: local NED of home.
+        size_m: extent.
+        tag_id: what can be read off it; -1: nothing.
+    """
+
+    position_ned_m: Vector
+    size_m: float
+    tag_id: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraView:
+    """One moment of one camera.
+
+    Attributes:
+        time_us: vehicle time.
+        eye_ned_m: the camera's place, local NED of home.
+        q_ned_from_mount: (w, x, y, z); x along the optical axis, y to the right of the picture, z downwards.
+        zoom: the focal length against that of the camera's model.
+        focus_distance_m: what is sharp; infinity: the far distance.
+        covered: put away, it sees nothing.
+        targets: those of the world.
+    """
+
+    time_us: int
+    eye_ned_m: Vector
+    q_ned_from_mount: tuple[float, float, float, float]
+    zoom: float = 1.0
+    focus_distance_m: float = float("inf")
+    covered: bool = False
+    targets: tuple[TargetView, ...] = ()

@@ -1,0 +1,135 @@
+"""From a camera's view to its picture."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal
+from flightsim.payload.camera_view import CameraView
+from flightsim.payload.checks import require_finite
+from flightsim.picture import landscape_kernel as k
+from flightsim.picture.ground_texture import ground_texture
+from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag
+from flightsim.rotations import rotate
+from flightsim.sensors.checks import require_not_negative, require_positive
+
+Picture = NDArray[np.uint8]
+
+_COVERED: Final = 12  # grey of a camera that is put away
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scenery:
+    """What there is to see besides the targets: fields of 100 m with tracks between them, a mark at home.
+
+    Attributes:
+        runway_length_m: of a runway whose middle is at home; 0: there is none.
+        runway_width_m, runway_heading_rad: of it.
+        visibility_m: over which haze takes 63 % of the contrast.
+        sun_azimuth_rad, sun_elevation_rad: where light comes from.
+    """
+
+    runway_length_m: float = 0.0
+    runway_width_m: float = 20.0
+    runway_heading_rad: float = 0.0
+    visibility_m: float = 6000.0
+    sun_azimuth_rad: float = math.radians(150.0)
+    sun_elevation_rad: float = math.radians(45.0)
+
+    def __post_init__(self) -> None:
+        require_not_negative(runway_length_m=self.runway_length_m)
+        require_positive(runway_width_m=self.runway_width_m, visibility_m=self.visibility_m)
+        require_finite(
+            runway_heading_rad=self.runway_heading_rad,
+            sun_azimuth_rad=self.sun_azimuth_rad,
+            sun_elevation_rad=self.sun_elevation_rad,
+        )
+
+
+class Renderer:
+    """Makes pictures for one camera.
+
+    Args:
+        model: the camera's geometry at zoom 1.
+        aperture_px_m: blur of what is far off when focused near: diameter in pixels times distance in metres
+            at zoom 1 (thin lens). 0: all is sharp always.
+        scenery: of the world.
+    """
+
+    def __init__(
+        self, model: PinholeModel, *, aperture_px_m: float = 0.0, scenery: Scenery | None = None
+    ) -> None:
+        require_not_negative(aperture_px_m=aperture_px_m)
+        self.model = model
+        self.scenery = scenery or Scenery()
+        self._aperture_px_m = aperture_px_m
+        self._texture = ground_texture()
+        numbers = self._numbers = np.zeros(k.SCENERY)
+        s = self.scenery
+        numbers[k.RUNWAY_LENGTH_M] = s.runway_length_m
+        numbers[k.RUNWAY_WIDTH_M] = s.runway_width_m
+        numbers[k.RUNWAY_COSINE] = math.cos(s.runway_heading_rad)
+        numbers[k.RUNWAY_SINE] = math.sin(s.runway_heading_rad)
+        numbers[k.VISIBILITY_M] = s.visibility_m
+        level = math.cos(s.sun_elevation_rad)
+        numbers[k.SUN_NED] = (
+            level * math.cos(s.sun_azimuth_rad),
+            level * math.sin(s.sun_azimuth_rad),
+            -math.sin(s.sun_elevation_rad),
+        )
+
+    def render(self, view: CameraView, *, width_px: int | None = None) -> Picture:
+        """The picture (height, width, 3), BGR, at the model's size or scaled to another width."""
+        model = self.model
+        width = model.width_px if width_px is None else width_px
+        height = max(1, round(model.height_px * width / model.width_px))
+        picture: Picture = np.empty((height, width, 3), np.uint8)
+        if view.covered:
+            picture[:] = _COVERED
+            return picture
+        scale = width / model.width_px
+        focal_px = model.focal_px * view.zoom * scale
+        r_ned_from_mount = _matrix(view.q_ned_from_mount)
+        eye = np.array(view.eye_ned_m)
+        k.paint_landscape(r_ned_from_mount, eye, focal_px, self._numbers, self._texture, picture)
+        camera_from_ned = camera_from_gimbal(r_ned_from_mount).T
+        sun = self._numbers[k.SUN_NED]
+
+        def distance_m(index: int) -> float:
+            return math.dist(view.targets[index].position_ned_m, view.eye_ned_m)
+
+        for index in sorted(range(len(view.targets)), key=distance_m, reverse=True):
+            target = view.targets[index]
+            if shows_tag(target):
+                draw_tag(picture, target, camera_from_ned, eye, focal_px)
+            else:
+                draw_ball(picture, target, camera_from_ned, eye, focal_px, sun)
+        return self._defocused(picture, view, r_ned_from_mount, scale)
+
+    def _defocused(
+        self, picture: Picture, view: CameraView, r_ned_from_mount: NDArray[np.float64], scale: float
+    ) -> Picture:
+        """Blur by the distance in the middle of the picture: one circle of confusion for all of it."""
+        sine = float(r_ned_from_mount[2, 0])
+        height_m = max(0.05, -view.eye_ned_m[2])
+        nearness = max(0.0, sine / height_m)
+        # thin lens: the circle grows with the square of the focal length, at one aperture number
+        circle_px = self._aperture_px_m * view.zoom**2 * scale * abs(1.0 / view.focus_distance_m - nearness)
+        if circle_px < 0.5:
+            return picture
+        sigma = min(40.0, 0.35 * circle_px)
+        blurred: Picture = cv2.GaussianBlur(picture, (0, 0), sigma).astype(np.uint8, copy=False)
+        return blurred
+
+
+def _matrix(q: tuple[float, float, float, float]) -> NDArray[np.float64]:
+    """Rotation matrix of a quaternion."""
+    columns = np.empty((3, 3))
+    quaternion = np.array(q)
+    for axis in range(3):
+        rotate(quaternion, np.eye(3)[axis], columns[axis])
+    return np.ascontiguousarray(columns.T)

@@ -1,0 +1,137 @@
+"""Ground targets in a picture: tags as plates that lie on the ground, others as red balls.
+
+A tag is of the family 36h11 (Olson 2011, AprilTag), so that any detector reads its number; its black square is
+the target's size, within a yellow margin of one cell. What has no number, or one beyond the family, is a ball of
+the target's size: it looks the same from every side, as the detector takes it to be.
+"""
+
+import functools
+import math
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.payload.camera_view import TargetView
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+TAG_FAMILY: Final = cv2.aruco.DICT_APRILTAG_36h11
+TAGS: Final = 587
+_CELLS: Final = 8  # of the black square, border included
+_MARGIN_BGR: Final = (0.0, 215.0, 255.0)
+_BALL_BGR: Final = np.array((36.0, 36.0, 220.0))
+_FINE: Final = 4  # subpixels, each way
+_TEXELS_PER_CELL: Final = 16
+_NEAREST_M: Final = 0.1
+_LARGEST_PX: Final = 20_000.0  # a plate that fills more than the picture many times over is not painted
+
+
+def shows_tag(target: TargetView) -> bool:
+    """Whether a target is painted as a tag."""
+    return 0 <= target.tag_id < TAGS
+
+
+@functools.lru_cache(maxsize=64)
+def tag_plate(tag_id: int) -> Picture:
+    """The plate of a tag, north up, (n, n, 3) BGR."""
+    dictionary = cv2.aruco.getPredefinedDictionary(TAG_FAMILY)
+    side = _CELLS * _TEXELS_PER_CELL
+    black = cv2.aruco.generateImageMarker(dictionary, tag_id, side)
+    plate = np.empty((side + 2 * _TEXELS_PER_CELL, side + 2 * _TEXELS_PER_CELL, 3), np.uint8)
+    plate[:] = _MARGIN_BGR
+    middle = slice(_TEXELS_PER_CELL, _TEXELS_PER_CELL + side)
+    plate[middle, middle] = black[:, :, None]
+    return plate
+
+
+def draw_tag(
+    picture: Picture, target: TargetView, camera_from_ned: Array, eye: Array, focal_px: float
+) -> None:
+    """Lay a tag's plate on the ground."""
+    half = 0.5 * target.size_m * (_CELLS + 2) / _CELLS
+    north, east, down = target.position_ned_m
+    corners = np.array(
+        [
+            (north + half, east - half, down),
+            (north + half, east + half, down),
+            (north - half, east + half, down),
+            (north - half, east - half, down),
+        ]
+    )
+    seen = (corners - eye) @ camera_from_ned.T
+    if seen[:, 2].min() < _NEAREST_M:
+        return
+    height, width = picture.shape[:2]
+    pixels = focal_px * seen[:, :2] / seen[:, 2:] + (0.5 * width, 0.5 * height)
+    if not np.abs(pixels).max() < _LARGEST_PX:
+        return
+    box = _box(pixels.min(axis=0), pixels.max(axis=0), width, height)
+    if box is None:
+        return
+    left, top, right, bottom = box
+    fine = _FINE if (right - left) * (bottom - top) < 200_000 else 1
+    # OpenCV counts from the middle of the first pixel, the pinhole model from its corner
+    onto = ((pixels - (left, top)) * fine - 0.5).astype(np.float32)
+    plate = tag_plate(target.tag_id)
+    side = plate.shape[0]
+    source = np.array(
+        [(-0.5, -0.5), (side - 0.5, -0.5), (side - 0.5, side - 0.5), (-0.5, side - 0.5)], np.float32
+    )
+    warp = cv2.getPerspectiveTransform(source, onto)
+    size = ((right - left) * fine, (bottom - top) * fine)
+    # one texel more of the same colour all round, so that the edge is the mask's alone
+    colour: NDArray[Any] = cv2.warpPerspective(
+        plate, warp, size, flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+    )
+    mask: Picture = np.zeros((size[1], size[0]), np.uint8)
+    cv2.fillConvexPoly(mask, np.round(onto * 256).astype(np.int32), 255, lineType=cv2.LINE_AA, shift=8)
+    if fine > 1:
+        colour = cv2.resize(colour, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
+        mask = cv2.resize(mask, (right - left, bottom - top), interpolation=cv2.INTER_AREA).astype(np.uint8)
+    _blend(picture[top:bottom, left:right], colour, mask / 255.0)
+
+
+def draw_ball(
+    picture: Picture, target: TargetView, camera_from_ned: Array, eye: Array, focal_px: float, sun_ned: Array
+) -> None:
+    """Put a ball where the target is, lit by the sun."""
+    sight = np.asarray(target.position_ned_m) - eye
+    seen = camera_from_ned @ sight
+    if seen[2] < _NEAREST_M:
+        return
+    height, width = picture.shape[:2]
+    centre = focal_px * seen[:2] / seen[2] + (0.5 * width, 0.5 * height)
+    range_m = float(np.linalg.norm(sight))
+    radius = focal_px * 0.5 * target.size_m / range_m
+    if not radius < _LARGEST_PX:
+        return
+    box = _box(centre - radius - 1.0, centre + radius + 1.0, width, height)
+    if box is None:
+        return
+    left, top, right, bottom = box
+    x = (np.arange(left, right) + 0.5 - centre[0])[None, :]
+    y = (np.arange(top, bottom) + 0.5 - centre[1])[:, None]
+    distance = np.hypot(x, y)
+    cover = np.clip(radius - distance + 0.5, 0.0, 1.0)
+    if radius < 0.5:  # less than a pixel: as much of it as the ball covers
+        cover *= math.pi * radius * radius / max(1e-9, float(cover.sum()))
+    facing = camera_from_ned @ sun_ned
+    depth = np.sqrt(np.clip(1.0 - (distance / max(radius, 1e-9)) ** 2, 0.0, 1.0))
+    lit = np.clip((x * facing[0] + y * facing[1]) / max(radius, 1e-9) - depth * facing[2], 0.0, 1.0)
+    colour = (0.6 + 0.4 * lit)[:, :, None] * _BALL_BGR
+    _blend(picture[top:bottom, left:right], colour, np.clip(cover, 0.0, 1.0))
+
+
+def _box(low: Array, high: Array, width: int, height: int) -> tuple[int, int, int, int] | None:
+    """The pixels of a picture that a box covers: left, top, right, bottom; None: none."""
+    left, top = max(0, math.floor(low[0])), max(0, math.floor(low[1]))
+    right, bottom = min(width, math.ceil(high[0])), min(height, math.ceil(high[1]))
+    return (left, top, right, bottom) if left < right and top < bottom else None
+
+
+def _blend(part: Picture, colour: NDArray[Any], cover: Array) -> None:
+    share = cover[:, :, None]
+    part[:] = np.round(part * (1.0 - share) + colour * share).astype(np.uint8)
