@@ -9,6 +9,7 @@ import click
 
 from missions.cli_fly_report import ProgressLine, tell
 from missions.cli_types import SPEEDUP
+from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 
 if TYPE_CHECKING:
     from missions.mission import Mission
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 _PATTERNS: Final = "missions.pattern_command"
 _OWN: Final = "missions.own_command"
+_FILE: Final = "missions.plan_files.command"
 _COMMANDS: Final = {
     "lissajous": _PATTERNS,
     "sector": _PATTERNS,
@@ -47,9 +49,10 @@ class FlyCommand(click.Command):
     """`fly MISSION`: the options are those of every flight, and those the mission declares."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        named = next((a for a in args if a in _COMMANDS or a.endswith(".py")), None)
+        named = self._mission_named(args)
         if named is not None:
-            ctx.meta["mission command"] = _command_of(_COMMANDS.get(named, _OWN))
+            other = _OWN if named.endswith(".py") else _FILE
+            ctx.meta["mission command"] = _command_of(_COMMANDS.get(named, other))
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
@@ -59,6 +62,17 @@ class FlyCommand(click.Command):
                     f"{error.option_name} is for {', '.join(owners)}, not for {named}"
                 ) from None
             raise
+
+    def _mission_named(self, args: list[str]) -> str | None:
+        """The mission among the arguments, which is no option's value."""
+        valued = {
+            name
+            for parameter in self.params
+            if isinstance(parameter, click.Option) and not parameter.is_flag
+            for name in parameter.opts
+        }
+        words = [a for a, before in zip(args, ["", *args], strict=False) if before not in valued]
+        return next((a for a in words if a in _COMMANDS or _is_file(a)), None)
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         declared = ctx.meta.get("mission command")
@@ -76,6 +90,10 @@ class FlyCommand(click.Command):
             for paragraph in declared.help.split("\n\n"):
                 formatter.write_text(paragraph)
                 formatter.write_paragraph()
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith(".py") or name.lower().endswith(MISSION_FILES)
 
 
 def _owners(option_name: str) -> list[str]:
@@ -101,7 +119,9 @@ def _owners(option_name: str) -> list[str]:
     help="Of the vehicle, where several are on its link; one for each --connect. [default: the first heard]",
 )
 @click.option(
-    "--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", help="Of the embedded SITL."
+    "--autopilot",
+    type=click.Choice(["px4", "ardupilot"]),
+    help="Of the embedded SITL. [default: px4, or what a mission file is for]",
 )
 @click.option(
     "--model",
@@ -159,8 +179,8 @@ def _owners(option_name: str) -> list[str]:
 @click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
 @click.option("--arg", multiple=True, metavar="NAME=VALUE", help="For a mission of your own.")
 def fly(**given: Any) -> int:
-    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, or a
-    Python file of your own.
+    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, a mission
+    file (.plan, .waypoints), or a Python file of your own.
 
     `flightstack fly MISSION --help` tells a mission's own options. Your own file has
     `async def fly(vehicle, options)`.
@@ -268,7 +288,7 @@ def _fly(given: dict[str, Any]) -> int:
                 options=options,
                 connect=given["connect"],
                 system_ids=given["system_id"],
-                autopilot=given["autopilot"],
+                autopilot=given["autopilot"] or world.autopilot or "px4",
                 model=models,
                 launch=given["launch"],
                 seed=given["seed"],
@@ -277,7 +297,7 @@ def _fly(given: dict[str, Any]) -> int:
                 wind_from_deg=wind_from_deg,
                 turbulence=given["turbulence"] or world.turbulence,
                 expected_wind_m_s=forecast_m_s,
-                home=given["home"],
+                home=given["home"] or (None if given["connect"] else world.home),
                 parameters=parameters,
                 out=given["out"],
                 picture=not given["no_picture"],

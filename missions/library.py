@@ -27,6 +27,8 @@ from missions.patterns import (
     sector,
 )
 from missions.patterns.lissajous import reduced_ratio
+from missions.plan_files.mission import FileMission
+from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.planning.sizing import (
     curve_side_m,
@@ -328,17 +330,19 @@ def _load(path: Path) -> Any:
 
 
 def find_mission(name: str) -> Mission[Any]:
-    """A mission by name, or a user's own by path (anything ending in .py).
+    """A mission by name, a user's own by path (anything ending in .py), or a mission file.
 
     Raises:
         PlanError: no such mission; lists the known ones.
     """
     if name.endswith(".py"):
         return ScriptMission(Path(name))
+    if Path(name).suffix.lower() in MISSION_FILES:
+        return FileMission(Path(name))
     known = MISSIONS.get(name)
     if known is None:
         raise PlanError(
             f"mission {name!r} is not known; there are {', '.join(MISSIONS)}, "
-            "or the path of a mission file (.py)"
+            f"or the path of a file: Python (.py), or a mission file ({', '.join(MISSION_FILES)})"
         )
     return known

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from autopilot_bridge.geodesy import GeodeticPosition
     from missions.notes import FlightNotes
+    from missions.outline import Outline
     from missions.records import FlightRecords
     from missions.score import FlightScore
     from missions.vehicle.vehicle import Vehicle
@@ -30,11 +31,15 @@ class WorldDefaults:
         model: vehicle.
         wind: "SPEED[@FROM]", m/s and degrees.
         turbulence: "none", "light", "moderate" or "severe".
+        autopilot: flavour; None: any.
+        home: "lat,lon,alt[,heading]"; None: the flavour's own.
     """
 
     model: str = "iris"
     wind: str = "0"
     turbulence: str = "none"
+    autopilot: str | None = None
+    home: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +91,10 @@ class Mission(Generic[AnyOptions]):
     def scenario(self, options: AnyOptions, setting: Setting) -> Scenario:
         """What an embedded world must hold beside the vehicles; not asked for vehicles elsewhere."""
         return Scenario()
+
+    async def outline(self, vehicle: "Vehicle", options: AnyOptions) -> "Outline | None":
+        """Where one vehicle, which is ready to arm, would fly; None: it can't be told."""
+        return None
 
     async def fly(self, vehicle: "Vehicle", options: AnyOptions) -> None:
         """Fly one vehicle, which is ready to arm, from the ground back to the ground."""

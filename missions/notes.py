@@ -50,6 +50,7 @@ class FlightNotes:
         options: as the vehicle flies them.
         left: how the vehicle was left when the flight failed or was interrupted; "": it was not.
         warnings: what the user should know, each once.
+        reached: items of a mission file (index from 0) and when, in their order.
         marks: moments and figures that the mission gives a name to, for its own score.
     """
 
@@ -62,6 +63,7 @@ class FlightNotes:
     options: MissionOptions | None = None
     left: str = ""
     warnings: list[str] = field(default_factory=list)
+    reached: list[tuple[int, int]] = field(default_factory=list)
     marks: dict[str, float] = field(default_factory=dict)
     _open: tuple[str, int] | None = None
 

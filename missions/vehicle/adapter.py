@@ -104,6 +104,10 @@ class Adapter(Protocol):
         """The radius within which a waypoint counts as reached."""
         ...
 
+    async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
+        """The same of a waypoint that asks for none."""
+        ...
+
     async def loiter(
         self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
     ) -> None:

@@ -131,6 +131,9 @@ class ArduCopter:
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
         return 0.01 * await vehicle.parameter_or("WPNAV_RADIUS", 100.0 * asked_m)  # param2 is not used
 
+    async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
+        return 0.01 * await vehicle.parameter_or("WPNAV_RADIUS", 200.0)
+
     async def loiter(
         self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
     ) -> None:

@@ -92,6 +92,9 @@ class ArduPlane(ArduCopter):
             bank_parameter="ROLL_LIMIT_DEG",
         )
 
+    async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
+        return await vehicle.parameter_or("WP_RADIUS", 90.0)
+
     async def loiter(
         self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
     ) -> None:

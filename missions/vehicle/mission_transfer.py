@@ -1,11 +1,12 @@
-"""The MAVLink mission protocol, from the ground station's side."""
+"""The MAVLink mission protocol, from the ground station's side: missions, geofences and rally points."""
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions.errors import CommandRejected, VehicleTimeout
 
 if TYPE_CHECKING:
@@ -14,9 +15,17 @@ if TYPE_CHECKING:
 _GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
+_DO_JUMP: Final = 177
+_NAMES: Final = {
+    MissionType.MISSION: "mission",
+    MissionType.FENCE: "geofence",
+    MissionType.RALLY: "list of rally points",
+}
 
 
-def item_message(item: MissionItem, sequence: int, system_id: int) -> Any:
+def item_message(
+    item: MissionItem, sequence: int, system_id: int, mission_type: MissionType = MissionType.MISSION
+) -> Any:
     """MISSION_ITEM_INT of an item: degrees in 1e-7, local metres in 1e-4; NaN x or y ("not set") as 0."""
     scale = 1e7 if item.frame in _GLOBAL_FRAMES else (1.0 if item.frame == 2 else 1e4)
 
@@ -29,7 +38,7 @@ def item_message(item: MissionItem, sequence: int, system_id: int) -> Any:
         sequence,
         item.frame,
         item.command,
-        1 if sequence == 0 else 0,
+        1 if sequence == 0 and mission_type is MissionType.MISSION else 0,
         int(item.autocontinue),
         item.param1,
         item.param2,
@@ -38,7 +47,7 @@ def item_message(item: MissionItem, sequence: int, system_id: int) -> Any:
         whole(item.x),
         whole(item.y),
         item.z,
-        dialect.MAV_MISSION_TYPE_MISSION,
+        int(mission_type),
     )
 
 
@@ -59,61 +68,84 @@ def item_from_message(message: Any) -> MissionItem:
     )
 
 
+def renumbered(items: Sequence[MissionItem], by: int) -> list[MissionItem]:
+    """Items whose jumps lead to the same items when `by` others stand before them all."""
+    return [replace(i, param1=i.param1 + by) if i.command == _DO_JUMP and by else i for i in items]
+
+
 def _result_name(result: int) -> str:
     entry = dialect.enums["MAV_MISSION_RESULT"].get(result)
     return entry.name.removeprefix("MAV_MISSION_") if entry else f"result {result}"
 
 
-async def upload(vehicle: "Vehicle", items: Sequence[MissionItem]) -> None:
+def _command_name(command: int) -> str:
+    entry = dialect.enums["MAV_CMD"].get(command)
+    return entry.name.removeprefix("MAV_CMD_") if entry else f"command {command}"
+
+
+async def upload(
+    vehicle: "Vehicle",
+    items: Sequence[MissionItem],
+    mission_type: MissionType = MissionType.MISSION,
+    *,
+    before: int = 0,
+) -> None:
     """Send a whole plan, numbered as the vehicle numbers it.
+
+    Args:
+        before: how many of the items are not the user's own (ArduPilot's home): an item that is refused is
+            numbered from 1 without them.
 
     Raises:
         CommandRejected: the vehicle refused it; names the item where it says which.
         VehicleTimeout: it stopped asking for items.
     """
+    what = _NAMES[mission_type]
     names = ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK")
     asked = -1
     with vehicle.messages(*names) as replies:
-        count = dialect.MAVLink_mission_count_message(vehicle.system_id, 1, len(items), 0)
+        count = dialect.MAVLink_mission_count_message(vehicle.system_id, 1, len(items), int(mission_type))
         vehicle.send(count)
         attempts = 0
         while True:
             try:
-                async with vehicle.deadline(_RETRY_S if asked < 0 else 6.0, "a request for a mission item"):
+                async with vehicle.deadline(
+                    _RETRY_S if asked < 0 else 6.0, f"a request for an item of the {what}"
+                ):
                     reply = await anext(replies)
             except TimeoutError:
                 attempts += 1
                 if asked >= 0 or attempts > _RETRIES:
                     raise VehicleTimeout(
-                        f"the vehicle stopped asking for mission items after {asked + 1} of {len(items)}; "
-                        f"{vehicle.heard()}"
+                        f"the vehicle stopped asking for items of the {what} after {asked + 1} of "
+                        f"{len(items)}; {vehicle.heard()}"
                     ) from None
                 vehicle.send(count)
                 continue
-            if not vehicle.addressed_here(reply):
+            if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
                 continue
             if reply.get_type() == "MISSION_ACK":
-                if reply.mission_type != 0:
-                    continue
                 if reply.type == dialect.MAV_MISSION_ACCEPTED:
                     if asked + 1 >= len(items):
                         return
                     continue  # of an earlier transfer
                 if reply.type == dialect.MAV_MISSION_INVALID_SEQUENCE:
                     continue  # to an item that was sent twice: the transfer stays open (ArduPilot)
-                where = f" at item {asked} (command {items[asked].command})" if asked >= 0 else ""
+                where = ""
+                if asked >= 0:
+                    where = f" at item {asked - before + 1} ({_command_name(items[asked].command)})"
                 raise CommandRejected(
-                    f"the vehicle refused the mission{where}: {_result_name(reply.type)}; {vehicle.heard()}",
+                    f"the vehicle refused the {what}{where}: {_result_name(reply.type)}; {vehicle.heard()}",
                     reply.type,
                 )
-            if reply.mission_type == 0 and reply.seq < len(items):
+            if reply.seq < len(items):
                 asked = max(asked, reply.seq)
-                vehicle.send(item_message(items[reply.seq], reply.seq, vehicle.system_id))
+                vehicle.send(item_message(items[reply.seq], reply.seq, vehicle.system_id, mission_type))
 
 
-async def download(vehicle: "Vehicle") -> list[MissionItem]:
+async def download(vehicle: "Vehicle", mission_type: MissionType = MissionType.MISSION) -> list[MissionItem]:
     """The whole plan the vehicle holds, as it numbers it."""
-    system_id = vehicle.system_id
+    system_id, what = vehicle.system_id, _NAMES[mission_type]
 
     async def ask(message: Any, name: str, sequence: int | None = None) -> Any:
         with vehicle.messages(name) as replies:
@@ -122,37 +154,46 @@ async def download(vehicle: "Vehicle") -> list[MissionItem]:
                 try:
                     async with vehicle.deadline(_RETRY_S, name):
                         async for reply in replies:
-                            if vehicle.addressed_here(reply) and (sequence is None or reply.seq == sequence):
+                            if (
+                                vehicle.addressed_here(reply)
+                                and reply.mission_type == mission_type
+                                and (sequence is None or reply.seq == sequence)
+                            ):
                                 return reply
                 except TimeoutError:
                     continue
-        raise VehicleTimeout(f"no {name} came while downloading the mission; {vehicle.heard()}")
+        raise VehicleTimeout(f"no {name} came while downloading the {what}; {vehicle.heard()}")
 
-    count = await ask(dialect.MAVLink_mission_request_list_message(system_id, 1, 0), "MISSION_COUNT")
+    count = await ask(
+        dialect.MAVLink_mission_request_list_message(system_id, 1, int(mission_type)), "MISSION_COUNT"
+    )
     items = []
     for k in range(count.count):
-        request = dialect.MAVLink_mission_request_int_message(system_id, 1, k, 0)
+        request = dialect.MAVLink_mission_request_int_message(system_id, 1, k, int(mission_type))
         items.append(item_from_message(await ask(request, "MISSION_ITEM_INT", k)))
-    vehicle.send(dialect.MAVLink_mission_ack_message(system_id, 1, dialect.MAV_MISSION_ACCEPTED, 0))
+    vehicle.send(
+        dialect.MAVLink_mission_ack_message(system_id, 1, dialect.MAV_MISSION_ACCEPTED, int(mission_type))
+    )
     return items
 
 
-async def clear(vehicle: "Vehicle") -> None:
+async def clear(vehicle: "Vehicle", mission_type: MissionType = MissionType.MISSION) -> None:
     """Delete the plan the vehicle holds."""
+    what = _NAMES[mission_type]
     with vehicle.messages("MISSION_ACK") as replies:
         for _ in range(_RETRIES):
-            vehicle.send(dialect.MAVLink_mission_clear_all_message(vehicle.system_id, 1, 0))
+            vehicle.send(dialect.MAVLink_mission_clear_all_message(vehicle.system_id, 1, int(mission_type)))
             try:
-                async with vehicle.deadline(_RETRY_S, "the clearing of the mission"):
+                async with vehicle.deadline(_RETRY_S, f"the clearing of the {what}"):
                     async for reply in replies:
-                        if not vehicle.addressed_here(reply):
+                        if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
                             continue
                         if reply.type != dialect.MAV_MISSION_ACCEPTED:
                             raise CommandRejected(
-                                f"the vehicle refused to clear the mission: {_result_name(reply.type)}",
+                                f"the vehicle refused to clear the {what}: {_result_name(reply.type)}",
                                 reply.type,
                             )
                         return
             except TimeoutError:
                 continue
-    raise VehicleTimeout(f"clearing the mission was not answered; {vehicle.heard()}")
+    raise VehicleTimeout(f"clearing the {what} was not answered; {vehicle.heard()}")

@@ -116,6 +116,9 @@ class Px4:
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
         return asked_m  # a waypoint's param2 counts
 
+    async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
+        return await vehicle.parameter_or("NAV_ACC_RAD", 10.0)
+
     async def loiter(
         self, vehicle: "Vehicle", place: GeodeticPosition, radius_m: float | None, clockwise: bool
     ) -> None:

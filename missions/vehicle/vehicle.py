@@ -9,7 +9,7 @@ from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions import telemetry
 from missions.connection import Connection
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
@@ -325,19 +325,33 @@ class Vehicle(FixedWingFlight):
     # missions
 
     async def upload_mission(self, items: Sequence[MissionItem]) -> int:
-        """Upload a plan; gives the wire number of its first item (1 for ArduPilot, whose item 0 is home)."""
+        """Upload a plan; gives the wire number of its first item (1 for ArduPilot, whose item 0 is home).
+
+        Jumps name items by their index in `items`.
+        """
         first = 1 if self.adapter.first_mission_item_is_home else 0
         home = self.home
         marker = MissionItem(
             command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m
         )
-        await mission_transfer.upload(self, [marker, *items] if first else items)
+        own = mission_transfer.renumbered(items, first)
+        await mission_transfer.upload(self, [marker, *own] if first else own, before=first)
         return first
+
+    async def upload_plan(self, mission_type: MissionType, items: Sequence[MissionItem]) -> None:
+        """Upload a geofence or rally points in place of those the vehicle has."""
+        await mission_transfer.upload(self, items, mission_type)
+
+    async def download_plan(self, mission_type: MissionType) -> list[MissionItem]:
+        """The geofence or the rally points the vehicle holds."""
+        return await mission_transfer.download(self, mission_type)
 
     async def download_mission(self) -> list[MissionItem]:
         """The plan the vehicle holds (without ArduPilot's home item)."""
         items = await mission_transfer.download(self)
-        return items[1:] if self.adapter.first_mission_item_is_home else items
+        if not self.adapter.first_mission_item_is_home:
+            return items
+        return mission_transfer.renumbered(items[1:], -1)
 
     async def clear_mission(self) -> None:
         """Delete the plan the vehicle holds."""

@@ -1,0 +1,22 @@
+"""Where a mission is going to fly and how long, as far as it can be told before it is flown."""
+
+from dataclasses import dataclass
+
+from autopilot_bridge.geodesy import GeodeticPosition
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outline:
+    """What is looked at before a flight.
+
+    Attributes:
+        points_ned_m: places it flies through, from home.
+        duration_s: of the flight without takeoff and landing; None: not known.
+        plan_home: where the plan begins; None: wherever the vehicle stands.
+        brings_fence: the mission uploads a fence of its own.
+    """
+
+    points_ned_m: tuple[tuple[float, float, float], ...] = ()
+    duration_s: float | None = None
+    plan_home: GeodeticPosition | None = None
+    brings_fence: bool = False

@@ -1,0 +1,87 @@
+"""A mission file as data, whatever its format."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import PlanError
+from missions.kind import VehicleKind
+
+NAV_WAYPOINT: Final = 16
+NAV_LOITER_UNLIM: Final = 17
+NAV_LOITER_TURNS: Final = 18
+NAV_LOITER_TIME: Final = 19
+NAV_RETURN_TO_LAUNCH: Final = 20
+NAV_LAND: Final = 21
+NAV_TAKEOFF: Final = 22
+NAV_LOITER_TO_ALT: Final = 31
+NAV_SPLINE_WAYPOINT: Final = 82
+NAV_DELAY: Final = 93
+DO_JUMP: Final = 177
+DO_CHANGE_SPEED: Final = 178
+DO_LAND_START: Final = 189
+
+FLOWN_TO: Final = frozenset(
+    {
+        NAV_WAYPOINT,
+        NAV_LOITER_UNLIM,
+        NAV_LOITER_TURNS,
+        NAV_LOITER_TIME,
+        NAV_LAND,
+        NAV_TAKEOFF,
+        NAV_LOITER_TO_ALT,
+        NAV_SPLINE_WAYPOINT,
+    }
+)
+"""Commands that name a place to fly to."""
+
+LOITERS: Final = frozenset({NAV_LOITER_UNLIM, NAV_LOITER_TURNS, NAV_LOITER_TIME, NAV_LOITER_TO_ALT})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionDocument:
+    """What a mission file holds.
+
+    Attributes:
+        path: of the file.
+        items: the mission, without a home item; DO_JUMP names its target by the index in this tuple.
+        fence, rally: items of the other two mission types.
+        home: where the plan begins; None: the file doesn't say.
+        kind: class of vehicle it is for; None: the file doesn't say.
+        firmware: "px4" or "ardupilot"; None: the file doesn't say, or means any.
+        cruise_speed_m_s, hover_speed_m_s: what the planner reckoned with, by wings and by rotors.
+    """
+
+    path: Path
+    items: tuple[MissionItem, ...]
+    fence: tuple[MissionItem, ...] = ()
+    rally: tuple[MissionItem, ...] = ()
+    home: GeodeticPosition | None = None
+    kind: VehicleKind | None = None
+    firmware: str | None = None
+    cruise_speed_m_s: float | None = None
+    hover_speed_m_s: float | None = None
+
+    def item_name(self, index: int) -> str:
+        """An item as ground stations number it: "item 3 (NAV_WAYPOINT)"."""
+        return item_name(index, self.items[index].command)
+
+    def refuse(self, index: int, why: str) -> PlanError:
+        """The error that names an item."""
+        return PlanError(f"{self.path}: {self.item_name(index)}: {why}")
+
+    @property
+    def lands(self) -> bool:
+        """Whether the mission itself brings the vehicle down: a landing, or the return as its last word."""
+        commands = [item.command for item in self.items]
+        return NAV_LAND in commands or NAV_RETURN_TO_LAUNCH in commands
+
+
+def item_name(index: int, command: int) -> str:
+    """An item by its place in the mission (from 0), numbered from 1 as ground stations do."""
+    entry = dialect.enums["MAV_CMD"].get(command)
+    name = entry.name.removeprefix("MAV_CMD_") if entry else f"command {command}"
+    return f"item {index + 1} ({name})"

@@ -1,0 +1,57 @@
+"""Reading and writing mission files by their suffix."""
+
+from pathlib import Path
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import PlanError
+from missions.kind import VehicleKind
+from missions.plan_files import qgc_plan, wpl
+from missions.plan_files.document import MissionDocument
+from missions.plan_files.suffixes import PLAN, SUFFIXES
+from missions.plan_files.validation import validated
+
+
+def read_mission_file(path: Path) -> MissionDocument:
+    """A mission file that some vehicle can fly.
+
+    Raises:
+        PlanError: names the file, the item, the value and what is accepted.
+    """
+    if path.suffix.lower() == PLAN:
+        return validated(qgc_plan.read_plan(path))
+    return validated(wpl.read_wpl(path))
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse a name that no mission file has, or that a file has already."""
+    if path.suffix.lower() not in SUFFIXES:
+        raise PlanError(f"mission file {path}: suffix {path.suffix!r}; accepted: {', '.join(SUFFIXES)}")
+    if path.exists():
+        raise PlanError(f"{path} is there already, and nothing is overwritten; choose another name")
+
+
+def write_mission_file(
+    path: Path,
+    items: tuple[MissionItem, ...],
+    home: GeodeticPosition,
+    *,
+    firmware: str,
+    kind: VehicleKind,
+    speed_m_s: float,
+) -> None:
+    """Write a mission in the format that the suffix names.
+
+    Raises:
+        PlanError: the suffix names none, the file is there already, or can't be written.
+    """
+    check_suffix(path)
+    if path.suffix.lower() == PLAN:
+        text = qgc_plan.format_plan(items, home, firmware=firmware, kind=kind, speed_m_s=speed_m_s)
+    else:
+        text = wpl.format_wpl(items, home)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except OSError as error:
+        raise PlanError(f"mission file {path} can't be written: {error.strerror}") from error

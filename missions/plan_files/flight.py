@@ -1,0 +1,112 @@
+"""Flying a mission file: uploaded as it is, and watched to its end."""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.mission_plan import MissionType
+from missions.errors import PlanError, VehicleTimeout
+from missions.kind import VehicleKind
+from missions.notes import CommandedPath
+from missions.plan_files.document import NAV_WAYPOINT, MissionDocument
+from missions.plan_files.options import FileOptions, Then
+from missions.plan_files.progress import MissionWatch
+from missions.plan_files.route import Route, Stop, path_ned_m, placed, route_of, scored_stops
+from missions.vehicle.vehicle import Vehicle
+
+FARTHEST_M: Final = 10_000.0
+"""From home to the nearest place of a mission; beyond, the file is of another place."""
+
+_SLOW: Final = 0.5  # of the planned speed, for a deadline
+_LANDING_S: Final = 600.0
+
+
+def check_distance(route: Route, path: object, home: object) -> None:
+    """Refuse, with a PlanError, a mission that lies elsewhere than its vehicle."""
+    if not route.stops:
+        return
+    nearest_m = min(math.hypot(*stop.position_ned_m[:2]) for stop in route.stops)
+    if nearest_m > FARTHEST_M:
+        raise PlanError(
+            f"{path} is flown {nearest_m * 1e-3:.0f} km from where the vehicle stands ({home}); accepted: at "
+            f"most {FARTHEST_M * 1e-3:g} km"
+        )
+
+
+def own_speed_m_s(document: MissionDocument, kind: VehicleKind) -> float:
+    """Speed that the plan reckons with for a class of vehicle."""
+    if kind is VehicleKind.FIXED_WING:
+        return document.cruise_speed_m_s or 15.0
+    return document.hover_speed_m_s or 5.0
+
+
+async def fly_document(vehicle: Vehicle, options: FileOptions, document: MissionDocument) -> None:
+    """Upload the document and fly it from the ground back to the ground.
+
+    Raises:
+        PlanError: it lies elsewhere, or an aircraft could not come down.
+        MissionError: the vehicle refused it, or the flight went wrong.
+    """
+    notes, clock, home = vehicle.notes, vehicle.clock, vehicle.home
+    wings = vehicle.kind is VehicleKind.FIXED_WING
+    route = route_of(document, home)
+    check_distance(route, document.path, home)
+    if route.endless and options.time_limit_s is None:
+        raise PlanError(f"{document.path} jumps back for ever; say when it ends with --time-limit SECONDS")
+    if document.firmware not in (None, vehicle.autopilot):
+        notes.warn(
+            f"{document.path} was planned for {document.firmware}, and is flown by {vehicle.autopilot}"
+        )
+    stops = scored_stops(route, with_takeoff=not wings)
+    if stops:
+        notes.commanded = CommandedPath(
+            origin=home,
+            points_ned_m=path_ned_m(stops),
+            waypoints_ned_m=np.array([stop.position_ned_m for stop in stops]),
+            acceptance_m=await _acceptance_m(vehicle, document, stops),
+        )
+    notes.begin("upload", clock.time_us)
+    vehicle.note_runway()
+    if document.fence:
+        await vehicle.upload_plan(MissionType.FENCE, document.fence)
+    if document.rally:
+        await vehicle.upload_plan(MissionType.RALLY, document.rally)
+    items = placed(document.items, home, vehicle.adapter.unset)
+    first = await vehicle.upload_mission(items)
+    notes.begin("takeoff", clock.time_us)
+    watch = MissionWatch(vehicle, document, route, stops, first)
+    expected_s = route.duration_s(own_speed_m_s(document, vehicle.kind))
+    tallest_m = max((-stop.position_ned_m[2] for stop in route.stops), default=0.0)
+    limit_s = options.time_limit_s or 180.0 + 3.0 * max(0.0, tallest_m) + expected_s / _SLOW
+    await vehicle.start_mission()
+    try:
+        ended = await watch.until_the_end(limit_s)
+    except VehicleTimeout:
+        if options.time_limit_s is None:
+            raise
+        ended = False
+    notes.begin("return", clock.time_us)
+    if not (ended and document.lands):
+        if options.then is Then.LAND:
+            await (vehicle.land_along(wait=False) if wings else vehicle.land(wait=False))
+        else:
+            await vehicle.return_to_launch(wait=False)
+    await vehicle.wait_disarmed(_LANDING_S + 2.0 * expected_s)
+    notes.end(clock.time_us)
+
+
+async def _acceptance_m(vehicle: Vehicle, document: MissionDocument, stops: tuple[Stop, ...]) -> float:
+    """The largest radius within which the mission's places count as reached."""
+    asked = {
+        document.items[stop.index].param2
+        for stop in stops
+        if document.items[stop.index].command == NAV_WAYPOINT
+    }
+    radii = [
+        await vehicle.adapter.acceptance_m(
+            vehicle, a if a > 0.0 else await vehicle.adapter.own_acceptance_m(vehicle)
+        )
+        for a in sorted(asked or {0.0}, key=lambda a: (math.isnan(a), a))
+    ]
+    return max(radii)

@@ -1,0 +1,72 @@
+"""Values of a JSON file that somebody else wrote, with errors that say where they stand."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+Refuse = Callable[[str, str], Exception]
+"""Where it stands and what is wrong -> the error to raise."""
+
+
+def mapping(value: Any, where: str, refuse: Refuse) -> Mapping[str, Any]:
+    """A JSON object."""
+    if not isinstance(value, Mapping):
+        raise refuse(where, f"{_shown(value)} is not a JSON object")
+    return value
+
+
+def entries(value: Any, where: str, refuse: Refuse) -> Sequence[Any]:
+    """A JSON array."""
+    if not isinstance(value, list):
+        raise refuse(where, f"{_shown(value)} is not a JSON array")
+    return value
+
+
+def is_number(value: Any) -> bool:
+    """A JSON number; JSON's true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def number(entry: Mapping[str, Any], name: str, where: str, refuse: Refuse) -> float:
+    """A number that must be there."""
+    value = entry.get(name)
+    if not is_number(value):
+        raise refuse(where, f"{name} = {_shown(value)} is not a number")
+    return _finite_float(value, f"{where}, {name}", refuse)
+
+
+def whole(entry: Mapping[str, Any], name: str, where: str, refuse: Refuse) -> int:
+    """A whole number that must be there, and is not negative."""
+    value: Any = entry.get(name)
+    if not is_number(value) or (isinstance(value, float) and not math.isfinite(value)) or value != int(value):
+        raise refuse(where, f"{name} = {_shown(value)} is not a whole number")
+    if not 0 <= value < 2**31:
+        raise refuse(where, f"{name} = {_shown(value)} is not in 0..{2**31 - 1}")
+    return int(value)
+
+
+def flag(entry: Mapping[str, Any], name: str, default: bool, where: str, refuse: Refuse) -> bool:
+    """True or false."""
+    value = entry.get(name, default)
+    if not isinstance(value, bool):
+        raise refuse(where, f"{name} = {_shown(value)} is not true or false")
+    return value
+
+
+def numbers(value: Any, count: int, where: str, refuse: Refuse) -> list[float]:
+    """An array of so many numbers."""
+    if not (isinstance(value, list) and len(value) == count and all(is_number(v) for v in value)):
+        raise refuse(where, f"{_shown(value)} is not an array of {count} numbers")
+    return [_finite_float(v, where, refuse) for v in value]
+
+
+def _finite_float(value: Any, where: str, refuse: Refuse) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        raise refuse(where, "the number is too large") from None
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."

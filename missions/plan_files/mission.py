@@ -1,0 +1,184 @@
+"""The mission that a file describes."""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from missions.errors import PlanError
+from missions.kind import VehicleKind
+from missions.mission import Debriefing, Mission, WorldDefaults
+from missions.plan_files.document import FLOWN_TO, LOITERS, NAV_LAND, MissionDocument
+from missions.plan_files.files import read_mission_file
+from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
+from missions.plan_files.options import FileOptions
+from missions.plan_files.route import Stop, route_of, scored_stops
+from missions.planning.limits import FixedWingLimits, Limits
+
+if TYPE_CHECKING:
+    from missions.notes import FlightNotes
+    from missions.outline import Outline
+    from missions.score import FlightScore
+    from missions.vehicle.vehicle import Vehicle
+
+_MODELS: Final = {VehicleKind.MULTICOPTER: "iris", VehicleKind.FIXED_WING: "aerosonde"}
+
+
+class FileMission(Mission[FileOptions]):
+    """A mission file, flown as it is.
+
+    Attributes:
+        document: what the file holds.
+
+    Raises:
+        PlanError: the file can't be read, or what it says can't be flown.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.document = document = read_mission_file(path)
+        self.name = path.stem
+        kind = document.kind or VehicleKind.MULTICOPTER
+        self.kinds = (kind,) if document.kind else (VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING)
+        self.world_defaults = WorldDefaults(
+            model=_MODELS[kind], autopilot=document.firmware, home=_home_text(document)
+        )
+
+    def adapted(self, options: FileOptions, limits: Limits) -> FileOptions:
+        heights = [-stop.position_ned_m[2] for stop in route_of(self.document, self._plan_home).stops]
+        return options.unless_chosen(altitude_m=max(heights, default=options.altitude_m))
+
+    def check(self, options: FileOptions, limits: Limits) -> None:
+        for name in options.arguments:
+            raise PlanError(
+                f"--arg {name}: {self.document.path} takes none; they are for missions of your own"
+            )
+        wings = isinstance(limits, FixedWingLimits)
+        kind = VehicleKind.FIXED_WING if wings else VehicleKind.MULTICOPTER
+        if self.document.kind not in (None, kind):
+            raise PlanError(
+                f"{self.document.path} is for a {self.document.kind}, and the vehicle is a {kind}; choose "
+                "another vehicle (--model, --connect), or plan it for this one"
+            )
+        if wings and not self.document.lands and options.then is None:
+            raise PlanError(
+                f"{self.document.path} does not land; add a landing, or say what comes after it: --then land "
+                "(along the runway, at home) or --then return"
+            )
+
+    def check_place(self, options: FileOptions, limits: Limits, home: GeodeticPosition) -> None:
+        check_distance(route_of(self.document, home), self.document.path, home)
+
+    async def fly(self, vehicle: "Vehicle", options: FileOptions) -> None:
+        await fly_document(vehicle, options, self.document)
+
+    async def outline(self, vehicle: "Vehicle", options: FileOptions) -> "Outline":
+        from missions.outline import Outline
+
+        route = route_of(self.document, vehicle.home)
+        return Outline(
+            points_ned_m=tuple(stop.position_ned_m for stop in route.stops),
+            duration_s=options.time_limit_s
+            if route.endless
+            else route.duration_s(own_speed_m_s(self.document, vehicle.kind)),
+            plan_home=self.document.home,
+            brings_fence=bool(self.document.fence),
+        )
+
+    @property
+    def _plan_home(self) -> GeodeticPosition:
+        return self.document.home or GeodeticPosition(lat_deg=0.0, lon_deg=0.0, alt_m=0.0)
+
+    def title(self, options: FileOptions) -> str:
+        return self.document.path.name
+
+    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
+        notes, score = debriefing.flights[0] if debriefing.flights else (None, None)
+        document = self.document
+        block: dict[str, Any] = {
+            "file": str(document.path),
+            "items": len(document.items),
+            "fence_items": len(document.fence),
+            "rally_points": len(document.rally),
+            "reached": [],
+            "legs": [],
+        }
+        if notes is None or score is None:
+            return {"mission_file": block}
+        block["reached"] = [
+            {"item": index + 1, "command": document.items[index].command, "time_s": time_us / 1e6}
+            for index, time_us in notes.reached
+        ]
+        block["legs"] = legs = list(self._legs(notes, score))
+        worst = [leg["cross_track_max_m"] for leg in legs]
+        squares = [leg["cross_track_rms_m"] ** 2 for leg in legs]
+        block["cross_track_max_m"] = max(worst) if worst else None
+        block["cross_track_rms_m"] = round(math.sqrt(sum(squares) / len(squares)), 3) if squares else None
+        return {"mission_file": block}
+
+    def _legs(self, notes: "FlightNotes", score: "FlightScore") -> Sequence[Mapping[str, Any]]:
+        """Distance of the track from each straight leg, between the moments of its ends."""
+        track = score.truth if score.truth is not None else score.estimate
+        if track is None or notes.commanded is None:
+            return ()
+        route = route_of(self.document, notes.commanded.origin)
+        stops = scored_stops(route, with_takeoff=notes.kind == VehicleKind.MULTICOPTER)
+        legs: list[Mapping[str, Any]] = []
+        times = list(notes.reached)
+        for a, b in pairwise(stops):
+            while times and times[0][0] != a.index:
+                times.pop(0)
+            if len(times) < 2 or times[1][0] != b.index or {a.command, b.command} & LOITERS:
+                continue
+            flown = track.between(times[0][1], times[1][1]).pos_ned_m
+            if len(flown) > 1:
+                legs.append({"from": a.index + 1, "to": b.index + 1, **_cross_track(a, b, flown)})
+        return legs
+
+    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+        block = summary["mission_file"]
+        reached = {entry["item"] for entry in block["reached"]}
+        places = {
+            k + 1
+            for k, i in enumerate(self.document.items)
+            if i.command in FLOWN_TO and i.command != NAV_LAND
+        }
+        lines = [f"places reached: {len(reached & places)} of {len(places)}"]
+        if block["cross_track_rms_m"] is not None:
+            lines.append(
+                f"cross-track {block['cross_track_rms_m']:.2f} m RMS, {block['cross_track_max_m']:.2f} m at most, "
+                f"over {len(block['legs'])} legs"
+            )
+        return lines
+
+
+def _cross_track(a: Stop, b: Stop, flown: np.ndarray[Any, Any]) -> dict[str, float]:
+    """Horizontal distance from the leg's line."""
+    start, stop = np.array(a.position_ned_m[:2]), np.array(b.position_ned_m[:2])
+    along = stop - start
+    length = float(np.linalg.norm(along))
+    offset = flown[:, :2] - start
+    if length < 1.0:
+        across = np.linalg.norm(offset, axis=1)
+    else:
+        across = np.abs(offset[:, 0] * along[1] - offset[:, 1] * along[0]) / length
+    return {
+        "cross_track_rms_m": round(float(np.sqrt(np.mean(across**2))), 3),
+        "cross_track_max_m": round(float(across.max()), 3),
+    }
+
+
+def _home_text(document: MissionDocument) -> str | None:
+    """The file's home for an embedded world, which faces the mission's first place."""
+    home = document.home
+    if home is None:
+        return None
+    for stop in route_of(document, home).stops:
+        north, east, _ = stop.position_ned_m
+        if math.hypot(north, east) > 5.0:
+            heading_deg = math.degrees(math.atan2(east, north)) % 360.0
+            return f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt_m:.3f},{heading_deg:.3f}"
+    return f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt_m:.3f}"

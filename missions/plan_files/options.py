@@ -1,0 +1,36 @@
+"""What a mission file is flown with."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from missions.errors import PlanError
+from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
+
+
+class Then(StrEnum):
+    """What comes after a mission that does not land by itself."""
+
+    RETURN = "return"
+    LAND = "land"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FileOptions(MissionOptions):
+    """How a mission file is flown.
+
+    Attributes:
+        then: after a mission that doesn't land; None: a multicopter returns, an aircraft's is refused.
+        time_limit_s: ends a mission that takes longer, with `then`; None: twice what it should take, and it
+            has failed.
+    """
+
+    then: Then | None = None
+    time_limit_s: float | None = None
+
+    def __post_init__(self) -> None:
+        super(FileOptions, self).__post_init__()
+        check_positive(time_limit=self.time_limit_s)
+        if self.time_limit_s is not None and self.time_limit_s > MAX_SEARCH_TIME_S:
+            raise PlanError(f"--time-limit {self.time_limit_s:g} s is more than {MAX_SEARCH_TIME_S:g} s")
+        if self.vehicles > 1:
+            raise PlanError("a mission file is flown by one vehicle; start the command once for each")

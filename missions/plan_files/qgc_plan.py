@@ -1,0 +1,239 @@
+"""QGroundControl's `.plan` (JSON, version 1): mission, geofence, rally points, home and speeds."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import PlanError
+from missions.kind import KIND_OF_TYPE, VehicleKind
+from missions.plan_files.complex_items import landing_items, simple_items
+from missions.plan_files.document import DO_JUMP, MissionDocument
+from missions.plan_files.json_values import Refuse, entries, flag, is_number, mapping, number, numbers, whole
+
+_MAX_BYTES: Final = 32 * 1024 * 1024
+_FIRMWARE: Final = {12: "px4", 3: "ardupilot"}
+_RETURN_POINT, _VERTEX_IN, _VERTEX_OUT, _CIRCLE_IN, _CIRCLE_OUT, _RALLY = 5000, 5001, 5002, 5003, 5004, 5100
+_INT_FRAMES: Final = {0: 5, 3: 6, 10: 11}
+_PLAIN_FRAMES: Final = {5: 0, 6: 3, 11: 10}
+
+
+def read_plan(path: Path) -> MissionDocument:
+    """A plan file.
+
+    Raises:
+        PlanError: it can't be read, or is none; says where.
+    """
+
+    def refuse(where: str, why: str) -> PlanError:
+        return PlanError(f"{path}: {where}: {why}")
+
+    plan = mapping(_load(path), "the file", refuse)
+    if plan.get("fileType") != "Plan":
+        raise PlanError(f"{path}: fileType is {plan.get('fileType')!r}; accepted: 'Plan', of QGroundControl")
+    if plan.get("version") != 1:
+        raise PlanError(f"{path}: version {plan.get('version')!r} of the format; accepted: 1")
+    mission = mapping(plan.get("mission"), "mission", refuse)
+    if mission.get("version") != 2:
+        raise PlanError(f"{path}: version {mission.get('version')!r} of its mission; accepted: 2")
+    home = None
+    if mission.get("plannedHomePosition") is not None:
+        lat, lon, alt = numbers(mission["plannedHomePosition"], 3, "plannedHomePosition", refuse)
+        if not (abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(alt)):
+            raise refuse("plannedHomePosition", f"{lat!r}, {lon!r}, {alt!r} is no place")
+        home = GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt)
+    return MissionDocument(
+        path=path,
+        items=_mission_items(mission, refuse),
+        fence=_fence_items(mapping(plan.get("geoFence", {}), "geoFence", refuse), refuse),
+        rally=_rally_items(mapping(plan.get("rallyPoints", {}), "rallyPoints", refuse), refuse),
+        home=home,
+        kind=_kind(mission, path),
+        firmware=_FIRMWARE.get(mission.get("firmwareType", 0)),
+        cruise_speed_m_s=_speed(mission, "cruiseSpeed", refuse),
+        hover_speed_m_s=_speed(mission, "hoverSpeed", refuse),
+    )
+
+
+def _load(path: Path) -> Any:
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise PlanError(f"mission file {path} is larger than {_MAX_BYTES >> 20} MB")
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise PlanError(f"mission file {path} can't be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise PlanError(f"mission file {path} is not text (byte {error.start})") from error
+    except json.JSONDecodeError as error:
+        raise PlanError(f"{path}, line {error.lineno}: not JSON: {error.msg}") from error
+    except (RecursionError, ValueError) as error:
+        raise PlanError(f"{path}: not a plan: {error}") from error
+
+
+def _kind(mission: Mapping[str, Any], path: Path) -> VehicleKind | None:
+    type_ = mission.get("vehicleType")
+    if type_ is None or type_ == 0:
+        return None
+    kind = KIND_OF_TYPE.get(type_) if isinstance(type_, int) else None
+    if kind is None:
+        entry = dialect.enums["MAV_TYPE"].get(type_) if isinstance(type_, int) else None
+        raise PlanError(
+            f"{path}: vehicleType {type_!r}{f' ({entry.name})' if entry else ''} can't be flown; accepted: "
+            "multicopters and fixed wings"
+        )
+    return kind
+
+
+def _speed(mission: Mapping[str, Any], name: str, refuse: Refuse) -> float | None:
+    if mission.get(name) is None:
+        return None
+    speed_m_s = number(mission, name, "mission", refuse)
+    return speed_m_s if 0.0 < speed_m_s < math.inf else None
+
+
+def _mission_items(mission: Mapping[str, Any], refuse: Refuse) -> tuple[MissionItem, ...]:
+    items: list[MissionItem] = []
+    index_of_id: dict[int, int] = {}
+    for place, raw in enumerate(entries(mission.get("items"), "mission.items", refuse), start=1):
+        where = f"item {place} of the plan"
+        entry = mapping(raw, where, refuse)
+        if entry.get("type") == "SimpleItem":
+            _note_id(entry, len(items), index_of_id)
+            items.append(_simple(entry, where, refuse))
+        elif entry.get("type") != "ComplexItem":
+            raise refuse(where, f"type {entry.get('type')!r}; accepted: SimpleItem and ComplexItem")
+        elif entry.get("complexItemType") == "fwLandingPattern":
+            items += landing_items(entry, where, refuse)
+        elif entry.get("complexItemType") == "vtolLandingPattern":
+            raise refuse(where, "a landing pattern for a VTOL vehicle, which can't be flown here")
+        else:
+            for inner_where, inner in simple_items(entry, where, refuse):
+                _note_id(inner, len(items), index_of_id)
+                items.append(_simple(inner, inner_where, refuse))
+    return tuple(_with_index(item, index_of_id, k, refuse) for k, item in enumerate(items))
+
+
+def _note_id(entry: Mapping[str, Any], index: int, index_of_id: dict[int, int]) -> None:
+    jump_id = entry.get("doJumpId")
+    if isinstance(jump_id, int):
+        index_of_id.setdefault(jump_id, index)
+
+
+def _with_index(item: MissionItem, index_of_id: Mapping[int, int], index: int, refuse: Refuse) -> MissionItem:
+    """A jump with its target as an index instead of a doJumpId."""
+    if item.command != DO_JUMP:
+        return item
+    target = index_of_id.get(int(item.param1)) if math.isfinite(item.param1) else None
+    if target is None:
+        raise refuse(f"item {index + 1} (DO_JUMP)", f"there is no item with doJumpId {item.param1:g}")
+    return replace(item, param1=float(target))
+
+
+def _simple(entry: Mapping[str, Any], where: str, refuse: Refuse) -> MissionItem:
+    params = entry.get("params")
+    if not (isinstance(params, list) and len(params) == 7):
+        raise refuse(where, "params is not an array of 7 values")
+    values = []
+    for name, value in zip(("1", "2", "3", "4", "5", "6", "7"), params, strict=True):
+        if value is not None and not is_number(value):
+            raise refuse(where, f"params[{name}] = {value!r} is neither a number nor null")
+        values.append(math.nan if value is None else float(value))
+    frame = whole(entry, "frame", where, refuse)
+    command = whole(entry, "command", where, refuse)
+    if frame > 255 or command > 65535:
+        raise refuse(where, f"frame {frame}, command {command}; accepted: a MAV_FRAME and a MAV_CMD")
+    return MissionItem(
+        command=command,
+        frame=_INT_FRAMES.get(frame, frame),
+        param1=values[0],
+        param2=values[1],
+        param3=values[2],
+        param4=values[3],
+        x=values[4],
+        y=values[5],
+        z=values[6],
+        autocontinue=flag(entry, "autoContinue", True, where, refuse),
+    )
+
+
+def _fence_items(fence: Mapping[str, Any], refuse: Refuse) -> tuple[MissionItem, ...]:
+    items: list[MissionItem] = []
+    for number_, raw in enumerate(entries(fence.get("polygons", []), "geoFence.polygons", refuse), start=1):
+        where = f"geoFence, polygon {number_}"
+        polygon = mapping(raw, where, refuse)
+        points = [numbers(p, 2, where, refuse) for p in entries(polygon.get("polygon"), where, refuse)]
+        command = _VERTEX_IN if flag(polygon, "inclusion", True, where, refuse) else _VERTEX_OUT
+        items += [
+            MissionItem(command=command, frame=0, param1=float(len(points)), x=lat, y=lon)
+            for lat, lon in points
+        ]
+    for number_, raw in enumerate(entries(fence.get("circles", []), "geoFence.circles", refuse), start=1):
+        where = f"geoFence, circle {number_}"
+        entry = mapping(raw, where, refuse)
+        circle = mapping(entry.get("circle"), where, refuse)
+        lat, lon = numbers(circle.get("center"), 2, f"{where}, center", refuse)
+        command = _CIRCLE_IN if flag(entry, "inclusion", True, where, refuse) else _CIRCLE_OUT
+        radius_m = number(circle, "radius", where, refuse)
+        items.append(MissionItem(command=command, frame=0, param1=radius_m, x=lat, y=lon))
+    if fence.get("breachReturn"):
+        lat, lon, alt = numbers(fence["breachReturn"], 3, "geoFence.breachReturn", refuse)
+        items.append(MissionItem(command=_RETURN_POINT, frame=3, x=lat, y=lon, z=alt))
+    return tuple(items)
+
+
+def _rally_items(rally: Mapping[str, Any], refuse: Refuse) -> tuple[MissionItem, ...]:
+    items = []
+    for number_, point in enumerate(entries(rally.get("points", []), "rallyPoints.points", refuse), start=1):
+        lat, lon, alt = numbers(point, 3, f"rallyPoints, point {number_}", refuse)
+        items.append(MissionItem(command=_RALLY, frame=3, x=lat, y=lon, z=alt))
+    return tuple(items)
+
+
+def format_plan(
+    items: tuple[MissionItem, ...],
+    home: GeodeticPosition,
+    *,
+    firmware: str,
+    kind: VehicleKind,
+    speed_m_s: float,
+) -> str:
+    """A mission as the text of a plan file."""
+    wings = kind is VehicleKind.FIXED_WING
+    simple = [_simple_entry(index, item) for index, item in enumerate(items)]
+    plan = {
+        "fileType": "Plan",
+        "geoFence": {"circles": [], "polygons": [], "version": 2},
+        "groundStation": "QGroundControl",
+        "mission": {
+            "cruiseSpeed": speed_m_s if wings else 15,
+            "firmwareType": {name: number_ for number_, name in _FIRMWARE.items()}[firmware],
+            "globalPlanAltitudeMode": 1,
+            "hoverSpeed": 5 if wings else speed_m_s,
+            "items": simple,
+            "plannedHomePosition": [home.lat_deg, home.lon_deg, home.alt_m],
+            "vehicleType": dialect.MAV_TYPE_FIXED_WING if wings else dialect.MAV_TYPE_QUADROTOR,
+            "version": 2,
+        },
+        "rallyPoints": {"points": [], "version": 2},
+        "version": 1,
+    }
+    return json.dumps(plan, indent=4, allow_nan=False) + "\n"
+
+
+def _simple_entry(index: int, item: MissionItem) -> dict[str, Any]:
+    if item.command == DO_JUMP:
+        item = replace(item, param1=item.param1 + 1)
+    numbers_ = (item.param1, item.param2, item.param3, item.param4, item.x, item.y, item.z)
+    return {
+        "autoContinue": item.autocontinue,
+        "command": item.command,
+        "doJumpId": index + 1,
+        "frame": _PLAIN_FRAMES.get(item.frame, item.frame),
+        "params": [None if math.isnan(n) else n for n in numbers_],
+        "type": "SimpleItem",
+    }

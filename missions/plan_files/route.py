@@ -1,0 +1,174 @@
+"""The way that a mission's items mean: places in the order in which they are flown."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mission_plan import MissionItem
+from missions.plan_files.document import (
+    DO_CHANGE_SPEED,
+    DO_JUMP,
+    FLOWN_TO,
+    LOITERS,
+    NAV_DELAY,
+    NAV_LAND,
+    NAV_LOITER_TIME,
+    NAV_LOITER_TURNS,
+    NAV_RETURN_TO_LAUNCH,
+    NAV_TAKEOFF,
+    NAV_WAYPOINT,
+    MissionDocument,
+)
+from missions.plan_files.validation import has_place
+
+_ABSOLUTE: Final = frozenset({0, 5})
+_MOST_STEPS: Final = 20_000
+_PATH_STEP_M: Final = 1.0
+_LOITER_RADIUS_M: Final = 60.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """One place of the route.
+
+    Attributes:
+        index: of the mission item.
+        command: its MAV_CMD.
+        position_ned_m: from home.
+        speed_m_s: commanded for the way to it; None: the vehicle's own.
+        stay_s: time spent there, as far as the item tells.
+    """
+
+    index: int
+    command: int
+    position_ned_m: tuple[float, float, float]
+    speed_m_s: float | None
+    stay_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Route:
+    """All places in their order.
+
+    Attributes:
+        stops: in the order in which they are flown, as often as jumps lead there.
+        endless: a jump repeats for ever (or more often than is looked at).
+    """
+
+    stops: tuple[Stop, ...]
+    endless: bool
+
+    @property
+    def length_m(self) -> float:
+        """From the first place to the last."""
+        return sum(math.dist(a.position_ned_m, b.position_ned_m) for a, b in pairwise(self.stops))
+
+    def duration_s(self, own_speed_m_s: float) -> float:
+        """Time for all legs and stays, without takeoff and landing."""
+        legs = pairwise(self.stops)
+        flown_s = sum(
+            math.dist(a.position_ned_m, b.position_ned_m) / (b.speed_m_s or own_speed_m_s) for a, b in legs
+        )
+        return flown_s + sum(stop.stay_s for stop in self.stops)
+
+
+def placed(items: Sequence[MissionItem], home: GeodeticPosition, unset: float) -> list[MissionItem]:
+    """The items as a vehicle gets them: "here" is a place, and what is not set is `unset`."""
+    given: list[MissionItem] = []
+    last = (home.lat_deg, home.lon_deg)
+    for item in items:
+        if item.command in FLOWN_TO:
+            if not has_place(item):
+                item = replace(item, x=last[0], y=last[1])
+            last = (item.x, item.y)
+        values: dict[str, Any] = {
+            name: unset
+            for name in ("param1", "param2", "param3", "param4", "z")
+            if math.isnan(getattr(item, name))
+        }
+        given.append(replace(item, **values) if values else item)
+    return given
+
+
+def route_of(document: MissionDocument, home: GeodeticPosition) -> Route:
+    """Where the mission leads from a home; jumps are followed as often as they say."""
+    items = placed(document.items, home, 0.0)
+    frame = LocalFrame(home)
+    stops: list[Stop] = []
+    repeats: dict[int, int] = {}
+    speed_m_s: float | None = None
+    index, steps, endless = 0, 0, False
+    while index < len(items):
+        item = items[index]
+        steps += 1
+        if steps > _MOST_STEPS:
+            endless = True
+            break
+        if item.command == NAV_RETURN_TO_LAUNCH:
+            break
+        if item.command == DO_JUMP:
+            done = repeats.get(index, 0)
+            if item.param2 < 0:
+                endless = True
+                break
+            if done < item.param2:
+                repeats[index] = done + 1
+                index = int(item.param1)
+                continue
+        elif item.command == DO_CHANGE_SPEED and item.param2 > 0.0:
+            speed_m_s = item.param2
+        elif item.command == NAV_DELAY and stops:
+            stops[-1] = replace(stops[-1], stay_s=stops[-1].stay_s + max(0.0, item.param1))
+        elif item.command in FLOWN_TO:
+            north, east, _ = frame.ned_from_geodetic(item.x, item.y, home.alt_m)
+            height_m = item.z - home.alt_m if item.frame in _ABSOLUTE else item.z
+            stops.append(
+                Stop(
+                    index=index,
+                    command=item.command,
+                    position_ned_m=(north, east, -height_m),
+                    speed_m_s=speed_m_s,
+                    stay_s=_stay_s(item, speed_m_s),
+                )
+            )
+            if item.command == NAV_LAND:
+                break
+        index += 1
+    return Route(stops=tuple(stops), endless=endless)
+
+
+def _stay_s(item: MissionItem, speed_m_s: float | None) -> float:
+    if item.command in (NAV_WAYPOINT, NAV_LOITER_TIME):
+        return min(max(0.0, item.param1), 86_400.0)
+    if item.command == NAV_LOITER_TURNS:
+        around_m = math.tau * (abs(item.param3) or _LOITER_RADIUS_M)
+        return max(0.0, item.param1) * around_m / (speed_m_s or 10.0)
+    return 0.0
+
+
+def scored_stops(route: Route, *, with_takeoff: bool) -> tuple[Stop, ...]:
+    """What a track is compared with: no landings, and no takeoffs that go along a runway."""
+    left_out = {NAV_LAND} if with_takeoff else {NAV_LAND, NAV_TAKEOFF}
+    return tuple(stop for stop in route.stops if stop.command not in left_out)
+
+
+def has_circles(stops: Sequence[Stop]) -> bool:
+    """Whether somewhere between the first and the last place the way is a circle, not a line."""
+    return any(stop.command in LOITERS for stop in stops[:-1])
+
+
+def path_ned_m(stops: Sequence[Stop]) -> NDArray[np.float64]:
+    """The straight legs between places as points (n, 3), a metre apart."""
+    points: list[NDArray[np.float64]] = []
+    for a, b in pairwise(stops):
+        start, stop = np.array(a.position_ned_m), np.array(b.position_ned_m)
+        count = max(1, math.ceil(float(np.linalg.norm(stop - start)) / _PATH_STEP_M))
+        points.append(start + np.arange(count)[:, None] / count * (stop - start))
+    points.append(np.array([s.position_ned_m for s in stops[-1:]]).reshape(-1, 3))
+    return np.concatenate(points)

@@ -1,0 +1,88 @@
+"""`QGC WPL 110`: the waypoint files of Mission Planner and MAVProxy (.waypoints, .txt), read by pymavlink."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import PlanError
+from missions.plan_files.document import DO_JUMP, NAV_WAYPOINT, MissionDocument
+
+HEADER: Final = "QGC WPL 110"
+_ABSOLUTE: Final = frozenset({0, 5})
+_TERRAIN_OR_RELATIVE: Final = {3: 6, 10: 11, 0: 5}  # the same frames, counted in whole numbers
+
+
+def read_wpl(path: Path) -> MissionDocument:
+    """A waypoint file. Its first row is home when it is an absolute waypoint, as ArduPilot's tools write it.
+
+    Raises:
+        PlanError: it can't be read; says which item.
+    """
+    from pymavlink import mavwp
+
+    loader = mavwp.MAVWPLoader()
+    try:
+        loader.load(str(path))
+    except OSError as error:
+        raise PlanError(f"mission file {path} can't be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise PlanError(f"{path} is not text (byte {error.start})") from error
+    except (mavwp.MAVWPError, ValueError, OverflowError) as error:
+        raise PlanError(f"{path} is not understood after {loader.count()} rows: {error}") from error
+    rows = [loader.wp(index) for index in range(loader.count())]
+    for index, row in enumerate(rows):
+        if row.frame not in range(256) or row.command not in range(65536):
+            raise PlanError(
+                f"{path}: row {index}: frame {row.frame}, command {row.command}; accepted: a MAV_FRAME and a "
+                "MAV_CMD"
+            )
+    home = _home(rows[0]) if rows else None
+    first = 0 if home is None else 1
+    return MissionDocument(
+        path=path,
+        items=tuple(_item(row, first) for row in rows[first:]),
+        home=home,
+    )
+
+
+def _home(row: Any) -> GeodeticPosition | None:
+    if row.command != NAV_WAYPOINT or row.frame not in _ABSOLUTE:
+        return None
+    if not (abs(row.x) <= 90.0 and abs(row.y) <= 180.0 and math.isfinite(row.z)) or row.x == row.y == 0.0:
+        return None
+    return GeodeticPosition(lat_deg=row.x, lon_deg=row.y, alt_m=row.z)
+
+
+def _item(row: Any, first: int) -> MissionItem:
+    item = MissionItem(
+        command=row.command,
+        frame=_TERRAIN_OR_RELATIVE.get(row.frame, row.frame),
+        param1=row.param1,
+        param2=row.param2,
+        param3=row.param3,
+        param4=row.param4,
+        x=row.x,
+        y=row.y,
+        z=row.z,
+        autocontinue=bool(row.autocontinue),
+    )
+    return replace(item, param1=item.param1 - first) if item.command == DO_JUMP else item
+
+
+def format_wpl(items: Iterable[MissionItem], home: GeodeticPosition) -> str:
+    """A mission as the text of a waypoint file: home in the first row, "not set" (NaN) as 0."""
+    marker = MissionItem(command=NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m)
+    lines = [HEADER]
+    for index, item in enumerate((marker, *items)):
+        if item.command == DO_JUMP:
+            item = replace(item, param1=item.param1 + 1)
+        frame = {6: 3, 5: 0, 11: 10}.get(item.frame, item.frame)
+        numbers = (item.param1, item.param2, item.param3, item.param4, item.x, item.y, item.z)
+        texts = [f"{0.0 if math.isnan(number) else number:.8f}" for number in numbers]
+        lines.append("\t".join([str(index), str(int(index == 0)), str(frame), str(item.command), *texts,
+                                str(int(item.autocontinue))]))  # fmt: skip
+    return "\n".join(lines) + "\n"
