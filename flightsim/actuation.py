@@ -1,13 +1,21 @@
 """Actuators of a fixed-wing vehicle: commands by role to JSBSim's properties, and their failures."""
 
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from operator import call
 from typing import Any, Final
 
 import jsbsim
+import numpy as np
+from numpy.typing import NDArray
 
 from flightsim.airframe import ActuatorChannel, Airframe, AirframeError, AirframeKind, Role
-from flightsim.interface import AILERON, BRAKE, ELEVATOR, RUDDER, THROTTLE
+from flightsim.interface import AILERON, BRAKE, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
 from flightsim.jsbsim_model import find_property
+from flightsim.kernels import compiled_for, kernel
+
+Array = NDArray[np.float64]
 
 _GROUND_ROLES: Final = (Role.FLAPS, Role.STEERING, Role.BRAKE)
 """Roles that need not be written every step."""
@@ -16,10 +24,49 @@ _MOVING_THROTTLE: Final = 0.05
 _BACKLASH: Final = 0.2
 _SURFACES: Final = (AILERON, ELEVATOR, RUDDER)
 
-_Entry = tuple[Any, int, float, float, float, float]
-"""Setter of a property, place of the command, scale, offset, minimum, maximum."""
-_MixedEntry = tuple[Any, tuple[tuple[int, float], ...], float, float, float]
-"""Setter of a property, (place, scale) of each command that it takes, offset, minimum, maximum."""
+_Entry = tuple[Callable[[float], Any], Array, tuple[float, float, float]]
+"""Setter of a property, scales of the commands in it, (offset, minimum, maximum)."""
+
+
+@kernel
+def _scale(commands: Array, scales: Array, limits: Array, values: Array) -> None:
+    """Values of properties: the offset and every command times its scale, clipped.
+
+    Args:
+        commands: (n,).
+        scales: (properties, n).
+        limits: (properties, 3): offset, minimum, maximum.
+        values: (properties,), written.
+    """
+    for i in range(values.shape[0]):
+        value = limits[i, 0]
+        for j in range(commands.shape[0]):
+            if scales[i, j] != 0.0:
+                value += commands[j] * scales[i, j]
+        values[i] = limits[i, 1] if value < limits[i, 1] else limits[i, 2] if value > limits[i, 2] else value
+
+
+class _Properties:
+    """Properties that are written together.
+
+    Args:
+        setters: of each property.
+        scales: (properties, MAX_ACTUATORS) of the commands in each.
+        limits: (properties, 3): offset, minimum, maximum.
+    """
+
+    __slots__ = ("_kernel", "_limits", "_scales", "_setters", "_values")
+
+    def __init__(self, setters: Sequence[Callable[[float], Any]], scales: Array, limits: Array) -> None:
+        self._setters = tuple(setters)
+        self._scales, self._limits = scales, limits
+        self._values = np.zeros(len(self._setters))
+        self._kernel = compiled_for(_scale, np.zeros(MAX_ACTUATORS), scales, limits, self._values)
+
+    def write(self, commands: Array) -> None:
+        """Set them from (MAX_ACTUATORS,) commands."""
+        self._kernel(commands, self._scales, self._limits, self._values)
+        deque(map(call, self._setters, self._values.tolist()), 0)  # every step: no loop of bytecode
 
 
 class FixedWingActuators:
@@ -37,8 +84,6 @@ class FixedWingActuators:
         "_effectiveness",
         "_fast",
         "_fdm",
-        "_mixed",
-        "_mixed_slow",
         "_name",
         "_nodes",
         "_slow",
@@ -78,30 +123,26 @@ class FixedWingActuators:
         self.parked = False
         self._arrange()
 
-    def write(self, commands: list[float]) -> None:
-        """Write flying surfaces and throttle."""
-        for set_value, index, scale, offset, low, high in self._fast:
-            value = commands[index] * scale + offset
-            set_value(low if value < low else high if value > high else value)
-        if self._mixed:
-            _write_sums(self._mixed, commands)
+    def write(self, commands: Array) -> None:
+        """Write flying surfaces and throttle from (MAX_ACTUATORS,) commands."""
+        self._fast.write(commands)
 
-    def write_slow(self, commands: list[float]) -> None:
-        """Write flaps, steering and brake; may change `commands`."""
+    def write_slow(self, commands: Array) -> None:
+        """Write flaps, steering and brake."""
         if self.parked:
-            self.parked = commands[THROTTLE] <= _MOVING_THROTTLE
+            self.parked = bool(commands[THROTTLE] <= _MOVING_THROTTLE)
+            commands = commands.copy()
             commands[BRAKE] = 1.0
-        for set_value, index, scale, offset, low, high in self._slow:
-            value = commands[index] * scale + offset
-            set_value(low if value < low else high if value > high else value)
-        _write_sums(self._mixed_slow, commands)
+        self._slow.write(commands)
 
-    def write_below(self, commands: list[float]) -> None:
+    def write_below(self, commands: Array) -> None:
         """Write surfaces lower than commanded by more than an actuator's backlash, to come up to it next.
 
         So that surfaces with backlash are where they were the last time they had these commands.
         """
-        self.write([command - (_BACKLASH if i in _SURFACES else 0.0) for i, command in enumerate(commands)])
+        below = commands.copy()
+        below[list(_SURFACES)] -= _BACKLASH
+        self.write(below)
 
     def effectiveness(self, role: Role) -> float:
         """1 sound, 0 failed."""
@@ -166,13 +207,8 @@ class FixedWingActuators:
                 by_property.setdefault(name, []).append(channel)
         fast: list[_Entry] = []
         slow: list[_Entry] = []
-        mixed: list[_MixedEntry] = []
-        mixed_slow: list[_MixedEntry] = []
         for name, channels in by_property.items():
-            set_value = self._nodes[name].set_double_value
-            low = max(channel.minimum for channel in channels)
-            high = min(channel.maximum for channel in channels)
-            terms: list[tuple[int, float]] = []
+            scales = np.zeros(MAX_ACTUATORS)
             total_offset = 0.0
             for channel in channels:
                 scale, offset = channel.scale, channel.offset
@@ -180,22 +216,20 @@ class FixedWingActuators:
                     scale *= self._effectiveness[channel.role]
                 if channel.role in self._stuck:
                     scale, offset = 0.0, self._stuck[channel.role][name]
-                terms.append((channel.role.command, scale))
+                scales[channel.role.command] += scale
                 total_offset += offset
+            low = max(channel.minimum for channel in channels)
+            high = min(channel.maximum for channel in channels)
             slowly = all(channel.role in _GROUND_ROLES for channel in channels)
-            if len(terms) > 1:
-                group = mixed_slow if slowly else mixed
-                group.append((set_value, tuple(terms), total_offset, low, high))
-                continue
-            entries = slow if slowly else fast
-            entries.append((set_value, *terms[0], total_offset, low, high))
-        self._fast, self._slow = tuple(fast), tuple(slow)
-        self._mixed, self._mixed_slow = tuple(mixed), tuple(mixed_slow)
+            (slow if slowly else fast).append(
+                (self._nodes[name].set_double_value, scales, (total_offset, low, high))
+            )
+        self._fast, self._slow = _properties(fast), _properties(slow)
 
 
-def _write_sums(entries: tuple[_MixedEntry, ...], commands: list[float]) -> None:
-    for set_value, terms, offset, low, high in entries:
-        value = offset
-        for index, scale in terms:
-            value += commands[index] * scale
-        set_value(low if value < low else high if value > high else value)
+def _properties(entries: list[_Entry]) -> _Properties:
+    return _Properties(
+        [set_value for set_value, _, _ in entries],
+        np.array([scales for _, scales, _ in entries]).reshape(-1, MAX_ACTUATORS),
+        np.array([limits for _, _, limits in entries]).reshape(-1, 3),
+    )

@@ -277,10 +277,9 @@ class Vehicle:
             for set_actuator, value in zip(self._set_actuators, actuators.tolist(), strict=False):
                 set_actuator(value)
         else:
-            commands = actuators.tolist()
-            surfaces.write(commands)
+            surfaces.write(actuators)
             if self._steps % self._slow_steps == 0:
-                surfaces.write_slow(commands)
+                surfaces.write_slow(actuators)
         if self._gusts:
             self._start_due_gust()
         if self.launcher is not None:
@@ -351,8 +350,8 @@ class Vehicle:
         """Let it come to rest where it stands or is held."""
         if self._surfaces is not None:
             self._surfaces.parked = self.launcher is None
-            self._surfaces.write([0.0] * MAX_ACTUATORS)
-            self._surfaces.write_slow([0.0] * MAX_ACTUATORS)
+            self._surfaces.write(np.zeros(MAX_ACTUATORS))
+            self._surfaces.write_slow(np.zeros(MAX_ACTUATORS))
         for _ in range(round(duration_s * self.physics_rate_hz)):
             if self.launcher is not None:
                 self.launcher.step()
@@ -360,9 +359,11 @@ class Vehicle:
 
     def _let_actuators_follow(self, start: InitialState) -> None:
         """Run the actuators to their commands, then start again with them there."""
-        commands = [*(start.actuators or ()), *([0.0] * MAX_ACTUATORS)][:MAX_ACTUATORS]
+        commands = np.zeros(MAX_ACTUATORS)
+        given = (start.actuators or ())[:MAX_ACTUATORS]
+        commands[: len(given)] = given
         if self._surfaces is None:
-            for set_actuator, value in zip(self._set_actuators, commands, strict=False):
+            for set_actuator, value in zip(self._set_actuators, commands.tolist(), strict=False):
                 set_actuator(value)
         hold_motion(self._fdm, True)
         if self._surfaces is not None:

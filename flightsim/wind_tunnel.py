@@ -179,7 +179,7 @@ class WindTunnel:
                 change of anything but throttle and airspeed.
         """
         self._initialise(state)
-        commands = list(state.actuators)
+        commands = np.array(state.actuators, np.float64)
         run = self._fdm.run
         if self._sticky:
             self.actuators.write_below(commands)
