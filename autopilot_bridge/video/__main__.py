@@ -1,0 +1,35 @@
+"""`python -m autopilot_bridge.video CONTROL LISTEN`: the picture process, on sockets that it inherits.
+
+It ends when the process that started it does, however that ends.
+"""
+
+import asyncio
+import os
+import signal
+import socket
+import sys
+
+import cv2
+
+from autopilot_bridge.video.messages import setup_from_json, unpack
+from autopilot_bridge.video.rtsp_server import RtspServer
+from autopilot_bridge.video.studio import Studio, open_line
+
+
+async def _main(control: int, listen: int) -> None:
+    reader, writer = await open_line(control)
+    studio = Studio(reader, writer, setup_from_json(unpack(await reader.readline())))
+    server = None
+    if listen >= 0:
+        rtsp = RtspServer(studio.streams)
+        server = await asyncio.start_server(rtsp.accept, sock=socket.socket(fileno=listen))
+    await studio.serve()
+    if server is not None:
+        server.close()
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the vehicles; their end is ours
+    os.nice(5)
+    cv2.setNumThreads(1)
+    asyncio.run(_main(int(sys.argv[1]), int(sys.argv[2])))

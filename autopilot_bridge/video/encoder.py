@@ -1,0 +1,110 @@
+"""Pictures to H.264, by FFmpeg (PyAV): as RTP packets for streams, as MP4 for recordings."""
+
+from collections.abc import Callable
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Final
+
+import av
+import numpy as np
+from av.video.frame import PictureType
+from numpy.typing import NDArray
+
+Picture = NDArray[np.uint8]
+
+RTP_CLOCK_HZ: Final = 90_000
+PAYLOAD_TYPE: Final = 96
+_PACKET_BYTES: Final = 1400
+_MICROSECOND: Final = Fraction(1, 1_000_000)
+_TICK: Final = Fraction(1, RTP_CLOCK_HZ)
+_OPTIONS: Final = {"preset": "ultrafast", "tune": "zerolatency", "crf": "22", "forced-idr": "1"}
+
+
+class RtpEncoder:
+    """A running stream of RTP packets (RFC 6184), and RTCP sender reports between them.
+
+    Args:
+        width_px, height_px: of the pictures; even numbers.
+        rate_hz: about how many there will be in a second.
+        send: takes (packet, whether it is RTCP).
+    """
+
+    def __init__(
+        self, *, width_px: int, height_px: int, rate_hz: float, send: Callable[[bytes, bool], None]
+    ) -> None:
+        self._send = send
+        self._container: Any = av.open(
+            self,  # it asks for no more than `write`
+            "w",
+            format="rtp",
+            container_options={"packetsize": str(_PACKET_BYTES)},
+            buffer_size=_PACKET_BYTES,
+        )
+        self._stream = _video_stream(self._container, width_px, height_px, rate_hz, _TICK)
+
+    def write(self, packet: bytes) -> int:
+        """Taken by FFmpeg for a file: one call for each packet."""
+        data = bytes(packet)
+        # payload types 72..76 can't be told from RTCP (RFC 5761, section 4), and ours is 96
+        self._send(data, 64 <= data[1] & 0x7F <= 95)
+        return len(data)
+
+    def encode(self, picture: Picture, *, ticks: int, key: bool) -> None:
+        """Send one picture; `ticks` of 90 kHz rise. A key picture is where a decoder can begin."""
+        for packet in self._stream.encode(_frame(picture, ticks, _TICK, key)):
+            self._container.mux(packet)
+
+    def close(self) -> None:
+        """End the stream."""
+        self._container.close()
+
+
+class Recording:
+    """An MP4 file that is readable up to its last fragment whenever the process ends.
+
+    Raises:
+        OSError: the file can't be made, or exists.
+    """
+
+    def __init__(self, path: Path, *, width_px: int, height_px: int, rate_hz: float) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = path.open("xb")
+        self._container: Any = av.open(
+            self._file, "w", format="mp4", options={"movflags": "frag_keyframe+empty_moov+default_base_moof"}
+        )
+        self._stream = _video_stream(self._container, width_px, height_px, rate_hz, _MICROSECOND)
+        self._start_us: int | None = None
+
+    def write(self, picture: Picture, *, time_us: int) -> None:
+        """Add a picture of a vehicle time; times rise."""
+        if self._start_us is None:
+            self._start_us = time_us
+        for packet in self._stream.encode(_frame(picture, time_us - self._start_us, _MICROSECOND, False)):
+            self._container.mux(packet)
+
+    def close(self) -> None:
+        """Finish the file."""
+        if self._start_us is not None:
+            for packet in self._stream.encode(None):
+                self._container.mux(packet)
+        self._container.close()
+        self._file.close()
+
+
+def _video_stream(container: Any, width_px: int, height_px: int, rate_hz: float, unit: Fraction) -> Any:
+    stream = container.add_stream("libx264", rate=max(1, round(rate_hz)))
+    stream.width, stream.height, stream.pix_fmt = width_px, height_px, "yuv420p"
+    context = stream.codec_context
+    context.time_base = unit
+    context.gop_size = max(1, round(rate_hz))  # a key picture each second
+    context.options = dict(_OPTIONS)
+    return stream
+
+
+def _frame(picture: Picture, ticks: int, unit: Fraction, key: bool) -> av.VideoFrame:
+    frame = av.VideoFrame.from_ndarray(picture, format="bgr24")
+    frame.pts = ticks
+    frame.time_base = unit
+    if key:
+        frame.pict_type = PictureType.I
+    return frame

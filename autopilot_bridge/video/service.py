@@ -1,0 +1,303 @@
+"""The vehicles' side of pictures: listens, starts the picture process when needed, tells it what is seen."""
+
+import contextlib
+import os
+import select
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Protocol
+
+from autopilot_bridge.errors import BridgeError
+from autopilot_bridge.video.messages import (
+    CameraSetup,
+    StudioSetup,
+    pack,
+    setup_to_json,
+    stream_size_px,
+    unpack,
+    view_to_json,
+)
+from flightsim.payload import CameraView, PinholeModel
+from flightsim.picture import Scenery
+
+DEFAULT_PORT: Final = 8554
+_PORTS_TRIED: Final = 50
+_BACKLOG: Final = 16
+_QUEUE_BYTES: Final = 4 << 20  # photos that the picture process has not taken yet
+_END_S: Final = 5.0
+
+
+class VideoError(BridgeError):
+    """Pictures can't be offered as asked for."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VideoParameters:
+    """How pictures are offered.
+
+    Attributes:
+        host: where players connect.
+        port: for RTSP; 0: any; None: no streams.
+        any_port: when `port` is busy, the next free one will do.
+        folder: for photos and recordings; None: they are not kept. It is new or empty.
+        width_px: of streams and recordings.
+        rate_hz: pictures per second of streams (wall clock) and recordings (vehicle time).
+    """
+
+    host: str = "127.0.0.1"
+    port: int | None = DEFAULT_PORT
+    any_port: bool = True
+    folder: Path | None = None
+    width_px: int = 640
+    rate_hz: float = 20.0
+
+    def __post_init__(self) -> None:
+        if self.port is not None and not 0 <= self.port <= 65535:
+            raise VideoError(f"video port {self.port} is not in 0..65535")
+        if not 16 <= self.width_px <= 4096:
+            raise VideoError(f"video width {self.width_px} px is not in 16..4096")
+        if not 0.1 <= self.rate_hz <= 100.0:
+            raise VideoError(f"video rate {self.rate_hz:g} Hz is not in 0.1..100")
+
+
+class Watched(Protocol):
+    """A camera that pictures are made of (`flightsim.payload.Camera`)."""
+
+    def view(self, time_us: int) -> CameraView:
+        """What it sees now."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraOnShow:
+    """One camera.
+
+    Attributes:
+        name: last part of its address, and its folder.
+        camera: the device.
+        model: its geometry.
+        blur_px_m: of its lens.
+        streaming: whether its stream is running (VIDEO_STOP_STREAMING); asked for each picture.
+    """
+
+    name: str
+    camera: Watched
+    model: PinholeModel
+    blur_px_m: float = 0.0
+    streaming: Callable[[], bool] = lambda: True
+
+
+class VideoService:
+    """Pictures of all cameras of a world. Call `poll` often; it costs next to nothing and never waits.
+
+    Attributes:
+        port: that players connect to; None: there are no streams.
+        errors: what could not be written, newest last.
+        pictures_lost: photos that were not taken by the picture process in time.
+
+    Raises:
+        VideoError: the port is busy, or the folder holds something already.
+    """
+
+    def __init__(
+        self, cameras: Sequence[CameraOnShow], *, scenery: Scenery, parameters: VideoParameters
+    ) -> None:
+        self._cameras = tuple(cameras)
+        self._parameters = parameters
+        self._setup = StudioSetup(
+            cameras=tuple(CameraSetup(name=c.name, model=c.model, blur_px_m=c.blur_px_m) for c in cameras),
+            scenery=scenery,
+            width_px=parameters.width_px,
+            rate_hz=parameters.rate_hz,
+        )
+        folder = parameters.folder
+        if folder is not None and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise VideoError(f"{folder} is there already; pictures go to a new or empty folder")
+        self._listener = _listen(parameters)
+        self.port = None if self._listener is None else int(self._listener.getsockname()[1])
+        self.errors: list[str] = []
+        self.pictures_lost = 0
+        self._process: subprocess.Popen[bytes] | None = None
+        self._line: socket.socket | None = None
+        self._incoming = b""
+        self._outgoing = bytearray()
+        self._photos = [0] * len(self._cameras)
+        self._videos = [0] * len(self._cameras)
+        self._next_frame_us: dict[int, int] = {}
+        self._untaken: set[int] = set()  # recordings with a picture under way
+        self._frame_us = round(1e6 / parameters.rate_hz)
+
+    # what others ask for
+
+    def uri(self, index: int) -> str | None:
+        """Where a camera's stream is."""
+        if self.port is None:
+            return None
+        return f"rtsp://{self._parameters.host}:{self.port}/{self._cameras[index].name}"
+
+    def size_px(self, index: int) -> tuple[int, int]:
+        """Width and height of a camera's stream."""
+        return stream_size_px(self._cameras[index].model, self._parameters.width_px)
+
+    @property
+    def rate_hz(self) -> float:
+        """Pictures per second of a stream."""
+        return self._parameters.rate_hz
+
+    def photo(self, index: int, time_us: int, notes: dict[str, Any]) -> str:
+        """Keep what a camera sees now; the file's name within the folder, "" when there is no folder."""
+        folder = self._parameters.folder
+        if folder is None:
+            return ""
+        name = f"{self._cameras[index].name}/IMG_{self._photos[index]:04d}.jpg"
+        self._photos[index] += 1
+        if len(self._outgoing) > _QUEUE_BYTES:
+            self.pictures_lost += 1
+            return ""
+        view = view_to_json(self._cameras[index].camera.view(time_us))
+        self._tell("photo", index, path=str(folder / name), view=view, notes=notes)
+        return name
+
+    def start_recording(self, index: int, time_us: int) -> None:
+        """Begin to keep a video, in a new file."""
+        folder = self._parameters.folder
+        if folder is None or index in self._next_frame_us:
+            return
+        path = folder / f"{self._cameras[index].name}/VID_{self._videos[index]:04d}.mp4"
+        self._videos[index] += 1
+        self._tell("record", index, path=str(path), rate_hz=self._parameters.rate_hz)
+        self._next_frame_us[index] = time_us
+
+    def stop_recording(self, index: int) -> None:
+        """Finish the file."""
+        if self._next_frame_us.pop(index, None) is not None:
+            self._tell("stop", index)
+
+    # the shell
+
+    def poll(self, time_us: int) -> None:
+        """Answer the picture process, and start it when somebody wants to watch."""
+        if self._line is None:
+            if self._listener is not None and select.select((self._listener,), (), (), 0.0)[0]:
+                self._start()
+            return
+        for index, due_us in tuple(self._next_frame_us.items()):
+            if time_us >= due_us:
+                self._next_frame_us[index] = max(due_us + self._frame_us, time_us)
+                if index not in self._untaken:  # else it is left out: the machine is too slow
+                    self._untaken.add(index)
+                    self._tell("frame", index, view=view_to_json(self._cameras[index].camera.view(time_us)))
+        try:
+            data = self._line.recv(65536)
+            if not data:
+                self._lost()
+                return
+            *lines, self._incoming = (self._incoming + data).split(b"\n")
+            for line in lines:
+                self._answer(unpack(line), time_us)
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._lost()
+            return
+        if self._outgoing:
+            self._flush()
+
+    def close(self) -> None:
+        """End the picture process once it has written what it was told to write."""
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
+        for index in tuple(self._next_frame_us):
+            self.stop_recording(index)
+        if self._line is None or self._process is None:
+            return
+        with contextlib.suppress(OSError):
+            self._line.settimeout(_END_S)
+            self._line.sendall(self._outgoing)
+            self._line.shutdown(socket.SHUT_WR)
+        try:
+            self._process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._line.close()
+        self._line = self._process = None
+
+    def _start(self) -> None:
+        ours, theirs = socket.socketpair()
+        listen = -1 if self._listener is None else self._listener.fileno()
+        with theirs:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "autopilot_bridge.video", str(theirs.fileno()), str(listen)],
+                stdin=subprocess.DEVNULL,
+                pass_fds=(theirs.fileno(), *((listen,) if listen >= 0 else ())),
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)},
+            )
+        ours.setblocking(False)
+        self._line = ours
+        self._incoming = b""
+        self._outgoing = bytearray(pack(setup_to_json(self._setup)))
+        self._flush()
+
+    def _tell(self, kind: str, index: int, **more: Any) -> None:
+        if self._line is None:
+            self._start()
+        self._outgoing += pack({"kind": kind, "camera": index, **more})
+        self._flush()
+
+    def _answer(self, message: dict[str, Any], time_us: int) -> None:
+        if "error" in message:
+            self.errors.append(message["error"])
+            return
+        if "took" in message:
+            self._untaken.discard(message["took"])
+            return
+        index = message["want"]
+        shown = self._cameras[index]
+        view = view_to_json(shown.camera.view(time_us)) if shown.streaming() else None
+        self._outgoing += pack({"kind": "view", "camera": index, "view": view})
+
+    def _flush(self) -> None:
+        if self._line is None:
+            return
+        try:
+            del self._outgoing[: self._line.send(self._outgoing)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._lost()
+
+    def _lost(self) -> None:
+        """The picture process is gone; the next one who wants a picture starts another."""
+        if self._line is not None:
+            self._line.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._line = self._process = None
+        self._next_frame_us.clear()
+        self._untaken.clear()
+        self._outgoing.clear()
+
+
+def _listen(parameters: VideoParameters) -> socket.socket | None:
+    if parameters.port is None:
+        return None
+    last = parameters.port + (_PORTS_TRIED if parameters.any_port and parameters.port else 1)
+    for port in range(parameters.port, min(last, 65536)):
+        listener = socket.socket()
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((parameters.host, port))
+            listener.listen(_BACKLOG)
+        except OSError as error:
+            listener.close()
+            reason = error
+            continue
+        listener.setblocking(False)
+        return listener
+    raise VideoError(f"no video on {parameters.host} port {parameters.port}: {reason}")
