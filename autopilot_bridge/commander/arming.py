@@ -17,6 +17,7 @@ _MANDATORY: Final = frozenset(
         Reason.MODE_NOT_ARMABLE,
         Reason.POSITION,
         Reason.TERMINATED,
+        Reason.CALIBRATING,
         Reason.MISSION_MISSING,
         Reason.MISSION_INVALID,
     }
@@ -71,6 +72,8 @@ def arming_reasons(
     health = situation.health
     if situation.terminated:
         reasons.append(Reason.TERMINATED)
+    if situation.calibrating:
+        reasons.append(Reason.CALIBRATING)
     if mode not in policy.armable_modes:
         reasons.append(Reason.MODE_NOT_ARMABLE)
     if not situation.ready:
@@ -87,7 +90,7 @@ def arming_reasons(
     by_position = Need.POSITION in needs or policy.position_needed_to_arm
     if not health.attitude:
         reasons.append(Reason.ATTITUDE)
-    if by_position and not health.gps:
+    if by_position and not (health.gps or health.external):
         reasons.append(Reason.GPS)
     missing = shortfalls(mode, situation, policy, parameters)
     reasons.extend(reason for reason in missing if reason not in reasons)

@@ -188,6 +188,8 @@ class Commander:
         if self.armed and (self.policy.active_when_landed or not self.context.on_ground):
             return SystemStatus.ACTIVE
         if self.policy.standby_when_armable:
+            if self.situation.calibrating:
+                return SystemStatus.CALIBRATING
             return SystemStatus.STANDBY if self.armable else SystemStatus.UNINIT
         return SystemStatus.STANDBY if self._booted else self.policy.boot_status
 

@@ -16,9 +16,12 @@ class PilotInput:
     Args:
         built_in_radio: without any sender the sticks are centred and the throttle is down (ArduPilot's
             SITL); else there are no sticks (PX4).
+
+    Attributes:
+        muted: the radio is being calibrated, sticks steer nothing.
     """
 
-    __slots__ = ("_built_in_radio", "_gcs_time_us", "_sticks", "_time_us", "radio_failed_since_us")
+    __slots__ = ("_built_in_radio", "_gcs_time_us", "_sticks", "_time_us", "muted", "radio_failed_since_us")
 
     def __init__(self, *, built_in_radio: bool) -> None:
         self._built_in_radio = built_in_radio
@@ -26,11 +29,12 @@ class PilotInput:
         self._time_us = -1
         self._gcs_time_us = -1
         self.radio_failed_since_us: int | None = None
+        self.muted = False
 
     def move(self, *, roll: float, pitch: float, throttle: float, yaw: float, time_us: int) -> None:
         """New sticks, each -1..1 (clamped); throttle 0 is the middle. Not-a-number input is ignored."""
         values = (roll, pitch, throttle, yaw)
-        if not all(math.isfinite(value) for value in values):
+        if self.muted or not all(math.isfinite(value) for value in values):
             return
         roll, pitch, throttle, yaw = (min(1.0, max(-1.0, value)) for value in values)
         self._sticks = ManualInput(roll=roll, pitch=pitch, throttle=throttle, yaw=yaw, valid=True)

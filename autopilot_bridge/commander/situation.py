@@ -35,6 +35,7 @@ class Situation:
         roll_rad, pitch_rad: attitude.
         tilt_rad: angle between the body's down axis and the vertical.
         terminated: flight termination was commanded.
+        calibrating: a sensor is being calibrated.
     """
 
     time_us: int = 0
@@ -60,3 +61,4 @@ class Situation:
     pitch_rad: float = 0.0
     tilt_rad: float = 0.0
     terminated: bool = False
+    calibrating: bool = False

@@ -43,6 +43,7 @@ class Reason(Enum):
     MODE_UNAVAILABLE = auto()
     OUTSIDE_FENCE = auto()
     TERMINATED = auto()
+    CALIBRATING = auto()
     LEANING = auto()  # standing too far from level
     THROTTLE_HIGH = auto()
     NOT_LANDED = auto()

@@ -30,6 +30,7 @@ _REASONS: Final[Mapping[Reason, str]] = {
     Reason.MISSION_INVALID: "Mode requires mission",
     Reason.OUTSIDE_FENCE: "vehicle outside fence",
     Reason.TERMINATED: "Vehicle is terminated",
+    Reason.CALIBRATING: "Calibration running",
     Reason.LEANING: "Leaning",
     Reason.THROTTLE_HIGH: "Throttle too high",
 }

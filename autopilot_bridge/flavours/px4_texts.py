@@ -36,6 +36,7 @@ _REASONS: Final[Mapping[Reason, str]] = {
     Reason.MODE_NOT_ARMABLE: "Mode not suitable for takeoff",
     Reason.OUTSIDE_FENCE: "Geofence violation",
     Reason.TERMINATED: "Flight termination active",
+    Reason.CALIBRATING: "Calibrating",
     Reason.LEANING: "Attitude too far from level",
     Reason.THROTTLE_HIGH: "Throttle above center",
 }

@@ -8,7 +8,7 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
-from autopilot_bridge.services.manual import ManualService
+from autopilot_bridge.services.manual import ManualService, manual_rules
 from autopilot_bridge.services.setpoints import SetpointService
 from autopilot_bridge.services.status_text import StatusTextService
 from tests.commander.rig import Rig
@@ -82,7 +82,9 @@ class ServiceRig(Rig):
             flavour, self.commander, hooks, self.flavour.command_address(1)
         )
         self.setpoints = SetpointService(flavour, self.commander)
-        self.manual = ManualService(self.commander, system_id=1)
+        self.manual = ManualService(
+            self.commander, system_id=1, parameters=self.store, rules=manual_rules(self.flavour)
+        )
 
     def handle(self, message: Any) -> bool:
         services = (self.setpoints, self.manual, self.commands, self.status)

@@ -1,0 +1,26 @@
+"""Calibration, actuators, traffic and people at the controls: those of a firmware for a class of vehicle."""
+
+from autopilot_bridge.services.actuators import ArducopterActuators, ArduplaneActuators, Px4Actuators, Tunes
+from autopilot_bridge.services.calibration_ardupilot import ArdupilotCalibration
+from autopilot_bridge.services.calibration_compass import CompassCalibration
+from autopilot_bridge.services.calibration_px4 import Px4Calibration
+from autopilot_bridge.services.manual import ManualService
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.traffic import ARDUPILOT_TRAFFIC, PX4_TRAFFIC, TrafficService
+from flightsim.airframe import AirframeKind
+
+
+def small_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
+    """Those of one autopilot."""
+    manual, tunes = ManualService.of(parts), Tunes()
+    if parts.flavour.name == "px4":
+        return manual, Px4Calibration(parts), Px4Actuators(parts), TrafficService(parts, PX4_TRAFFIC), tunes
+    aircraft = parts.flavour.kind is AirframeKind.FIXED_WING
+    return (
+        manual,
+        ArdupilotCalibration(parts),
+        CompassCalibration(parts),
+        ArduplaneActuators(parts) if aircraft else ArducopterActuators(parts),
+        TrafficService(parts, ARDUPILOT_TRAFFIC),
+        tunes,
+    )

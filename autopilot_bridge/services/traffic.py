@@ -1,0 +1,151 @@
+"""Other aircraft: ADSB_VEHICLE reports are kept, passed on to everybody, and warned of (PX4's NAV_TRAFF_*).
+
+Sources: PX4 v1.16 (transponder_report, AdsbConflict), ArduPilot 4.6 (AP_ADSB, which is off by default).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+
+_ADSB_VEHICLE: Final = mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE
+_AUTOPILOT: Final = 1
+_MOST: Final = 50  # aircraft kept
+_LIFETIME_US: Final = 30_000_000
+_LEAST_INTERVAL_US: Final = 90_000  # of one aircraft's reports
+_REMIND_US: Final = 60_000_000
+_PASSED_M: Final = 1000.0  # the other's way is looked at so far beyond us
+_NEEDED: Final = mavlink.ADSB_FLAGS_VALID_COORDS | mavlink.ADSB_FLAGS_VALID_ALTITUDE
+_NOTICE: Final = mavlink.MAV_SEVERITY_NOTICE
+
+
+@dataclass(slots=True)
+class _Aircraft:
+    heard_us: int
+    warned_us: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrafficRules:
+    """What a firmware does with traffic.
+
+    Attributes:
+        switch: parameter that switches reception on; empty: it is always on.
+        conflicts: conflicts are looked for, with the NAV_TRAFF_ parameters.
+    """
+
+    switch: str = ""
+    conflicts: bool = False
+
+
+PX4_TRAFFIC: Final = TrafficRules(conflicts=True)
+ARDUPILOT_TRAFFIC: Final = TrafficRules(switch="ADSB_TYPE")
+
+_ACTIONS: Final[Mapping[int, tuple[FlightMode, str]]] = {
+    2: (FlightMode.RETURN, ", returning home"),
+    3: (FlightMode.LAND, ", landing"),
+    4: (FlightMode.HOLD, ", holding position"),
+}
+"""NAV_TRAFF_AVOID beyond 1 (warn only)."""
+
+
+class TrafficService(Microservice):
+    """Aircraft heard by transponder."""
+
+    def __init__(self, parts: AutopilotParts, rules: TrafficRules) -> None:
+        self._parts = parts
+        self._commander = parts.commander
+        self._rules = rules
+        self._heard: dict[int, _Aircraft] = {}
+
+    @property
+    def aircraft(self) -> tuple[int, ...]:
+        """ICAO addresses of those heard lately."""
+        return tuple(self._heard)
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Take ADSB_VEHICLE; what another autopilot passes on is not passed on again."""
+        if message.get_msgId() != _ADSB_VEHICLE:
+            return False
+        switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0
+        if switched_on and source.component_id != _AUTOPILOT:
+            self._take(message, time_us)
+        return True
+
+    def _take(self, message: MavlinkMessage, time_us: int) -> None:
+        address = message.ICAO_address
+        for old in [icao for icao, seen in self._heard.items() if time_us - seen.heard_us > _LIFETIME_US]:
+            del self._heard[old]
+        known = self._heard.get(address)
+        if known is None:
+            if len(self._heard) >= _MOST:
+                return
+            known = self._heard[address] = _Aircraft(time_us)
+        elif time_us - known.heard_us < _LEAST_INTERVAL_US:
+            return
+        known.heard_us = time_us
+        send_to_all(self._parts.broadcast, message)
+        if self._rules.conflicts:
+            self._warn(message, known, time_us)
+
+    def _warn(self, message: MavlinkMessage, known: _Aircraft, time_us: int) -> None:
+        action = round(self._parts.parameters.get("NAV_TRAFF_AVOID"))
+        separation_m = self._conflict(message) if action > 0 else None
+        if separation_m is None:
+            known.warned_us = None
+            return
+        if known.warned_us is not None and time_us - known.warned_us < _REMIND_US:
+            return
+        known.warned_us = time_us
+        mode, words = _ACTIONS.get(action, (None, ""))
+        self._parts.announce(
+            _NOTICE,
+            f"Traffic alert - ICAO Address {message.ICAO_address}! Separation Distance {separation_m:.0f}, "
+            f"Heading {message.heading / 100.0:.0f}{words}",
+        )
+        if mode is not None and self._commander.airborne:
+            self._commander.set_mode(mode)
+
+    def _conflict(self, message: MavlinkMessage) -> float | None:
+        """How far from us the other's straight way passes, metres, when that is a conflict; else None.
+
+        As PX4: its way passes nearer than NAV_TRAFF_A_HOR ahead of it, it is nearer in height than
+        NAV_TRAFF_A_VER, and both flying straight at each other would meet within NAV_TRAFF_COLL_T.
+        """
+        frame = self._commander.context.frame
+        if frame is None or message.flags & _NEEDED != _NEEDED:
+            return None
+        lat_deg, lon_deg, alt_m = message.lat * 1e-7, message.lon * 1e-7, message.altitude * 1e-3
+        if abs(lat_deg) > 90.0 or abs(lon_deg) > 180.0:
+            return None
+        own = self._commander.context.nav
+        north_m, east_m, down_m = (
+            there - here
+            for there, here in zip(
+                frame.ned_from_geodetic(lat_deg, lon_deg, alt_m), own[nav.POS_NED_M].tolist(), strict=True
+            )
+        )
+        parameters = self._parts.parameters
+        if abs(down_m) >= parameters.get("NAV_TRAFF_A_VER"):
+            return None
+        heading_rad = math.radians(message.heading / 100.0)
+        along_m = -(
+            north_m * math.cos(heading_rad) + east_m * math.sin(heading_rad)
+        )  # to be flown until abeam
+        across_m = abs(east_m * math.cos(heading_rad) - north_m * math.sin(heading_rad))
+        horizontal_m = math.hypot(north_m, east_m)
+        if not 0.0 <= along_m <= horizontal_m + _PASSED_M or across_m >= parameters.get("NAV_TRAFF_A_HOR"):
+            return None
+        speed_m_s = math.hypot(message.hor_velocity, message.ver_velocity) / 100.0
+        closing_m_s = speed_m_s + math.hypot(*own[nav.VEL_NED_M_S].tolist())
+        if closing_m_s <= 0.0:
+            return None
+        time_s = math.hypot(horizontal_m, down_m) / closing_m_s
+        return across_m if time_s < parameters.get("NAV_TRAFF_COLL_T") else None
