@@ -2,14 +2,19 @@
 
 A frame goes to every other channel when it has no target or targets everybody (system 0); otherwise only
 to channels on which the target system (and the target component, unless it is 0) has been heard. It
-never goes back to where it came from.
+never goes back to where it came from. A key for signing (SETUP_SIGNING) goes nowhere.
 """
 
-from typing import Generic, TypeVar
+from collections.abc import Hashable
+from typing import Final, Generic, TypeVar
 
 from autopilot_bridge.mavlink.frame import Frame
+from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 
-ChannelT = TypeVar("ChannelT")
+ChannelT = TypeVar("ChannelT", bound=Hashable)
+
+MAX_COMPONENTS: Final = 256
+"""How many components are remembered for a channel; those that were silent longest are forgotten."""
 
 
 class Router(Generic[ChannelT]):
@@ -21,7 +26,7 @@ class Router(Generic[ChannelT]):
     __slots__ = ("_heard",)
 
     def __init__(self) -> None:
-        self._heard: dict[ChannelT, set[tuple[int, int]]] = {}
+        self._heard: dict[ChannelT, dict[tuple[int, int], None]] = {}
 
     @property
     def channels(self) -> tuple[ChannelT, ...]:
@@ -30,7 +35,7 @@ class Router(Generic[ChannelT]):
 
     def add(self, channel: ChannelT) -> None:
         """Make a channel known; a second time does nothing."""
-        self._heard.setdefault(channel, set())
+        self._heard.setdefault(channel, {})
 
     def remove(self, channel: ChannelT) -> None:
         """Forget a channel and what was heard on it."""
@@ -40,13 +45,22 @@ class Router(Generic[ChannelT]):
         """(system id, component id) of everybody heard on a channel."""
         return frozenset(self._heard.get(channel, ()))
 
-    def route(self, frame: Frame, source: ChannelT) -> list[ChannelT]:
-        """Learn from a frame that came in on `source` and tell which channels it is to be sent to."""
+    def learn(self, frame: Frame, source: ChannelT) -> None:
+        """Remember that the sender of a frame is on `source`."""
         sender = (frame.system_id, frame.component_id)
         table = self._heard.get(source)
         if table is None:
-            table = self._heard[source] = set()
-        table.add(sender)
+            table = self._heard[source] = {}
+        table.pop(sender, None)  # to the end: the first in the table was silent longest
+        table[sender] = None
+        if len(table) > MAX_COMPONENTS:
+            del table[next(iter(table))]
+
+    def route(self, frame: Frame, source: ChannelT) -> list[ChannelT]:
+        """Learn from a frame that came in on `source` and tell which channels it is to be sent to."""
+        self.learn(frame, source)
+        if frame.message_id == SETUP_SIGNING:
+            return []
         return self.destinations(frame.target_system, frame.target_component, source)
 
     def destinations(
@@ -60,7 +74,7 @@ class Router(Generic[ChannelT]):
         ]
 
 
-def _leads_to(heard: set[tuple[int, int]], system: int, component: int) -> bool:
+def _leads_to(heard: dict[tuple[int, int], None], system: int, component: int) -> bool:
     if system == 0:
         return True
     if component == 0:
@@ -92,4 +106,4 @@ class LoopGuard:
                 del self._heard[next(iter(self._heard))]
             self._heard[raw] = channel
             return False
-        return first is not channel
+        return first != channel

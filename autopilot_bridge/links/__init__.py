@@ -15,6 +15,7 @@ from autopilot_bridge.links.link import Link, LinkCounters, PeerId
 from autopilot_bridge.links.lossy import Impairment, LossyLink
 from autopilot_bridge.links.memory import MemoryLink, memory_pair
 from autopilot_bridge.links.opening import open_link
+from autopilot_bridge.links.reach import Reach, listens_to_network, open_unsigned, reach_of
 from autopilot_bridge.links.replay import ReplayLink
 from autopilot_bridge.links.serial_port import SerialLink
 from autopilot_bridge.links.tcp import TcpClientLink, TcpServerLink
@@ -28,6 +29,7 @@ __all__ = [
     "LossyLink",
     "MemoryLink",
     "PeerId",
+    "Reach",
     "ReplayLink",
     "ReplayLog",
     "SerialLink",
@@ -40,7 +42,10 @@ __all__ = [
     "UdpLink",
     "UdpPeer",
     "UdpServer",
+    "listens_to_network",
     "memory_pair",
     "open_link",
+    "open_unsigned",
     "parse_address",
+    "reach_of",
 ]

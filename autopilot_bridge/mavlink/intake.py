@@ -7,7 +7,7 @@ limited amount of work, so that a flood costs its sender, not the vehicle or its
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable
 from dataclasses import fields
-from typing import Final
+from typing import Final, Generic, TypeVar
 
 from autopilot_bridge.mavlink.frame import Frame
 from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
@@ -25,6 +25,7 @@ _BYTES_OF_WORK: Final = 64
 _SLICE_BYTES: Final = 512
 _SILENT_TAKES: Final = 5000  # 20 s of polls
 
+PeerT = TypeVar("PeerT", bound=Hashable)
 Admit = Callable[[list[Frame]], list[Frame]]
 
 
@@ -48,7 +49,7 @@ class _Inbox:
         self.heard_at = 0
 
 
-class Intake:
+class Intake(Generic[PeerT]):
     """The inboxes of one link.
 
     Args:
@@ -63,8 +64,8 @@ class Intake:
     def __init__(self, admit: Admit | None = None) -> None:
         self.overrun_bytes = 0
         self._admit = admit
-        self._inboxes: dict[Hashable, _Inbox] = {}
-        self._waiting: deque[Hashable] = deque()
+        self._inboxes: dict[PeerT, _Inbox] = {}
+        self._waiting: deque[PeerT] = deque()
         self._retired = ParserCounters()
         self._takes = 0
 
@@ -86,12 +87,12 @@ class Intake:
         """Something was not looked at yet."""
         return bool(self._waiting)
 
-    def understood(self, peer: Hashable) -> bool:
+    def understood(self, peer: PeerT) -> bool:
         """A frame of this peer was taken once, and it is not forgotten."""
         inbox = self._inboxes.get(peer)
         return inbox is not None and inbox.understood
 
-    def parse(self, peer: Hashable, data: bytes) -> list[Frame]:
+    def parse(self, peer: PeerT, data: bytes) -> list[Frame]:
         """The frames in bytes of one peer, at once and whatever they cost: for memory links."""
         inbox = self._inbox(peer)
         frames = inbox.parser.feed(data)
@@ -101,12 +102,12 @@ class Intake:
             inbox.understood = True
         return frames
 
-    def take(self, arrived: Iterable[tuple[Hashable, bytes]]) -> list[tuple[Hashable, list[Frame]]]:
+    def take(self, arrived: Iterable[tuple[PeerT, bytes]]) -> list[tuple[PeerT, list[Frame]]]:
         """Put what has arrived into the inboxes, and give the frames there is time for, by peer."""
         for peer, data in arrived:
             self._put(peer, data)
         self._takes += 1
-        served: list[tuple[Hashable, list[Frame]]] = []
+        served: list[tuple[PeerT, list[Frame]]] = []
         left = TOTAL
         for _ in range(len(self._waiting)):
             if left <= 0:
@@ -123,7 +124,7 @@ class Intake:
                 served.append((peer, frames))
         return served
 
-    def _put(self, peer: Hashable, data: bytes) -> None:
+    def _put(self, peer: PeerT, data: bytes) -> None:
         if not data:
             return
         inbox = self._inbox(peer)
@@ -161,7 +162,7 @@ class Intake:
             inbox.understood = True
         return frames, work
 
-    def _inbox(self, peer: Hashable) -> _Inbox:
+    def _inbox(self, peer: PeerT) -> _Inbox:
         inbox = self._inboxes.get(peer)
         if inbox is None:
             if len(self._inboxes) >= MAX_PEERS:

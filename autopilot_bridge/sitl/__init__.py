@@ -9,6 +9,7 @@ from autopilot_bridge.sitl.configuration import (
 )
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
+from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
 from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
 from autopilot_bridge.sitl.warm_up import compile_flight_code
 
@@ -16,10 +17,13 @@ __all__ = [
     "HOMES",
     "PaceReport",
     "Port",
+    "SigningParameters",
+    "SigningStore",
     "Sitl",
     "SitlConfiguration",
     "SitlServer",
     "SitlVehicle",
+    "UnsignedFrom",
     "VehicleSpecification",
     "compile_flight_code",
     "default_ports",

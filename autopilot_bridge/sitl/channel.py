@@ -1,16 +1,17 @@
-"""A link as an autopilot's MAVLink channel: a parser for each peer and its own sequence numbers."""
+"""A link as an autopilot's MAVLink channel: sequence numbers and signatures of its own, peers told apart."""
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Final
 
 from autopilot_bridge.links import Link, PeerId
-from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, ParserCounters
+from autopilot_bridge.mavlink import Frame, FrameEncoder, Intake, LinkSigning, ParserCounters
+from autopilot_bridge.mavlink.frame import SIGNATURE_SIZE
+from autopilot_bridge.mavlink.signing import is_unsigned_v2
+from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.services.channel import MavlinkMessage
 from autopilot_bridge.telemetry.line import LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
 
-_MAX_PARSERS: Final = 64
 _MAX_PACKET: Final = 1400  # bytes: one datagram that no network splits
 _MEMORY_PEER: Final[PeerId] = ("memory", 0)
 
@@ -23,12 +24,13 @@ class LinkChannel:
         link: where bytes go and come from.
         system_id, component_id: the autopilot's.
         line: what the link can carry; None: whatever there is.
+        signing: signs and checks what passes; None: nothing is.
 
     Attributes:
         motion: set by the autopilot that the channel is added to.
     """
 
-    __slots__ = ("_encoder", "_parsers", "_retired", "line", "link", "motion", "name")
+    __slots__ = ("_encoder", "_forward", "_intake", "_peers", "line", "link", "motion", "name", "signing")
 
     def __init__(
         self,
@@ -38,14 +40,17 @@ class LinkChannel:
         system_id: int,
         component_id: int = 1,
         line: LineBudget | None = None,
+        signing: LinkSigning | None = None,
     ) -> None:
         self.name = name
         self.link = link
         self.line = line
+        self.signing = signing
         self.motion: MotionMessages | None = None
         self._encoder = FrameEncoder(system_id, component_id)
-        self._parsers: dict[PeerId, FrameParser] = {}
-        self._retired = ParserCounters()
+        self._intake: Intake[PeerId] = Intake(None if signing is None else signing.admit)
+        self._peers = PeerExchange(link)
+        self._forward = getattr(link, "forward", None)  # of a link that several vehicles share
 
     @property
     def congested(self) -> bool:
@@ -55,15 +60,17 @@ class LinkChannel:
     @property
     def counters(self) -> ParserCounters:
         """Where every received byte went, over all peers; `sources` is left out."""
-        total = ParserCounters()
-        for counters in (self._retired, *(parser.counters for parser in self._parsers.values())):
-            _add(total, counters)
-        return total
+        return self._intake.counters
+
+    @property
+    def overrun_bytes(self) -> int:
+        """Bytes that were dropped unread, because their sender had too much waiting."""
+        return self._intake.overrun_bytes
 
     @property
     def pending_bytes(self) -> int:
         """Bytes of frames that are not complete yet."""
-        return sum(parser.pending_bytes for parser in self._parsers.values())
+        return self._intake.pending_bytes
 
     def send(self, message: MavlinkMessage) -> None:
         """Frame a message and send it."""
@@ -76,44 +83,92 @@ class LinkChannel:
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Send what is due together, a packet of a network at most at a time."""
         packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
-        for frame in self._encoder.encode_payloads(payloads) if payloads else ():
-            if len(packet) + len(frame) > _MAX_PACKET:
-                self._send(packet)
-                packet = b""
-            packet += frame
+        if payloads:
+            most = _MAX_PACKET
+            if self.signing is not None and self.signing.signs:
+                most -= SIGNATURE_SIZE * (len(payloads) + motion.bit_count())
+            for frame in self._encoder.encode_payloads(payloads):
+                if packet and len(packet) + len(frame) > most:
+                    self._send(packet)
+                    packet = b""
+                packet += frame
         if packet:
             self._send(packet)
 
     def send_frame(self, raw: bytes) -> None:
-        """Forward somebody else's frame as it is."""
-        self._send(raw)
+        """Forward somebody else's frame as it is: with its own signature, or none."""
+        if self._forward is None:
+            self._put(raw)
+        else:
+            self._forward(raw)
+
+    def send_own_frame(self, raw: bytes) -> None:
+        """Send a frame of another component of the vehicle, which has no key of its own."""
+        if is_unsigned_v2(raw):
+            self._send(raw)
+        else:
+            self._put(raw)
 
     def _send(self, data: bytes) -> None:
+        signing = self.signing
+        self._put(signing.sign(data) if signing is not None and signing.signs else data)
+
+    def _put(self, data: bytes) -> None:
         if self.line is not None:
             self.line.add(len(data))
         self.link.send(data)
 
-    def receive(self) -> list[Frame]:
-        """Every good frame that has arrived."""
-        frames: list[Frame] = []
-        for peer, data in self.link.receive():
-            frames += self.parse(data, peer)
-        return frames
+    def receive(self) -> list[tuple[PeerId, list[Frame]]]:
+        """Good frames that have arrived, by peer, as many as there is time for."""
+        arrived = self.link.receive()
+        intake = self._intake
+        if not arrived and not intake.waiting:
+            return []
+        served = intake.take(arrived)
+        self._peers.forget({peer for peer, _ in arrived if not intake.understood(peer)})
+        return served
 
     def parse(self, data: bytes, peer: PeerId = _MEMORY_PEER) -> list[Frame]:
-        """The good frames in bytes of one peer, which may come in any pieces."""
-        parser = self._parsers.get(peer)
-        if parser is None:
-            if len(self._parsers) >= _MAX_PARSERS:  # peers come and go: the oldest has had its say
-                oldest = self._parsers.pop(next(iter(self._parsers)))
-                _add(self._retired, oldest.counters)
-                self._retired.bytes_junk += oldest.pending_bytes
-            parser = self._parsers[peer] = FrameParser()
-        return parser.feed(data)
+        """The good frames in bytes of one peer, which may come in any pieces, at once."""
+        return self._intake.parse(peer, data)
+
+    def exchange(self, frame: Frame, peer: PeerId) -> None:
+        """Pass a frame of one peer of the link on to those of the others that it is meant for."""
+        for other in self._peers.others(frame, peer):
+            self.link.send(frame.raw, other)
 
 
-def _add(total: ParserCounters, more: ParserCounters) -> None:
-    for field in fields(ParserCounters):
-        value = getattr(more, field.name)
-        if isinstance(value, int):
-            setattr(total, field.name, getattr(total, field.name) + value)
+class PeerExchange:
+    """What the peers of one link have to say to each other.
+
+    Args:
+        link: any; those with one peer at a time have nothing to pass on.
+    """
+
+    __slots__ = ("_forget", "_link", "_loops", "_router")
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+        self._forget = getattr(link, "forget", None)
+        self._router: Router[PeerId] = Router()
+        self._loops = LoopGuard()
+
+    def others(self, frame: Frame, peer: PeerId) -> list[PeerId]:
+        """Learn from a frame, and tell which other peers of the link it is to be sent to."""
+        peers = self._link.peers
+        if len(peers) < 2:
+            return []
+        router = self._router
+        for known in router.channels:
+            if known not in peers:
+                router.remove(known)
+        for known in peers:
+            router.add(known)
+        found = [other for other in router.route(frame, peer) if other in peers]
+        return [] if found and self._loops.comes_round(frame.raw, peer) else found
+
+    def forget(self, strangers: set[PeerId]) -> None:
+        """Don't send to those who sent nothing that could be understood."""
+        if self._forget is not None:
+            for peer in strangers:
+                self._forget(peer)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.clock import RealTimeClock
-from autopilot_bridge.links import Link, open_link
+from autopilot_bridge.links import Link, open_link, reach_of
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
 
@@ -50,11 +50,14 @@ class SitlServer:
         poll_us = _FREE_RUN_POLL_US if speedup is None else round(_POLL_WALL_S * speedup * 1e6)
         sitl.poll_every(min(poll_us, _FREE_RUN_POLL_US))
 
-    def open(self, ports: Sequence[Sequence[Port]] | None = None) -> list[tuple[SitlVehicle, Port, str]]:
+    def open(
+        self, ports: Sequence[Sequence[Port]] | None = None, *, shared: Sequence[Port] = ()
+    ) -> list[tuple[SitlVehicle, Port, str]]:
         """Open the links of every vehicle.
 
         Args:
             ports: links per vehicle; None: where clients of each flavour look for them.
+            shared: links that all vehicles speak on together.
 
         Returns:
             (vehicle, port, address as opened) of every link.
@@ -71,8 +74,16 @@ class SitlServer:
                 )
                 for port in chosen:
                     link = open_link(port.address, monotonic=self._monotonic)
-                    vehicle.open(link, role=port.role, bytes_per_s=self._capacity(link))
+                    vehicle.open(
+                        link, role=port.role, bytes_per_s=self._capacity(link), reach=reach_of(port.address)
+                    )
                     opened.append((vehicle, port, link.description))
+            for port in shared:
+                link = open_link(port.address, monotonic=self._monotonic)
+                self.sitl.share(
+                    link, role=port.role, bytes_per_s=self._capacity(link), reach=reach_of(port.address)
+                )
+                opened += [(vehicle, port, link.description) for vehicle in self.sitl.vehicles]
             undo.pop_all()
         return opened
 
@@ -89,7 +100,7 @@ class SitlServer:
                 return False
             with contextlib.suppress(InterruptedError):
                 select.select(link.filenos(), (), (), _WAIT_S)
-            self.sitl.vehicles[0].poll()
+            self.sitl.poll()
         return True
 
     def run(
@@ -127,16 +138,12 @@ class SitlServer:
             left_s = deadline_s - self._monotonic()
             if left_s <= 0.0:
                 return
-            descriptors = [
-                number
-                for vehicle in self.sitl.vehicles
-                for channel in vehicle.channels
-                for number in channel.link.filenos()
-            ]
+            poll = select.poll()
+            for number in self.sitl.filenos():
+                poll.register(number, select.POLLIN)
             try:
-                ready, _, _ = select.select(descriptors, (), (), left_s)
-            except (InterruptedError, ValueError, OSError):  # a descriptor went away between the two calls
+                ready = poll.poll(left_s * 1e3)
+            except InterruptedError:
                 return
             if ready:
-                for vehicle in self.sitl.vehicles:
-                    vehicle.poll()
+                self.sitl.poll()

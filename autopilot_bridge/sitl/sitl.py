@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.flavours import get_flavour
-from autopilot_bridge.links import Link, MemoryLink, memory_pair
+from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
 from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.mavlink.signing import signing_time
 from autopilot_bridge.payload import PayloadStation
-from autopilot_bridge.routing import LoopGuard, Router
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.failures import FailureInjector
 from autopilot_bridge.sitl.launch_crew import LaunchCrew
+from autopilot_bridge.sitl.shared_link import SharedLink
+from autopilot_bridge.sitl.signing import SigningParameters, VehicleSigning
+from autopilot_bridge.sitl.switchboard import Switchboard
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder, TruthEncoder
-from autopilot_bridge.telemetry.line import LineBudget
 from autopilot_bridge.tlog import TlogWriter
 from flightsim.airframe import Airframe, AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
@@ -40,7 +42,7 @@ TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a frame of truth."""
 
 _NEVER_US: Final = 1 << 62
-AUTOPILOT_COMPONENT: Final = 1
+_NOT_SIGNED: Final = SigningParameters()
 
 
 class SitlVehicle:
@@ -51,8 +53,7 @@ class SitlVehicle:
         sensors: its sensor suite; `sensors.faults` switches failures.
         autopilot: the emulated autopilot.
         payload: what it carries, as MAVLink components on a link of their own; None: nothing.
-        channels: its open links.
-        echoes: frames of its own that came back on a link; they are dropped.
+        links: its open links, who is heard on them, and the key it signs with.
         crashed: the vehicle is a wreck; clients were told.
     """
 
@@ -63,6 +64,7 @@ class SitlVehicle:
         configuration: SitlConfiguration,
         world: World,
         targets: GroundTargets,
+        signing: SigningParameters,
     ) -> None:
         streams = world.streams
         self.specification = specification
@@ -99,11 +101,17 @@ class SitlVehicle:
             if self.vehicle.launcher is None
             else LaunchCrew(self.vehicle, self.autopilot.commander, step_us=world.step_us)
         )
-        self.channels: list[LinkChannel] = []
-        self.echoes = 0
+        self.links = Switchboard(
+            self.autopilot,
+            system_id=specification.system_id,
+            signing=VehicleSigning(
+                signing,
+                system_id=specification.system_id,
+                clock=lambda: signing_time(configuration.unix_epoch_us + world.time_us),
+                armed=lambda: self.autopilot.commander.armed,
+            ),
+        )
         self.crashed = False
-        self._router: Router[LinkChannel] = Router()
-        self._loops = LoopGuard()
         self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
         self.payload: PayloadStation | None = None
         if specification.payload != PayloadParameters():
@@ -128,6 +136,16 @@ class SitlVehicle:
         theirs.on_receive = station.receive
         self.payload = station
 
+    @property
+    def channels(self) -> list[LinkChannel]:
+        """Its open links."""
+        return self.links.channels
+
+    @property
+    def echoes(self) -> int:
+        """Frames of its own that came back on a link; they were dropped."""
+        return self.links.echoes
+
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
         self.vehicle.step(self._actuators)
@@ -140,8 +158,7 @@ class SitlVehicle:
         if self.vehicle.crash is not None and not self.crashed:
             self.crashed = True
             text = self.truth_encoder.encode_text(f"Simulator: {self.vehicle.crash}")
-            for channel in self.channels:
-                channel.send_frame(text)
+            self.links.send_to_all(text)
 
     def open(
         self,
@@ -150,6 +167,7 @@ class SitlVehicle:
         name: str | None = None,
         role: str = "onboard",
         bytes_per_s: float | None = None,
+        reach: Reach | None = None,
     ) -> LinkChannel:
         """Give the autopilot one more link.
 
@@ -157,55 +175,21 @@ class SitlVehicle:
             name: unique per vehicle; None: made from the link.
             role: which default streams run on it ("onboard", "gcs" or "payload").
             bytes_per_s: what the link carries in a second of vehicle time; streams are thinned to fit.
+            reach: who can get at it; None: only this process when it is a memory link, else the network.
         """
-        if name is None:
-            name = f"{role}{len(self.channels)} {link.description}"
-        line = None if bytes_per_s is None else LineBudget(bytes_per_s)
-        channel = LinkChannel(name, link, system_id=self.specification.system_id, line=line)
-        self.channels.append(channel)
-        self._router.add(channel)
-        self.autopilot.add_channel(channel, role=role)
-        return channel
+        return self.links.open(link, name=name, role=role, bytes_per_s=bytes_per_s, reach=reach)
 
     def close(self, channel: LinkChannel) -> None:
         """Take a link away; the link itself is closed too."""
-        self.channels.remove(channel)
-        self.autopilot.remove_channel(channel)
-        self._router.remove(channel)
-        channel.link.close()
+        self.links.close(channel)
 
     def poll(self) -> None:
         """Hand everything that has arrived to the autopilot, and forward what is for somebody else."""
-        for channel in self.channels:
-            frames = channel.receive()
-            if frames:
-                self.take(channel, frames)
+        self.links.poll()
 
     def take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
-        """Hand frames that came in on a channel to the autopilot and to the channels they are meant for.
-
-        What is for another component of the vehicle goes there; while it was never heard, to the autopilot,
-        which may answer for it (ArduPilot).
-        """
-        own = self.specification.system_id
-        several = len(self.channels) > 1
-        for frame in frames:
-            if frame.system_id == own and frame.component_id == AUTOPILOT_COMPONENT:
-                self.echoes += 1  # its own words, brought back by somebody's bridge
-                continue
-            if not several:
-                self.autopilot.receive(frame, channel)
-                continue
-            others = self._router.route(frame, channel)
-            target = (frame.target_system, frame.target_component)
-            if not others or frame.target_system != own or frame.target_component in (0, AUTOPILOT_COMPONENT):
-                self.autopilot.receive(frame, channel)
-            if target == (own, AUTOPILOT_COMPONENT):
-                continue
-            if self._loops.comes_round(frame.raw, channel):
-                continue
-            for other in others:
-                other.send_frame(frame.raw)
+        """Hand frames that came in on a channel to the autopilot and to the channels they are meant for."""
+        self.links.take(channel, frames)
 
 
 def _gps(flavour: str) -> GpsParameters:
@@ -225,18 +209,20 @@ class Sitl:
 
     Args:
         configuration: what it holds.
+        signing: how the vehicles sign what they say, and what they believe.
 
     Attributes:
         configuration: as given.
         world: vehicles and air.
         vehicles: with sensors, autopilots and links.
         targets: on the ground.
+        shared_links: those that several vehicles speak on.
 
     Raises:
         ValueError: a model, flavour or parameter that does not exist or is out of range.
     """
 
-    def __init__(self, configuration: SitlConfiguration) -> None:
+    def __init__(self, configuration: SitlConfiguration, *, signing: SigningParameters = _NOT_SIGNED) -> None:
         self.configuration = configuration
         self.world = World(
             WorldParameters(
@@ -251,13 +237,15 @@ class Sitl:
             configuration.targets, seeds=lambda target: streams.child("target", target)
         )
         self.vehicles = tuple(
-            SitlVehicle(specification, index, configuration, self.world, self.targets)
+            SitlVehicle(specification, index, configuration, self.world, self.targets, signing)
             for index, specification in enumerate(configuration.vehicles)
         )
+        self.shared_links: list[SharedLink] = []
         self._step_us = 1_000_000 // configuration.physics_rate_hz
         self._time_us = 0
         self._poll_us = self._step_us
         self._next_poll_us = _NEVER_US
+        self._attended: list[Callable[[int], None]] = []
         self._truth_listeners: list[TruthListener] = []
         self._truth_interval_us = 1_000_000 // TRUTH_RATE_HZ
         self._next_truth_us = _NEVER_US
@@ -282,8 +270,7 @@ class Sitl:
         self.world.advance()
         if time_us >= self._next_poll_us:
             self._next_poll_us = time_us + self._poll_us
-            for vehicle in self.vehicles:
-                vehicle.poll()
+            self.poll()
         if time_us >= self._next_truth_us:
             self._next_truth_us = time_us + self._truth_interval_us
             for vehicle in self.vehicles:
@@ -295,18 +282,67 @@ class Sitl:
         for listener in self._truth_listeners:
             listener(time_us, frame)
 
+    def poll(self) -> None:
+        """Take what has arrived on all links, as much of it as there is time for."""
+        for shared in self.shared_links:
+            shared.poll()
+        for vehicle in self.vehicles:
+            vehicle.links.poll()
+        for look_after in self._attended:
+            look_after(self._time_us)
+
+    def attend(self, look_after: Callable[[int], None]) -> None:
+        """Have a shell looked after, with vehicle time, whenever real links are."""
+        self._attended.append(look_after)
+
+    def filenos(self) -> list[int]:
+        """File descriptors of all links, to watch for reading."""
+        links = [shared.link for shared in self.shared_links]
+        links += [channel.link for vehicle in self.vehicles for channel in vehicle.channels]
+        return [number for link in links for number in link.filenos()]
+
+    def share(
+        self, link: Link, *, role: str, reach: Reach = Reach.NETWORK, bytes_per_s: float | None = None
+    ) -> SharedLink:
+        """Open one link for all vehicles together.
+
+        Args:
+            link: an open link.
+            role: which default streams run on it ("onboard" or "gcs").
+            reach: who can get at it.
+            bytes_per_s: what it carries in a second of vehicle time; each vehicle gets an equal part.
+        """
+        shared = SharedLink(link, reach=reach)
+        part = None if bytes_per_s is None else bytes_per_s / len(self.vehicles)
+        for vehicle in self.vehicles:
+            shared.join(vehicle.links, vehicle.specification.system_id, role=role, bytes_per_s=part)
+        self.shared_links.append(shared)
+        return shared
+
     def poll_every(self, interval_us: int) -> None:
         """Look at real links every so often (vehicle time); memory links need no polling."""
         self._poll_us = max(self._step_us, interval_us)
         self._next_poll_us = self._time_us + self._poll_us
 
     def connect(
-        self, index: int, *, role: str = "onboard", bytes_per_s: float | None = None
+        self,
+        index: int,
+        *,
+        role: str = "onboard",
+        bytes_per_s: float | None = None,
+        reach: Reach = Reach.PROCESS,
     ) -> MemoryLink:
-        """A memory link to vehicle `index`; the returned end is the client's."""
+        """A memory link to vehicle `index`; the returned end is the client's.
+
+        Args:
+            index: of the vehicle.
+            role: which default streams run on it.
+            bytes_per_s: what it carries in a second of vehicle time.
+            reach: whose link it stands for; of this process, it is trusted and never signed.
+        """
         vehicle = self.vehicles[index]
         ours, theirs = memory_pair(f"vehicle{index + 1}", f"client{index + 1}")
-        channel = vehicle.open(ours, role=role, bytes_per_s=bytes_per_s)
+        channel = vehicle.open(ours, role=role, bytes_per_s=bytes_per_s, reach=reach)
         ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
 

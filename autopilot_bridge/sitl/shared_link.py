@@ -1,0 +1,143 @@
+"""One link for several vehicles, as behind one telemetry radio: each frame goes to the vehicle it is for."""
+
+from typing import Final
+
+from autopilot_bridge.links import Link, LinkCounters, PeerId, Reach
+from autopilot_bridge.mavlink import Frame, Intake
+from autopilot_bridge.routing import LoopGuard
+from autopilot_bridge.sitl.channel import LinkChannel, PeerExchange
+from autopilot_bridge.sitl.switchboard import AUTOPILOT_COMPONENT, Switchboard
+
+ALL_SYSTEMS: Final = 0
+
+
+class SharedLink:
+    """A link that several vehicles speak on.
+
+    Everybody's frames reach the clients. A client's frame goes to the vehicle whose system it is addressed
+    to, or to all of them when it is addressed to none; and to other clients of the link by the routing rules.
+
+    Args:
+        link: where bytes go and come from.
+        reach: who can get at it.
+
+    Attributes:
+        link: as given.
+        echoes: frames of the vehicles' own that somebody brought back; they are dropped.
+    """
+
+    def __init__(self, link: Link, *, reach: Reach) -> None:
+        self.echoes = 0
+        self.link = link
+        self._reach = reach
+        self._intake: Intake[PeerId] = Intake()
+        self._peers = PeerExchange(link)
+        self._loops = LoopGuard()
+        self._members: dict[int, tuple[Switchboard, LinkChannel]] = {}
+
+    def join(
+        self, switchboard: Switchboard, system_id: int, *, role: str, bytes_per_s: float | None = None
+    ) -> LinkChannel:
+        """Open the link for one more vehicle.
+
+        Args:
+            switchboard: of the vehicle.
+            system_id: of the vehicle.
+            role: which default streams run on it ("onboard" or "gcs").
+            bytes_per_s: the vehicle's part of what the link carries.
+        """
+        port = _Port(self, system_id)
+        channel = switchboard.open(port, role=role, reach=self._reach, bytes_per_s=bytes_per_s)
+        port.channel = channel
+        self._members[system_id] = (switchboard, channel)
+        return channel
+
+    def poll(self) -> None:
+        """Hand what has arrived to the vehicles and clients it is for."""
+        arrived = self.link.receive()
+        intake = self._intake
+        if not arrived and not intake.waiting:
+            return
+        believed: set[PeerId] = set()
+        for peer, frames in intake.take(arrived):
+            for frame in frames:
+                if frame.component_id == AUTOPILOT_COMPONENT and frame.system_id in self._members:
+                    self.echoes += 1
+                elif self._deliver(frame):
+                    believed.add(peer)
+                    for other in self._peers.others(frame, peer):
+                        self.link.send(frame.raw, other)
+        self._peers.forget({peer for peer, _ in arrived} - believed)
+
+    def _deliver(self, frame: Frame) -> bool:
+        """Give a frame to the vehicles it is for; False when no vehicle believes it."""
+        target = frame.target_system
+        addressed = self._members.get(target)
+        if addressed is not None:
+            return _take(*addressed, frame)
+        if target == ALL_SYSTEMS:
+            taken = [_take(*member, frame) for member in self._members.values()]
+            return any(taken)
+        for _, channel in self._members.values():  # between clients: believed when any vehicle does
+            if channel.signing is None or channel.signing.admit([frame]):
+                return True
+        return False
+
+    def forward(self, raw: bytes, member: int) -> None:
+        """Send a frame that came to vehicle `member` on another link; from several vehicles, once."""
+        if not self._loops.comes_round(raw, member):
+            self.link.send(raw)
+
+    def leave(self, member: int) -> None:
+        """A vehicle is gone; the last one closes the link."""
+        self._members.pop(member, None)
+        if not self._members:
+            self.link.close()
+
+
+def _take(switchboard: Switchboard, channel: LinkChannel, frame: Frame) -> bool:
+    admitted = [frame] if channel.signing is None else channel.signing.admit([frame])
+    switchboard.take(channel, admitted)
+    return bool(admitted)
+
+
+class _Port:
+    """What one vehicle has of a shared link; what comes in is brought by `SharedLink.poll`."""
+
+    __slots__ = ("_member", "_shared", "channel")
+
+    def __init__(self, shared: SharedLink, member: int) -> None:
+        self._shared = shared
+        self._member = member
+        self.channel: LinkChannel | None = None
+
+    @property
+    def description(self) -> str:
+        return self._shared.link.description
+
+    @property
+    def counters(self) -> LinkCounters:
+        return self._shared.link.counters
+
+    @property
+    def peers(self) -> tuple[PeerId, ...]:
+        return self._shared.link.peers
+
+    @property
+    def congested(self) -> bool:
+        return self._shared.link.congested
+
+    def send(self, data: bytes, to: PeerId | None = None) -> None:
+        self._shared.link.send(data, to)
+
+    def receive(self) -> list[tuple[PeerId, bytes]]:
+        return []
+
+    def filenos(self) -> tuple[int, ...]:
+        return ()
+
+    def forward(self, raw: bytes) -> None:
+        self._shared.forward(raw, self._member)
+
+    def close(self) -> None:
+        self._shared.leave(self._member)

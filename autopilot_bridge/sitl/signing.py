@@ -1,0 +1,197 @@
+"""Signing of the vehicles of a SITL: whose key, what each link takes, and how a client brings another key.
+
+The rules are the firmware's (ArduPilot `GCS_Signing.cpp`; PX4 has some since 1.17): no key is changed while
+armed, and it is taken on a link that only the owner can reach, or from the holder of the present key.
+"""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from types import MappingProxyType
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.errors import SigningKeyError
+from autopilot_bridge.links import Reach
+from autopilot_bridge.mavlink import Frame, LinkSigning, LinkSigningPolicy, SigningKey, SigningState, decode
+from autopilot_bridge.mavlink.signing import INTERNAL, MINUTE, REQUIRED, TRUSTED, UNSIGNED_TOO
+
+_KEY_REMOVED: Final = "Signing key removed"
+_KEY_TAKEN: Final = "Signing key set"
+_WHILE_ARMED: Final = "ERROR: Won't setup signing when armed"  # ArduPilot's words
+_NOT_TRUSTED: Final = "Signing key refused: link not trusted"
+_NOT_REMOVABLE: Final = "Signing key can't be removed"
+
+
+class UnsignedFrom(StrEnum):
+    """From whom unsigned frames are taken while there is a key."""
+
+    NONE = "none"
+    LOCAL = "local"
+    ALL = "all"
+
+
+POLICIES: Final[Mapping[UnsignedFrom, Mapping[Reach, LinkSigningPolicy]]] = MappingProxyType(
+    {
+        UnsignedFrom.NONE: {Reach.MACHINE: REQUIRED, Reach.NETWORK: REQUIRED},
+        UnsignedFrom.LOCAL: {Reach.MACHINE: TRUSTED, Reach.NETWORK: REQUIRED},
+        UnsignedFrom.ALL: {Reach.MACHINE: TRUSTED, Reach.NETWORK: UNSIGNED_TOO},
+    }
+)
+"""What a link takes, by who can get at it; links within the process are never signed."""
+
+
+class SigningStore:
+    """Keys and times of vehicles in a file, so that time doesn't go back over a restart.
+
+    One line for each vehicle: system id, timestamp, key in hexadecimal digits. Only its owner can read it.
+
+    Args:
+        path: the file; it need not exist.
+
+    Raises:
+        SigningKeyError: the file is something else, or can't be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._vehicles: dict[int, tuple[int, SigningKey | None]] = {}
+        if path.exists():
+            try:
+                for line in path.read_text(encoding="ascii").splitlines():
+                    number, timestamp, *key = line.split()
+                    self._vehicles[int(number)] = (
+                        int(timestamp),
+                        SigningKey(bytes.fromhex(key[0])) if key else None,
+                    )
+            except OSError as error:
+                raise SigningKeyError(f"can't read {path}: {error.strerror}") from error
+            except (ValueError, IndexError) as error:
+                raise SigningKeyError(
+                    f"{path} is not a store of signing keys; choose another path, which is made anew"
+                ) from error
+
+    def load(self, system_id: int) -> tuple[int, SigningKey | None] | None:
+        """Timestamp to go on from, a minute later than any that was used, and the key; None: never stored."""
+        found = self._vehicles.get(system_id)
+        return None if found is None else (found[0] + MINUTE, found[1])
+
+    def save(self, system_id: int, state: SigningState) -> None:
+        """Store a vehicle's key and time; the file is replaced whole."""
+        self._vehicles[system_id] = (state.timestamp, state.key)
+        lines = [
+            f"{number} {timestamp}{'' if key is None else ' ' + key.secret.hex()}\n"
+            for number, (timestamp, key) in sorted(self._vehicles.items())
+        ]
+        beside = self._path.with_name(self._path.name + ".new")
+        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        with os.fdopen(descriptor, "w", encoding="ascii") as file:
+            file.writelines(lines)
+        beside.replace(self._path)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SigningParameters:
+    """How the vehicles sign.
+
+    Attributes:
+        key: of all vehicles; None: none until a client sets one, or the stored one.
+        unsigned_from: from whom unsigned frames are taken while there is a key.
+        removable: a client that may set a key may also switch signing off.
+        clock: time as a timestamp, for clients that live in real time; None: the vehicles' own clock.
+        store: where keys and times are kept; None: nowhere.
+    """
+
+    key: SigningKey | None = None
+    unsigned_from: UnsignedFrom = UnsignedFrom.LOCAL
+    removable: bool = True
+    clock: Callable[[], int] | None = None
+    store: SigningStore | None = field(default=None, compare=False)
+
+
+class VehicleSigning:
+    """Signing of one vehicle.
+
+    Args:
+        parameters: as given to the SITL.
+        system_id: the vehicle's.
+        clock: the vehicle's time as a timestamp.
+        armed: asked when somebody brings a key.
+
+    Attributes:
+        state: key, time and streams.
+    """
+
+    def __init__(
+        self,
+        parameters: SigningParameters,
+        *,
+        system_id: int,
+        clock: Callable[[], int],
+        armed: Callable[[], bool],
+    ) -> None:
+        self._parameters = parameters
+        self._system_id = system_id
+        self._armed = armed
+        self._links = 0
+        store = parameters.store
+        stored = None if store is None else store.load(system_id)
+        timestamp, key = (0, None) if stored is None else stored
+        self.state = SigningState(
+            key if parameters.key is None else parameters.key,
+            clock=parameters.clock or clock,
+            timestamp=timestamp,
+            on_save=None if store is None else lambda state: store.save(system_id, state),
+        )
+
+    def link(self, reach: Reach) -> LinkSigning:
+        """The signing of one more link."""
+        if reach is Reach.PROCESS:
+            return LinkSigning(self.state, link_id=0, policy=INTERNAL)
+        number, self._links = self._links, self._links + 1
+        return LinkSigning(
+            self.state,
+            link_id=number & 0xFF,
+            policy=POLICIES[self._parameters.unsigned_from][reach],
+        )
+
+    def take_setup(self, frame: Frame, link: LinkSigning, reach: Reach) -> str | None:
+        """SETUP_SIGNING: take the key, or say why not.
+
+        Args:
+            frame: as `LinkSigning.admit` let it pass.
+            link: by which it came.
+            reach: of that link.
+
+        Returns:
+            A text for the sender; None when the message was for somebody else.
+        """
+        message = decode(frame)
+        if message.target_system != self._system_id or message.target_component not in (0, 1):
+            return None
+        if self._armed():
+            return _WHILE_ARMED
+        if self.state.active:
+            believed = frame.signed or link.policy.accept_bad_signature
+        else:
+            believed = reach is not Reach.NETWORK
+        if not believed:
+            return _NOT_TRUSTED
+        secret = bytes(message.secret_key)
+        if any(secret):
+            self.state.set_key(SigningKey(secret), message.initial_timestamp)
+            return _KEY_TAKEN
+        if not self._parameters.removable:
+            return _NOT_REMOVABLE
+        self.state.set_key(None)
+        return _KEY_REMOVED
+
+
+def told(text: str) -> mavlink.MAVLink_statustext_message:
+    """A text for who brought a key."""
+    good = text in (_KEY_TAKEN, _KEY_REMOVED)
+    severity = mavlink.MAV_SEVERITY_INFO if good else mavlink.MAV_SEVERITY_ERROR
+    return mavlink.MAVLink_statustext_message(severity, text.encode())

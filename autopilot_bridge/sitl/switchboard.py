@@ -1,0 +1,131 @@
+"""The links of one vehicle: what comes in goes to the autopilot and to whom it is meant for.
+
+Frames are passed on by the MAVLink routing rules between links, and between the clients that share one. What
+is for another component of the vehicle goes there; while that was never heard, to the autopilot, which may
+answer for it (ArduPilot).
+"""
+
+from collections.abc import Sequence
+from typing import Final
+
+from autopilot_bridge.autopilot import Autopilot
+from autopilot_bridge.links import Link, MemoryLink, PeerId, Reach
+from autopilot_bridge.mavlink import Frame
+from autopilot_bridge.mavlink.signing import SETUP_SIGNING
+from autopilot_bridge.routing import LoopGuard, Router
+from autopilot_bridge.sitl.channel import LinkChannel
+from autopilot_bridge.sitl.signing import VehicleSigning, told
+from autopilot_bridge.telemetry.line import LineBudget
+
+AUTOPILOT_COMPONENT: Final = 1
+
+
+class Switchboard:
+    """The open links of one vehicle.
+
+    Args:
+        autopilot: hears and speaks on all of them.
+        system_id: the vehicle's.
+        signing: keys of the vehicle.
+
+    Attributes:
+        channels: the open links.
+        echoes: frames of the autopilot's own that came back on a link; they are dropped.
+        signing: as given.
+    """
+
+    def __init__(self, autopilot: Autopilot, *, system_id: int, signing: VehicleSigning) -> None:
+        self.channels: list[LinkChannel] = []
+        self.echoes = 0
+        self.signing = signing
+        self._autopilot = autopilot
+        self._system_id = system_id
+        self._router: Router[LinkChannel] = Router()
+        self._loops = LoopGuard()
+        self._reach: dict[LinkChannel, Reach] = {}
+
+    def open(
+        self,
+        link: Link,
+        *,
+        name: str | None = None,
+        role: str = "onboard",
+        bytes_per_s: float | None = None,
+        reach: Reach | None = None,
+    ) -> LinkChannel:
+        """Give the autopilot one more link.
+
+        Args:
+            name: unique per vehicle; None: made from the link.
+            role: which default streams run on it ("onboard", "gcs" or "payload").
+            bytes_per_s: what the link carries in a second of vehicle time; streams are thinned to fit.
+            reach: who can get at it; None: only this process when it is a memory link, else the network.
+        """
+        if name is None:
+            name = f"{role}{len(self.channels)} {link.description}"
+        if reach is None:
+            reach = Reach.PROCESS if isinstance(link, MemoryLink) else Reach.NETWORK
+        line = None if bytes_per_s is None else LineBudget(bytes_per_s)
+        signing = self.signing.link(reach)
+        channel = LinkChannel(name, link, system_id=self._system_id, line=line, signing=signing)
+        self.channels.append(channel)
+        self._router.add(channel)
+        self._reach[channel] = reach
+        self._autopilot.add_channel(channel, role=role)
+        return channel
+
+    def close(self, channel: LinkChannel) -> None:
+        """Take a link away; the link itself is closed too."""
+        self.channels.remove(channel)
+        self._autopilot.remove_channel(channel)
+        self._router.remove(channel)
+        del self._reach[channel]
+        channel.link.close()
+
+    def send_to_all(self, raw: bytes) -> None:
+        """Send a frame of a component of the vehicle on every link."""
+        for channel in self.channels:
+            channel.send_own_frame(raw)
+
+    def poll(self) -> None:
+        """Take what has arrived on all links."""
+        for channel in self.channels:
+            for peer, frames in channel.receive():
+                self.take(channel, frames, peer)
+
+    def take(self, channel: LinkChannel, frames: Sequence[Frame], peer: PeerId | None = None) -> None:
+        """Hand frames that came in on a channel to the autopilot, and to the links and clients they are for.
+
+        Args:
+            peer: who of several on the link sent them; None: there is one, or the link sees to the others.
+        """
+        own = self._system_id
+        several = len(self.channels) > 1
+        for frame in frames:
+            if frame.system_id == own and frame.component_id == AUTOPILOT_COMPONENT:
+                self.echoes += 1  # its own words, brought back by somebody's bridge
+                continue
+            if frame.message_id == SETUP_SIGNING:
+                self._take_key(frame, channel)
+                continue
+            others = self._router.route(frame, channel) if several else ()
+            if not others or frame.target_system != own or frame.target_component in (0, AUTOPILOT_COMPONENT):
+                self._autopilot.receive(frame, channel)
+            if frame.target_system == own and frame.target_component == AUTOPILOT_COMPONENT:
+                continue
+            if peer is not None:
+                channel.exchange(frame, peer)
+            if not others or self._loops.comes_round(frame.raw, channel):
+                continue
+            within = self._reach[channel] is Reach.PROCESS
+            for other in others:
+                if within:
+                    other.send_own_frame(frame.raw)
+                else:
+                    other.send_frame(frame.raw)
+
+    def _take_key(self, frame: Frame, channel: LinkChannel) -> None:
+        assert channel.signing is not None
+        text = self.signing.take_setup(frame, channel.signing, self._reach[channel])
+        if text is not None:
+            channel.send(told(text))
