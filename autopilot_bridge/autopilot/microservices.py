@@ -1,9 +1,10 @@
 """Which microservices an autopilot has, beyond those that it is built around."""
 
+from autopilot_bridge.services.incoming import incoming_services
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.small_services import small_services
 
 
 def microservices(parts: AutopilotParts) -> tuple[Microservice, ...]:
     """Those of one autopilot, in the order in which they are asked."""
-    return small_services(parts)
+    return (*incoming_services(parts), *small_services(parts))

@@ -39,11 +39,19 @@ class NavigationJudgement:
 
     @property
     def position_valid(self) -> bool:
-        """The horizontal position is good, on Earth; dead-reckoned through the wind counts, as in PX4."""
+        """The horizontal position is good; dead-reckoned through the wind counts, and external odometry.
+
+        Such a position may be local only: whoever needs a place on Earth needs the filter's origin too.
+        """
         health = self._navigation.health
         return health.position_horizontal_absolute or (
-            health.wind_dead_reckoning and health.position_horizontal_relative
+            (health.wind_dead_reckoning or health.external_in_use) and health.position_horizontal_relative
         )
+
+    @property
+    def external(self) -> bool:
+        """External odometry aids the position: it needs no GPS."""
+        return self._navigation.health.external_in_use
 
     @property
     def position_accuracy_m(self) -> float:

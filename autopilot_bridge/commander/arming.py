@@ -90,7 +90,7 @@ def arming_reasons(
     by_position = Need.POSITION in needs or policy.position_needed_to_arm
     if not health.attitude:
         reasons.append(Reason.ATTITUDE)
-    if by_position and not health.gps:
+    if by_position and not (health.gps or health.external):
         reasons.append(Reason.GPS)
     missing = shortfalls(mode, situation, policy, parameters)
     reasons.extend(reason for reason in missing if reason not in reasons)

@@ -44,6 +44,8 @@ class NavigationStatus(Protocol):
     @property
     def position_valid(self) -> bool: ...
     @property
+    def external(self) -> bool: ...
+    @property
     def position_accuracy_m(self) -> float: ...
     @property
     def airspeed_rejected(self) -> bool: ...
@@ -65,6 +67,7 @@ class VehicleHealth:
     altitude: bool = False
     velocity: bool = False
     position: bool = False
+    external: bool = False
     position_accuracy_m: float = math.nan
     battery: bool = False
     battery_voltage_v: float = math.nan
@@ -163,6 +166,7 @@ class HealthMonitor:
         health.altitude = navigation.altitude_valid
         health.velocity = navigation.velocity_valid
         health.position = navigation.position_valid
+        health.external = navigation.external
         health.position_accuracy_m = navigation.position_accuracy_m
         battery = readings.battery.values.tolist()
         health.battery_voltage_v = battery[interface.BATTERY_VOLTAGE_V]

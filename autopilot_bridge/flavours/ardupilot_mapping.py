@@ -8,6 +8,7 @@ from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
+from autopilot_bridge.flavours.external_mapping import ardupilot_external
 from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -278,6 +279,7 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         store,
         NAVIGATION,
         use_gps=gps_is_fused(store),
+        external=ardupilot_external(store),
         **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
     )
 

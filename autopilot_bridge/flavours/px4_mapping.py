@@ -7,6 +7,7 @@ from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
+from autopilot_bridge.flavours.external_mapping import px4_external
 from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -241,6 +242,7 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         NAVIGATION,
         gps_required_satellites=max(4, min(12, satellites)),
         use_gps=gps_is_fused(store),
+        external=px4_external(store),
         **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
     )
 

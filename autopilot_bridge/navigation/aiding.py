@@ -16,6 +16,8 @@ from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.air_aiding import AirAiding
 from autopilot_bridge.navigation.alignment import magnetic_heading_rad, tilt_from_accel
 from autopilot_bridge.navigation.earth import pressure_altitude_m
+from autopilot_bridge.navigation.external import ExternalSample
+from autopilot_bridge.navigation.external_aiding import ExternalAiding
 from autopilot_bridge.navigation.gps_quality import GpsQuality
 from autopilot_bridge.navigation.heading_check import HeadingCheck
 from autopilot_bridge.navigation.health import NavigationHealth
@@ -60,6 +62,7 @@ class Aiding:
 
     Attributes:
         air: airspeed, sideslip and wind; None unless on a fixed wing.
+        external: odometry by messages; None before any has come.
         frame: NED frame at the origin; None before it is set.
         at_rest: the vehicle stands still on the ground.
     """
@@ -86,6 +89,7 @@ class Aiding:
         "_tick",
         "air",
         "at_rest",
+        "external",
         "frame",
     )
 
@@ -112,6 +116,7 @@ class Aiding:
         self.frame: LocalFrame | None = None
         self._heading = HeadingCheck()
         self._pressure_scale = PressureScale()
+        self.external: ExternalAiding | None = None
         self.air: AirAiding | None = None
         if parameters.fixed_wing:
             self.air = AirAiding(parameters, readings=readings, solution=solution, health=health)
@@ -134,6 +139,8 @@ class Aiding:
         self.at_rest = False
         if self.air is not None:
             self.air.restart()
+        if self.external is not None:
+            self.external.restart(self._clocks)
         obs = self._solution.obs
         obs[:] = 0.0
         self._tune()
@@ -147,7 +154,21 @@ class Aiding:
         self._terrain.set_parameters(parameters)
         if self.air is not None:
             self.air.set_parameters(parameters)
+        if self.external is not None:
+            self.external.set_parameters(parameters.external)
         self._tune()
+
+    def take_external(self, sample: ExternalSample) -> None:
+        """External odometry, for the next update."""
+        if self.external is None:
+            self.external = ExternalAiding(
+                self._parameters.external,
+                solution=self._solution,
+                standby=self._standby,
+                health=self._health,
+                clocks=self._clocks,
+            )
+        self.external.take(sample)
 
     def _tune(self) -> None:
         """Variances and gates that don't depend on the measurement."""
@@ -231,7 +252,8 @@ class Aiding:
             baro_row = self._prepare_baro(time_us)
             if baro_row >= 0:
                 has |= f.HAS_BARO
-        if pending & f.HAS_MAG:
+        external = self.external
+        if pending & f.HAS_MAG and (external is None or not external.heading.in_use):
             mag_row = self._prepare_mag(time_us)
             if mag_row >= 0:
                 has |= f.HAS_MAG
@@ -265,6 +287,8 @@ class Aiding:
                 self._rejoined(solution.core[X_VEL : X_POS + 2] - before)
         if self.air is not None and slow:
             accepted |= self._fuse_air(self.air, time_us)
+        if external is not None and not external.update(time_us, at_rest=self.at_rest):
+            return f.UNSOUND
         ranged = self._readings.rangefinder if pending & HAS_RANGE else None
         update_terrain(self._terrain, solution, ranged, time_us, slow=slow, at_rest=self.at_rest)
         if self._tick % self._report_every == 0:
@@ -284,6 +308,8 @@ class Aiding:
             health.position_vertical_agl = self._terrain.valid(time_us)
             if self.air is not None:
                 self.air.report(time_us)
+            if external is not None:
+                external.report(health, on_earth=self.frame is not None)
         self._tick += 1
         return f.UNSOUND if self._contradictions >= _TOO_MANY_CONTRADICTIONS else accepted
 

@@ -16,6 +16,7 @@ from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import mechanisation
 from autopilot_bridge.navigation.aiding import HAS_RANGE, Aiding
 from autopilot_bridge.navigation.alignment import Alignment
+from autopilot_bridge.navigation.external import ExternalCounts, ExternalSample
 from autopilot_bridge.navigation.fusion import HAS_BARO, HAS_GPS, HAS_MAG, UNSOUND
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.layout import (
@@ -141,6 +142,20 @@ class NavigationFilter:
     def parameters(self) -> NavigationParameters:
         """The tuning in use."""
         return self._parameters
+
+    def take_external(self, sample: ExternalSample) -> None:
+        """Pose and velocity that somebody else has measured; fused at the next update, if they fit.
+
+        They may hold anything: what can't be used is counted (`external_counts`).
+        """
+        if self._aligned:
+            self._aiding.take_external(sample)
+
+    @property
+    def external_counts(self) -> ExternalCounts | None:
+        """What became of external odometry; None while none has come."""
+        external = self._aiding.external
+        return None if external is None else external.counts
 
     def set_parameters(self, parameters: NavigationParameters) -> None:
         """Take new tuning from the next update on; the estimate and its covariance stay.

@@ -30,6 +30,8 @@ class NavigationHealth:
         wind_dead_reckoning: airspeed and sideslip aid the velocity in its place, through the wind (PX4's
             filter status of this name; ArduPilot's EKF then has a relative, but no absolute position). The
             accuracies grow.
+        external_in_use: position or velocity of external odometry aid the horizontal position.
+        external_yaw_in_use: the heading is that of external odometry.
         airspeed_in_use, sideslip_in_use: fused lately.
         airspeed_valid: the navigation state's airspeed is the pitot tube's, and believed.
         airspeed_synthetic: it is the ground velocity's less the wind instead.
@@ -59,6 +61,8 @@ class NavigationHealth:
         "barometer_in_use",
         "constant_position",
         "dead_reckoning",
+        "external_in_use",
+        "external_yaw_in_use",
         "filter_resets",
         "gps_glitch",
         "gps_in_use",
@@ -139,6 +143,8 @@ class NavigationHealth:
         self.rangefinder_in_use = False
         self.dead_reckoning = False
         self.wind_dead_reckoning = False
+        self.external_in_use = False
+        self.external_yaw_in_use = False
         self.airspeed_in_use = False
         self.sideslip_in_use = False
         self.airspeed_valid = False

@@ -1,7 +1,9 @@
 """Tuning of the navigation filter."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
+
+from autopilot_bridge.navigation.external_parameters import ExternalParameters
 
 _MAY_BE_ZERO = frozenset(
     {
@@ -117,6 +119,7 @@ class NavigationParameters:
         assumed_airspeed_noise_m_s: 1-sigma of the airspeed that is assumed to have stayed as it was when
             neither GPS nor a pitot tube can be used; it keeps the attitude bounded, as ArduPilot's EK3 does
             with AIRSPEED_CRUISE.
+        external: odometry that comes by messages.
     """
 
     covariance_rate_hz: int = 25
@@ -200,14 +203,15 @@ class NavigationParameters:
     airspeed_stop_delay_s: float = 1.0
     airspeed_start_delay_s: float = 5.0
     assumed_airspeed_noise_m_s: float = 3.0
+    external: ExternalParameters = field(default_factory=ExternalParameters)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if value is None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if value is None or entry.name == "external":
                 continue
             numbers = value if isinstance(value, tuple) else (value,)
-            if field.name == "mag_ned_gauss":
+            if entry.name == "mag_ned_gauss":
                 if not all(math.isfinite(number) for number in numbers) or math.hypot(*numbers) < 0.05:
                     raise ValueError(
                         f"mag_ned_gauss {value} is not a field of the Earth (0.2 to 0.7 gauss), NED"
@@ -217,11 +221,11 @@ class NavigationParameters:
                 if (
                     not math.isfinite(number)
                     or number < 0.0
-                    or (number == 0.0 and field.name not in _MAY_BE_ZERO)
+                    or (number == 0.0 and entry.name not in _MAY_BE_ZERO)
                 ):
-                    accepted = "zero or positive" if field.name in _MAY_BE_ZERO else "positive"
+                    accepted = "zero or positive" if entry.name in _MAY_BE_ZERO else "positive"
                     raise ValueError(
-                        f"{field.name} {value} is not accepted: it must be finite and {accepted}"
+                        f"{entry.name} {value} is not accepted: it must be finite and {accepted}"
                     )
         if not 2025.0 <= self.magnetic_year <= 2030.0:
             raise ValueError(

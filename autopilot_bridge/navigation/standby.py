@@ -89,7 +89,7 @@ class Standby:
         lost = clocks.horizontal_aid_us < 0 or time_us - clocks.horizontal_aid_us > p.no_aid_timeout_s * 1e6
         if lost and not self.held:
             self._hold(clocks, flying=flying)
-        may_leave = clocks.gps_us >= 0 or winged  # a launch must not be held back
+        may_leave = clocks.horizontal_aid_us >= 0 or winged  # a launch must not be held back
         sigma = p.no_aid_noise_m if may_leave and not at_rest else p.at_rest_noise_m
         if self.held and flying:
             self._adrift = True

@@ -6,6 +6,9 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.flavours.flavour import Flavour
@@ -16,6 +19,9 @@ from autopilot_bridge.services.channel import Announce, Broadcast, Channel, Mavl
 from autopilot_bridge.services.command_common import Handler
 from autopilot_bridge.telemetry.streams import Builder
 from flightsim.interface import SensorReadings
+
+Spoil = Callable[[int, NDArray[np.float64]], bool]
+"""Spoils the values of a FAILURE_UNIT's sample in place; False: the sample doesn't arrive."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +38,7 @@ class AutopilotParts:
         stores: the uploaded plans, by type.
         broadcast: all channels.
         announce: sends a STATUSTEXT.
+        spoil: failures of what comes in by messages; None: nothing fails.
     """
 
     flavour: Flavour
@@ -43,6 +50,7 @@ class AutopilotParts:
     stores: Mapping[MissionType, MissionStore]
     broadcast: Broadcast
     announce: Announce
+    spoil: Spoil | None = None
 
 
 class Microservice:

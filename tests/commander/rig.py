@@ -34,6 +34,7 @@ class Judgement:
         self.velocity_valid = True
         self.position_valid = True
         self.position_accuracy_m = 0.5
+        self.external = False
         self.airspeed_rejected = False
 
 

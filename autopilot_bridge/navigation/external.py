@@ -1,0 +1,98 @@
+"""Pose and velocity that somebody else has measured: visual odometry, motion capture.
+
+The navigation filter takes them as `ExternalSample`s. They come by messages, so nothing in them is trusted.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+POSITION_M: Final = slice(0, 3)
+Q_LOCAL_FROM_FRD: Final = slice(3, 7)
+VELOCITY_M_S: Final = slice(7, 10)
+SAMPLE_SIZE: Final = 10
+
+
+class ExternalFrame(IntEnum):
+    """Axes that a sample's vectors are in."""
+
+    NED = 0  # north, east, down
+    LOCAL_FRD = 1  # level and down, but with a heading of its own
+    BODY_FRD = 2  # the vehicle's; velocities only
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExternalSample:
+    """One measurement.
+
+    Attributes:
+        time_us: vehicle time at which it was taken; -1: not known, its arrival counts.
+        values: float64[SAMPLE_SIZE]: position m, attitude (Hamilton, w x y z), velocity m/s; NaN: not there.
+        frame: of position and attitude.
+        velocity_frame: of the velocity.
+        position_variance_m2, velocity_variance_m2_s2: of the three axes; NaN: not known.
+        yaw_variance_rad2: NaN: not known.
+        reset_counter: changes when the sender's estimate has jumped.
+        quality: 1 to 100 %; 0: not known, -1: the sender's estimate has failed.
+    """
+
+    time_us: int
+    values: Array
+    frame: ExternalFrame
+    velocity_frame: ExternalFrame
+    position_variance_m2: tuple[float, float, float]
+    velocity_variance_m2_s2: tuple[float, float, float]
+    yaw_variance_rad2: float
+    reset_counter: int = 0
+    quality: int = 0
+
+
+class ExternalCounts:
+    """What became of the samples.
+
+    Attributes:
+        taken: came in.
+        fused: moved the estimate.
+        refused: all that was to be fused was beyond its gate.
+        not_finite: nothing usable in it, or beyond any sense.
+        late: older than the filter's history.
+        poor: of too little quality.
+        frozen: the same to the last digit, in flight.
+        incoherent: moves in another way than the vehicle, so that nothing is begun with it.
+        flooded: more than are looked at between two updates.
+        resets: jumps of the estimate to what the sender says.
+    """
+
+    __slots__ = (
+        "flooded",
+        "frozen",
+        "fused",
+        "incoherent",
+        "late",
+        "not_finite",
+        "poor",
+        "refused",
+        "resets",
+        "taken",
+    )
+
+    def __init__(self) -> None:
+        self.taken = self.fused = self.refused = self.not_finite = self.late = 0
+        self.poor = self.frozen = self.incoherent = self.flooded = self.resets = 0
+
+
+def variance_of(said: float, noise: float, *, own: bool) -> float:
+    """What is believed of a variance that a sender states.
+
+    Args:
+        said: the sender's; NaN or nonsense: not known.
+        noise: 1-sigma: the least that is believed.
+        own: only `noise` counts.
+    """
+    least = noise * noise
+    return least if own or not 0.0 < said < 1e6 else max(said, least)

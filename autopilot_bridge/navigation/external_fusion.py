@@ -1,0 +1,179 @@
+"""Measurement updates of external odometry: position, velocity and heading, against the history.
+
+As in `fusion`, a delayed measurement is compared with the past, and its Jacobian carries the past back. The
+heading of r_ned_from_frd with the attitude error theta (NED): with r the rotation matrix,
+    d heading = theta_d - r[2, 0] (r[0, 0] theta_n + r[1, 0] theta_e) / (r[0, 0]^2 + r[1, 0]^2).
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.navigation.covariance import apply_scalar, inject, is_sound
+from autopilot_bridge.navigation.fusion import body_axis_in_ned, velocity_dot, velocity_ph
+from autopilot_bridge.navigation.states import (
+    ATT,
+    CORRECTION_POS,
+    CORRECTION_VEL,
+    DX,
+    GRAVITY,
+    HISTORY_POS,
+    HISTORY_VEL,
+    PH,
+    POS,
+    VEL,
+    X_VEL,
+    R,
+)
+from flightsim.kernels import kernel
+
+Array = NDArray[np.float64]
+
+# obs: one sample, NED
+EXT_POS: Final = 0
+EXT_VEL: Final = 3
+EXT_YAW: Final = 6
+EXT_POS_VAR: Final = 7
+EXT_VEL_VAR: Final = 10
+EXT_YAW_VAR: Final = 13
+EXT_DELAY_S: Final = 14
+EXT_GATE_POS: Final = 15
+EXT_GATE_VEL: Final = 16
+EXT_GATE_YAW: Final = 17
+# results: the innovation over its gate
+EXT_RATIO_POS: Final = 18
+EXT_RATIO_HEIGHT: Final = 19
+EXT_RATIO_VEL: Final = 20
+EXT_RATIO_YAW: Final = 21
+EXT_SIZE: Final = 22
+
+# which parts are there, and which were accepted
+EXT_HAS_POS: Final = 1
+EXT_HAS_HEIGHT: Final = 2
+EXT_HAS_VEL: Final = 4
+EXT_HAS_YAW: Final = 8
+EXT_UNSOUND: Final = 32
+
+_LEAST_LEVEL: Final = 1e-3  # horizontal part of the nose, squared, below which there is no heading
+
+
+@kernel
+def place_dot(work: Array, base: int, axis: int, delay: float) -> float:
+    """H times the vector at `base` of `work`, for a position axis."""
+    return work[base + POS + axis] - delay * work[base + VEL + axis]
+
+
+@kernel
+def place_ph(p: Array, work: Array, axis: int, delay: float) -> float:
+    """PH of a position axis; returns H P H^T."""
+    for i in range(p.shape[0]):
+        work[PH + i] = p[i, POS + axis] - delay * p[i, VEL + axis]
+    return place_dot(work, PH, axis, delay)
+
+
+@kernel
+def heading_dot(work: Array, base: int, hn: float, he: float) -> float:
+    """H times the vector at `base`, for the heading."""
+    return hn * work[base + ATT] + he * work[base + ATT + 1] + work[base + ATT + 2]
+
+
+@kernel
+def heading_ph(p: Array, work: Array, hn: float, he: float) -> float:
+    """PH of the heading; returns H P H^T."""
+    for i in range(p.shape[0]):
+        work[PH + i] = hn * p[i, ATT] + he * p[i, ATT + 1] + p[i, ATT + 2]
+    return heading_dot(work, PH, hn, he)
+
+
+@kernel
+def wrapped(angle: float) -> float:
+    """An angle within -pi..pi."""
+    return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
+
+
+@kernel
+def fuse_heading(p: Array, history: Array, work: Array, obs: Array, row: int) -> bool:
+    """The heading, gated."""
+    r00, r10, r20 = body_axis_in_ned(history, row, 0)
+    level = r00 * r00 + r10 * r10
+    if level < _LEAST_LEVEL:
+        return False
+    hn, he = -r20 * r00 / level, -r20 * r10 / level
+    s = heading_ph(p, work, hn, he) + obs[EXT_YAW_VAR]
+    residual = wrapped(obs[EXT_YAW] - math.atan2(r10, r00)) - heading_dot(work, DX, hn, he)
+    obs[EXT_RATIO_YAW] = abs(residual) / (obs[EXT_GATE_YAW] * math.sqrt(s))
+    if not obs[EXT_RATIO_YAW] <= 1.0:
+        return False
+    apply_scalar(p, work, residual, s)
+    return True
+
+
+@kernel
+def fuse_velocity(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> bool:
+    """The three velocity axes, gated as a whole."""
+    d = obs[EXT_DELAY_S]
+    ux = core[X_VEL] - history[row, HISTORY_VEL] - core[CORRECTION_VEL]
+    uy = core[X_VEL + 1] - history[row, HISTORY_VEL + 1] - core[CORRECTION_VEL + 1]
+    uz = core[X_VEL + 2] - history[row, HISTORY_VEL + 2] - core[CORRECTION_VEL + 2] - core[GRAVITY] * d
+    worst = 0.0
+    for again in range(2):  # gate first, then fuse
+        for a in range(3):
+            un = uy if a == 0 else (uz if a == 1 else ux)
+            ul = uz if a == 0 else (ux if a == 1 else uy)
+            b0, b1, b2 = d * core[R + 3 * a], d * core[R + 3 * a + 1], d * core[R + 3 * a + 2]
+            s = velocity_ph(p, work, a, un, ul, b0, b1, b2) + obs[EXT_VEL_VAR + a]
+            residual = obs[EXT_VEL + a] - history[row, HISTORY_VEL + a] - core[CORRECTION_VEL + a]
+            residual -= velocity_dot(work, DX, a, un, ul, b0, b1, b2)
+            if again == 0:
+                worst = max(worst, abs(residual) / (obs[EXT_GATE_VEL] * math.sqrt(s)))
+            else:
+                apply_scalar(p, work, residual, s)
+        if again == 0:
+            obs[EXT_RATIO_VEL] = worst
+            if not worst <= 1.0:
+                return False
+    return True
+
+
+@kernel
+def fuse_place(
+    p: Array, core: Array, history: Array, work: Array, obs: Array, row: int, first: int, last: int
+) -> bool:
+    """Position axes `first` up to `last`, gated as a whole."""
+    d = obs[EXT_DELAY_S]
+    worst = 0.0
+    for again in range(2):
+        for a in range(first, last):
+            s = place_ph(p, work, a, d) + obs[EXT_POS_VAR + a]
+            residual = obs[EXT_POS + a] - history[row, HISTORY_POS + a] - core[CORRECTION_POS + a]
+            residual -= place_dot(work, DX, a, d)
+            if again == 0:
+                worst = max(worst, abs(residual) / (obs[EXT_GATE_POS] * math.sqrt(s)))
+            else:
+                apply_scalar(p, work, residual, s)
+        if again == 0:
+            obs[EXT_RATIO_POS if first == 0 else EXT_RATIO_HEIGHT] = worst
+            if not worst <= 1.0:
+                return False
+    return True
+
+
+@kernel
+def fuse_external(p: Array, core: Array, history: Array, work: Array, obs: Array, has: int, row: int) -> int:
+    """Fuse the parts of one sample that are there (`has`) and inject; returns those that were accepted."""
+    accepted = 0
+    if has & EXT_HAS_YAW and fuse_heading(p, history, work, obs, row):
+        accepted |= EXT_HAS_YAW
+    if has & EXT_HAS_VEL and fuse_velocity(p, core, history, work, obs, row):
+        accepted |= EXT_HAS_VEL
+    if has & EXT_HAS_POS and fuse_place(p, core, history, work, obs, row, 0, 2):
+        accepted |= EXT_HAS_POS
+    if has & EXT_HAS_HEIGHT and fuse_place(p, core, history, work, obs, row, 2, 3):
+        accepted |= EXT_HAS_HEIGHT
+    if accepted:
+        inject(core, work)
+    if not is_sound(p, core):
+        accepted |= EXT_UNSOUND
+    return accepted

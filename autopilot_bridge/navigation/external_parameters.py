@@ -1,0 +1,69 @@
+"""What the filter does with external odometry."""
+
+import math
+from dataclasses import dataclass, fields
+from typing import Final
+
+_MAY_BE_ZERO: Final = frozenset({"delay_s"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExternalParameters:
+    """Which parts of external odometry are fused, and how much they are trusted.
+
+    Attributes:
+        use_position, use_height, use_velocity, use_yaw: fused (EKF2_EV_CTRL; EK3_SRC1_POSXY, _POSZ, _VELXY,
+            _YAW of 6).
+        height_reference: heights are the sender's (EKF2_HGT_REF 3, EK3_SRC1_POSZ 6); else its heights count
+            from where the vehicle was when they began.
+        own_noise: the noise below counts instead of the messages' (EKF2_EV_NOISE_MD 1); else it is the least
+            that is believed.
+        position_noise_m, velocity_noise_m_s, yaw_noise_rad: 1-sigma (EKF2_EVP_NOISE, _EVV_, _EVA_;
+            VISO_POS_M_NSE, VISO_VEL_M_NSE, VISO_YAW_M_NSE).
+        position_gate, velocity_gate, yaw_gate: standard deviations of the innovation (EKF2_EVP_GATE,
+            EKF2_EVV_GATE, EKF2_HDG_GATE; EK3_POS_I_GATE, EK3_VEL_I_GATE, EK3_YAW_I_GATE).
+        delay_s: how much older than their time stamps the samples are (EKF2_EV_DELAY, VISO_DELAY_MS).
+        offset_frd_m: where the sensor sits on the vehicle (EKF2_EV_POS_X, VISO_POS_X).
+        least_quality: samples of less are refused (EKF2_EV_QMIN, VISO_QUAL_MIN).
+        scale: of the sender's metres (VISO_SCALE).
+        reset_after_s: refused for this long although coherent: the estimate goes to the sender's.
+        timeout_s: nothing fused for this long: no longer in use.
+    """
+
+    use_position: bool = False
+    use_height: bool = False
+    use_velocity: bool = False
+    use_yaw: bool = False
+    height_reference: bool = False
+    own_noise: bool = False
+    position_noise_m: float = 0.1
+    velocity_noise_m_s: float = 0.1
+    yaw_noise_rad: float = 0.1
+    position_gate: float = 5.0
+    velocity_gate: float = 3.0
+    yaw_gate: float = 2.6
+    delay_s: float = 0.0
+    offset_frd_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    least_quality: int = 0
+    scale: float = 1.0
+    reset_after_s: float = 7.0
+    timeout_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            name, value = field.name, getattr(self, field.name)
+            if name == "offset_frd_m":
+                if not all(math.isfinite(part) and abs(part) <= 10.0 for part in value):
+                    raise ValueError(f"offset_frd_m {value} is not accepted: three numbers within 10 m are")
+            elif isinstance(value, float) and not (
+                math.isfinite(value) and (value > 0.0 or (value == 0.0 and name in _MAY_BE_ZERO))
+            ):
+                accepted = "zero or positive" if name in _MAY_BE_ZERO else "positive"
+                raise ValueError(f"{name} {value} is not accepted: it must be finite and {accepted}")
+        if not -1 <= self.least_quality <= 100:
+            raise ValueError(f"least_quality {self.least_quality} is not accepted: -1 to 100 % are")
+
+    @property
+    def any(self) -> bool:
+        """Something is fused at all."""
+        return self.use_position or self.use_height or self.use_velocity or self.use_yaw
