@@ -13,7 +13,7 @@ from flightsim import truth as t
 from flightsim.home import Home
 from flightsim.payload import camera_kernel as k
 from flightsim.payload.camera_model import PinholeModel
-from flightsim.payload.camera_view import CameraView, TargetView
+from flightsim.payload.camera_view import CameraView, TargetView, Vector
 from flightsim.payload.checks import require_finite
 from flightsim.payload.detection import CameraFrame, Detection, DetectionModel, ResolutionDetection
 from flightsim.payload.gimbal import Gimbal
@@ -207,29 +207,40 @@ class Camera:
         self._zoom = min(p.max_zoom, max(1.0, zoom))
         self._focal_px = self._constants[k.FOCAL_PX] = p.model.focal_px * self._zoom
 
-    def view(self, time_us: int) -> CameraView:
-        """What a picture of this moment is made from; changes nothing."""
+    @property
+    def autofocus_m(self) -> float:
+        """Distance of the ground in the middle of the picture; infinity: there is sky."""
+        eye, q = self._pose()
+        w, x, y, z = q
+        sine = 2.0 * (x * z - w * y)  # of the optical axis below the horizon
+        return max(self.parameters.min_focus_m, -eye[2] / sine) if sine > 0.0 else math.inf
+
+    def _pose(self) -> tuple[Vector, tuple[float, float, float, float]]:
+        """The camera's place, local NED of home, and q_ned_from_mount."""
         truth, gimbal = self._truth, self._gimbal
         q_ned_from_frd, arm, q = truth[t.Q_NED_FROM_FRD], np.zeros(3), np.zeros(4)
-        multiply(q_ned_from_frd, self._q_frd_from_mount if gimbal is None else gimbal.q_frd_from_gimbal, q)
+        q_frd_from_mount = self._q_frd_from_mount if gimbal is None else gimbal.q_frd_from_gimbal
+        multiply(q_ned_from_frd, q_frd_from_mount, q)
         rotate(q_ned_from_frd, self._constants[k.POSITION_FRD_M], arm)
-        place = self._home_frame.position_ned_m(truth)
-        eye = (place[0] + float(arm[0]), place[1] + float(arm[1]), place[2] + float(arm[2]))
+        north_m, east_m, down_m = self._home_frame.position_ned_m(truth)
+        eye = (north_m + float(arm[0]), east_m + float(arm[1]), down_m + float(arm[2]))
         w, x, y, z = q.tolist()
-        focus_m = self.focus_distance_m
-        if focus_m is None:
-            sine = 2.0 * (x * z - w * y)  # of the optical axis below the horizon
-            focus_m = max(0.0, -eye[2]) / sine if sine > 0.0 else math.inf
+        return eye, (w, x, y, z)
+
+    def view(self, time_us: int) -> CameraView:
+        """What a picture of this moment is made from; changes nothing."""
+        eye, q = self._pose()
+        focus_m = self.autofocus_m if self.focus_distance_m is None else self.focus_distance_m
         targets = self._targets
         if time_us > targets.time_us:
             targets.step(time_us)
         return CameraView(
             time_us=time_us,
             eye_ned_m=eye,
-            q_ned_from_mount=(w, x, y, z),
+            q_ned_from_mount=q,
             zoom=self._zoom,
-            focus_distance_m=max(self.parameters.min_focus_m, focus_m),
-            covered=gimbal is not None and gimbal.retracted,
+            focus_distance_m=focus_m,
+            covered=self._gimbal is not None and self._gimbal.retracted,
             targets=tuple(
                 TargetView(
                     position_ned_m=(float(north_m), float(east_m), float(down_m)),
