@@ -10,6 +10,7 @@ PeerId = tuple[str, int]
 
 MAX_BACKLOG_BYTES: Final = 256 * 1024
 MAX_READS: Final = 256  # of one `receive`, so that a flood on one link can't starve the others
+MAX_READ_BYTES: Final = 1 << 20  # of one `receive`
 READ_SIZE: Final = 65536
 
 
@@ -79,15 +80,21 @@ class Link(Protocol):
 
 
 class SendQueue:
-    """What a slow byte stream has not taken yet: pieces go out whole and in order, or not at all."""
+    """What a slow byte stream has not taken yet: pieces go out whole and in order, or not at all.
 
-    __slots__ = ("_counters", "_limit_bytes", "_pieces", "queued_bytes")
+    Attributes:
+        queued_bytes: waiting.
+        taken_bytes: what the stream took in all.
+    """
+
+    __slots__ = ("_counters", "_limit_bytes", "_pieces", "queued_bytes", "taken_bytes")
 
     def __init__(self, counters: LinkCounters, limit_bytes: int = MAX_BACKLOG_BYTES) -> None:
         self._counters = counters
         self._limit_bytes = limit_bytes
         self._pieces: deque[bytes] = deque()
         self.queued_bytes = 0
+        self.taken_bytes = 0
 
     @property
     def congested(self) -> bool:
@@ -117,6 +124,7 @@ class SendQueue:
                 return
             self._counters.bytes_out += taken
             self.queued_bytes -= taken
+            self.taken_bytes += taken
             if taken < len(pieces[0]):
                 pieces[0] = pieces[0][taken:]
                 return

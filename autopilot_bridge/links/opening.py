@@ -39,7 +39,7 @@ def open_link(
     if isinstance(address, str):
         address = parse_address(address)
     if isinstance(address, TcpServer):
-        return TcpServerLink(address)
+        return TcpServerLink(address, monotonic=monotonic)
     if isinstance(address, TcpClient):
         return TcpClientLink(address, monotonic=monotonic)
     if isinstance(address, SerialPort):

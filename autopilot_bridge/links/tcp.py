@@ -13,17 +13,32 @@ from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, Peer
 
 CONNECT_TIMEOUT_S: Final = 5.0
 RECONNECT_INTERVAL_S: Final = 1.0
+MAX_CLIENTS: Final = 32
+MAX_CLIENT_READS: Final = 2
+"""Pieces read from one client of a server at once; more waits where it comes from."""
+REPLACE_S: Final = 5.0
+STALLED_S: Final = 2.0
+DEAF_S: Final = 60.0
 _BACKLOG: Final = 16
 
 
 class TcpServerLink:
     """A listening port; every client is a peer with its own byte stream.
 
+    There are at most `MAX_CLIENTS`. A newcomer takes the place of one that has said nothing for `REPLACE_S`;
+    while there is none, it is turned away. One that takes nothing of what it is sent for `STALLED_S` does not
+    hold back the others (`congested`), and is parted from after `DEAF_S`.
+
+    Args:
+        address: where to listen.
+        monotonic: wall clock in seconds, to find the silent and the deaf.
+
     Raises:
         LinkError: the port is busy or the host unknown.
     """
 
-    def __init__(self, address: TcpServer) -> None:
+    def __init__(self, address: TcpServer, *, monotonic: Callable[[], float] = wall_time_s) -> None:
+        self._monotonic = monotonic
         self.counters = LinkCounters()
         self._clients: dict[PeerId, _Stream] = {}
         self._listener: socket.socket | None = _listen(address)
@@ -37,8 +52,11 @@ class TcpServerLink:
 
     @property
     def congested(self) -> bool:
-        """True while any client reads too slowly."""
-        return any(client.queue.congested for client in self._clients.values())
+        """True while any client reads too slowly, unless it doesn't read at all."""
+        return any(
+            client.queue.congested and client.deaf_s(self._monotonic()) < STALLED_S
+            for client in self._clients.values()
+        )
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
         """Send to one client or to all of them."""
@@ -55,8 +73,11 @@ class TcpServerLink:
         self._accept()
         received: list[tuple[PeerId, bytes]] = []
         for peer, client in tuple(self._clients.items()):
-            alive = client.receive(peer, received)
-            if not alive:
+            before = len(received)
+            alive = client.receive(peer, received, MAX_CLIENT_READS)
+            if len(received) > before:
+                client.heard_s = self._monotonic()
+            if not alive or (client.queue.congested and client.deaf_s(self._monotonic()) > DEAF_S):
                 self._drop(peer)
         return received
 
@@ -75,7 +96,9 @@ class TcpServerLink:
             self._drop(peer)
 
     def _accept(self) -> None:
-        while self._listener is not None:
+        for _ in range(_BACKLOG):
+            if self._listener is None:
+                return
             try:
                 opened, peer = self._listener.accept()
             except (BlockingIOError, InterruptedError):
@@ -83,8 +106,20 @@ class TcpServerLink:
             except OSError:  # the client went away again while waiting
                 self.counters.errors += 1
                 return
+            if len(self._clients) >= MAX_CLIENTS and not self._make_room():
+                self.counters.errors += 1
+                opened.close()
+                continue
             self.counters.connects += 1
-            self._clients[peer[:2]] = _Stream(opened, self.counters)
+            self._clients[peer[:2]] = stream = _Stream(opened, self.counters)
+            stream.heard_s = stream.taken_s = self._monotonic()
+
+    def _make_room(self) -> bool:
+        silent = min(self._clients, key=lambda peer: self._clients[peer].heard_s)
+        if self._monotonic() - self._clients[silent].heard_s < REPLACE_S:
+            return False
+        self._drop(silent)
+        return True
 
     def _drop(self, peer: PeerId) -> None:
         self._clients.pop(peer).close()
@@ -209,16 +244,33 @@ class TcpClientLink:
 
 
 class _Stream:
-    """One open connection."""
+    """One open connection.
 
-    __slots__ = ("_counters", "queue", "socket")
+    Attributes:
+        socket: as opened.
+        queue: what was sent and not taken yet.
+        heard_s: when something came from it.
+        taken_s: when it last took something of what waited for it, as far as was looked.
+    """
+
+    __slots__ = ("_counters", "_taken_bytes", "heard_s", "queue", "socket", "taken_s")
 
     def __init__(self, opened: socket.socket, counters: LinkCounters) -> None:
         opened.setblocking(False)
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.socket = opened
         self.queue = SendQueue(counters)
+        self.heard_s = self.taken_s = 0.0
+        self._taken_bytes = 0
         self._counters = counters
+
+    def deaf_s(self, now_s: float) -> float:
+        """How long it has taken nothing of what waits for it."""
+        queue = self.queue
+        if queue.taken_bytes != self._taken_bytes or not queue.queued_bytes:
+            self.taken_s = now_s
+        self._taken_bytes = queue.taken_bytes
+        return now_s - self.taken_s
 
     def send(self, data: bytes) -> bool:
         """False when the connection is broken."""
@@ -229,12 +281,12 @@ class _Stream:
             return False
         return True
 
-    def receive(self, peer: PeerId, received: list[tuple[PeerId, bytes]]) -> bool:
+    def receive(self, peer: PeerId, received: list[tuple[PeerId, bytes]], reads: int = MAX_READS) -> bool:
         """Append what has arrived; False when the connection is closed or broken."""
         counters = self._counters
         try:
             self.queue.flush(self.socket.send)
-            for _ in range(MAX_READS):
+            for _ in range(reads):
                 data = self.socket.recv(READ_SIZE)
                 if not data:
                     return False

@@ -9,21 +9,24 @@ from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import LinkError
 from autopilot_bridge.links.address import UdpClient, UdpPeer, UdpServer
 from autopilot_bridge.links.faults import open_error
-from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, PeerId
+from autopilot_bridge.links.link import MAX_READ_BYTES, READ_SIZE, LinkCounters, PeerId
 
 PEER_SILENCE_S: Final = 30.0
+REPLACE_S: Final = 5.0
 MAX_PEERS: Final = 32
+_MAX_DATAGRAMS: Final = 512
 _RECEIVE_BUFFER_BYTES: Final = 1 << 20
 
 
 class UdpLink:
     """A UDP socket with any number of peers.
 
-    * `UdpServer`: everybody who sends is a peer until silent for `silence_s` (the longest
-      silent one makes room when there are more than `MAX_PEERS`).
+    * `UdpServer`: everybody who sends is a peer until silent for `silence_s`, or forgotten. When there are
+      `MAX_PEERS`, one that was silent for `REPLACE_S` makes room; while there is none, newcomers are heard
+      but not sent to, so that a thousand strangers can't push out who was there before.
     * `UdpClient`: the remote is the only peer; nobody else is heard.
-    * `UdpPeer`: the remote is the peer from the start; the first sender heard replaces it and stays. Others
-      are heard but not sent to (PX4).
+    * `UdpPeer`: the remote is the peer from the start; the first sender heard replaces it and stays, unless
+      it is forgotten. Others are heard but not sent to (PX4).
 
     Args:
         address: what to open.
@@ -46,6 +49,7 @@ class UdpLink:
         self.counters = LinkCounters()
         self._last_heard_s: dict[PeerId, float] = {}
         self._partner: PeerId | None = None
+        self._remote: PeerId | None = None  # the partner until one is heard
         self._partner_heard = False
         self._learns = isinstance(address, UdpServer)
         self._is_client = isinstance(address, UdpClient)
@@ -58,7 +62,7 @@ class UdpLink:
             host, port = self._socket.getsockname()[:2]
             if isinstance(address, UdpPeer):
                 _, remote = _resolve(address.remote_host, address.remote_port, self._socket.family)
-                self._partner = remote
+                self._partner = self._remote = remote
                 self.description = str(UdpPeer(address.host, port, address.remote_host, address.remote_port))
             else:
                 self.description = str(UdpServer(address.host, port))
@@ -91,12 +95,15 @@ class UdpLink:
             self._send_to(data, self._partner)
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """All datagrams that have arrived (at most `MAX_READS` at once)."""
+        """All datagrams that have arrived (at most 512 of them, and a megabyte, at once)."""
         received: list[tuple[PeerId, bytes]] = []
         if self._closed:
             return received
         counters = self.counters
-        for _ in range(MAX_READS):
+        most_bytes = counters.bytes_in + MAX_READ_BYTES
+        for _ in range(_MAX_DATAGRAMS):
+            if counters.bytes_in > most_bytes:
+                break
             try:
                 data, sender = self._socket.recvfrom(READ_SIZE)
             except (BlockingIOError, InterruptedError):
@@ -145,22 +152,31 @@ class UdpLink:
                 self._partner, self._partner_heard = peer, True
                 self.counters.connects += 1
             return
+        now_s = self._monotonic()
         if peer not in self._last_heard_s:
-            self.counters.connects += 1
             if len(self._last_heard_s) >= MAX_PEERS:
-                self._forget(min(self._last_heard_s, key=self._last_heard_s.__getitem__))
-        self._last_heard_s[peer] = self._monotonic()
+                silent = min(self._last_heard_s, key=self._last_heard_s.__getitem__)
+                if now_s - self._last_heard_s[silent] < REPLACE_S:
+                    return
+                self.forget(silent)
+            self.counters.connects += 1
+        self._last_heard_s[peer] = now_s
+
+    def forget(self, peer: PeerId) -> None:
+        """Send nothing more to a peer, until it is heard again."""
+        if peer in self._last_heard_s:
+            del self._last_heard_s[peer]
+            self.counters.disconnects += 1
+        elif peer == self._partner and self._partner_heard:
+            self._partner, self._partner_heard = self._remote, False
+            self.counters.disconnects += 1
 
     def _forget_silent(self) -> None:
         if not self._last_heard_s:
             return
         oldest_s = self._monotonic() - self._silence_s
         for peer in [peer for peer, heard_s in self._last_heard_s.items() if heard_s < oldest_s]:
-            self._forget(peer)
-
-    def _forget(self, peer: PeerId) -> None:
-        del self._last_heard_s[peer]
-        self.counters.disconnects += 1
+            self.forget(peer)
 
 
 def _resolve(host: str, port: int, family: int = 0) -> tuple[int, PeerId]:

@@ -62,8 +62,8 @@ def receive(link, size):
     return by_peer
 
 
-def accept(server):
-    while not server.peers:
+def accept(server, clients=1):
+    while len(server.peers) < clients:
         wait_readable(server)
         server.receive()
 
@@ -189,15 +189,84 @@ def test_udp_server_forgets_silent_peers():
     assert list(receive(new, 12).values()) == [b"still there?"]
 
 
-def test_udp_server_keeps_a_bounded_number_of_peers():
+def test_udp_server_keeps_those_who_were_there_before_a_crowd():
     clock = WallClock()
     server = UdpLink(UdpServer("127.0.0.1", 0), monotonic=clock)
     clients = [open_link(UdpClient("127.0.0.1", server.port)) for _ in range(40)]
     for client in clients:
-        clock.now_s += 0.1
+        clock.now_s += 0.01
         client.send(b"x")
         receive(server, 1)
-    assert len(server.peers) == 32 and server.counters.connects == 40 and server.counters.disconnects == 8
+    assert len(server.peers) == 32 and server.counters.connects == 32  # the others are heard all the same
+    first, clients[:1] = server.peers[0], []
+    clock.now_s += 5.0
+    for client in clients[:31]:
+        client.send(b"x")
+        receive(server, 1)
+    clients[-1].send(b"x")
+    receive(server, 1)
+    assert first not in server.peers and len(server.peers) == 32  # whoever is silent makes room
+
+
+def test_udp_links_forget_whom_they_are_told_to():
+    server = open_link("udpin:0")
+    stranger = open_link(UdpClient("127.0.0.1", server.port))
+    stranger.send(b"?")
+    ((peer, _),) = receive(server, 1).items()
+    server.forget(peer)
+    server.forget(peer)
+    assert server.peers == () and server.counters.disconnects == 1
+    expected = open_link("udpin:0")
+    vehicle = open_link(UdpPeer("127.0.0.1", 0, "127.0.0.1", expected.port))
+    stranger = open_link(UdpClient("127.0.0.1", vehicle.port))
+    stranger.send(b"?")
+    ((peer, _),) = receive(vehicle, 1).items()
+    assert vehicle.peers == (peer,)
+    vehicle.forget(peer)
+    assert vehicle.peers == (("127.0.0.1", expected.port),)
+
+
+def test_tcp_clients_are_bounded_and_those_who_talk_stay():
+    clock = WallClock()
+    server = TcpServerLink(TcpServer("127.0.0.1", 0), monotonic=clock)
+    talker = socket.create_connection(("127.0.0.1", server.port))
+    accept(server)
+    crowd = []
+    while len(server.peers) < 32:
+        crowd.append(socket.create_connection(("127.0.0.1", server.port)))
+        accept(server, len(server.peers) + 1)
+    crowd.append(socket.create_connection(("127.0.0.1", server.port)))
+    wait_readable(server)
+    server.receive()
+    assert crowd[-1].recv(1) == b"" and len(server.peers) == 32
+    clock.now_s += 5.0
+    talker.send(b"x")
+    receive(server, 1)
+    crowd.append(socket.create_connection(("127.0.0.1", server.port)))
+    before = set(server.peers)
+    while set(server.peers) == before:
+        wait_readable(server)
+        server.receive()
+    assert talker.getsockname()[:2] in server.peers and len(server.peers) == 32
+    for client in (talker, *crowd):
+        client.close()
+
+
+def test_tcp_client_that_never_reads_holds_nobody_back_and_is_parted_from():
+    clock = WallClock()
+    server = TcpServerLink(TcpServer("127.0.0.1", 0), monotonic=clock)
+    deaf = socket.create_connection(("127.0.0.1", server.port))
+    accept(server)
+    while not server.congested:
+        server.send(bytes(60_000))
+    clock.now_s += 2.5
+    assert not server.congested
+    server.receive()
+    assert len(server.peers) == 1
+    clock.now_s += 60.0
+    server.receive()
+    assert server.peers == () and server.counters.disconnects == 1
+    deaf.close()
 
 
 def test_udp_peer_sends_first_and_takes_the_first_sender_for_its_partner():
