@@ -5,6 +5,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.commander import Commander
+from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.health import VehicleHealth
 from autopilot_bridge.flavours.flavour import Flavour, Identity, ModeDisplay
 from autopilot_bridge.navigation import NavigationFilter
@@ -12,6 +13,7 @@ from autopilot_bridge.telemetry.streams import Values
 
 MAVLINK_VERSION: Final = 3
 PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+GEOFENCE: Final = mavlink.MAV_SYS_STATUS_GEOFENCE
 
 
 class NavigationJudgement:
@@ -115,11 +117,25 @@ class StatusReport:
                 health &= ~bit
         if not (commander.armed or commander.armable):
             health &= ~PREARM_CHECK
-        return (bits.present, bits.enabled_armed if commander.armed else bits.enabled, health)
+        enabled = bits.enabled_armed if commander.armed else bits.enabled
+        if not self._flavour.policy.fence_in_status:
+            return (bits.present, enabled, health)
+        fence, parameters = commander.fence, commander.parameters.fence
+        there = fence.present(parameters)
+        acts = there and fence.enabled(parameters) and parameters.action > FailsafeAction.WARN
+        return (
+            _with(bits.present, GEOFENCE, there),
+            _with(enabled, GEOFENCE, acts),
+            _with(health, GEOFENCE, not (there and fence.broken)),
+        )
 
     def autopilot_version(self) -> Values:
         """AUTOPILOT_VERSION (148)."""
         return autopilot_version(self._flavour.identity)
+
+
+def _with(bits: int, bit: int, on: bool) -> int:
+    return bits | bit if on else bits & ~bit
 
 
 def _sensors(health: VehicleHealth) -> tuple[tuple[int, bool], ...]:

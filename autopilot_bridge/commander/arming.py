@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
+from autopilot_bridge.commander.geofence_parameters import AutoEnable, FenceParameters
 from autopilot_bridge.commander.modes import FlightMode, Need
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
@@ -103,8 +104,7 @@ def arming_reasons(
         reasons.append(Reason.BATTERY_FAILSAFE)
     elif situation.battery_level >= BatteryLevel.LOW:
         reasons.append(Reason.BATTERY_LOW)
-    if situation.outside_fence:
-        reasons.append(Reason.OUTSIDE_FENCE)
+    reasons.extend(_fence_reasons(situation, parameters.fence))
     if not situation.tilt_rad < MAX_ARMING_TILT_RAD:  # NaN fails too
         reasons.append(Reason.LEANING)
     if situation.throttle_high and Need.MANUAL_CONTROL in needs:
@@ -117,3 +117,20 @@ def arming_reasons(
         optional = frozenset() if Need.POSITION in needs else frozenset({Reason.POSITION})
         reasons = [reason for reason in reasons if reason in _MANDATORY - optional]
     return tuple(reasons)
+
+
+def _fence_reasons(situation: Situation, fence: FenceParameters) -> list[Reason]:
+    """What is wrong with the geofence, or with the place the vehicle stands at."""
+    if not fence.counts_breaches:
+        return [Reason.OUTSIDE_FENCE] if situation.outside_fence else []
+    watched = fence.enabled or fence.auto_enable is not AutoEnable.OFF
+    reasons = []
+    if fence.enabled and not situation.fence_present:
+        reasons.append(Reason.FENCE_MISSING)
+    low = fence.height_min_m if fence.floor else -math.inf
+    both = fence.height_max_m > 0.0 and fence.height_max_m - low <= 2.0 * fence.margin_m
+    if watched and (both or 0.0 < fence.radius_m < fence.margin_m):
+        reasons.append(Reason.FENCE_PARAMETERS)
+    if situation.outside_fence:
+        reasons.append(Reason.OUTSIDE_FENCE)
+    return reasons

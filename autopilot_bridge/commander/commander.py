@@ -29,7 +29,8 @@ from autopilot_bridge.commander.events import (
     SystemStatus,
 )
 from autopilot_bridge.commander.failsafe import FailsafeMonitor, failsafe_mode
-from autopilot_bridge.commander.geofence import Geofence
+from autopilot_bridge.commander.fence_return import fence_return_place, place_ahead
+from autopilot_bridge.commander.fence_watch import FenceWatch
 from autopilot_bridge.commander.guidance import Guidance
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.home import Home
@@ -81,6 +82,7 @@ class Commander:
         home: where to return to.
         battery: warning level.
         failsafes: conditions that are up.
+        fence: the geofence, and what of it is broken.
         vehicle: makes the flight tasks.
         tasks: the flight task being flown.
         guidance: requests that send the vehicle somewhere.
@@ -121,7 +123,8 @@ class Commander:
         self._health = health
         self._land_detector = land_detector
         self._thrust = thrust
-        self._geofence = Geofence(fence)
+        self.fence = FenceWatch(fence)
+        context.within_fence = self._within_fence
         self._mission_valid = mission_valid
         self._mode_after_disarm = policy.boot_mode
         self._events: list[Event] = []
@@ -371,10 +374,38 @@ class Commander:
         situation.roll_rad, situation.pitch_rad = roll, pitch
         situation.tilt_rad = math.acos(math.cos(roll) * math.cos(pitch))
         situation.terminated = self.terminated
+        self._watch_fence()
+
+    def _watch_fence(self) -> None:
+        situation, context, parameters = self.situation, self.context, self.parameters.fence
+        position: tuple[float, float, float] | None = None
+        if parameters.by_gps:
+            position = self._health.gps_position_ned(context.frame)
+        elif situation.position:
+            north, east, down = context.nav[nav.POS_NED_M].tolist()
+            position = (north, east, down)
+        if parameters.predicts and position is not None and situation.airborne:
+            position = place_ahead(context, position)
         home = tuple(context.home_ned_m.tolist()) if situation.home_set else None
-        situation.outside_fence = situation.position and self._geofence.breached(
-            tuple(context.nav[nav.POS_NED_M].tolist()), home, context.frame, parameters
+        told = self.fence.update(
+            position,
+            home,
+            context.frame,
+            parameters,
+            time_us=situation.time_us,
+            armed=self.armed,
+            airborne=situation.airborne,
+            landing=situation.landing,
         )
+        self._events.extend(told)
+        situation.outside_fence = bool(self.fence.broken)
+        situation.fence_present = self.fence.present(parameters)
+        situation.fence_breaches = self.fence.breaches
+        situation.fence_away_m = self.fence.distance_m
+
+    def _within_fence(self, place_ned_m: flight.Array) -> bool:
+        north, east, down = place_ned_m.tolist()
+        return self.fence.allows((north, east, down), self.context.frame)
 
     @property
     def mission_problem(self) -> Reason | None:
@@ -390,6 +421,8 @@ class Commander:
             return None if mode in self.policy.ground_modes else Reason.MODE_UNAVAILABLE
         if mode not in self.policy.flown_modes:
             return Reason.MODE_UNAVAILABLE
+        if self.parameters.fence.locks_mode and self.failsafes.recovers_from_fence and mode is not self.mode:
+            return Reason.FENCE_RECOVERY
         missing = shortfalls(mode, self.situation, self.policy, self.parameters)
         return missing[0] if missing else None
 
@@ -426,6 +459,8 @@ class Commander:
             if not self.policy.recovers:
                 self._command(mode)
             self._enter(mode)
+            if action is FailsafeAction.FENCE_POINT and mode is FlightMode.GUIDED:
+                self.guidance.go_to_place(fence_return_place(self.context, self.fence, self.parameters.fence))
 
     def _enter(self, mode: FlightMode) -> None:
         if mode is self.mode:

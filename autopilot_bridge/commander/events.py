@@ -47,13 +47,14 @@ class FailsafeAction(IntEnum):
     HOLD = 5
     CIRCLE = 6  # where the aircraft is, without a position if need be (ArduPlane)
     BRAKE = 7
-    RETURN = 8
-    MISSION = 9  # the plan, with its landing (ArduPlane)
-    LAND = 10
-    GLIDE = 11  # level, without power (ArduPlane)
-    DESCEND = 12
-    TERMINATE = 13
-    DISARM = 14
+    FENCE_POINT = 8  # to the fence's return point in GUIDED (ArduPlane)
+    RETURN = 9
+    MISSION = 10  # the plan, with its landing (ArduPlane)
+    LAND = 11
+    GLIDE = 12  # level, without power (ArduPlane)
+    DESCEND = 13
+    TERMINATE = 14
+    DISARM = 15
 
 
 class BatteryLevel(IntEnum):
@@ -195,6 +196,28 @@ class HomeSet(Event):
     """Home has a new place."""
 
     home: GeodeticPosition
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FenceBreached(Event):
+    """A wall of the geofence was passed; `walls` are `FenceType` bits that are newly broken."""
+
+    walls: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FenceSwitched(Event):
+    """The geofence switched itself (FENCE_AUTOENABLE); `walls` are `FenceType` bits."""
+
+    walls: int
+    on: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ItemCommanded(Event):
+    """An item of the mission is due that equipment, or another part of the autopilot, carries out."""
+
+    index: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -38,6 +38,7 @@ _ACTION_MODES: Final = {
     FailsafeAction.HOLD: FlightMode.HOLD,
     FailsafeAction.CIRCLE: FlightMode.CIRCLE,
     FailsafeAction.BRAKE: FlightMode.BRAKE,
+    FailsafeAction.FENCE_POINT: FlightMode.GUIDED,
     FailsafeAction.RETURN: FlightMode.RETURN,
     FailsafeAction.MISSION: FlightMode.MISSION,
     FailsafeAction.LAND: FlightMode.LAND,
@@ -63,12 +64,21 @@ class FailsafeMonitor:
             the modes need.
     """
 
-    __slots__ = ("_active", "_keeps_mode", "_policy", "_position_lost_us", "_tilted_us", "started")
+    __slots__ = (
+        "_active",
+        "_fence_breaches",
+        "_keeps_mode",
+        "_policy",
+        "_position_lost_us",
+        "_tilted_us",
+        "started",
+    )
 
     def __init__(self, policy: CommanderPolicy) -> None:
         self._policy = policy
         self._keeps_mode = policy.recovers
         self._active: dict[FailsafeKind, _Active] = {}
+        self._fence_breaches = 0
         self._position_lost_us: int | None = None
         self._tilted_us: int | None = None
         self.started: list[tuple[FailsafeKind, FailsafeAction]] = []
@@ -77,6 +87,12 @@ class FailsafeMonitor:
     def kinds(self) -> frozenset[FailsafeKind]:
         """Conditions that are up, whatever their action."""
         return frozenset(kind for kind, active in self._active.items() if active.present)
+
+    @property
+    def recovers_from_fence(self) -> bool:
+        """The geofence is broken, and what that asked for is flown."""
+        active = self._active.get(FailsafeKind.GEOFENCE)
+        return active is not None and active.present and active.action > FailsafeAction.WARN
 
     @property
     def any(self) -> bool:
@@ -97,6 +113,8 @@ class FailsafeMonitor:
                 events.append(FailsafeActivated(time_us=time_us, kind=kind, action=action))
             elif active is not None and present:
                 active.present = True
+                if kind is FailsafeKind.GEOFENCE and situation.fence_breaches != self._fence_breaches:
+                    self.started.append((kind, action))  # broken once more, farther out
                 active.action = action  # its parameter may have been changed meanwhile
             elif active is not None:
                 if active.present:
@@ -105,6 +123,7 @@ class FailsafeMonitor:
                 latched = self._keeps_mode and kind in _LATCHING and active.action >= FailsafeAction.RETURN
                 if not latched or active.overridden or not situation.armed:
                     del self._active[kind]
+        self._fence_breaches = situation.fence_breaches
         return events
 
     def action(self, time_us: int, parameters: CommanderParameters) -> FailsafeAction:
@@ -197,7 +216,15 @@ class FailsafeMonitor:
             self._tilted(situation, parameters),
             parameters.attitude_action,
         )
-        yield FailsafeKind.GEOFENCE, situation.outside_fence, parameters.fence_action
+        yield FailsafeKind.GEOFENCE, situation.outside_fence, self._fence_action(situation, parameters)
+
+    @staticmethod
+    def _fence_action(situation: Situation, parameters: CommanderParameters) -> FailsafeAction:
+        """The geofence's action; far outside it is no use to fly back (ArduCopter)."""
+        fence = parameters.fence
+        if fence.action > FailsafeAction.WARN and 0.0 < fence.give_up_m < situation.fence_away_m:
+            return FailsafeAction.LAND
+        return fence.action
 
     def _exempt(self, kind: FailsafeKind, mode: FlightMode, exempt: frozenset[FlightMode]) -> bool:
         """The mode flies on without that link."""

@@ -87,14 +87,18 @@ class FixedWingTasks:
             case FlightMode.TAKEOFF:
                 return TakeoffTask()
             case FlightMode.MISSION:
-                return MissionTask(self._missions, first_item=self._policy.mission_first_item)
+                return MissionTask(
+                    self._missions, first_item=self._policy.mission_first_item, habits=self._policy.plans
+                )
             case FlightMode.OFFBOARD:
                 return self.offboard
             case FlightMode.GUIDED:
                 self.guided.set_hold(self._context)
                 return self.guided
             case FlightMode.RETURN:
-                return ReturnTask(self._missions, first_item=self._policy.mission_first_item)
+                return ReturnTask(
+                    self._missions, first_item=self._policy.mission_first_item, habits=self._policy.plans
+                )
             case FlightMode.LAND:
                 return LandTask()
             case FlightMode.DESCEND:

@@ -119,6 +119,11 @@ class Guidance:
             radius_m: of an aircraft's circle there, positive clockwise; 0 or NaN: the parameter's.
         """
         commander = self._commander
+        here = commander.context.frame
+        if commander.policy.fence_bounds_targets and not commander.fence.allows(
+            (north_m, east_m, down_m), here
+        ):
+            return Verdict(result=commander.policy.mode_denied, reasons=(Reason.OUTSIDE_FENCE,))
         verdict = commander.set_mode(commander.policy.reposition_mode)
         if not verdict.accepted or not commander.armed or commander.mode is not commander.commanded_mode:
             return verdict
@@ -147,6 +152,11 @@ class Guidance:
         """Give the guided task (the one `guided` returned) a place to fly to."""
         place = Place(ned_m=np.array(position_ned_m), yaw_rad=yaw_rad, speed_m_s=speed_m_s)
         self._vehicle.guide_to(self._commander.context, place)
+
+    def go_to_place(self, place: Place | None) -> None:
+        """Have the guided task fly to a place, in GUIDED; None: it stays as it is."""
+        if place is not None and self.guided() is not None:
+            self._vehicle.guide_to(self._commander.context, place)
 
     def guided(self) -> Any:
         """The task that flies guided targets, made the active one; None where there is nothing to guide.

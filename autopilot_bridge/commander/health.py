@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
+from autopilot_bridge.geodesy import LocalFrame
 from flightsim import interface
 from flightsim.interface import Reading, SensorReadings
 
@@ -134,6 +135,18 @@ class HealthMonitor:
         self._battery = _Watch(readings.battery, _STALE_US["battery"])
         self._airspeed = _Watch(readings.airspeed, _STALE_US["airspeed"]) if airspeed else None
         self._rangefinder = _Watch(readings.rangefinder, _STALE_US["barometer"])
+
+    def gps_position_ned(self, frame: LocalFrame | None) -> tuple[float, float, float] | None:
+        """Where the receiver says the vehicle is, local NED; None while it doesn't know."""
+        if frame is None or not self.health.gps:
+            return None
+        gps = self._readings.gps.values
+        lat, lon, alt = (
+            float(gps[interface.GPS_LAT_DEG]),
+            float(gps[interface.GPS_LON_DEG]),
+            float(gps[interface.GPS_ALT_M]),
+        )
+        return frame.ned_from_geodetic(lat, lon, alt)
 
     def update(self, time_us: int) -> None:
         """Judge every source; called by the commander at 10 Hz."""

@@ -80,14 +80,14 @@ class MulticopterTasks:
             case FlightMode.MISSION:
                 if policy.mission_waits_for_start and context.on_ground and not mission_started:
                     return IdleTask()
-                return MissionTask(self._missions, first_item=policy.mission_first_item)
+                return MissionTask(self._missions, first_item=policy.mission_first_item, habits=policy.plans)
             case FlightMode.OFFBOARD:
                 return self.offboard
             case FlightMode.GUIDED | FlightMode.GUIDED_NOGPS:
                 self.guided.set_hold(context)
                 return self.guided
             case FlightMode.RETURN | FlightMode.SMART_RETURN | FlightMode.AUTO_RETURN:
-                return ReturnTask()
+                return ReturnTask(self._missions, first_item=policy.mission_first_item, habits=policy.plans)
             case FlightMode.LAND | FlightMode.PRECISION_LAND | FlightMode.DESCEND:
                 return LandTask()
             case FlightMode.ORBIT:

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, fields
 
 from autopilot_bridge.commander.events import FailsafeAction
+from autopilot_bridge.commander.geofence_parameters import FenceParameters
 from autopilot_bridge.commander.modes import FlightMode
 
 
@@ -26,8 +27,7 @@ class CommanderParameters:
         manual_long_loss_*: a second stage of lost sticks (ArduPlane); 0 s switches it off.
         attitude_roll_max_rad, attitude_pitch_max_rad: beyond them for `attitude_time_s` the attitude is
             excessive; 0 switches it off.
-        fence_radius_m, fence_height_max_m: cylinder around home; 0 switches that wall off.
-        fence_polygons: the uploaded fence counts too.
+        fence: the geofence.
         disarm_preflight_s, disarm_landed_s: automatic disarming; 0 or less switches it off.
         stick_override: moved sticks take over from automatic flight (PX4 COM_RC_OVERRIDE, bit 0).
         stick_override_offboard: and from OFFBOARD (bit 1).
@@ -56,10 +56,7 @@ class CommanderParameters:
     battery_emergency_action: FailsafeAction
     position_loss_s: float
     position_loss_action: FailsafeAction
-    fence_radius_m: float
-    fence_height_max_m: float
-    fence_polygons: bool
-    fence_action: FailsafeAction
+    fence: FenceParameters
     disarm_preflight_s: float
     disarm_landed_s: float
     stick_override: bool

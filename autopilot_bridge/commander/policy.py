@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,6 +60,9 @@ class CommanderPolicy:
         radio_restores_mode: the mode comes back when a radio does before the second stage of its failsafe
             (ArduPlane).
         ground_speed_apart: a commanded ground speed isn't an airspeed (ArduPlane's least ground speed).
+        plans: how it goes through a plan.
+        fence_in_status: SYS_STATUS shows the geofence (ArduPilot).
+        fence_bounds_targets: a place to fly to outside the geofence is refused (not on ArduPlane).
         mission_end_mode: mode after the last item of a mission, in the air; None: stays.
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
     """
@@ -105,3 +109,6 @@ class CommanderPolicy:
     radio_restores_mode: bool = False
     ground_speed_apart: bool = False
     mission_end_mode: FlightMode | None = None
+    plans: PlanHabits = PX4_PLANS
+    fence_bounds_targets: bool = True
+    fence_in_status: bool = False

@@ -31,6 +31,9 @@ class Situation:
         mission_problem: why the stored mission can't be flown; None when it can.
         battery_level: warning level.
         outside_fence: beyond the geofence.
+        fence_present: there is a geofence to keep to.
+        fence_breaches: new breaches of it so far.
+        fence_away_m: how far beyond its cylinder.
         position_accuracy_m: 1-sigma of the horizontal position; NaN while not known.
         roll_rad, pitch_rad: attitude.
         tilt_rad: angle between the body's down axis and the vertical.
@@ -56,6 +59,9 @@ class Situation:
     mission_problem: Reason | None = Reason.MISSION_MISSING
     battery_level: BatteryLevel = BatteryLevel.OK
     outside_fence: bool = False
+    fence_present: bool = False
+    fence_breaches: int = 0
+    fence_away_m: float = 0.0
     position_accuracy_m: float = math.nan
     roll_rad: float = 0.0
     pitch_rad: float = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from autopilot_bridge.commander.events import MissionFinished, MissionItemReached
+from autopilot_bridge.commander.events import ItemCommanded, MissionFinished, MissionItemReached
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight import context as flight
 
@@ -44,6 +44,8 @@ class TaskFollower:
             case flight.MissionModeRequested():
                 if commander.policy.mission_return_is_mode and commander.mode is commander.commanded_mode:
                     commander.change_mode(FlightMode.RETURN)
+            case flight.ItemCommanded(seq=seq):
+                commander.emit(ItemCommanded(time_us=commander.time_us, index=seq))
             case flight.HomeChangeRequested():
                 frame = commander.context.frame
                 if frame is not None:

@@ -42,6 +42,9 @@ class Reason(Enum):
     MODE_UNKNOWN = auto()
     MODE_UNAVAILABLE = auto()
     OUTSIDE_FENCE = auto()
+    FENCE_MISSING = auto()  # it is on and there is none
+    FENCE_PARAMETERS = auto()  # its limits contradict each other
+    FENCE_RECOVERY = auto()  # what a breach has begun is still flown
     TERMINATED = auto()
     CALIBRATING = auto()
     LEANING = auto()  # standing too far from level

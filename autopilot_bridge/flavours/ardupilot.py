@@ -16,6 +16,7 @@ from autopilot_bridge.flavours.flavour import Flavour, Identity, SensorBits
 from autopilot_bridge.flavours.mapping import airframe_overrides
 from autopilot_bridge.flavours.texts import Notice, Severity
 from autopilot_bridge.flight.land_detector import LandDetector
+from autopilot_bridge.flight.plan_habits import ARDUCOPTER_PLANS
 from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rule
 from flightsim.airframe import AirframeKind
 
@@ -88,6 +89,8 @@ POLICY: Final = CommanderPolicy(
     disarm_in_air_denied=Result.FAILED,
     gcs_needed_to_arm=False,
     force_arm_skips_checks=True,
+    fence_in_status=True,
+    plans=ARDUCOPTER_PLANS,
 )
 
 IDENTITY: Final = Identity(

@@ -5,12 +5,19 @@ from collections.abc import Mapping
 from typing import Final
 
 from autopilot_bridge.commander.events import FailsafeAction
+from autopilot_bridge.commander.geofence_parameters import (
+    ALL_FENCES,
+    AutoEnable,
+    FenceParameters,
+    FenceType,
+)
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours.external_mapping import ardupilot_external
 from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
+from autopilot_bridge.flight.return_rules import RallyRule
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 
@@ -63,9 +70,9 @@ _FENCE: Final = {
     4: FailsafeAction.BRAKE,
     5: FailsafeAction.LAND,
 }  # FENCE_ACTION
-_FENCE_HEIGHT: Final = 1
-_FENCE_CIRCLE: Final = 2
-_FENCE_POLYGON: Final = 4
+_GIVE_UP_M: Final = 100.0  # so far outside the copter lands (AC_FENCE_GIVE_UP_DISTANCE)
+_UNION: Final = 2  # of FENCE_OPTIONS
+_LOCKS_MODE: Final = 1
 _CONTINUE_AUTO_ON_RADIO: Final = 1
 _CONTINUE_AUTO_ON_GCS: Final = 2
 _CONTINUE_GUIDED_ON_RADIO: Final = 4
@@ -171,8 +178,6 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
     options = integer(store, "FS_OPTIONS", 16)
     gcs = integer(store, "FS_GCS_ENABLE", 0)
     radio = integer(store, "FS_THR_ENABLE", 1)
-    fence_on = bool(integer(store, "FENCE_ENABLE", 0))
-    fence_type = integer(store, "FENCE_TYPE", 7) if fence_on else 0
     capacity_mah = max(1.0, number(store, "BATT_CAPACITY", 3300.0))
     monitored = integer(store, "BATT_MONITOR", 4) != 0
     return CommanderParameters(
@@ -211,20 +216,63 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         battery_emergency_action=FailsafeAction.WARN,
         position_loss_s=POSITION_LOSS_S,
         position_loss_action=_EKF.get(integer(store, "FS_EKF_ACTION", 1), FailsafeAction.LAND),
-        fence_radius_m=clamp(number(store, "FENCE_RADIUS", 150.0), 0.0, 1e6)
-        if fence_type & _FENCE_CIRCLE
-        else 0.0,
-        fence_height_max_m=(
-            clamp(number(store, "FENCE_ALT_MAX", 100.0), 0.0, 1e6) if fence_type & _FENCE_HEIGHT else 0.0
-        ),
-        fence_polygons=bool(fence_type & _FENCE_POLYGON),
-        fence_action=_FENCE.get(integer(store, "FENCE_ACTION", 1), FailsafeAction.WARN),
+        fence=fence_parameters(store, _FENCE, give_up_m=_GIVE_UP_M),
         disarm_preflight_s=clamp(number(store, "DISARM_DELAY", 10.0), 0.0, 127.0),
         disarm_landed_s=1.0,
         stick_override=False,
         stick_override_offboard=False,
         stick_override_threshold=1.0,
         check_arming=integer(store, "ARMING_CHECK", 1) != 0,
+    )
+
+
+def fence_parameters(
+    store: ParameterStore,
+    actions: Mapping[int, FailsafeAction],
+    *,
+    give_up_m: float = 0.0,
+    backup_m: float = 20.0,
+) -> FenceParameters:
+    """FENCE_*.
+
+    Args:
+        actions: what each FENCE_ACTION does on this vehicle; any other only reports.
+        give_up_m: farther outside the vehicle lands; 0: never.
+        backup_m: so much farther out the circle counts as broken once more.
+    """
+    types = FenceType(integer(store, "FENCE_TYPE", 7) & int(ALL_FENCES))
+    options = integer(store, "FENCE_OPTIONS", 0)
+    auto = integer(store, "FENCE_AUTOENABLE", 0)
+    limit = clamp(number(store, "FENCE_ALT_MAX", 100.0), 1e-3, 1e6)
+    return FenceParameters(
+        enabled=bool(integer(store, "FENCE_ENABLE", 0)),
+        action=actions.get(integer(store, "FENCE_ACTION", 1), FailsafeAction.WARN),
+        radius_m=clamp(number(store, "FENCE_RADIUS", 150.0), 1e-3, 1e6) if FenceType.CIRCLE in types else 0.0,
+        height_max_m=limit if FenceType.HEIGHT_MAX in types else 0.0,
+        floor=FenceType.HEIGHT_MIN in types,
+        height_min_m=clamp(number(store, "FENCE_ALT_MIN", -10.0), -1e5, 1e5),
+        shapes=FenceType.SHAPES in types,
+        margin_m=clamp(number(store, "FENCE_MARGIN", 2.0), 0.0, 1e3),
+        inclusions_join=bool(options & _UNION),
+        locks_mode=bool(options & _LOCKS_MODE),
+        auto_enable=AutoEnable(auto) if auto in tuple(AutoEnable) else AutoEnable.OFF,
+        give_up_m=give_up_m,
+        backup_radius_m=backup_m,
+        backup_height_m=20.0,
+        return_to_rally=bool(integer(store, "FENCE_RET_RALLY", 0)),
+        return_height_m=clamp(number(store, "FENCE_RET_ALT", 0.0), 0.0, 1e5),
+        counts_breaches=True,
+    )
+
+
+def rally_rule(store: ParameterStore, *, within_fence: bool) -> RallyRule:
+    """RALLY_*."""
+    limit_km = clamp(number(store, "RALLY_LIMIT_KM", 0.3), 0.0, 1e5)
+    return RallyRule(
+        home_competes=bool(integer(store, "RALLY_INCL_HOME", 1)),
+        limit_m=1e3 * limit_km if limit_km > 0.0 else math.inf,
+        within_fence=within_fence,
+        altitude_is_ground=False,
     )
 
 
@@ -251,6 +299,12 @@ def flight_parameters(store: ParameterStore) -> FlightParameters:
     corner = number(store, "WPNAV_ACCEL_C", 0.0) * _CM
     if corner > 0.0:
         fixed["corner_acceleration_m_s2"] = clamp(corner, 0.5, 5.0)
+    fence = fence_parameters(store, _FENCE)
+    if fence.enabled and fence.height_max_m > 0.0:
+        fixed["return_height_max_m"] = max(1.0, fence.height_max_m - fence.margin_m)
+    fixed["return_stays_at_m"] = clamp(number(store, "RTL_ALT_FINAL", 0.0) * _CM, 0.0, 1000.0)
+    fixed["rally"] = rally_rule(store, within_fence=True)
+    fixed["nose_follows_roi"] = not integer(store, "MNT1_TYPE", 0)
     return build(FlightParameters, store, FLIGHT, **fixed)
 
 

@@ -18,6 +18,7 @@ from autopilot_bridge.flavours.ardupilot_plane_texts import notices
 from autopilot_bridge.flavours.flavour import SensorBits
 from autopilot_bridge.flavours.texts import Notice, Severity
 from autopilot_bridge.flight.fixed_wing import LandDetector
+from autopilot_bridge.flight.plan_habits import ARDUPLANE_PLANS
 from flightsim.airframe import AirframeKind, LaunchKind
 
 _FLOWN: Final = frozenset(
@@ -88,6 +89,9 @@ POLICY: Final = CommanderPolicy(
     radio_restores_mode=True,
     ground_speed_apart=True,
     mission_end_mode=FlightMode.RETURN,
+    fence_in_status=True,
+    plans=ARDUPLANE_PLANS,
+    fence_bounds_targets=False,
 )
 
 IDENTITY: Final = replace(

@@ -35,9 +35,9 @@ from autopilot_bridge.flavours.plane_limits import (
 from autopilot_bridge.flight.fixed_wing.parameters import (
     FixedWingFlightParameters,
     LaunchKind,
-    ReturnDestination,
     TurnInRule,
 )
+from autopilot_bridge.flight.return_rules import ReturnDestination
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.flight_envelope import FlightEnvelope
@@ -78,8 +78,8 @@ _BATTERY: Final = {
 _FENCE: Final = {
     0: FailsafeAction.WARN,
     1: FailsafeAction.RETURN,
-    6: FailsafeAction.RETURN,  # GUIDED to a return point; RTL circles over the nearest safe place, home
-    7: FailsafeAction.RETURN,
+    6: FailsafeAction.FENCE_POINT,
+    7: FailsafeAction.FENCE_POINT,
     8: FailsafeAction.RETURN,
 }  # FENCE_ACTION
 
@@ -230,7 +230,6 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
     long_s = clamp(number(store, "FS_LONG_TIMEOUT", 5.0), 1.0, 300.0)
     keeps_short = (_AUTOMATIC if short == 0 else frozenset()) | _SAFE | {FlightMode.CIRCLE}
     keeps_long = (_AUTOMATIC if long == 0 else frozenset()) | _SAFE
-    fence_on = bool(integer(store, "FENCE_ENABLE", 0))
     return replace(
         ardupilot_mapping.commander_parameters(store),
         gcs_loss_s=long_s if gcs else 0.0,
@@ -246,9 +245,7 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         battery_critical_action=_BATTERY.get(integer(store, "BATT_FS_CRT_ACT", 0), FailsafeAction.WARN),
         position_loss_s=_NEVER_S,  # the aircraft flies on by dead reckoning
         position_loss_action=FailsafeAction.NONE,
-        fence_action=_FENCE.get(integer(store, "FENCE_ACTION", 1), FailsafeAction.WARN)
-        if fence_on
-        else FailsafeAction.NONE,
+        fence=ardupilot_mapping.fence_parameters(store, _FENCE, backup_m=100.0),
         disarm_preflight_s=0.0,
         disarm_landed_s=clamp(number(store, "LAND_DISARMDELAY", 20.0), 0.0, 127.0),
     )
@@ -311,6 +308,7 @@ def flight_parameters(
     values["return_destination"] = _DESTINATIONS.get(
         integer(store, "RTL_AUTOLAND", 0), ReturnDestination.HOME
     )
+    values["rally"] = ardupilot_mapping.rally_rule(store, within_fence=False)
     values["acceptance_altitude_m"] = math.inf
     values["turn_in"] = TurnInRule.TURN_ANGLE
     values["launch"] = (

@@ -7,6 +7,7 @@ from typing import Final
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.events import DisarmReason, FailsafeAction, FailsafeKind
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.flavours import ardupilot_texts
 from autopilot_bridge.flavours.ardupilot_plane_modes import MODE_NAMES, REFUSED_TEXTS
 from autopilot_bridge.flavours.texts import Notice, Severity
@@ -29,6 +30,8 @@ _AS_ON_THE_COPTER: Final = (
     events.NavigationReady,
     events.BatteryWarning,
     events.CommandDenied,
+    events.FenceBreached,
+    events.FenceSwitched,
 )
 
 
@@ -46,6 +49,9 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
         case events.ModeDenied(mode=None, custom_mode=number):
             text = REFUSED_TEXTS.get(number, f"No such mode {number}") if number is not None else ""
             return (Notice(Severity.WARNING, text),)
+        case events.ModeDenied(mode=mode, reason=Reason.FENCE_RECOVERY) if mode is not None:
+            text = f"Mode change to {MODE_NAMES[mode]} denied, in fence recovery"
+            return (Notice(Severity.NOTICE, text),)
         case events.ModeDenied():
             return (Notice(Severity.WARNING, "Flight mode change failed"),)
         case events.FailsafeActivated(kind=kind, action=action):
@@ -53,7 +59,7 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
         case events.FailsafeCleared(kind=kind) if kind in _LINKS:
             return (Notice(Severity.WARNING, f"{_LINKS[kind]} Cleared"),)
         case events.FailsafeCleared(kind=FailsafeKind.GEOFENCE):
-            return (Notice(Severity.INFO, "Fence breach cleared"),)
+            return (Notice(Severity.NOTICE, "Fence breach cleared"),)
         case events.AirspeedChanged(valid=False):
             return (Notice(Severity.ERROR, "Airspeed sensor 1 failure. Disabling"),)
         case events.AirspeedChanged(valid=True):
@@ -96,8 +102,6 @@ def _disarmed(reason: DisarmReason) -> tuple[Notice, ...]:
 
 
 def _failsafe(kind: FailsafeKind, action: FailsafeAction) -> tuple[Notice, ...]:
-    if kind is FailsafeKind.GEOFENCE:
-        return (Notice(Severity.CRITICAL, "Fence Breached"),)
     if kind in (FailsafeKind.BATTERY_LOW, FailsafeKind.BATTERY_CRITICAL):
         return (Notice(Severity.WARNING, "Battery Failsafe"),) if action > FailsafeAction.WARN else ()
     name = _LINKS.get(kind)

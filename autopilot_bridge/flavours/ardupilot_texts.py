@@ -5,6 +5,7 @@ from typing import Final
 
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.events import BatteryLevel, DisarmReason, FailsafeAction, FailsafeKind
+from autopilot_bridge.commander.geofence_parameters import FenceType
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.flavours.ardupilot_modes import MODE_NAMES, REFUSED_NAMES
@@ -29,6 +30,8 @@ _REASONS: Final[Mapping[Reason, str]] = {
     Reason.MISSION_MISSING: "Mode requires mission",
     Reason.MISSION_INVALID: "Mode requires mission",
     Reason.OUTSIDE_FENCE: "vehicle outside fence",
+    Reason.FENCE_MISSING: "Fences enabled, but none selected",
+    Reason.FENCE_PARAMETERS: "FENCE_MARGIN too big",
     Reason.TERMINATED: "Vehicle is terminated",
     Reason.CALIBRATING: "Calibration running",
     Reason.LEANING: "Leaning",
@@ -43,19 +46,25 @@ _MODE_REASONS: Final[Mapping[Reason, str]] = {
     Reason.MISSION_INVALID: "requires mission",
     Reason.MANUAL_CONTROL: "requires radio",
     Reason.TERMINATED: "terminated",
+    Reason.FENCE_RECOVERY: "in fence recovery",
 }
 _FAILSAFES: Final[Mapping[FailsafeKind, str]] = {
     FailsafeKind.GCS_LOST: "GCS Failsafe",
     FailsafeKind.MANUAL_LOST: "Radio Failsafe",
     FailsafeKind.BATTERY_LOW: "Battery Failsafe",
     FailsafeKind.BATTERY_CRITICAL: "Battery Failsafe",
-    FailsafeKind.GEOFENCE: "Fence Breached",
 }
 _CLEARED: Final[Mapping[FailsafeKind, Notice]] = {
     FailsafeKind.GCS_LOST: Notice(Severity.WARNING, "GCS Failsafe Cleared"),
     FailsafeKind.MANUAL_LOST: Notice(Severity.WARNING, "Radio Failsafe Cleared"),
     FailsafeKind.POSITION_LOST: Notice(Severity.CRITICAL, "EKF Failsafe Cleared"),
-    FailsafeKind.GEOFENCE: Notice(Severity.INFO, "Fence breach cleared"),
+    FailsafeKind.GEOFENCE: Notice(Severity.NOTICE, "Fence breach cleared"),
+}
+_WALLS: Final = {
+    FenceType.HEIGHT_MAX: "Max Alt",
+    FenceType.CIRCLE: "Circle",
+    FenceType.SHAPES: "Polygon",
+    FenceType.HEIGHT_MIN: "Min Alt",
 }
 _EKF_MODES: Final = {FailsafeAction.LAND: FlightMode.LAND, FailsafeAction.ALTITUDE: FlightMode.ALTITUDE}
 _COMMANDS: Final[Mapping[tuple[int, Reason], Notice]] = {
@@ -97,6 +106,10 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
             return (Notice(Severity.WARNING, _FAILSAFES[kind]),)
         case events.FailsafeCleared(kind=kind) if kind in _CLEARED:
             return (_CLEARED[kind],)
+        case events.FenceBreached(walls=walls):
+            return (Notice(Severity.NOTICE, f"{fence_names(walls)} breached"),)
+        case events.FenceSwitched(walls=walls, on=on):
+            return (Notice(Severity.NOTICE, f"{fence_names(walls)} auto-{'enabled' if on else 'disabled'}"),)
         case events.BatteryWarning():
             return battery_warning(event)
         case events.MissionItemReached(index=index):
@@ -112,6 +125,13 @@ def arming_denied(event: events.ArmingDenied, mode_names: Mapping[FlightMode, st
         for reason in event.reasons
         if not (event.check_only and reason is Reason.MODE_NOT_ARMABLE)
     )
+
+
+def fence_names(walls: int) -> str:
+    """The walls of a fence in ArduPilot's words."""
+    names = [name for wall, name in _WALLS.items() if wall & walls]
+    listed = ", ".join(names[:-1]) + " and " + names[-1] if len(names) > 1 else "".join(names)
+    return f"{listed} fence{'s' if len(names) > 1 else ''}"
 
 
 def battery_warning(event: events.BatteryWarning) -> tuple[Notice, ...]:

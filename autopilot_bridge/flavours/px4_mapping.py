@@ -4,12 +4,14 @@ import math
 from typing import Final
 
 from autopilot_bridge.commander.events import FailsafeAction
+from autopilot_bridge.commander.geofence_parameters import FenceParameters
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours.external_mapping import px4_external
 from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
+from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.parameters import ParameterStore
 
@@ -41,6 +43,14 @@ _FENCE: Final = {
     4: FailsafeAction.TERMINATE,
     5: FailsafeAction.LAND,
 }  # GF_ACTION
+_RETURNS: Final = {
+    0: ReturnDestination.HOME,
+    1: ReturnDestination.LANDING_OR_RALLY,
+    2: ReturnDestination.ALONG_PLAN,
+    3: ReturnDestination.CLOSEST,
+    4: ReturnDestination.ALONG_PLAN_SHORTER,
+}  # RTL_TYPE
+_RALLY_RETURNS: Final = frozenset({0, 1, 3})
 _BATTERY_CRITICAL: Final = {1: FailsafeAction.RETURN, 2: FailsafeAction.LAND, 3: FailsafeAction.RETURN}
 _BATTERY_EMERGENCY: Final = {1: FailsafeAction.RETURN, 2: FailsafeAction.LAND, 3: FailsafeAction.LAND}
 _EXCEPTIONS: Final = {
@@ -164,7 +174,6 @@ _GPS_POSITION_OR_VELOCITY: Final = 1 | 4  # of EKF2_GPS_CTRL
 def commander_parameters(store: ParameterStore) -> CommanderParameters:
     """COM_*, NAV_*, BAT_*, GF_* (PX4 v1.16 parameter reference)."""
     low_battery = integer(store, "COM_LOW_BAT_ACT", 0)
-    fence_action = _FENCE.get(integer(store, "GF_ACTION", 2), FailsafeAction.NONE)
     override = integer(store, "COM_RC_OVERRIDE", 1)
     manual_loss_s = clamp(number(store, "COM_RC_LOSS_T", 0.5), 0.1, 35.0)
     return CommanderParameters(
@@ -189,10 +198,7 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         battery_emergency_action=_BATTERY_EMERGENCY.get(low_battery, FailsafeAction.WARN),
         position_loss_s=0.0,
         position_loss_action=FailsafeAction.DESCEND,
-        fence_radius_m=clamp(number(store, "GF_MAX_HOR_DIST", 0.0), 0.0, 1e6),
-        fence_height_max_m=clamp(number(store, "GF_MAX_VER_DIST", 0.0), 0.0, 1e6),
-        fence_polygons=fence_action is not FailsafeAction.NONE,
-        fence_action=fence_action,
+        fence=fence_parameters(store),
         disarm_preflight_s=clamp(number(store, "COM_DISARM_PRFLT", 10.0), -1.0, 1e6),
         disarm_landed_s=clamp(number(store, "COM_DISARM_LAND", 2.0), -1.0, 1e6),
         stick_override=bool(override & 1),
@@ -208,13 +214,37 @@ def flight_parameters(store: ParameterStore) -> FlightParameters:
     yaw = {0: YawBehaviour.TOWARDS_TARGET, 3: YawBehaviour.ALONG_TRACK, 4: YawBehaviour.TOWARDS_TARGET}
     slow_m = clamp(number(store, "MPC_LAND_ALT2", 5.0), 0.1, 100.0)
     fast_m = clamp(number(store, "MPC_LAND_ALT1", 10.0), slow_m, 100.0)
+    destination, rally = return_rules(store)
     return build(
         FlightParameters,
         store,
         FLIGHT,
+        return_destination=destination,
+        rally=rally,
+        nose_follows_roi=not integer(store, "MIS_MNT_YAW_CTL", 0),
         yaw_behaviour=yaw.get(yaw_mode, YawBehaviour.KEEP),
         land_slow_altitude_m=slow_m,
         land_fast_altitude_m=fast_m,
+    )
+
+
+def return_rules(store: ParameterStore, default: int = 0) -> tuple[ReturnDestination, RallyRule]:
+    """RTL_TYPE: where a return leads, and whether rally points count."""
+    kind = integer(store, "RTL_TYPE", default)
+    return _RETURNS.get(kind, ReturnDestination.HOME), RallyRule(used=kind in _RALLY_RETURNS)
+
+
+def fence_parameters(store: ParameterStore) -> FenceParameters:
+    """GF_*."""
+    action = _FENCE.get(integer(store, "GF_ACTION", 2), FailsafeAction.NONE)
+    return FenceParameters(
+        enabled=action is not FailsafeAction.NONE,
+        action=action,
+        radius_m=clamp(number(store, "GF_MAX_HOR_DIST", 0.0), 0.0, 1e6),
+        height_max_m=clamp(number(store, "GF_MAX_VER_DIST", 0.0), 0.0, 1e6),
+        shapes=True,
+        predicts=bool(integer(store, "GF_PREDICT", 0)),
+        by_gps=bool(integer(store, "GF_SOURCE", 0)),
     )
 
 

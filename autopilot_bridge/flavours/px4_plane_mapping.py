@@ -33,7 +33,6 @@ from autopilot_bridge.flavours.px4_plane_parameters import PX4_PLANE_PARAMETERS
 from autopilot_bridge.flight.fixed_wing.parameters import (
     FixedWingFlightParameters,
     LaunchKind,
-    ReturnDestination,
     TurnInRule,
 )
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -276,8 +275,7 @@ def flight_parameters(
     values["turn_in"] = TurnInRule.SWITCH_DISTANCE
     values["launch"] = _launch(store)
     values["rangefinder_landing"] = integer(store, "FW_LND_USETER", 1) > 0
-    home = integer(store, "RTL_TYPE", 1) == 0
-    values["return_destination"] = ReturnDestination.HOME if home else ReturnDestination.LANDING_SEQUENCE
+    values["return_destination"], values["rally"] = px4_mapping.return_rules(store, default=1)
     values["return_climbs"] = True
     values["return_cone_half_angle_rad"] = 0.0  # RTL_CONE_ANG is the multicopter's
     return replace(tuned, **flight_values(values, tuned, controller))

@@ -7,6 +7,7 @@ Positions are local NED metres at the filter's origin.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING, Final
@@ -18,6 +19,7 @@ from autopilot_bridge.control import fixed_wing_setpoint
 from autopilot_bridge.control.setpoint import SETPOINT_SIZE
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.health import NavigationHealth
 
@@ -106,6 +108,13 @@ class HomeChangeRequested:
 
 
 @dataclass(frozen=True, slots=True)
+class ItemCommanded:
+    """An item of the plan that other equipment or another part of the autopilot carries out."""
+
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
 class TaskFinished:
     """The active task is done."""
 
@@ -123,6 +132,7 @@ FlightEvent = (
     | MissionFinished
     | MissionModeRequested
     | HomeChangeRequested
+    | ItemCommanded
     | TaskFinished
     | TouchedDown
 )
@@ -148,6 +158,8 @@ class FlightContext:
         armed: motors may turn.
         sticks: newest pilot input.
         frame: local frame of the filter's origin, None before it is known.
+        rally: the uploaded rally points; None: there are none.
+        within_fence: says whether a place, local NED, (3,), is inside the geofence; None: nobody knows.
         events: what happened since the autopilot last emptied the list.
         hover_thrust: the controller's estimate, 0..1.
     """
@@ -167,9 +179,11 @@ class FlightContext:
         "nav",
         "parameters",
         "phase",
+        "rally",
         "setpoint",
         "sticks",
         "time_us",
+        "within_fence",
     )
 
     def __init__(
@@ -200,6 +214,8 @@ class FlightContext:
         self.armed = False
         self.sticks = ManualInput()
         self.frame: LocalFrame | None = None
+        self.rally: MissionStore | None = None
+        self.within_fence: Callable[[Array], bool] | None = None
         self.events: list[FlightEvent] = []
         self.hover_thrust = 0.5
 

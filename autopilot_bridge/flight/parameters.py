@@ -1,9 +1,11 @@
 """Limits and habits of flight, in the meaning PX4 (MPC_*, RTL_*) and ArduPilot (WPNAV_*, RTL_*) share."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import Final
+
+from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
 
 _MAY_BE_ZERO: Final = frozenset(
     {
@@ -13,6 +15,7 @@ _MAY_BE_ZERO: Final = frozenset(
         "return_loiter_time_s",
         "return_min_distance_m",
         "return_climb_min_m",
+        "return_stays_at_m",
         "manual_deadzone",
         "manual_expo",
     }
@@ -51,6 +54,7 @@ class FlightParameters:
     yaw_behaviour: YawBehaviour = YawBehaviour.TOWARDS_TARGET  # MPC_YAW_MODE | WP_YAW_BEHAVIOR
     acceptance_radius_m: float = 2.0  # NAV_ACC_RAD | WPNAV_RADIUS
     acceptance_altitude_m: float = 0.8  # NAV_MC_ALT_RAD
+    nose_follows_roi: bool = True  # MIS_MNT_YAW_CTL 0 | MNT1_TYPE 0: no gimbal that turns by itself
     use_waypoint_yaw: bool = True  # param4 of mission items turns the nose (PX4); ArduPilot ignores it
 
     takeoff_altitude_m: float = 2.5  # MIS_TAKEOFF_ALT
@@ -75,6 +79,10 @@ class FlightParameters:
         10.0  # RTL_MIN_DIST: the cone rule works within this range; inf: everywhere
     )
     return_climb_min_m: float = 0.0  # RTL_CLIMB_MIN
+    return_height_max_m: float = math.inf  # no higher over home; ArduPilot: under FENCE_ALT_MAX
+    return_stays_at_m: float = 0.0  # hovers there at the end; 0: lands | RTL_ALT_FINAL
+    return_destination: ReturnDestination = ReturnDestination.HOME  # RTL_TYPE
+    rally: RallyRule = field(default_factory=RallyRule)  # RTL_TYPE | RALLY_*
 
     orbit_radius_m: float = 20.0  # default of DO_ORBIT | CIRCLE_RADIUS
     orbit_speed_m_s: float = 3.0  # default of DO_ORBIT | CIRCLE_RATE
@@ -94,16 +102,16 @@ class FlightParameters:
     guided_timeout_s: float = 3.0  # GUID_TIMEOUT
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name = field.name
+        for each in fields(self):
+            name = each.name
             value = getattr(self, name)
-            if name == "return_min_distance_m" and value == math.inf:
+            if name in ("return_min_distance_m", "return_height_max_m") and value == math.inf:
                 continue
-            if isinstance(value, bool):
+            if isinstance(value, bool | RallyRule | IntEnum):
                 continue
             if not math.isfinite(value):
                 raise ValueError(f"{name} = {value} is not a finite number")
-            if name in ("return_loiter_time_s", "yaw_behaviour"):
+            if name == "return_loiter_time_s":
                 continue
             if name in _MAY_BE_ZERO or name == "return_cone_half_angle_rad":
                 if value < 0.0:

@@ -24,28 +24,45 @@ class Command(IntEnum):
     NAV_TAKEOFF = 22
     NAV_CONTINUE_AND_CHANGE_ALT = 30
     NAV_LOITER_TO_ALT = 31
+    NAV_ROI = 80
     NAV_SPLINE_WAYPOINT = 82
     NAV_VTOL_TAKEOFF = 84
     NAV_VTOL_LAND = 85
     NAV_DELAY = 93
     NAV_LAST = 95
     CONDITION_DELAY = 112
+    CONDITION_DISTANCE = 114
     CONDITION_YAW = 115
     DO_JUMP = 177
     DO_CHANGE_SPEED = 178
     DO_SET_HOME = 179
+    DO_RETURN_PATH_START = 188
     DO_LAND_START = 189
+    DO_GO_AROUND = 191
+    DO_SET_ROI_LOCATION = 195
+    DO_SET_ROI_WPNEXT_OFFSET = 196
+    DO_SET_ROI_NONE = 197
+    DO_SET_ROI = 201
+    JUMP_TAG = 600
+    DO_JUMP_TAG = 601
 
 
 _GLOBAL: Final = frozenset({0, 5})  # MAV_FRAME_GLOBAL, _INT: above mean sea level
 _RELATIVE: Final = frozenset({3, 6, 10, 11})  # above home; terrain is taken as level with home
 _LOCAL_NED: Final = 1
 _WAYPOINTS: Final = frozenset({Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT})
+_NOT_FLOWN: Final = frozenset({Command.NAV_ROI})  # a region of interest in spite of its name
+CONDITIONS: Final = frozenset({Command.CONDITION_DELAY, Command.CONDITION_DISTANCE, Command.CONDITION_YAW})
+JUMPS: Final = frozenset({Command.DO_JUMP, Command.DO_JUMP_TAG})
+MARKERS: Final = frozenset(
+    {Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.DO_GO_AROUND, Command.JUMP_TAG}
+)
+"""Items that do nothing when the plan comes to them."""
 
 
 def is_navigation(item: MissionItem) -> bool:
     """The item moves or holds the vehicle (MAV_CMD_NAV_*), so that it ends when that is done."""
-    return item.command <= Command.NAV_LAST
+    return item.command <= Command.NAV_LAST and item.command not in _NOT_FLOWN
 
 
 def is_waypoint(item: MissionItem) -> bool:
@@ -91,10 +108,13 @@ def target_of(item: MissionItem, ctx: FlightContext) -> Array | None:
 
 
 def jump_target(item: MissionItem, items: Sequence[MissionItem]) -> int | None:
-    """Sequence number a DO_JUMP leads to; None when there is no such item."""
+    """Sequence number a DO_JUMP or DO_JUMP_TAG leads to; None when there is no such item."""
     if not math.isfinite(item.param1):
         return None
     target = round(item.param1)
+    if item.command == Command.DO_JUMP_TAG:
+        tags = (seq for seq, each in enumerate(items) if each.command == Command.JUMP_TAG)
+        return next((seq for seq in tags if items[seq].param1 == item.param1), None)
     return target if 0 <= target < len(items) else None
 
 

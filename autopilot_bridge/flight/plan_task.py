@@ -2,41 +2,65 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections import deque
+from dataclasses import replace
 from typing import Final
 
 from autopilot_bridge.flight.context import (
     Array,
     FlightContext,
+    FlightEvent,
     HomeChangeRequested,
+    ItemCommanded,
     MissionFinished,
     MissionModeRequested,
+    TaskFinished,
     WaypointReached,
     WaypointStarted,
 )
-from autopilot_bridge.flight.plan_reading import Command, is_navigation, jump_target, target_of
+from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.plan_reading import (
+    CONDITIONS,
+    JUMPS,
+    MARKERS,
+    Command,
+    is_navigation,
+    is_waypoint,
+    jump_target,
+    target_of,
+)
+from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, RegionOfInterest, RoiMode, roi_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 
 _MAX_INSTANT_ITEMS: Final = 200  # per update: breaks loops of DO_JUMP without anything to fly in between
+_DEFAULT_SPEED: Final = -2.0
+_WAITS: Final = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME})
 
 
 class PlanTask(ABC):
     """Executes the items of a store, from its current one; DONE (and holding) after the last.
 
     A new plan or another current item, seen in the store, takes effect at the next update. DO_ items act at
-    once; those for equipment the vehicle doesn't have are passed over. What takes time is either a task of
-    its own (`_sub`) or a leg, which the vehicle's class flies itself.
+    once; with `PlanHabits.conditions` they act beside the flight to the next place, held up by CONDITION_
+    items, and what the flight overtakes is dropped. Items for equipment are told as `ItemCommanded`. What
+    takes time is either a task of its own (`_sub`) or a leg, which the vehicle's class flies itself.
 
     Args:
         store: the plan; its `current` is kept up to date.
         first_item: 1 where item 0 is home (ArduPilot).
+        habits: how the firmware goes through a plan.
     """
 
     __slots__ = (
+        "_beside",
+        "_condition_left_s",
         "_finished",
         "_first_item",
+        "_habits",
         "_jumps",
+        "_roi",
         "_seq",
         "_store",
         "_sub",
@@ -44,14 +68,18 @@ class PlanTask(ABC):
         "_wait_left_s",
     )
 
-    def __init__(self, store: MissionStore, *, first_item: int = 0) -> None:
+    def __init__(self, store: MissionStore, *, first_item: int = 0, habits: PlanHabits = PX4_PLANS) -> None:
         self._store = store
         self._first_item = first_item
+        self._habits = habits
         self._version = -1
         self._seq = -1
         self._sub: FlightTask | None = None
         self._jumps: dict[int, int] = {}
         self._wait_left_s = 0.0
+        self._beside: deque[int] = deque()
+        self._condition_left_s = math.nan
+        self._roi: RegionOfInterest | None = None
         self._finished = False
 
     @abstractmethod
@@ -77,16 +105,37 @@ class PlanTask(ABC):
         `came_from`: the place the leg before has led to; None: wherever the vehicle is.
         """
 
+    def _turn(self, ctx: FlightContext, item: MissionItem) -> None:  # noqa: B027
+        """CONDITION_YAW begins; an aircraft can't."""
+
+    def _turned(self, ctx: FlightContext) -> bool:
+        """CONDITION_YAW is done."""
+        return True
+
+    @abstractmethod
+    def activate(self, ctx: FlightContext) -> None:
+        """Take over from the present state, and begin the current item."""
+
+    @abstractmethod
+    def update(self, ctx: FlightContext) -> TaskStatus:
+        """Write `ctx.setpoint` for the next period."""
+
     @property
     def item(self) -> MissionItem | None:
         """The item being flown; None after the last."""
         return None if self._finished or self._seq < 0 else self._store.items[self._seq]
+
+    def _tell(self, ctx: FlightContext, event: FlightEvent) -> None:
+        """Report progress, unless the plan is a private one."""
+        if not self._habits.silent:
+            ctx.events.append(event)
 
     def _restart(self, ctx: FlightContext) -> None:
         """(Re-)read the plan and begin its current item."""
         self._version = self._store.version
         self._finished = False
         self._jumps.clear()
+        self._roi = None
         self._begin(ctx, max(self._store.current, self._first_item), None)
 
     def _begin(self, ctx: FlightContext, seq: int, came_from: Array | None) -> None:
@@ -95,25 +144,40 @@ class PlanTask(ABC):
         self._sub = None
         self._forget_leg()
         self._wait_left_s = 0.0
+        self._beside.clear()
+        self._condition_left_s = math.nan
         for _ in range(_MAX_INSTANT_ITEMS):
             if seq >= len(items):
+                self._do_the_rest(ctx)
                 self._finish(ctx)
                 return
             item = items[seq]
-            self._seq = self._store.current = seq
-            ctx.events.append(WaypointStarted(seq))
-            if is_navigation(item) or item.command in (Command.CONDITION_DELAY, Command.CONDITION_YAW):
+            if is_navigation(item):
+                self._seq = self._store.current = seq
+                self._tell(ctx, WaypointStarted(seq))
                 if self._begin_timed(ctx, item, came_from):
+                    self._go_on_beside(ctx)
                     return
+                self._do_the_rest(ctx)
                 seq += 1
                 continue
-            seq = self._act(ctx, item, seq)
+            if item.command in JUMPS:
+                seq = self._jump(ctx, item, seq)
+                continue
+            if self._habits.conditions:
+                self._beside.append(seq)
+            else:
+                self._seq = self._store.current = seq
+                self._tell(ctx, WaypointStarted(seq))
+                self._act(ctx, item, seq)
+            seq += 1
         self._finish(ctx)
 
     def _finish(self, ctx: FlightContext) -> None:
         if not self._finished:
-            ctx.events.append(MissionFinished())
+            self._tell(ctx, MissionFinished())
         self._finished = True
+        self._seq = self._store.current
         self._forget_leg()
         self._set_sub(ctx, self._hold_task())
 
@@ -121,23 +185,33 @@ class PlanTask(ABC):
         self._sub = task
         task.activate(ctx)
 
-    def _act(self, ctx: FlightContext, item: MissionItem, seq: int) -> int:
-        """A DO_ item: do it, and give the next sequence number."""
-        if item.command == Command.DO_JUMP:
-            target = jump_target(item, self._store.items)
-            left = self._jumps.get(seq, round(item.param2) if math.isfinite(item.param2) else 0)
-            if target is not None and target >= self._first_item and left != 0:
-                self._jumps[seq] = left - 1 if left > 0 else left
-                return target
-        elif item.command == Command.DO_CHANGE_SPEED:
+    # items that take no time
+
+    def _jump(self, ctx: FlightContext, item: MissionItem, seq: int) -> int:
+        """DO_JUMP, DO_JUMP_TAG: the next sequence number."""
+        target = jump_target(item, self._store.items)
+        left = self._jumps.get(seq, round(item.param2) if math.isfinite(item.param2) else 0)
+        if target is not None and target >= self._first_item and left != 0:
+            self._jumps[seq] = left - 1 if left > 0 else left
+            return target
+        self._tell(ctx, WaypointReached(seq, navigation=False))
+        return seq + 1
+
+    def _act(self, ctx: FlightContext, item: MissionItem, seq: int) -> None:
+        """A DO_ item: do it."""
+        if item.command == Command.DO_CHANGE_SPEED:
             self._change_by_item(ctx, item)
         elif item.command == Command.DO_SET_HOME:
             here = item.param1 == 1.0
             place = ctx.nav[nav_layout.POS_NED_M] if here else target_of(item, ctx)
             if place is not None:
                 ctx.events.append(HomeChangeRequested(float(place[0]), float(place[1]), float(place[2])))
-        ctx.events.append(WaypointReached(seq, navigation=False))
-        return seq + 1
+        elif item.command in ROI_COMMANDS:
+            self._roi = roi_of(item, ctx)
+            ctx.events.append(ItemCommanded(seq))
+        elif item.command not in MARKERS and item.command not in CONDITIONS:
+            ctx.events.append(ItemCommanded(seq))
+        self._tell(ctx, WaypointReached(seq, navigation=False))
 
     def _change_by_item(self, ctx: FlightContext, item: MissionItem) -> None:
         """DO_CHANGE_SPEED in the plan; -2: back to the parameters' speed."""
@@ -146,16 +220,84 @@ class PlanTask(ABC):
             return
         if speed_m_s > 0.0:
             self.change_speed(ctx, SpeedKind(kind), speed_m_s)
-        elif speed_m_s == -2.0 and kind <= SpeedKind.GROUND_SPEED:
+        elif speed_m_s == _DEFAULT_SPEED and kind <= SpeedKind.GROUND_SPEED:
             for each in (SpeedKind.GROUND_SPEED, SpeedKind.CLIMB, SpeedKind.DESCENT):
                 self.change_speed(ctx, each, None)
 
+    # items beside the flight to the next place
+
+    def _go_on_beside(self, ctx: FlightContext) -> None:
+        """Act on the items that are due beside what is flown, up to a condition that isn't met."""
+        while self._beside:
+            seq = self._beside[0]
+            item = self._store.items[seq]
+            if item.command in CONDITIONS:
+                if not self._is_met(ctx, item):
+                    return
+                self._condition_left_s = math.nan
+                self._tell(ctx, WaypointReached(seq, navigation=False))
+            else:
+                self._act(ctx, item, seq)
+            self._beside.popleft()
+
+    def _do_the_rest(self, ctx: FlightContext) -> None:
+        """There is nothing to fly beside which the items could wait: those before a condition act."""
+        while self._beside:
+            seq = self._beside.popleft()
+            item = self._store.items[seq]
+            if item.command in CONDITIONS:
+                self._beside.clear()
+                return
+            self._act(ctx, item, seq)
+
+    def _is_met(self, ctx: FlightContext, item: MissionItem) -> bool:
+        """One update of a CONDITION_ item; true when it lets the next one pass."""
+        if item.command == Command.CONDITION_DISTANCE:
+            target = target_of(self._store.items[self._seq], ctx)
+            if target is None:
+                return True
+            here = ctx.nav[nav_layout.POS_NED_M]
+            away_m = math.hypot(float(target[0] - here[0]), float(target[1] - here[1]))
+            return away_m <= item.param1
+        first = math.isnan(self._condition_left_s)
+        if item.command == Command.CONDITION_YAW:
+            if first:
+                self._condition_left_s = 0.0
+                self._turn(ctx, item)
+            return self._turned(ctx)
+        if first:
+            self._condition_left_s = item.param1 if math.isfinite(item.param1) else 0.0
+        else:
+            self._condition_left_s -= ctx.dt_s
+        return self._condition_left_s <= 0.0
+
+    # what is looked at
+
+    def _roi_place(self, ctx: FlightContext) -> Array | None:
+        """Place of the region of interest, local NED, (3,); None: there is none."""
+        roi = self._roi
+        if roi is None or self._finished:
+            return None
+        if roi.mode is RoiMode.LOCATION:
+            return roi.place_ned_m
+        seq = roi.index if roi.mode is RoiMode.WAYPOINT else self._seq
+        items = self._store.items
+        if not self._first_item <= seq < len(items) or not is_waypoint(items[seq]):
+            return None
+        return target_of(items[seq], ctx)
+
+    # items that take time
+
     def _begin_timed(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         """Begin an item that takes time; False when there is nothing to do."""
-        if item.command in (Command.CONDITION_DELAY, Command.NAV_DELAY):
+        if self._habits.hurries and item.command in _WAITS:
+            item = replace(item, command=Command.NAV_WAYPOINT, param1=0.0, param2=0.0, param3=0.0)
+        if item.command == Command.NAV_DELAY:
             self._wait_left_s = item.param1 if math.isfinite(item.param1) else 0.0
+            if not self._wait_left_s > 0.0 or self._habits.hurries:
+                return False
             self._set_sub(ctx, self._hold_task())
-            return self._wait_left_s > 0.0
+            return True
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
             ctx.events.append(MissionModeRequested(item.command))
             self._set_sub(ctx, self._return_task())
@@ -163,22 +305,24 @@ class PlanTask(ABC):
         return self._begin_flown(ctx, item, came_from)
 
     def _follow_store(self, ctx: FlightContext) -> None:
-        """Take over a new plan, or another current item."""
+        """Take over a new plan, or another current item; let the items beside the flight act."""
         if self._store.version != self._version:
             self._restart(ctx)
         elif self._store.current != self._seq and not self._finished:
             self._begin(ctx, max(self._store.current, self._first_item), None)
+        elif self._beside:
+            self._go_on_beside(ctx)
 
     def _fly_sub(self, ctx: FlightContext, task: FlightTask) -> None:
         before = len(ctx.events)
         status = task.update(ctx)
         if len(ctx.events) != before:
             # the sub-task's own end is not the mission's
-            ctx.events[before:] = [e for e in ctx.events[before:] if type(e).__name__ != "TaskFinished"]
+            ctx.events[before:] = [e for e in ctx.events[before:] if not isinstance(e, TaskFinished)]
         if self._finished:
             return
         item = self._store.items[self._seq]
-        if item.command in (Command.CONDITION_DELAY, Command.NAV_DELAY):
+        if item.command == Command.NAV_DELAY:
             self._wait_left_s -= ctx.dt_s
             done = self._wait_left_s <= 0.0
         else:
@@ -196,7 +340,7 @@ class PlanTask(ABC):
 
     def _complete(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> None:
         """The current item is done: report, and go on."""
-        ctx.events.append(WaypointReached(self._seq, navigation=is_navigation(item)))
+        self._tell(ctx, WaypointReached(self._seq, navigation=is_navigation(item)))
         last = self._seq + 1 >= len(self._store.items)
         if last or not item.autocontinue:
             self._finish(ctx)

@@ -373,7 +373,7 @@ def test_ardupilot_fence_from_the_plan() -> None:
     rig.spoil = lambda: nav.__setitem__(10, 21.0)  # the rig's vehicle would be back before the next check
     rig.run(0.2)
     assert rig.commander.mode is FlightMode.RETURN
-    assert "Fence Breached" in rig.texts()
+    assert "Polygon fence breached" in rig.texts()
 
 
 @pytest.mark.parametrize("make", [lambda: Rig("px4", NAV_DLL_ACT=2), lambda: guided(FS_GCS_ENABLE=1)])

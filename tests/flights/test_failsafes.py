@@ -153,7 +153,7 @@ def test_the_fence_turns_the_vehicle_back(flavour: str) -> None:
     flight.fly(14.0, look)
     assert 29.0 < farthest < 37.0
     assert flight.mode == "return"
-    text = "Failsafe activated" if flavour == "px4" else "Fence Breached"
+    text = "Failsafe activated" if flavour == "px4" else "Circle fence breached"
     assert flight.text_time(text) < math.inf
     flight.fly(20.0)
     assert math.hypot(*flight.position_ned_m[:2]) < 15.0

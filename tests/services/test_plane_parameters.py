@@ -134,7 +134,7 @@ def test_under_the_airframe_the_landing_fits_the_aircraft(flavour: str) -> None:
 def test_px4_habits() -> None:
     flight = flight_of("px4")
     assert (flight.return_altitude_m, flight.return_loiter_time_s) == (100.0, -1.0)
-    assert flight.return_destination is ReturnDestination.LANDING_SEQUENCE
+    assert flight.return_destination is ReturnDestination.LANDING_OR_RALLY
     assert flight_of("px4", RTL_TYPE=0).return_destination is ReturnDestination.HOME
     assert flight.turn_in is TurnInRule.SWITCH_DISTANCE
     assert (flight.takeoff_altitude_m, flight.acceptance_radius_m) == (25.0, 10.0)

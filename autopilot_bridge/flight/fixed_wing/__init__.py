@@ -11,7 +11,6 @@ from autopilot_bridge.flight.fixed_wing.offboard import OffboardTask
 from autopilot_bridge.flight.fixed_wing.parameters import (
     FixedWingFlightParameters,
     LaunchKind,
-    ReturnDestination,
     TurnInRule,
 )
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
@@ -19,6 +18,7 @@ from autopilot_bridge.flight.fixed_wing.return_home import ReturnPhase, ReturnTa
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffPhase, TakeoffTask
 from autopilot_bridge.flight.guided import GuidedKind
 from autopilot_bridge.flight.offboard import OffboardKind
+from autopilot_bridge.flight.return_rules import ReturnDestination
 
 __all__ = [
     "DescendTask",

@@ -28,6 +28,7 @@ class Leg:
         ramps: the height goes evenly from the start's to the target's; False: to the target's at once.
         radius_m: acceptance radius.
         turn_rad: change of course behind the waypoint, 0..pi; NaN: not known, or of no matter.
+        to_the_end: no turn begins before the waypoint is passed.
     """
 
     __slots__ = (
@@ -35,6 +36,7 @@ class Leg:
         "_line",
         "_ramps",
         "_start_down_m",
+        "_to_the_end",
         "_turn_rad",
         "_turn_side",
         "course_rad",
@@ -43,10 +45,20 @@ class Leg:
         "target",
     )
 
-    def __init__(self, start: Place, target: Place, *, ramps: bool, radius_m: float, turn_rad: float) -> None:
+    def __init__(
+        self,
+        start: Place,
+        target: Place,
+        *,
+        ramps: bool,
+        radius_m: float,
+        turn_rad: float,
+        to_the_end: bool = False,
+    ) -> None:
         self.target = target
         self.radius_m = radius_m
         self._turn_rad = turn_rad
+        self._to_the_end = to_the_end
         self._ramps = ramps
         self._direct = not ramps
         self._start_down_m = start[2]
@@ -129,6 +141,8 @@ class Leg:
 
     def turn_in_m(self, guidance: PathGuidance, parameters: FixedWingFlightParameters) -> float:
         """Distance to the waypoint at which it counts as reached."""
+        if self._to_the_end:
+            return 0.0
         if parameters.turn_in is TurnInRule.SWITCH_DISTANCE:
             return max(self.radius_m, guidance.switch_distance_m)
         if math.isnan(self._turn_rad):

@@ -19,7 +19,8 @@ from autopilot_bridge.flight.fixed_wing.position_lost import PositionLost
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffTask
-from autopilot_bridge.flight.plan_reading import Command, is_navigation, is_waypoint, target_of
+from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.plan_reading import JUMPS, Command, is_navigation, is_waypoint, target_of
 from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus, clear_setpoint
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
@@ -46,12 +47,14 @@ class MissionTask(PlanTask):
     Args:
         store: the plan; its `current` is kept up to date.
         first_item: 1 where item 0 is home (ArduPilot).
+        habits: how the firmware goes through a plan.
     """
 
     __slots__ = (
         "_airspeed_m_s",
         "_circle",
         "_command",
+        "_hold_s",
         "_leg",
         "_lost",
         "_path",
@@ -61,8 +64,8 @@ class MissionTask(PlanTask):
         "_track_down_m",
     )
 
-    def __init__(self, store: MissionStore, first_item: int = 0) -> None:
-        super().__init__(store, first_item=first_item)
+    def __init__(self, store: MissionStore, first_item: int = 0, habits: PlanHabits = PX4_PLANS) -> None:
+        super().__init__(store, first_item=first_item, habits=habits)
         self._state = AircraftState()
         self._command = FlightCommand()
         self._path = GuidedPath()
@@ -73,6 +76,7 @@ class MissionTask(PlanTask):
         self._track_down_m = 0.0
         self._airspeed_m_s = math.nan
         self._throttle = math.nan
+        self._hold_s = 0.0
 
     @property
     def sub_task(self) -> FlightTask | None:
@@ -94,12 +98,13 @@ class MissionTask(PlanTask):
         self._leg = None
         self._circle = None
         self._track = None
+        self._hold_s = 0.0
 
     def _hold_task(self) -> FlightTask:
         return LoiterTask(airspeed_m_s=self._airspeed_m_s)
 
     def _return_task(self) -> FlightTask:
-        return ReturnTask(self._store, first_item=self._first_item)
+        return ReturnTask(self._store, first_item=self._first_item, habits=self._habits)
 
     def _finish(self, ctx: FlightContext) -> None:
         sub, leg = self._sub, self._leg
@@ -128,8 +133,6 @@ class MissionTask(PlanTask):
 
     def _begin_flown(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
         command, p = item.command, ctx.fixed_wing
-        if command == Command.CONDITION_YAW:
-            return False
         target = target_of(item, ctx)
         if target is None:
             return False
@@ -150,6 +153,8 @@ class MissionTask(PlanTask):
             self._track_down_m = float(target[2])
         else:
             self._begin_leg(ctx, item, target, came_from)
+            hold_s = item.param1 if math.isfinite(item.param1) and self._habits.holds else 0.0
+            self._hold_s = max(0.0, hold_s)
         return True
 
     def _place_before(self, ctx: FlightContext) -> Array | None:
@@ -165,7 +170,7 @@ class MissionTask(PlanTask):
             if is_navigation(item):
                 has = is_waypoint(item) or item.command in _CIRCLES or item.command in _LANDINGS
                 return target_of(item, ctx) if has else None
-            if item.command == Command.DO_JUMP:
+            if item.command in JUMPS:
                 return None
         return None
 
@@ -179,12 +184,16 @@ class MissionTask(PlanTask):
         after = self._place_after(ctx)
         # an item's own radius holds whatever the turn behind it, as ArduPlane has it
         turn = math.nan if after is None or own > 0.0 else turn_angle(start, place, _place(after))
+        beyond_m = item.param3 if self._habits.passes_by and item.param3 > 0.0 else 0.0
+        if beyond_m > 0.0:
+            place = _beyond(start, place, beyond_m)
         self._leg = Leg(
             start,
             place,
             ramps=came_from is not None,
             radius_m=own if own > 0.0 else p.acceptance_radius_m,
             turn_rad=turn,
+            to_the_end=beyond_m > 0.0,
         )
         if came_from is not None:
             self._leg.turn_from(state.course_rad)
@@ -254,6 +263,10 @@ class MissionTask(PlanTask):
         item = self._store.items[self._seq]
         if passed and away > max(near, _MISSED_RADII * leg.radius_m) and not leg.too_short:
             leg.start_again(state)
+        elif self._hold_s > 0.0:
+            wait = MissionItem(command=Command.NAV_LOITER_TIME, param1=self._hold_s)
+            self._circle = CircleItem(wait, np.array(leg.target), self._airspeed_m_s, p)
+            self._set_sub(ctx, self._circle.task)
         elif abs(state.down_m - leg.target[2]) < p.acceptance_altitude_m:
             self._complete(ctx, item, np.array(leg.target))
         else:
@@ -263,6 +276,15 @@ class MissionTask(PlanTask):
 
 def _place(v: Array) -> Place:
     return float(v[0]), float(v[1]), float(v[2])
+
+
+def _beyond(start: Place, place: Place, distance_m: float) -> Place:
+    """So far behind a place, on the line from `start`."""
+    north, east = place[0] - start[0], place[1] - start[1]
+    length = math.hypot(north, east)
+    if length < 1.0:
+        return place
+    return place[0] + north / length * distance_m, place[1] + east / length * distance_m, place[2]
 
 
 def _has_place(item: MissionItem) -> bool:

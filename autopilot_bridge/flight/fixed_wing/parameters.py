@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from autopilot_bridge.control.fixed_wing.gains import gains_for
+from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
 
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
@@ -66,14 +67,6 @@ class TurnInRule(IntEnum):
 
     SWITCH_DISTANCE = 0  # PX4: the larger of NAV_ACC_RAD and the guidance's switch distance
     TURN_ANGLE = 1  # ArduPilot: WP_RADIUS, less for turns below 90 degrees
-
-
-class ReturnDestination(IntEnum):
-    """Where a return ends: PX4 RTL_TYPE | ArduPilot RTL_AUTOLAND."""
-
-    HOME = 0  # circle over home; land by `return_loiter_time_s`
-    LANDING_SEQUENCE = 1  # straight to the plan's landing sequence (RTL_TYPE 1 | RTL_AUTOLAND 2)
-    HOME_THEN_LANDING_SEQUENCE = 2  # over home first (RTL_AUTOLAND 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +150,8 @@ class FixedWingFlightParameters:
     return_climb_min_m: float = 0.0  # RTL_CLIMB_MIN
     return_loiter_time_s: float = -1.0  # RTL_LAND_DELAY; negative: for ever
     return_loiter_radius_m: float = 80.0  # RTL_LOITER_RAD | RTL_RADIUS; negative: counter-clockwise
-    return_destination: ReturnDestination = ReturnDestination.HOME
+    return_destination: ReturnDestination = ReturnDestination.HOME  # RTL_TYPE | RTL_AUTOLAND
+    rally: RallyRule = field(default_factory=RallyRule)  # RTL_TYPE | RALLY_*
     return_cone_half_angle_rad: float = 0.0  # RTL_CONE_ANG within RTL_MIN_DIST; 0: off
     return_min_distance_m: float = 100.0  # RTL_MIN_DIST
 
@@ -225,10 +219,10 @@ class FixedWingFlightParameters:
         return cls(**values)
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name = field.name
+        for each in fields(self):
+            name = each.name
             value = getattr(self, name)
-            if isinstance(value, bool | IntEnum):
+            if isinstance(value, bool | IntEnum | RallyRule):
                 continue
             if value == math.inf and name in _MAY_BE_INFINITE:
                 continue

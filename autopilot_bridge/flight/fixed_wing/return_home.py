@@ -1,6 +1,7 @@
 """Return: PX4's fixed-wing Return and ArduPlane's RTL, told apart by parameters only."""
 
 import math
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
@@ -9,8 +10,12 @@ from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, LandingTask
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, ReturnDestination
+from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
+from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_reading import landing_start
+from autopilot_bridge.flight.return_place import ReturnPlace, choose_return, plan_landing
+from autopilot_bridge.flight.return_plan import ReturnPlan
+from autopilot_bridge.flight.return_rules import ALONG_PLAN, ReturnDestination
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionStore
 
@@ -44,22 +49,29 @@ def return_height(distance_m: float, height_m: float, parameters: FixedWingFligh
 class ReturnTask(AircraftTask):
     """Climb, fly home, circle down, circle there or land; or fly the landing sequence of the plan.
 
-    Without a home it circles where it is; without a position it does as `LoiterTask`.
+    Home is the place that `choose_return` gives: a rally point may take its place. Without a home it circles
+    where it is; without a position it does as `LoiterTask`.
 
     Args:
         store: the plan, whose landing sequence the parameters may send the return to; None: there is none.
         first_item: the first item that is flown, as the mission task has it.
+        habits: how the firmware goes through a plan.
 
     Attributes:
         phase: see `ReturnPhase`.
+        place: where the return leads; None: nowhere.
     """
 
-    __slots__ = ("_first_item", "_home", "_store", "_sub", "_wait_s", "phase")
+    __slots__ = ("_first_item", "_habits", "_home", "_store", "_sub", "_wait_s", "phase", "place")
 
-    def __init__(self, store: MissionStore | None = None, *, first_item: int = 0) -> None:
+    def __init__(
+        self, store: MissionStore | None = None, *, first_item: int = 0, habits: PlanHabits = PX4_PLANS
+    ) -> None:
         super().__init__()
         self._store = store
         self._first_item = first_item
+        self._habits = habits
+        self.place: ReturnPlace | None = None
         self._sub: FlightTask | None = None
         self._home: Array = np.full(3, np.nan)
         self._wait_s = 0.0
@@ -74,25 +86,35 @@ class ReturnTask(AircraftTask):
         self._sub = task
         task.activate(ctx)
 
-    def _landing_start(self) -> int | None:
-        return None if self._store is None else landing_start(self._store.items)
+    def _landing_start(self, destination: ReturnDestination) -> int | None:
+        """Where the plan's landing begins; ArduPlane asks for a DO_LAND_START."""
+        if self._store is None:
+            return None
+        marked = destination in (
+            ReturnDestination.LANDING_SEQUENCE,
+            ReturnDestination.HOME_THEN_LANDING_SEQUENCE,
+        )
+        return landing_start(self._store.items) if marked else plan_landing(self._store)
 
     def _begin(self, ctx: FlightContext) -> None:
         p, state = ctx.fixed_wing, self._state
         self._wait_s = 0.0
-        self._home[:] = ctx.home_ned_m
-        if not math.isfinite(float(self._home.sum())):
+        destination = p.return_destination
+        landing = self._landing_start(destination)
+        self.place = place = choose_return(ctx, p.rally, destination, landing, self._store)
+        if place is None:
             self.phase = ReturnPhase.LOITER
             self._set_sub(ctx, LoiterTask())
             return
-        to_plan = p.return_destination is ReturnDestination.LANDING_SEQUENCE
-        if to_plan and self._land_by_plan(ctx):
+        if (place.landing is not None or destination in ALONG_PLAN) and self._land_by_plan(ctx, place):
             return
-        home_down = float(self._home[2])
+        self._home[:] = place.ned_m
+        ground_down = float(self._home[2])
         distance = math.hypot(float(self._home[0]) - state.north_m, float(self._home[1]) - state.east_m)
-        height = home_down - state.down_m
+        height = ground_down - state.down_m
         wanted = return_height(distance, height, p)
-        self._home[2] = home_down - wanted
+        own_down = place.altitude_down_m
+        self._home[2] = own_down if math.isfinite(own_down) else ground_down - wanted
         if p.return_climbs and wanted - height > p.acceptance_altitude_m:
             self.phase = ReturnPhase.CLIMB
             self._set_sub(ctx, LoiterTask(np.array([math.nan, math.nan, self._home[2]])))
@@ -103,18 +125,27 @@ class ReturnTask(AircraftTask):
         self.phase = ReturnPhase.FLY
         self._set_sub(ctx, LoiterTask(self._home, ctx.fixed_wing.return_loiter_radius_m))
 
-    def _land_by_plan(self, ctx: FlightContext) -> bool:
-        """Go on with the landing sequence of the plan, if there is one."""
+    def _land_by_plan(self, ctx: FlightContext, place: ReturnPlace) -> bool:
+        """Go on along the plan, or with its landing sequence, if there is one."""
         # a plan may send the vehicle home, and a return may fly the plan
         from autopilot_bridge.flight.fixed_wing.mission import MissionTask
 
-        start = self._landing_start()
-        if start is None or self._store is None:
+        store = self._store
+        if store is None or len(store.items) <= self._first_item:
             return False
-        self._store.current = start
+        destination = ctx.fixed_wing.return_destination
+        plan = ReturnPlan.of(ctx, store, self._first_item, self._habits, destination, place)
         self.phase = ReturnPhase.LAND
-        self._set_sub(ctx, MissionTask(self._store, first_item=self._first_item))
+        self._set_sub(ctx, plan.task(MissionTask))
         return True
+
+    def _land_after_home(self, ctx: FlightContext) -> bool:
+        """Over home the landing sequence begins, where that is asked for and there is one."""
+        destination, place = ctx.fixed_wing.return_destination, self.place
+        start = self._landing_start(destination)
+        if destination is not ReturnDestination.HOME_THEN_LANDING_SEQUENCE or place is None or start is None:
+            return False
+        return self._land_by_plan(ctx, replace(place, landing=start))
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Another airspeed on the way (DO_CHANGE_SPEED)."""
@@ -149,21 +180,21 @@ class ReturnTask(AircraftTask):
         at_height = abs(self._state.down_m - float(loiter.centre_ned_m[2])) < min(
             p.acceptance_altitude_m, 10.0
         )
-        home_down = float(ctx.home_ned_m[2])
+        place = self.place
+        ground_down = math.nan if place is None else float(place.ned_m[2])
         if self.phase is ReturnPhase.CLIMB and at_height:
             self._fly_home(ctx)
         elif self.phase is ReturnPhase.FLY and loiter.circling:
-            then_plan = p.return_destination is ReturnDestination.HOME_THEN_LANDING_SEQUENCE
-            if then_plan and self._land_by_plan(ctx):
+            if self._land_after_home(ctx):
                 return
             self.phase = ReturnPhase.DESCEND
-            if p.return_climbs and math.isfinite(home_down):
-                low_down = max(float(self._home[2]), home_down - p.return_descend_altitude_m)
+            if p.return_climbs and math.isfinite(ground_down):
+                low_down = max(float(self._home[2]), ground_down - p.return_descend_altitude_m)
                 loiter.set_height(low_down)
         elif self.phase is ReturnPhase.DESCEND and at_height:
             self.phase = ReturnPhase.LOITER
         elif self.phase is ReturnPhase.LOITER:
             self._wait_s += ctx.dt_s
-            if 0.0 <= p.return_loiter_time_s <= self._wait_s and math.isfinite(home_down):
+            if 0.0 <= p.return_loiter_time_s <= self._wait_s and place is not None:
                 self.phase = ReturnPhase.LAND
-                self._set_sub(ctx, LandTask(np.array(ctx.home_ned_m)))
+                self._set_sub(ctx, LandTask(np.array(place.ned_m)))

@@ -1,0 +1,30 @@
+"""Turning the nose of a multicopter beside what its task asks for: to a region of interest."""
+
+import math
+
+from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.flight.yaw import YawSteering
+
+
+class Nose:
+    """Replaces the heading of a setpoint that a task has written."""
+
+    __slots__ = ("_heading",)
+
+    def __init__(self) -> None:
+        self._heading = YawSteering()
+
+    def point(self, ctx: FlightContext, yaw_rad: float) -> None:
+        """Turn towards a heading; NaN leaves the task's own."""
+        setpoint = ctx.setpoint
+        if setpoint[sp.LEVEL] != sp.TRAJECTORY:
+            return
+        if math.isnan(yaw_rad):
+            yaw, rate = float(setpoint[sp.YAW_RAD]), float(setpoint[sp.YAW_RATE_RAD_S])
+            if math.isfinite(yaw):
+                self._heading.reset(yaw, rate if math.isfinite(rate) else 0.0)
+            return
+        self._heading.turn_to(yaw_rad, ctx.multicopter, ctx.dt_s)
+        setpoint[sp.YAW_RAD] = self._heading.yaw_rad
+        setpoint[sp.YAW_RATE_RAD_S] = self._heading.rate_rad_s

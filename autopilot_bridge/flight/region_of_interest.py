@@ -1,0 +1,83 @@
+"""What a plan or a command tells the vehicle to look at (MAV_CMD_DO_SET_ROI and its kin)."""
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.plan_reading import Command, target_of
+from autopilot_bridge.flight.yaw import wrap_pi
+from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.navigation import layout as nav_layout
+
+_NEAREST_M: Final = 0.5  # right under or over it no heading is better than another
+
+
+class RoiMode(IntEnum):
+    """MAV_ROI."""
+
+    NONE = 0
+    NEXT_WAYPOINT = 1
+    WAYPOINT = 2
+    LOCATION = 3
+
+
+_BY_COMMAND: Final = {
+    Command.DO_SET_ROI_LOCATION: RoiMode.LOCATION,
+    Command.DO_SET_ROI_WPNEXT_OFFSET: RoiMode.NEXT_WAYPOINT,
+    Command.DO_SET_ROI_NONE: RoiMode.NONE,
+}
+ROI_COMMANDS: Final = frozenset({*_BY_COMMAND, Command.DO_SET_ROI, Command.NAV_ROI})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionOfInterest:
+    """A region of interest.
+
+    Attributes:
+        mode: what kind it is.
+        place_ned_m: local NED, (3,), of a LOCATION.
+        index: item of a WAYPOINT.
+        yaw_offset_rad: beside the direction of the NEXT_WAYPOINT.
+    """
+
+    mode: RoiMode
+    place_ned_m: Array | None = None
+    index: int = -1
+    yaw_offset_rad: float = 0.0
+
+
+def roi_of(item: MissionItem, ctx: FlightContext) -> RegionOfInterest | None:
+    """What an item of `ROI_COMMANDS` asks to look at; None: at nothing any more.
+
+    DO_SET_ROI and NAV_ROI carry their kind in param1 (PX4); ArduPilot's DO_SET_ROI is always a location,
+    and its all-zero place ends it.
+    """
+    mode = _BY_COMMAND.get(Command(item.command))
+    if mode is None:
+        number = round(item.param1) if math.isfinite(item.param1) else 0
+        placed = item.x != 0.0 or item.y != 0.0
+        known = number in (RoiMode.NEXT_WAYPOINT, RoiMode.WAYPOINT)
+        mode = RoiMode(number) if known else RoiMode.LOCATION if placed else RoiMode.NONE
+    if mode is RoiMode.NONE:
+        return None
+    if mode is RoiMode.LOCATION:
+        place = target_of(item, ctx)
+        return None if place is None else RegionOfInterest(mode=mode, place_ned_m=place)
+    index = round(item.param2) if math.isfinite(item.param2) else -1
+    offset = item.z if mode is RoiMode.NEXT_WAYPOINT and math.isfinite(item.z) else 0.0
+    return RegionOfInterest(mode=mode, index=index, yaw_offset_rad=math.radians(offset))
+
+
+def heading_to(ctx: FlightContext, place_ned_m: Array | None, offset_rad: float = 0.0) -> float:
+    """Heading from the vehicle to a place; NaN where there is none."""
+    if place_ned_m is None or not ctx.position_valid:
+        return math.nan
+    here = ctx.nav[nav_layout.POS_NED_M]
+    north, east = (float(value) for value in np.subtract(place_ned_m, here)[0:2])
+    if math.hypot(north, east) < _NEAREST_M:
+        return math.nan
+    return wrap_pi(math.atan2(east, north) + offset_rad)
