@@ -31,9 +31,14 @@ _ARDUPLANE_MAX_RATE_HZ: Final = 0.8 * 50.0
 
 PAYLOAD_ROLE: Final = "payload"
 PAYLOAD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
-    {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 5.0}
+    {
+        mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE: 10.0,
+        mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+    }
 )
-"""What devices on the vehicle's own bus are told: whom they hang on, and where it is."""
+"""What devices on the vehicle's own bus are told: whom they hang on, where it is, how it lies, the time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,41 +1,78 @@
-"""The camera as a MAVLink component: basics of camera protocol v2, and LANDING_TARGET for what it detects.
+"""The camera as a MAVLink component: camera protocol v2, and LANDING_TARGET for what its detector finds.
 
 Source: MAVLink camera protocol v2 (mavlink.io/en/services/camera.html) and the LANDING_TARGET message.
 Detections carry angles off the optical axis; their tangents are the normalized image coordinates (seed 004,
-equation 36).
+equation 36). The camera has no receiver of its own: where photos were taken is what the autopilot told.
 """
 
-import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.payload.component import Component, fixed_text, whole
-from flightsim.payload import Camera, CameraFrame, Detection
+from autopilot_bridge.payload.camera_commands import CameraCommands
+from autopilot_bridge.payload.camera_lens import CameraLens
+from autopilot_bridge.payload.camera_messages import (
+    SENSOR_WIDTH_MM,
+    capture_status,
+    fov_status,
+    image_captured,
+    information,
+    landing_target,
+    photo_notes,
+    tracking_geo_status,
+)
+from autopilot_bridge.payload.camera_storage import VIDEO_MIB_S, CameraStorage
+from autopilot_bridge.payload.camera_tracking import CameraTracker
+from autopilot_bridge.payload.camera_trigger import PhotoTrigger
+from autopilot_bridge.payload.camera_video import VideoStream
+from autopilot_bridge.payload.component import Component
+from autopilot_bridge.payload.vehicle_heard import Quaternion, VehicleHeard, product, quaternion
+from flightsim.payload import Camera, CameraFrame, Gimbal
 
 CAMERA_COMPONENT: Final = int(mavlink.MAV_COMP_ID_CAMERA)
 
-_SENSOR_WIDTH_MM: Final = 6.0  # a 1/2.3-inch sensor; with the field of view it gives the focal length
-_MODE_IMAGE: Final = 0
-_CAPACITY_MIB: Final = 32_768.0
-_IMAGE_MIB: Final = 4.0
-_NO_NUMBER: Final = 255
-_UNKNOWN_POSITION: Final = 0
-_ACCEPTED: Final = int(mavlink.MAV_RESULT_ACCEPTED)
-_DENIED: Final = int(mavlink.MAV_RESULT_DENIED)
-_MIN_INTERVAL_S: Final = 0.1
+_LENS_INTERVAL_US: Final = 100_000
+
+
+class PictureKeeper(Protocol):
+    """Makes files of what the camera takes."""
+
+    def photo(self, time_us: int, notes: dict[str, float]) -> str:
+        """Keep a photo; the name that clients are told, "" when it is not kept."""
+
+    def start_video(self, time_us: int) -> None:
+        """Begin to keep a video."""
+
+    def stop_video(self, time_us: int) -> None:
+        """Finish it."""
 
 
 class CameraComponent(Component):
-    """Tells what the detector found, and takes still pictures (it counts them; nothing is rendered here).
+    """Takes photos and videos, zooms, focuses, follows things, and tells what its detector found.
 
     Args:
         camera: the device.
-        gimbal_device_id: of the gimbal it hangs on; 0: none.
+        system_id: of the vehicle.
+        send: takes packed frames.
+        gimbal: what it hangs on; None: fixed to the body.
+        gimbal_device_id: of that gimbal; 0: none.
+
+    Attributes:
+        stream: a video stream that somebody serves; None: there is none.
+        keeper: makes files of photos and videos; None: they are counted only.
+        mode: CAMERA_MODE.
+        lens, storage, tracker, trigger, heard: the parts.
+        recording_since_us: None: no video is being taken.
     """
 
     def __init__(
-        self, camera: Camera, *, system_id: int, send: Callable[[bytes], None], gimbal_device_id: int = 0
+        self,
+        camera: Camera,
+        *,
+        system_id: int,
+        send: Callable[[bytes], None],
+        gimbal: Gimbal | None = None,
+        gimbal_device_id: int = 0,
     ) -> None:
         super().__init__(
             system_id=system_id,
@@ -44,152 +81,147 @@ class CameraComponent(Component):
             send=send,
             rates_hz={},
         )
-        self._model = camera.parameters.model
-        self._gimbal_device_id = gimbal_device_id
-        self._images = 0
-        self._pictures_left = 0
-        self._interval_us = 0
-        self._next_picture_us = 0
+        self.device = camera
+        self.gimbal_device_id = gimbal_device_id
+        self.stream: VideoStream | None = None
+        self.keeper: PictureKeeper | None = None
+        self.mode = int(mavlink.CAMERA_MODE_IMAGE)
+        self.lens = CameraLens(camera, sensor_width_mm=SENSOR_WIDTH_MM)
+        self.storage = CameraStorage()
+        self.tracker = CameraTracker(camera.parameters.model)
+        self.trigger = PhotoTrigger()
+        self.heard = VehicleHeard(system_id)
+        self.recording_since_us: int | None = None
+        self.status_interval_us = 0
+        self._gimbal = gimbal
+        p = camera.parameters
+        self._q_frd_from_mount = quaternion(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad)
+        self._next_status_us = 0
+        self._lens_us = 0
         self._builders.update(
             {
-                mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION: self._information,
+                mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION: lambda _: information(self),
                 mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS: self._settings,
-                mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION: self._storage,
-                mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS: self._capture_status,
+                mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS: lambda t: capture_status(self, t),
+                mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION: lambda _: self.storage.message(self.time_ms),
+                mavlink.MAVLINK_MSG_ID_CAMERA_FOV_STATUS: lambda t: fov_status(self, t),
+                mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_IMAGE_STATUS: lambda _: self.tracker.message(),
+                mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS: lambda t: tracking_geo_status(self, t),
             }
         )
-        self._handlers.update(
-            {
-                mavlink.MAV_CMD_IMAGE_START_CAPTURE: self._on_start_capture,
-                mavlink.MAV_CMD_IMAGE_STOP_CAPTURE: self._on_stop_capture,
-                mavlink.MAV_CMD_SET_CAMERA_MODE: self._on_set_mode,
-                mavlink.MAV_CMD_STORAGE_FORMAT: self._on_format,
-            }
-        )
+        self._commands = CameraCommands(self)
+        self._handlers.update(self._commands.handlers)
+        self._answers.update(self._commands.answers)
+
+    @property
+    def time_us(self) -> int:
+        """Vehicle time."""
+        return self._time_us
 
     def step(self, time_us: int) -> None:
-        """Streams, and pictures of a running series."""
+        """Streams, photos of a running series, a moving lens, the status while something runs."""
         super().step(time_us)
-        if self._pictures_left and time_us >= self._next_picture_us:
-            self._next_picture_us += self._interval_us
-            if self._pictures_left > 0:
-                self._pictures_left -= 1
-            self._take_picture()
+        if self.trigger.running and self.trigger.due(time_us):
+            self.take_photo()
+        if self.lens.moving and time_us - self._lens_us >= _LENS_INTERVAL_US:
+            self.lens.move(1e-6 * min(time_us - self._lens_us, 2 * _LENS_INTERVAL_US))
+            self._lens_us = time_us
+            self.tell_settings()
+        if self.recording_since_us is not None:
+            self._record(time_us)
 
     def tell(self, frame: CameraFrame) -> None:
         """Send the detections of a frame that was delivered on this step."""
+        self.tracker.tell(frame)
         for detection in frame.detections:
-            self.send(_landing_target(detection))
+            self.send(landing_target(detection))
+
+    @property
+    def orientation(self) -> Quaternion | None:
+        """q_ned_from_mount: by the gimbal's own reference, or by the attitude heard; None: not known."""
+        if self._gimbal is not None:
+            w, x, y, z = self._gimbal.measured_q_ned_from_gimbal.tolist()
+            return w, x, y, z
+        q_ned_from_frd = self.heard.q_ned_from_frd
+        return None if q_ned_from_frd is None else product(q_ned_from_frd, self._q_frd_from_mount)
+
+    # what commands do
+
+    def take_photo(self) -> bool:
+        """Take one now; False: the card is full."""
+        if self.storage.full:
+            self.trigger.stop()
+            self.tell_status()
+            return False
+        name = "" if self.keeper is None else self.keeper.photo(self._time_us, photo_notes(self))
+        message = image_captured(self, self._time_us, self.storage.images, name)
+        self.storage.add_photo(message)
+        self.send(message)
+        self.tell_status()
+        return True
+
+    def start_recording(self, status_hz: float) -> bool:
+        """Begin a video; False: one is being taken, or the card is full."""
+        if self.recording_since_us is not None or self.storage.full:
+            return False
+        self.recording_since_us = self._lens_us = self._time_us
+        self.status_interval_us = round(1e6 / status_hz) if status_hz > 0.0 else 0
+        self._next_status_us = self._time_us + self.status_interval_us
+        if self.keeper is not None:
+            self.keeper.start_video(self._time_us)
+        self.tell_status()
+        return True
+
+    def stop_recording(self) -> bool:
+        """Finish the video; False: none is being taken."""
+        if self.recording_since_us is None:
+            return False
+        self.storage.used_mib += VIDEO_MIB_S * 1e-6 * (self._time_us - self.recording_since_us)
+        self.recording_since_us = None
+        if self.keeper is not None:
+            self.keeper.stop_video(self._time_us)
+        self.tell_status()
+        return True
+
+    def move_lens(self) -> None:
+        """A continuous zoom or focus begins, or anything about the lens has changed."""
+        self._lens_us = self._time_us
+        self.tell_settings()
+
+    def tell_settings(self) -> None:
+        """Send CAMERA_SETTINGS."""
+        self.send(self._settings(self._time_us))
+
+    def tell_status(self) -> None:
+        """Send CAMERA_CAPTURE_STATUS."""
+        self.send(capture_status(self, self._time_us))
+
+    # inside
 
     def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        """Nothing but commands concerns it."""
+        told = self.heard.handle(message, sender, self._time_us)
+        if (
+            told
+            and message.get_msgId() == mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+            and self.trigger.travelled(self.heard.velocity_ned_m_s, self._time_us)
+        ):
+            self.take_photo()
 
-    def _on_start_capture(self, message: Any, sender: tuple[int, int]) -> int | None:
-        """IMAGE_START_CAPTURE: p2 interval s, p3 how many, 0 for ever."""
-        interval_s, count = message.param2, whole(message.param3, -1)
-        if count < 0 or (count != 1 and not interval_s >= _MIN_INTERVAL_S) or interval_s == math.inf:
-            return _DENIED
-        self._interval_us = round(interval_s * 1e6) if count != 1 else 0
-        self._pictures_left = count or -1
-        self._next_picture_us = self._time_us
-        return _ACCEPTED
+    def _record(self, time_us: int) -> None:
+        if self.recorded_mib >= self.storage.available_mib:
+            self.stop_recording()
+        elif self.status_interval_us and time_us >= self._next_status_us:
+            self._next_status_us += self.status_interval_us
+            self.tell_status()
 
-    def _on_stop_capture(self, message: Any, sender: tuple[int, int]) -> int | None:
-        self._pictures_left = 0
-        return _ACCEPTED
-
-    def _on_set_mode(self, message: Any, sender: tuple[int, int]) -> int | None:
-        return _ACCEPTED if whole(message.param2, -1) == _MODE_IMAGE else _DENIED
-
-    def _on_format(self, message: Any, sender: tuple[int, int]) -> int | None:
-        if whole(message.param2, 0) == 1:
-            self._images = 0
-        return _ACCEPTED
-
-    def _take_picture(self) -> None:
-        index, self._images = self._images, self._images + 1
-        # the camera has no receiver of its own: the place is the autopilot's to tell
-        self.send(
-            mavlink.MAVLink_camera_image_captured_message(
-                self.time_ms,
-                0,
-                0,
-                _UNKNOWN_POSITION,
-                _UNKNOWN_POSITION,
-                _UNKNOWN_POSITION,
-                _UNKNOWN_POSITION,
-                [math.nan] * 4,
-                index,
-                1,
-                b"",
-            )
-        )
-
-    def _information(self, time_us: int) -> Any:
-        model = self._model
-        focal_length_mm = 0.5 * _SENSOR_WIDTH_MM / math.tan(0.5 * model.horizontal_fov_rad)
-        return mavlink.MAVLink_camera_information_message(
-            self.time_ms,
-            fixed_text("flightstack", 32),
-            fixed_text("simulated camera", 32),
-            0x01000000,
-            focal_length_mm,
-            _SENSOR_WIDTH_MM,
-            _SENSOR_WIDTH_MM * model.height_px / model.width_px,
-            model.width_px,
-            model.height_px,
-            0,
-            mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE,
-            0,
-            b"",
-            gimbal_device_id=self._gimbal_device_id,
-        )
+    @property
+    def recorded_mib(self) -> float:
+        """Size of the video that is being taken."""
+        since_us = self.recording_since_us
+        return 0.0 if since_us is None else VIDEO_MIB_S * 1e-6 * (self._time_us - since_us)
 
     def _settings(self, time_us: int) -> Any:
-        return mavlink.MAVLink_camera_settings_message(self.time_ms, _MODE_IMAGE)
-
-    def _storage(self, time_us: int) -> Any:
-        used_mib = min(self._images * _IMAGE_MIB, _CAPACITY_MIB)
-        return mavlink.MAVLink_storage_information_message(
-            self.time_ms,
-            1,
-            1,
-            mavlink.STORAGE_STATUS_READY,
-            _CAPACITY_MIB,
-            used_mib,
-            _CAPACITY_MIB - used_mib,
-            0.0,
-            0.0,
+        lens = self.lens
+        return mavlink.MAVLink_camera_settings_message(
+            self.time_ms, self.mode, lens.zoom_percent, lens.focus_percent
         )
-
-    def _capture_status(self, time_us: int) -> Any:
-        series = self._pictures_left != 0
-        return mavlink.MAVLink_camera_capture_status_message(
-            self.time_ms,
-            3 if series else 0,  # interval set and capture in progress
-            0,
-            1e-6 * self._interval_us if series else 0.0,
-            0,
-            max(0.0, _CAPACITY_MIB - self._images * _IMAGE_MIB),
-            self._images,
-        )
-
-
-def _landing_target(detection: Detection) -> Any:
-    tagged = detection.target_id >= 0
-    return mavlink.MAVLink_landing_target_message(
-        detection.time_us,
-        detection.target_id if 0 <= detection.target_id < _NO_NUMBER else _NO_NUMBER,
-        mavlink.MAV_FRAME_BODY_FRD,
-        detection.angle_x_rad,
-        detection.angle_y_rad,
-        detection.distance_m,
-        detection.size_rad,
-        detection.size_rad,
-        0.0,
-        0.0,
-        0.0,
-        [1.0, 0.0, 0.0, 0.0],
-        mavlink.LANDING_TARGET_TYPE_VISION_FIDUCIAL if tagged else mavlink.LANDING_TARGET_TYPE_VISION_OTHER,
-        0,
-    )

@@ -17,6 +17,9 @@ Builder = Callable[[int], Any]
 CommandHandler = Callable[[Any, tuple[int, int]], int | None]
 """Carries out a command: (COMMAND_LONG or COMMAND_INT, sender) -> MAV_RESULT; None: no answer."""
 
+Answer = Callable[[Any, tuple[int, int]], int]
+"""Answers REQUEST_MESSAGE for a message that has parameters of its own -> MAV_RESULT."""
+
 MAX_RATE_HZ: Final = 50.0
 _NEVER_US: Final = 1 << 62
 _SECOND_US: Final = 1_000_000
@@ -47,6 +50,7 @@ class Component(ABC):
         self._send = send
         self._encoder = FrameEncoder(system_id, component_id)
         self._builders: dict[int, Builder] = {mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._heartbeat}
+        self._answers: dict[int, Answer] = {}
         self._handlers: dict[int, CommandHandler] = {
             mavlink.MAV_CMD_REQUEST_MESSAGE: self._on_request_message,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self._on_set_interval,
@@ -119,7 +123,15 @@ class Component(ABC):
             )
 
     def _on_request_message(self, message: Any, sender: tuple[int, int]) -> int | None:
-        builder = self._builders.get(whole(message.param1, -1))
+        return self._request(whole(message.param1, -1), message, sender)
+
+    def _request(self, message_id: int, message: Any, sender: tuple[int, int]) -> int:
+        answer = self._answers.get(message_id)
+        return self.request(message_id) if answer is None else answer(message, sender)
+
+    def request(self, message_id: int) -> int:
+        """Send a message now; the MAV_RESULT for who asked for it."""
+        builder = self._builders.get(message_id)
         if builder is None:
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
         self.send(builder(self._time_us))
@@ -158,6 +170,15 @@ class Component(ABC):
         return mavlink.MAVLink_heartbeat_message(
             self._mav_type, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
         )
+
+
+def parameters(message: Any) -> tuple[float, ...]:
+    """The seven of a command, as they would be in a COMMAND_LONG."""
+    if hasattr(message, "param5"):
+        last = (message.param5, message.param6, message.param7)
+    else:
+        last = (float(message.x), float(message.y), message.z)
+    return (message.param1, message.param2, message.param3, message.param4, *last)
 
 
 def whole(value: float, default: int) -> int:

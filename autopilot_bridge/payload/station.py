@@ -20,6 +20,7 @@ class PayloadStation:
 
     Attributes:
         components: those there are.
+        camera: the camera among them; None: there is none.
         parser: of what comes in; its counters account for every byte.
     """
 
@@ -27,14 +28,18 @@ class PayloadStation:
         self.parser = FrameParser()
         self.components: list[Component] = []
         self._payload = payload
-        self._camera: CameraComponent | None = None
+        self.camera: CameraComponent | None = None
         self._magnetometer: MagnetometerComponent | None = None
         if payload.camera is not None:
             device_id = GIMBAL_COMPONENT if payload.gimbal is not None else 0
-            self._camera = CameraComponent(
-                payload.camera, system_id=system_id, send=send, gimbal_device_id=device_id
+            self.camera = CameraComponent(
+                payload.camera,
+                system_id=system_id,
+                send=send,
+                gimbal=payload.gimbal,
+                gimbal_device_id=device_id,
             )
-            self.components.append(self._camera)
+            self.components.append(self.camera)
         if payload.gimbal is not None:
             self.components.append(GimbalComponent(payload.gimbal, system_id=system_id, send=send))
         if payload.magnetometer is not None:
@@ -45,8 +50,8 @@ class PayloadStation:
         """One physics step: devices, then what they have to say."""
         payload = self._payload
         payload.step(time_us)
-        if self._camera is not None and payload.frame is not None:
-            self._camera.tell(payload.frame)
+        if self.camera is not None and payload.frame is not None:
+            self.camera.tell(payload.frame)
         if self._magnetometer is not None and payload.reading is not None:
             self._magnetometer.tell(payload.reading)
         for component in self.components:

@@ -1,4 +1,4 @@
-"""The grain of the ground: a periodic patch of noise with its smaller copies (MIP pyramid; Williams, 1983)."""
+"""The grain of the ground: a periodic patch of noise and its smaller copies (MIP pyramid; Williams, 1983)."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +10,8 @@ LEVELS = 10  # 512, 256, ... 1
 def ground_texture(seed: int = 1) -> NDArray[np.float32]:
     """Levels (LEVELS, TEXELS, TEXELS); level n fills its first TEXELS >> n.
 
-    The noise has mean 0, at the finest level a deviation of 1, a falling spectrum as grass and soil have, and no
-    seam: the patch may be laid beside itself.
+    The noise has mean 0, at the finest level a deviation of 1, a falling spectrum as grass and soil have, and
+    no seam: the patch may be laid beside itself.
     """
     rng = np.random.Generator(np.random.PCG64(seed))
     frequency = np.fft.fftfreq(TEXELS) * TEXELS

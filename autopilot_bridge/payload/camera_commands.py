@@ -1,0 +1,290 @@
+"""The commands of camera protocol v2, and older ones that people still send (DO_DIGICAM_CONTROL, ...)."""
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.camera_storage import STORAGE_ID
+from autopilot_bridge.payload.camera_video import STREAM_ID
+from autopilot_bridge.payload.component import Answer, CommandHandler, parameters, whole
+
+if TYPE_CHECKING:
+    from autopilot_bridge.payload.camera import CameraComponent
+
+Sender = tuple[int, int]
+
+_ACCEPTED: Final = int(mavlink.MAV_RESULT_ACCEPTED)
+_DENIED: Final = int(mavlink.MAV_RESULT_DENIED)
+_FAILED: Final = int(mavlink.MAV_RESULT_FAILED)
+_REJECTED: Final = int(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+_UNSUPPORTED: Final = int(mavlink.MAV_RESULT_UNSUPPORTED)
+_MODES: Final = (
+    mavlink.CAMERA_MODE_IMAGE,
+    mavlink.CAMERA_MODE_VIDEO,
+    mavlink.CAMERA_MODE_IMAGE_SURVEY,
+)
+_REPEATED_US: Final = 3_000_000  # a single photo asked for again within it is the same photo
+_MAX_STATUS_HZ: Final = 50.0
+_OLD_REQUESTS: Final[Mapping[int, int]] = {
+    mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION,
+    mavlink.MAV_CMD_REQUEST_CAMERA_SETTINGS: mavlink.MAVLINK_MSG_ID_CAMERA_SETTINGS,
+    mavlink.MAV_CMD_REQUEST_CAMERA_CAPTURE_STATUS: mavlink.MAVLINK_MSG_ID_CAMERA_CAPTURE_STATUS,
+    mavlink.MAV_CMD_REQUEST_STORAGE_INFORMATION: mavlink.MAVLINK_MSG_ID_STORAGE_INFORMATION,
+}
+
+
+class CameraCommands:
+    """What a camera component does when it is told.
+
+    Attributes:
+        handlers: by MAV_CMD.
+        answers: messages whose request has parameters of its own, by message id.
+    """
+
+    def __init__(self, camera: "CameraComponent") -> None:
+        self._camera = camera
+        self._newest_single: tuple[Sender, int, int] | None = None  # sender, sequence number, time
+        m = mavlink
+        self.handlers: dict[int, CommandHandler] = {
+            m.MAV_CMD_IMAGE_START_CAPTURE: self._start_capture,
+            m.MAV_CMD_IMAGE_STOP_CAPTURE: self._stop_capture,
+            m.MAV_CMD_VIDEO_START_CAPTURE: self._start_video,
+            m.MAV_CMD_VIDEO_STOP_CAPTURE: self._stop_video,
+            m.MAV_CMD_SET_CAMERA_MODE: self._set_mode,
+            m.MAV_CMD_SET_CAMERA_ZOOM: self._zoom,
+            m.MAV_CMD_SET_CAMERA_FOCUS: self._focus,
+            m.MAV_CMD_RESET_CAMERA_SETTINGS: self._reset,
+            m.MAV_CMD_STORAGE_FORMAT: self._format,
+            m.MAV_CMD_VIDEO_START_STREAMING: lambda message, _: self._set_streaming(message, True),
+            m.MAV_CMD_VIDEO_STOP_STREAMING: lambda message, _: self._set_streaming(message, False),
+            m.MAV_CMD_CAMERA_TRACK_POINT: self._track_point,
+            m.MAV_CMD_CAMERA_TRACK_RECTANGLE: self._track_rectangle,
+            m.MAV_CMD_CAMERA_STOP_TRACKING: self._stop_tracking,
+            m.MAV_CMD_DO_TRIGGER_CONTROL: self._trigger_control,
+            m.MAV_CMD_DO_SET_CAM_TRIGG_DIST: self._trigger_distance,
+            m.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL: self._trigger_interval,
+            m.MAV_CMD_DO_DIGICAM_CONTROL: self._digicam,
+            m.MAV_CMD_REQUEST_VIDEO_STREAM_INFORMATION: self._old_stream_information,
+            m.MAV_CMD_REQUEST_VIDEO_STREAM_STATUS: self._old_stream_status,
+            m.MAV_CMD_REQUEST_CAMERA_IMAGE_CAPTURE: lambda message, _: self._send_photo(message.param1),
+            **dict.fromkeys(_OLD_REQUESTS, self._old_request),
+        }
+        self.answers: dict[int, Answer] = {
+            m.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED: lambda message, _: self._send_photo(message.param2),
+            m.MAVLINK_MSG_ID_STORAGE_INFORMATION: lambda message, _: self._send_storage(message.param2),
+            m.MAVLINK_MSG_ID_VIDEO_STREAM_INFORMATION: lambda message, _: self._send_stream(message.param2),
+            m.MAVLINK_MSG_ID_VIDEO_STREAM_STATUS: lambda message, _: self._send_stream_status(message.param2),
+        }
+
+    # photos and videos
+
+    def _start_capture(self, message: Any, sender: Sender) -> int | None:
+        """p1 camera, p2 interval s, p3 how many (0: for ever), p4 sequence number of a single photo."""
+        camera = self._camera
+        _, interval_s, count_value, sequence_value, *_ = parameters(message)
+        count, sequence = whole(count_value, -1), whole(sequence_value, 0)
+        if count < 0:
+            return _DENIED
+        if camera.storage.full:
+            return _FAILED
+        if count != 1:
+            if not camera.trigger.start(interval_s, count, camera.time_us):
+                return _DENIED
+            camera.tell_status()
+            return _ACCEPTED
+        single = (sender, sequence, camera.time_us)
+        if sequence > 0 and self._is_repeated(single):
+            return _ACCEPTED
+        self._newest_single = single
+        return _ACCEPTED if camera.take_photo() else _FAILED
+
+    def _is_repeated(self, single: tuple[Sender, int, int]) -> bool:
+        """The command was sent again because its acknowledgement was lost."""
+        last = self._newest_single
+        return last is not None and last[:2] == single[:2] and single[2] - last[2] < _REPEATED_US
+
+    def _stop_capture(self, message: Any, sender: Sender) -> int | None:
+        self._camera.trigger.stop()
+        self._camera.tell_status()
+        return _ACCEPTED
+
+    def _start_video(self, message: Any, sender: Sender) -> int | None:
+        """p1 stream (0: all), p2 how often to tell the status meanwhile, Hz."""
+        stream, status_hz, *_ = parameters(message)
+        if whole(stream, -1) not in (0, STREAM_ID) or not 0.0 <= status_hz <= _MAX_STATUS_HZ:
+            return _DENIED
+        if self._camera.recording_since_us is not None:
+            return _REJECTED
+        return _ACCEPTED if self._camera.start_recording(status_hz) else _FAILED
+
+    def _stop_video(self, message: Any, sender: Sender) -> int | None:
+        if whole(message.param1, -1) not in (0, STREAM_ID):
+            return _DENIED
+        self._camera.stop_recording()
+        return _ACCEPTED
+
+    def _trigger_control(self, message: Any, sender: Sender) -> int | None:
+        """p1 enable (1, 0, -1: leave), p2 reset the sequence (1), p3 pause (1, 0, -1: leave)."""
+        enable, reset, pause = (whole(value, -1) for value in parameters(message)[:3])
+        if enable not in (-1, 0, 1) or reset not in (-1, 0, 1) or pause not in (-1, 0, 1):
+            return _DENIED
+        trigger = self._camera.trigger
+        if enable != -1:
+            trigger.enabled = bool(enable)
+        if pause != -1:
+            trigger.paused = bool(pause)
+        if reset == 1:
+            self._newest_single = None
+        return _ACCEPTED
+
+    def _trigger_distance(self, message: Any, sender: Sender) -> int | None:
+        """p1 metres between photos (0: off, -1: leave), p3 one at once (1)."""
+        distance_m, _, at_once, *_ = parameters(message)
+        if distance_m != -1.0 and not self._camera.trigger.set_distance(distance_m):
+            return _DENIED
+        if whole(at_once, 0) == 1:
+            self._camera.take_photo()
+        return _ACCEPTED
+
+    def _trigger_interval(self, message: Any, sender: Sender) -> int | None:
+        """p1 milliseconds between photos (0: off, -1: leave)."""
+        if message.param1 == -1.0:
+            return _ACCEPTED
+        accepted = self._camera.trigger.set_cycle(1e-3 * message.param1, self._camera.time_us)
+        return _ACCEPTED if accepted else _DENIED
+
+    def _digicam(self, message: Any, sender: Sender) -> int | None:
+        """DO_DIGICAM_CONTROL: p3 zoom step, p4 focus lock, p5 shoot (1)."""
+        values = parameters(message)
+        step, shoot = values[2], whole(values[4], 0)
+        if math.isfinite(step) and step != 0.0 and self._camera.lens.zoom(mavlink.ZOOM_TYPE_STEP, step):
+            self._camera.move_lens()
+        if shoot == 1 and not self._camera.take_photo():
+            return _FAILED
+        return _ACCEPTED
+
+    # settings
+
+    def _set_mode(self, message: Any, sender: Sender) -> int | None:
+        mode = whole(message.param2, -1)
+        if mode not in _MODES:
+            return _DENIED
+        self._camera.mode = mode
+        self._camera.tell_settings()
+        return _ACCEPTED
+
+    def _zoom(self, message: Any, sender: Sender) -> int | None:
+        if not self._camera.lens.has_zoom:
+            return _UNSUPPORTED
+        if not self._camera.lens.zoom(whole(message.param1, -1), message.param2):
+            return _DENIED
+        self._camera.move_lens()
+        return _ACCEPTED
+
+    def _focus(self, message: Any, sender: Sender) -> int | None:
+        if not self._camera.lens.has_focus:
+            return _UNSUPPORTED
+        if not self._camera.lens.focus(whole(message.param1, -1), message.param2):
+            return _DENIED
+        self._camera.move_lens()
+        return _ACCEPTED
+
+    def _reset(self, message: Any, sender: Sender) -> int | None:
+        if whole(message.param1, 0) != 1:
+            return _DENIED
+        self._camera.mode = int(mavlink.CAMERA_MODE_IMAGE)
+        self._camera.lens.reset()
+        self._camera.tell_settings()
+        return _ACCEPTED
+
+    def _format(self, message: Any, sender: Sender) -> int | None:
+        """p1 storage, p2 format (1), p3 count photos from 0 again (1)."""
+        camera = self._camera
+        storage, wanted, reset_log, *_ = (whole(value, -1) for value in parameters(message))
+        if storage not in (0, STORAGE_ID) or wanted != 1:
+            return _DENIED
+        if camera.recording_since_us is not None or camera.trigger.series:
+            return _REJECTED
+        camera.storage.format(reset_log=reset_log == 1)
+        camera.send(camera.storage.message(camera.time_ms))
+        camera.tell_status()
+        return _ACCEPTED
+
+    # the stream
+
+    def _set_streaming(self, message: Any, running: bool) -> int | None:
+        stream = self._camera.stream
+        if stream is None:
+            return _UNSUPPORTED
+        if whole(message.param1, -1) not in (0, STREAM_ID):
+            return _DENIED
+        stream.running = running
+        self._camera.send(stream.status(self._fov_deg()))
+        return _ACCEPTED
+
+    def _send_stream(self, number: float) -> int:
+        stream = self._camera.stream
+        if stream is None:
+            return _UNSUPPORTED
+        if whole(number, -1) not in (0, STREAM_ID):
+            return _DENIED
+        self._camera.send(stream.information(self._fov_deg()))
+        return _ACCEPTED
+
+    def _send_stream_status(self, number: float) -> int:
+        stream = self._camera.stream
+        if stream is None:
+            return _UNSUPPORTED
+        if whole(number, -1) not in (0, STREAM_ID):
+            return _DENIED
+        self._camera.send(stream.status(self._fov_deg()))
+        return _ACCEPTED
+
+    def _fov_deg(self) -> float:
+        return math.degrees(self._camera.lens.fov_rad[0])
+
+    # following things
+
+    def _track_point(self, message: Any, sender: Sender) -> int | None:
+        x, y, radius, *_ = parameters(message)
+        return self._tracked(self._camera.tracker.follow_point(x, y, radius))
+
+    def _track_rectangle(self, message: Any, sender: Sender) -> int | None:
+        return self._tracked(self._camera.tracker.follow_rectangle(*parameters(message)[:4]))
+
+    def _tracked(self, found: bool) -> int:
+        self._camera.send(self._camera.tracker.message())
+        return _ACCEPTED if found else _FAILED
+
+    def _stop_tracking(self, message: Any, sender: Sender) -> int | None:
+        self._camera.tracker.stop()
+        self._camera.send(self._camera.tracker.message())
+        return _ACCEPTED
+
+    # what is asked for again
+
+    def _send_photo(self, index: float) -> int:
+        """CAMERA_IMAGE_CAPTURED of a photo by its index; -1: the newest."""
+        storage, number = self._camera.storage, whole(index, -2)
+        message = storage.log.get(storage.images - 1 if number == -1 else number)
+        if message is None:
+            return _DENIED
+        self._camera.send(message)
+        return _ACCEPTED
+
+    def _send_storage(self, number: float) -> int:
+        if whole(number, -1) not in (0, STORAGE_ID):
+            return _DENIED
+        self._camera.send(self._camera.storage.message(self._camera.time_ms))
+        return _ACCEPTED
+
+    def _old_request(self, message: Any, sender: Sender) -> int | None:
+        """Commands from before REQUEST_MESSAGE."""
+        return self._camera.request(_OLD_REQUESTS[message.command])
+
+    def _old_stream_information(self, message: Any, sender: Sender) -> int | None:
+        return self._send_stream(message.param1)
+
+    def _old_stream_status(self, message: Any, sender: Sender) -> int | None:
+        return self._send_stream_status(message.param1)

@@ -1,0 +1,201 @@
+"""What the camera component tells: each function makes one message of its present state."""
+
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.component import fixed_text
+from autopilot_bridge.payload.vehicle_heard import Quaternion, forward_axis
+from flightsim.payload import Detection
+
+if TYPE_CHECKING:
+    from autopilot_bridge.payload.camera import CameraComponent
+
+SENSOR_WIDTH_MM: Final = 6.0  # a 1/2.3-inch sensor; with the field of view it gives the focal length
+_FILM_WIDTH_MM: Final = 36.0
+_NO_NUMBER: Final = 255
+_UNKNOWN_DEGE7: Final = 2**31 - 1
+_FARTHEST_M: Final = 20_000.0  # beyond, the ground is no plane
+
+
+def information(camera: "CameraComponent") -> Any:
+    """CAMERA_INFORMATION."""
+    model = camera.device.parameters.model
+    flags = (
+        mavlink.CAMERA_CAP_FLAGS_CAPTURE_IMAGE
+        | mavlink.CAMERA_CAP_FLAGS_CAPTURE_VIDEO
+        | mavlink.CAMERA_CAP_FLAGS_HAS_MODES
+        | mavlink.CAMERA_CAP_FLAGS_HAS_IMAGE_SURVEY_MODE
+        | mavlink.CAMERA_CAP_FLAGS_CAN_CAPTURE_IMAGE_IN_VIDEO_MODE
+        | mavlink.CAMERA_CAP_FLAGS_CAN_CAPTURE_VIDEO_IN_IMAGE_MODE
+        | mavlink.CAMERA_CAP_FLAGS_HAS_TRACKING_POINT
+        | mavlink.CAMERA_CAP_FLAGS_HAS_TRACKING_RECTANGLE
+        | mavlink.CAMERA_CAP_FLAGS_HAS_TRACKING_GEO_STATUS
+    )
+    flags |= mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_ZOOM if camera.lens.has_zoom else 0
+    flags |= mavlink.CAMERA_CAP_FLAGS_HAS_BASIC_FOCUS if camera.lens.has_focus else 0
+    flags |= mavlink.CAMERA_CAP_FLAGS_HAS_VIDEO_STREAM if camera.stream is not None else 0
+    return mavlink.MAVLink_camera_information_message(
+        camera.time_ms,
+        fixed_text("flightstack", 32),
+        fixed_text("simulated camera", 32),
+        0x01000000,
+        camera.lens.focal_mm,
+        SENSOR_WIDTH_MM,
+        SENSOR_WIDTH_MM * model.height_px / model.width_px,
+        model.width_px,
+        model.height_px,
+        0,
+        flags,
+        0,
+        b"",
+        gimbal_device_id=camera.gimbal_device_id,
+    )
+
+
+def capture_status(camera: "CameraComponent", time_us: int) -> Any:
+    """CAMERA_CAPTURE_STATUS; between two photos of a series the camera is idle with an interval set."""
+    since_us = camera.recording_since_us
+    return mavlink.MAVLink_camera_capture_status_message(
+        camera.time_ms,
+        2 if camera.trigger.series else 0,
+        1 if since_us is not None else 0,
+        1e-6 * camera.trigger.interval_us if camera.trigger.series else 0.0,
+        0 if since_us is None else (time_us - since_us) // 1000 & 0xFFFFFFFF,
+        max(0.0, camera.storage.available_mib - camera.recorded_mib),
+        camera.storage.images,
+    )
+
+
+def image_captured(camera: "CameraComponent", time_us: int, index: int, name: str) -> Any:
+    """CAMERA_IMAGE_CAPTURED: place by the autopilot, orientation as the camera knows it."""
+    here = camera.heard.located(time_us)
+    q = camera.orientation
+    relative_alt_m = camera.heard.relative_alt_m
+    return mavlink.MAVLink_camera_image_captured_message(
+        camera.time_ms,
+        camera.heard.unix_us(time_us),
+        0,
+        0 if here is None else round(here.lat_deg * 1e7),
+        0 if here is None else round(here.lon_deg * 1e7),
+        0 if here is None else round(here.alt_m * 1e3),
+        0 if here is None or math.isnan(relative_alt_m) else round(relative_alt_m * 1e3),
+        [math.nan] * 4 if q is None else list(q),
+        index,
+        1,
+        fixed_text(name, 205),
+    )
+
+
+def photo_notes(camera: "CameraComponent") -> dict[str, float]:
+    """What goes into a photo's file."""
+    notes = {
+        "focal_mm": camera.lens.focal_mm,
+        "focal_35_mm": camera.lens.focal_mm * _FILM_WIDTH_MM / SENSOR_WIDTH_MM,
+    }
+    here, q = camera.heard.located(camera.time_us), camera.orientation
+    if here is not None:
+        notes |= {"lat_deg": here.lat_deg, "lon_deg": here.lon_deg, "alt_m": here.alt_m}
+    if q is not None:
+        north, east, _ = forward_axis(q)
+        notes["yaw_deg"] = math.degrees(math.atan2(east, north))
+    unix_us = camera.heard.unix_us(camera.time_us)
+    if unix_us:
+        notes["unix_us"] = unix_us
+    return notes
+
+
+def fov_status(camera: "CameraComponent", time_us: int) -> Any:
+    """CAMERA_FOV_STATUS: where the camera is, and the ground in the middle of its picture."""
+    here, q = camera.heard.located(time_us), camera.orientation
+    ground = None if here is None or q is None else ground_point(camera, here, forward_axis(q))
+    width_rad, height_rad = camera.lens.fov_rad
+    return mavlink.MAVLink_camera_fov_status_message(
+        camera.time_ms,
+        *_dege7(here),
+        *_dege7(ground),
+        [math.nan] * 4 if q is None else list(q),
+        math.degrees(width_rad),
+        math.degrees(height_rad),
+    )
+
+
+def tracking_geo_status(camera: "CameraComponent", time_us: int) -> Any:
+    """CAMERA_TRACKING_GEO_STATUS: where on the ground the tracked thing is."""
+    tracker, here, q = camera.tracker, camera.heard.located(time_us), camera.orientation
+    place, distance_m, heading_rad = None, math.nan, math.nan
+    if tracker.thing is not None and here is not None and q is not None:
+        right, down = tracker.thing.detection.normalised
+        place = ground_point(camera, here, _turned(q, (1.0, right, down)))
+        if place is not None:
+            north_m, east_m, down_m = LocalFrame(here).ned_from_geodetic(
+                place.lat_deg, place.lon_deg, place.alt_m
+            )
+            distance_m = math.hypot(north_m, east_m, down_m)
+            heading_rad = math.atan2(east_m, north_m)
+    lat, lon, _ = _dege7(place)
+    nan = math.nan
+    return mavlink.MAVLink_camera_tracking_geo_status_message(
+        tracker.status(),
+        0 if place is None else lat,
+        0 if place is None else lon,
+        nan if place is None else place.alt_m,
+        *(nan,) * 6,
+        distance_m,
+        heading_rad,
+        nan,
+    )
+
+
+def ground_point(
+    camera: "CameraComponent", here: GeodeticPosition, ray_ned: tuple[float, float, float]
+) -> GeodeticPosition | None:
+    """Where a ray meets level ground at home's height; None: nowhere near."""
+    height_m = here.alt_m - camera.heard.home_alt_m
+    north, east, down = ray_ned
+    if not (height_m > 0.0 and down > 0.0 and height_m / down * math.hypot(north, east) < _FARTHEST_M):
+        return None
+    lat_deg, lon_deg, alt_m = LocalFrame(here).geodetic_from_ned(
+        height_m / down * north, height_m / down * east, height_m
+    )
+    return GeodeticPosition(lat_deg=max(-90.0, min(90.0, lat_deg)), lon_deg=lon_deg, alt_m=alt_m)
+
+
+def landing_target(detection: Detection) -> Any:
+    """LANDING_TARGET of a detection."""
+    tagged = detection.target_id >= 0
+    return mavlink.MAVLink_landing_target_message(
+        detection.time_us,
+        detection.target_id if 0 <= detection.target_id < _NO_NUMBER else _NO_NUMBER,
+        mavlink.MAV_FRAME_BODY_FRD,
+        detection.angle_x_rad,
+        detection.angle_y_rad,
+        detection.distance_m,
+        detection.size_rad,
+        detection.size_rad,
+        0.0,
+        0.0,
+        0.0,
+        [1.0, 0.0, 0.0, 0.0],
+        mavlink.LANDING_TARGET_TYPE_VISION_FIDUCIAL if tagged else mavlink.LANDING_TARGET_TYPE_VISION_OTHER,
+        0,
+    )
+
+
+def _dege7(place: GeodeticPosition | None) -> tuple[int, int, int]:
+    """Latitude, longitude (degE7) and altitude (mm); INT32_MAX: not known."""
+    if place is None:
+        return (_UNKNOWN_DEGE7,) * 3
+    return round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), round(place.alt_m * 1e3)
+
+
+def _turned(q: Quaternion, v: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A vector of the mount's frame in NED."""
+    w, x, y, z = q
+    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
+    return (
+        v[0] + w * tx + y * tz - z * ty,
+        v[1] + w * ty + z * tx - x * tz,
+        v[2] + w * tz + x * ty - y * tx,
+    )

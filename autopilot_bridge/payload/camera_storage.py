@@ -1,0 +1,72 @@
+"""What a camera has taken and where it is kept: counts, the log of photos, the memory card."""
+
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.component import fixed_text
+
+CAPACITY_MIB: Final = 32_768.0
+IMAGE_MIB: Final = 4.0
+VIDEO_MIB_S: Final = 1.0
+STORAGE_ID: Final = 1
+_REMEMBERED: Final = 20_000  # photos that can be asked for again
+
+
+@dataclass(slots=True)
+class CameraStorage:
+    """One card.
+
+    Attributes:
+        used_mib: of it.
+        images: taken since it was formatted (or the log was reset).
+        log: CAMERA_IMAGE_CAPTURED of each, by index.
+    """
+
+    used_mib: float = 0.0
+    images: int = 0
+    log: dict[int, Any] = field(default_factory=dict)
+
+    @property
+    def available_mib(self) -> float:
+        """Left on it."""
+        return max(0.0, CAPACITY_MIB - self.used_mib)
+
+    @property
+    def full(self) -> bool:
+        """No photo more fits."""
+        return self.available_mib < IMAGE_MIB
+
+    def add_photo(self, message: Any) -> None:
+        """Keep a photo and what is told of it."""
+        self.used_mib += IMAGE_MIB
+        self.log[message.image_index] = message
+        self.images += 1
+        if len(self.log) > _REMEMBERED:
+            del self.log[next(iter(self.log))]
+
+    def format(self, *, reset_log: bool) -> None:
+        """Forget what is on the card; with `reset_log` photos are counted from 0 again."""
+        self.used_mib = 0.0
+        if reset_log:
+            self.images = 0
+            self.log.clear()
+
+    def message(self, time_ms: int) -> Any:
+        """STORAGE_INFORMATION."""
+        return mavlink.MAVLink_storage_information_message(
+            time_ms,
+            STORAGE_ID,
+            1,
+            mavlink.STORAGE_STATUS_READY,
+            CAPACITY_MIB,
+            CAPACITY_MIB - self.available_mib,
+            self.available_mib,
+            90.0,
+            60.0,
+            mavlink.STORAGE_TYPE_MICROSD,
+            fixed_text("simulated card", 32),
+            mavlink.STORAGE_USAGE_FLAG_SET
+            | mavlink.STORAGE_USAGE_FLAG_PHOTO
+            | mavlink.STORAGE_USAGE_FLAG_VIDEO,
+        )

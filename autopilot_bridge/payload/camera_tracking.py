@@ -1,0 +1,127 @@
+"""Following a thing in the picture (CAMERA_TRACK_POINT, CAMERA_TRACK_RECTANGLE) among what is detected.
+
+Places in the picture are shares of its width and height from the upper left corner, as the protocol has them.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from flightsim.payload import CameraFrame, Detection, PinholeModel
+
+_COASTING_US: Final = 2_000_000
+_REACH: Final = 0.05  # around a point that is asked for
+_GATE: Final = 0.12  # from frame to frame
+_LEAST_SIDE: Final = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedThing:
+    """What is followed, as it was seen last."""
+
+    x: float
+    y: float
+    size: float
+    tag_id: int
+    time_us: int
+    detection: Detection
+
+
+class CameraTracker:
+    """Follows one detection from frame to frame.
+
+    Attributes:
+        mode: CAMERA_TRACKING_MODE.
+        thing: what is followed; None: nothing.
+    """
+
+    def __init__(self, model: PinholeModel) -> None:
+        self._model = model
+        self.mode = int(mavlink.CAMERA_TRACKING_MODE_NONE)
+        self.thing: TrackedThing | None = None
+        self._frame: CameraFrame | None = None
+        self._lost = False
+
+    def follow_point(self, x: float, y: float, radius: float) -> bool:
+        """Follow what is at a point; False: nothing is there."""
+        reach = radius if 0.0 < radius <= 1.0 else _REACH
+        return self._begin(mavlink.CAMERA_TRACKING_MODE_POINT, x, y, max(reach, _REACH))
+
+    def follow_rectangle(self, left: float, top: float, right: float, bottom: float) -> bool:
+        """Follow what is in a rectangle; False: nothing is in it."""
+        if not (left < right and top < bottom):
+            return False
+        half = 0.5 * max(right - left, bottom - top, 2.0 * _LEAST_SIDE)
+        middle = 0.5 * (left + right), 0.5 * (top + bottom)
+        return self._begin(mavlink.CAMERA_TRACKING_MODE_RECTANGLE, *middle, half)
+
+    def stop(self) -> None:
+        """Follow nothing."""
+        self.mode = int(mavlink.CAMERA_TRACKING_MODE_NONE)
+        self.thing = None
+        self._lost = False
+
+    def tell(self, frame: CameraFrame) -> None:
+        """A new frame."""
+        self._frame = frame
+        thing = self.thing
+        if thing is None:
+            return
+        found = self._nearest(frame, thing.x, thing.y, _GATE, thing.tag_id)
+        if found is not None:
+            self.thing = found
+        elif frame.time_us - thing.time_us > _COASTING_US:
+            self.stop()
+            self._lost = True
+
+    def status(self) -> int:
+        """CAMERA_TRACKING_STATUS_FLAGS."""
+        if self.thing is None:
+            lost = mavlink.CAMERA_TRACKING_STATUS_FLAGS_ERROR
+            return int(lost if self._lost else mavlink.CAMERA_TRACKING_STATUS_FLAGS_IDLE)
+        fresh = self._frame is not None and self.thing.time_us == self._frame.time_us
+        active = int(mavlink.CAMERA_TRACKING_STATUS_FLAGS_ACTIVE)
+        return active if fresh else active | int(mavlink.CAMERA_TRACKING_STATUS_FLAGS_COASTING)
+
+    def message(self) -> Any:
+        """CAMERA_TRACKING_IMAGE_STATUS."""
+        thing, nan = self.thing, math.nan
+        point, rectangle = (nan, nan, nan), (nan, nan, nan, nan)
+        if thing is not None:
+            half = max(0.5 * thing.size, 0.5 * _LEAST_SIDE)
+            aspect = self._model.width_px / self._model.height_px
+            point = (thing.x, thing.y, half)
+            rectangle = (thing.x - half, thing.y - half * aspect, thing.x + half, thing.y + half * aspect)
+        return mavlink.MAVLink_camera_tracking_image_status_message(
+            self.status(),
+            self.mode,
+            mavlink.CAMERA_TRACKING_TARGET_DATA_IN_STATUS if thing is not None else 0,
+            *(point if self.mode == mavlink.CAMERA_TRACKING_MODE_POINT else (nan, nan, nan)),
+            *(rectangle if self.mode == mavlink.CAMERA_TRACKING_MODE_RECTANGLE else (nan,) * 4),
+        )
+
+    def _begin(self, mode: int, x: float, y: float, reach: float) -> bool:
+        if self._frame is None or not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
+            return False
+        found = self._nearest(self._frame, x, y, reach, None)
+        if found is None:
+            return False
+        self.thing, self.mode, self._lost = found, int(mode), False
+        return True
+
+    def _nearest(
+        self, frame: CameraFrame, x: float, y: float, reach: float, tag_id: int | None
+    ) -> TrackedThing | None:
+        model = self._model
+        best, thing = reach, None
+        for detection in frame.detections:
+            if tag_id is not None and detection.target_id != tag_id:
+                continue
+            place = detection.u_px / model.width_px, detection.v_px / model.height_px
+            distance = math.hypot(place[0] - x, (place[1] - y) * model.height_px / model.width_px)
+            if distance <= best:
+                best = distance
+                size = detection.size_rad * model.focal_px / model.width_px
+                thing = TrackedThing(*place, size, detection.target_id, frame.time_us, detection)
+        return thing

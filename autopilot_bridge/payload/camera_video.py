@@ -1,0 +1,63 @@
+"""The camera's video stream as MAVLink tells of it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.component import fixed_text
+
+STREAM_ID = 1
+
+
+@dataclass(slots=True)
+class VideoStream:
+    """One stream that somebody serves.
+
+    Attributes:
+        uri: where; RTSP.
+        width_px, height_px, rate_hz: of its pictures.
+        bitrate: bits per second, about.
+        running: it gives pictures (VIDEO_STOP_STREAMING).
+    """
+
+    uri: str
+    width_px: int
+    height_px: int
+    rate_hz: float
+    bitrate: int
+    running: bool = True
+
+    def information(self, fov_deg: float) -> Any:
+        """VIDEO_STREAM_INFORMATION."""
+        return mavlink.MAVLink_video_stream_information_message(
+            STREAM_ID,
+            1,
+            mavlink.VIDEO_STREAM_TYPE_RTSP,
+            self._flags,
+            self.rate_hz,
+            self.width_px,
+            self.height_px,
+            self.bitrate,
+            0,
+            round(fov_deg),
+            fixed_text("camera", 32),
+            fixed_text(self.uri, 160),
+            encoding=mavlink.VIDEO_STREAM_ENCODING_H264,
+        )
+
+    def status(self, fov_deg: float) -> Any:
+        """VIDEO_STREAM_STATUS."""
+        return mavlink.MAVLink_video_stream_status_message(
+            STREAM_ID,
+            self._flags,
+            self.rate_hz,
+            self.width_px,
+            self.height_px,
+            self.bitrate,
+            0,
+            round(fov_deg),
+        )
+
+    @property
+    def _flags(self) -> int:
+        return int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0

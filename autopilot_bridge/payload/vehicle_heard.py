@@ -1,0 +1,113 @@
+"""What devices know of the vehicle they hang on: what its autopilot has told on their bus, no more."""
+
+import math
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mavlink import dialect as mavlink
+
+AUTOPILOT: Final = int(mavlink.MAV_COMP_ID_AUTOPILOT1)
+STALE_US: Final = 3_000_000
+_LAT_MAX: Final = 900_000_000
+_LON_MAX: Final = 1_800_000_000
+
+Quaternion = tuple[float, float, float, float]
+
+
+class VehicleHeard:
+    """The newest of position, attitude and time of one vehicle.
+
+    Attributes:
+        position: by GLOBAL_POSITION_INT; None: never told.
+        relative_alt_m: height over home.
+        velocity_ned_m_s: over ground.
+        heading_rad: of the nose from north; NaN: not told.
+        q_ned_from_frd: by ATTITUDE; None: never told.
+        armed: by its heartbeat.
+    """
+
+    def __init__(self, system_id: int) -> None:
+        self._system_id = system_id
+        self.position: GeodeticPosition | None = None
+        self.relative_alt_m = math.nan
+        self.velocity_ned_m_s = (0.0, 0.0, 0.0)
+        self.heading_rad = math.nan
+        self.q_ned_from_frd: Quaternion | None = None
+        self.armed = False
+        self._position_us = -STALE_US
+        self._unix_minus_boot_us: int | None = None
+
+    def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> bool:
+        """Take a message; True when it told something new. Contents never raise."""
+        if sender != (self._system_id, AUTOPILOT):
+            return False
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT:
+                return self._note_position(message, time_us)
+            case mavlink.MAVLINK_MSG_ID_ATTITUDE:
+                if not all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
+                    return False
+                self.q_ned_from_frd = quaternion(message.roll, message.pitch, message.yaw)
+            case mavlink.MAVLINK_MSG_ID_SYSTEM_TIME:
+                if message.time_unix_usec == 0:
+                    return False
+                self._unix_minus_boot_us = message.time_unix_usec - time_us
+            case mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+                self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+            case _:
+                return False
+        return True
+
+    def located(self, time_us: int) -> GeodeticPosition | None:
+        """The position while it is fresh; None: not known."""
+        return self.position if time_us - self._position_us < STALE_US else None
+
+    @property
+    def home_alt_m(self) -> float:
+        """Above mean sea level; NaN: not known."""
+        return math.nan if self.position is None else self.position.alt_m - self.relative_alt_m
+
+    def unix_us(self, time_us: int) -> int:
+        """The calendar's time; 0: not known."""
+        return 0 if self._unix_minus_boot_us is None else time_us + self._unix_minus_boot_us
+
+    def _note_position(self, message: Any, time_us: int) -> bool:
+        if abs(message.lat) > _LAT_MAX or abs(message.lon) > _LON_MAX or (message.lat == 0 == message.lon):
+            return False
+        self.position = GeodeticPosition(
+            lat_deg=1e-7 * message.lat, lon_deg=1e-7 * message.lon, alt_m=1e-3 * message.alt
+        )
+        self.relative_alt_m = 1e-3 * message.relative_alt
+        self.velocity_ned_m_s = (1e-2 * message.vx, 1e-2 * message.vy, 1e-2 * message.vz)
+        self.heading_rad = math.radians(1e-2 * message.hdg) if message.hdg < 36000 else math.nan
+        self._position_us = time_us
+        return True
+
+
+def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Hamilton quaternion (w, x, y, z) of Euler angles, radians, in the order yaw, pitch, roll."""
+    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
+    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
+    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """a (x) b, Hamilton."""
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )
+
+
+def forward_axis(q: Quaternion) -> tuple[float, float, float]:
+    """Where the x axis of a frame points (north, east, down)."""
+    w, x, y, z = q
+    return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
