@@ -10,6 +10,7 @@ import click
 
 from autopilot_bridge.errors import BridgeError
 from missions.cli_types import SLOWEST, FiniteRange
+from missions.cli_video import start_video, video_options
 from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
 
 _LOG_RATE_HZ = 4
@@ -149,6 +150,7 @@ def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
 @click.option(
     "--map-target", metavar="NORTH,EAST", help="A target's magnetic signature there, m from the map's home."
 )
+@video_options
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
@@ -171,6 +173,8 @@ def sitl(
     targets: tuple[str, ...],
     map_file: str | None,
     map_target: str | None,
+    video: str | None,
+    pictures: Path | None,
     params: str | None,
     log: str | None,
     no_wait: bool,
@@ -232,6 +236,7 @@ def sitl(
         world = Sitl(equipped(configuration, _scenario(camera, targets, map_file, map_target)))
         compile_flight_code(world.configuration.vehicles)
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
+        pictured = start_video(world, video, pictures)
         recorder = None if log is None else TlogWriter(log)
         opened = server.open(ports)
         if recorder is not None:
@@ -244,6 +249,8 @@ def sitl(
     for vehicle, port, address in opened:
         system_id = vehicle.specification.system_id
         click.echo(f"vehicle {system_id} ({autopilot} {vehicle.specification.model}): {address} {port.role}")
+    for uri in () if pictured is None else pictured.uris:
+        click.echo(f"video: {uri}")
     click.echo("ready, Ctrl-C ends it")
     sys.stdout.flush()
     waits = autopilot == "ardupilot" and ports is None and not no_wait
@@ -262,6 +269,8 @@ def sitl(
         )
     finally:
         world.close()
+        if pictured is not None:
+            pictured.close()
         if recorder is not None:
             recorder.close()
         for number, handler in before.items():

@@ -138,6 +138,11 @@ class VideoService:
             return None
         return f"rtsp://{self._parameters.host}:{self.port}/{self._cameras[index].name}"
 
+    @property
+    def uris(self) -> tuple[str, ...]:
+        """Where all streams are."""
+        return tuple(uri for index in range(len(self._cameras)) if (uri := self.uri(index)) is not None)
+
     def size_px(self, index: int) -> tuple[int, int]:
         """Width and height of a camera's stream."""
         return stream_size_px(self._cameras[index].model, self._parameters.width_px)

@@ -1,0 +1,60 @@
+"""Options of `flightstack sitl` about the pictures of its cameras."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from autopilot_bridge.sitl import Sitl
+    from autopilot_bridge.video import VideoService
+
+
+def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Adds --video and --pictures."""
+    command = click.option(
+        "--pictures",
+        type=click.Path(path_type=Path, file_okay=False),
+        metavar="DIR",
+        help="Keep photos and videos that the cameras take, in a new folder.",
+    )(command)
+    return click.option(
+        "--video",
+        metavar="[HOST:]PORT|off",
+        help="Where to serve the cameras' video (RTSP). [default: 127.0.0.1, from port 8554 on]",
+    )(command)
+
+
+def start_video(world: "Sitl", video: str | None, pictures: Path | None) -> "VideoService | None":
+    """Serve video and keep pictures as the options say; None: there is nothing to do.
+
+    Raises:
+        ValueError: an option that can't be met, or one that needs a camera.
+    """
+    cameras = any(vehicle.payload is not None and vehicle.payload.camera for vehicle in world.vehicles)
+    if not cameras:
+        if video is not None or pictures is not None:
+            option = "--video" if video is not None else "--pictures"
+            raise ValueError(f"{option} is for cameras; add --camera")
+        return None
+    if video == "off" and pictures is None:
+        return None
+    from autopilot_bridge.video import VideoParameters
+    from autopilot_bridge.video.for_sitl import show_cameras
+
+    if video == "off":
+        parameters = VideoParameters(port=None, folder=pictures)
+    elif video is None:
+        parameters = VideoParameters(folder=pictures)
+    else:
+        host, port = _place(video)
+        parameters = VideoParameters(host=host, port=port, any_port=False, folder=pictures)
+    return show_cameras(world, parameters)
+
+
+def _place(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not (port.isascii() and port.isdigit() and len(port) <= 5):
+        raise ValueError(f"--video {text!r} is not accepted: PORT, HOST:PORT or off is, for example 8554")
+    return host or "127.0.0.1", int(port)
