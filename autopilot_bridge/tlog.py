@@ -31,6 +31,38 @@ FLUSH_INTERVAL_US: Final = 1_000_000
 _CHUNK_BYTES: Final = 1 << 20
 
 
+def append_records(buffer: bytearray, time_us: int, packet: bytes) -> int:
+    """Append the frames of a packet that a channel of ours has sent, as records, to the bytes of a log.
+
+    They are told apart by their lengths only; what comes from elsewhere goes through a parser first.
+
+    Args:
+        buffer: where to.
+        time_us: microseconds of the Unix epoch.
+        packet: one or more whole MAVLink 2 frames, one behind the other, unsigned.
+
+    Returns:
+        How many records.
+
+    Raises:
+        TlogError: the packet does not end with a frame.
+    """
+    frames = [b""]
+    start, size = 0, len(packet)
+    try:
+        while start < size and packet[start] == MAGIC_V2:
+            end = start + _OVERHEAD_V2 + packet[start + 1]
+            frames.append(packet[start:end])
+            start = end
+    except IndexError:  # it ends with the first byte of a frame
+        pass
+    if start != size:
+        torn = size - len(frames[-1]) if start > size else start
+        raise TlogError(f"a packet of {size} bytes has no whole frame at byte {torn}")
+    buffer += _pack_time(time_us).join(frames)
+    return len(frames) - 1
+
+
 class TlogWriter:
     """Writes a new log; whole records only, so that the file is readable whatever ends the process.
 
@@ -89,15 +121,7 @@ class TlogWriter:
         Raises:
             TlogError: the packet does not end with a frame, the log is closed, or the disk is full.
         """
-        buffer, stamp = self._buffer, _pack_time(time_us)
-        start, size = 0, len(packet)
-        while start < size:
-            end = start + _OVERHEAD_V2 + (packet[start + 1] if start + 1 < size else 0)
-            if end > size or packet[start] != MAGIC_V2:
-                raise TlogError(f"a packet of {size} bytes has no whole frame at byte {start}")
-            buffer += stamp + packet[start:end]
-            self.records += 1
-            start = end
+        self.records += append_records(self._buffer, time_us, packet)
         self._flush_if_due(time_us)
 
     def _flush_if_due(self, time_us: int) -> None:

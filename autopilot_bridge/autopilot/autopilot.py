@@ -29,7 +29,6 @@ from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Channel, Service, Source, TimedService
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
-from autopilot_bridge.services.file_transfer import FileTransferService
 from autopilot_bridge.services.message_interval import MessageIntervalService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.mission import MissionService, new_stores
@@ -37,7 +36,10 @@ from autopilot_bridge.services.parameters import ParameterService
 from autopilot_bridge.services.radio import RadioService
 from autopilot_bridge.services.setpoints import SetpointService
 from autopilot_bridge.services.status_text import StatusTextService
+from autopilot_bridge.services.stored_parameters import boot_parameters
 from autopilot_bridge.services.timesync import TimeSyncService
+from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
+from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.telemetry.ardupilot import STREAM_RATE_PARAMETERS, ArdupilotMessages
 from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
@@ -109,6 +111,8 @@ class Autopilot:
         envelope: what the aircraft can do; None for a multicopter.
         unix_epoch_us: Unix time of boot.
         inject_failure: takes MAV_CMD_INJECT_FAILURE; None: not supported.
+        card: its memory card; None: an empty one in memory.
+        power: restarts the vehicle, or shuts it down; None: nobody can.
 
     Attributes:
         actuators: motor commands of the newest step (flightsim.interface).
@@ -130,6 +134,8 @@ class Autopilot:
         envelope: "FlightEnvelope | None" = None,
         unix_epoch_us: int = 0,
         inject_failure: FailureHook | None = None,
+        card: MemoryCard | None = None,
+        power: PowerHook | None = None,
     ) -> None:
         if physics_rate_hz % SLOW_RATE_HZ:
             raise ValueError(f"physics rate {physics_rate_hz} Hz is not a multiple of {SLOW_RATE_HZ} Hz")
@@ -150,6 +156,18 @@ class Autopilot:
         if envelope is not None and flavour.airframe_of is not None:
             airframe.update(flavour.airframe_of(envelope))
         self.parameters = ParameterStore(flavour.parameter_definitions(), {**airframe, **(parameters or {})})
+        card = card or MemoryCard()
+        memory = VehicleMemory(
+            card=card,
+            stored=boot_parameters(
+                self.parameters, card, flavour.name, system_id=system_id, given=parameters or {}
+            ),
+            time_us=lambda: self._time_us,
+            unix_epoch_us=unix_epoch_us,
+            add_channel=lambda channel, role: self.add_channel(channel, role=role),
+            remove_channel=self.remove_channel,
+            power=power,
+        )
         self.navigation = NavigationFilter(
             flavour.navigation_parameters(self.parameters), readings=readings, physics_rate_hz=physics_rate_hz
         )
@@ -205,6 +223,7 @@ class Autopilot:
                 stores=stores,
                 broadcast=self,
                 announce=self._texts.announce,
+                memory=memory,
             )
         )
         self._cache = PayloadCache(merged(self._messages.builders(), *(more.builders for more in self._more)))
@@ -227,14 +246,14 @@ class Autopilot:
             mission_item_count=lambda: len(stores[MissionType.MISSION].items),
             inject_failure=inject_failure,
         )
-        parameter_service = ParameterService(
+        self._parameter_service = ParameterService(
             self.parameters,
             firmware.parameters,
             self,
             on_list=lambda channel: self._texts.banner(channel),
         )
         self._timed: tuple[TimedService, ...] = (
-            parameter_service,
+            self._parameter_service,
             self.missions,
             *(more for more in self._more if type(more).tick is not Microservice.tick),
             self.intervals,
@@ -248,11 +267,10 @@ class Autopilot:
                 flavour.command_address(system_id),
                 merged(*(more.commands for more in self._more)),
             ),
-            parameter_service,
+            self._parameter_service,
             self.missions,
             TimeSyncService(answers_ping=firmware.answers_ping),
             RadioService(self._throttle),
-            FileTransferService(),
             *self._more,
             self.intervals,
             self._texts,
@@ -308,7 +326,9 @@ class Autopilot:
         self.channels.append(channel)
         self._tables[channel.name] = table
         self._table_list = list(self._tables.values())
-        if role != PAYLOAD_ROLE:
+        if role == LOG_ROLE:
+            self._parameter_service.list_on(channel)
+        elif role != PAYLOAD_ROLE:
             self._ports.append(table)
             self._apply_stream_rates(len(self._ports) - 1)
         if channel.line is not None:

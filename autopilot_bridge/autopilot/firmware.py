@@ -22,6 +22,7 @@ from autopilot_bridge.services.parameters import (
     PX4_PARAMETER_POLICY,
     ParameterPolicy,
 )
+from autopilot_bridge.services.vehicle_memory import LOG_ROLE
 from autopilot_bridge.telemetry import ardupilot, ardupilot_plane, px4, px4_plane
 from autopilot_bridge.telemetry.line import ARDUPILOT_FLOW_CONTROL, PX4_FLOW_CONTROL, FlowControl
 from flightsim.airframe import AirframeKind
@@ -64,6 +65,15 @@ class Firmware:
     position_pushed_at_arm: bool
 
 
+def _log_rates_hz(groups: Mapping[int, tuple[int, ...]]) -> Mapping[int, float]:
+    """What an ArduPilot, which streams nothing unasked, writes into its log."""
+    rates_hz = {message_id: 10.0 for group in groups.values() for message_id in group}
+    fast = (mavlink.MAVLINK_MSG_ID_ATTITUDE, mavlink.MAVLINK_MSG_ID_RAW_IMU)
+    return MappingProxyType(
+        {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **rates_hz, **dict.fromkeys(fast, 25.0)}
+    )
+
+
 _PX4: Final = Firmware(
     address=px4_address_rule,
     parameters=PX4_PARAMETER_POLICY,
@@ -76,7 +86,12 @@ _PX4: Final = Firmware(
         refuse_running=True,
     ),
     rates_hz=MappingProxyType(
-        {"onboard": px4.ONBOARD_RATES_HZ, "gcs": px4.GCS_RATES_HZ, PAYLOAD_ROLE: PAYLOAD_RATES_HZ}
+        {
+            "onboard": px4.ONBOARD_RATES_HZ,
+            "gcs": px4.GCS_RATES_HZ,
+            PAYLOAD_ROLE: PAYLOAD_RATES_HZ,
+            LOG_ROLE: px4.ONBOARD_RATES_HZ,
+        }
     ),
     answers_ping=True,
     flow_control=PX4_FLOW_CONTROL,
@@ -97,7 +112,12 @@ _ARDUPILOT: Final = Firmware(
         too_fast_text="Requested rate for message ID {} too fast. Increase SCHED_LOOP_RATE",
     ),
     rates_hz=MappingProxyType(
-        {"onboard": ardupilot.START_RATES_HZ, "gcs": ardupilot.START_RATES_HZ, PAYLOAD_ROLE: PAYLOAD_RATES_HZ}
+        {
+            "onboard": ardupilot.START_RATES_HZ,
+            "gcs": ardupilot.START_RATES_HZ,
+            PAYLOAD_ROLE: PAYLOAD_RATES_HZ,
+            LOG_ROLE: _log_rates_hz(ardupilot.STREAM_GROUPS),
+        }
     ),
     answers_ping=False,
     flow_control=ARDUPILOT_FLOW_CONTROL,
@@ -115,6 +135,7 @@ FIRMWARES: Final[Mapping[tuple[str, AirframeKind], Firmware]] = MappingProxyType
                     **_PX4.rates_hz,
                     "onboard": px4_plane.ONBOARD_RATES_HZ,
                     "gcs": px4_plane.GCS_RATES_HZ,
+                    LOG_ROLE: px4_plane.ONBOARD_RATES_HZ,
                 }
             ),
         ),
@@ -126,6 +147,9 @@ FIRMWARES: Final[Mapping[tuple[str, AirframeKind], Firmware]] = MappingProxyType
                 _ARDUPILOT.intervals,
                 max_rate_hz=_ARDUPLANE_MAX_RATE_HZ,
                 groups=ardupilot_plane.STREAM_GROUPS,
+            ),
+            rates_hz=MappingProxyType(
+                {**_ARDUPILOT.rates_hz, LOG_ROLE: _log_rates_hz(ardupilot_plane.STREAM_GROUPS)}
             ),
         ),
     }

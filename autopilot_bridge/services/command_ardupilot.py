@@ -55,9 +55,7 @@ class ArduPilotCommands(CommandHandlers):
             mavlink.MAV_CMD_DO_SET_SERVO: self.set_servo,
             mavlink.MAV_CMD_DO_GRIPPER: self.fail,
             mavlink.MAV_CMD_DO_FENCE_ENABLE: self.enable_fence,
-            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self.reboot_or_shutdown,
             mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self.calibrate,
-            mavlink.MAV_CMD_PREFLIGHT_STORAGE: self.storage,
         }
 
     @abstractmethod
@@ -197,12 +195,6 @@ class ArduPilotCommands(CommandHandlers):
             self.hooks.parameters.set("FENCE_ENABLE", action)
         return Result.ACCEPTED
 
-    def reboot_or_shutdown(self, command: Command, source: Source) -> Result:
-        """PREFLIGHT_REBOOT_SHUTDOWN: 1 and 3 reboot, when disarmed."""
-        if whole(command.p1) not in (1, 3):
-            return Result.UNSUPPORTED
-        return Result.ACCEPTED if self.reboot() is Result.ACCEPTED else Result.FAILED
-
     def calibrate(self, command: Command, source: Source) -> Result:
         """PREFLIGHT_CALIBRATION: gyro and pressure are in order; nothing or more is unsupported."""
         asked = [command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z]
@@ -210,11 +202,3 @@ class ArduPilotCommands(CommandHandlers):
         if not wanted or not wanted <= {0, 2}:
             return Result.UNSUPPORTED
         return Result.FAILED if self.commander.armed else Result.ACCEPTED
-
-    def storage(self, command: Command, source: Source) -> Result:
-        """PREFLIGHT_STORAGE: only the reset of all parameters."""
-        if whole(command.p1) != 2 or self.commander.armed:
-            return Result.DENIED
-        for definition in self.hooks.parameters.definitions:
-            self.hooks.parameters.set(definition.name, definition.default, check_range=False)
-        return Result.ACCEPTED

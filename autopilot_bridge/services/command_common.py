@@ -255,13 +255,6 @@ class CommandHandlers(ABC):
             return Result.DENIED
         return self.hooks.inject_failure(unit, kind, instance)
 
-    def reboot(self) -> Result:
-        """Restart the autopilot, when disarmed."""
-        if self.commander.armed:
-            return Result.DENIED
-        self.commander.emit(RebootRequested(time_us=self.commander.time_us))
-        return Result.ACCEPTED
-
     # places
 
     def ned_from(self, command: Command, *, relative: bool) -> tuple[float, float, float]:

@@ -42,9 +42,7 @@ class Px4Commands(CommandHandlers):
             mavlink.MAV_CMD_MISSION_START: self.start_mission,
             mavlink.MAV_CMD_DO_LAND_START: self.land_start,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.refuse,
-            mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self.reboot_or_shutdown,
             mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self.calibrate,
-            mavlink.MAV_CMD_PREFLIGHT_STORAGE: self.storage,
             mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self.request_protocol_version,
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self.silence,
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self.silence,
@@ -167,10 +165,6 @@ class Px4Commands(CommandHandlers):
         """DENIED, as the release does (flight termination is off by a circuit breaker)."""
         return Result.DENIED
 
-    def reboot_or_shutdown(self, command: Command, source: Source) -> Result:
-        """PREFLIGHT_REBOOT_SHUTDOWN: PX4's SITL refuses to reboot, and takes a request to do nothing."""
-        return Result.DENIED if whole(command.p1, 0) else Result.ACCEPTED
-
     def calibrate(self, command: Command, source: Source) -> Result:
         """PREFLIGHT_CALIBRATION: gyro, pressure and level need no help; the guided ones are not emulated."""
         if self.commander.armed:
@@ -180,14 +174,3 @@ class Px4Commands(CommandHandlers):
         if any(whole(value, 0) for value in interactive) or guided_accelerometer:
             return Result.UNSUPPORTED
         return Result.ACCEPTED
-
-    def storage(self, command: Command, source: Source) -> Result | None:
-        """PREFLIGHT_STORAGE: 0 and 1 load and save (parameters live in memory), 2 resets them."""
-        action = whole(command.p1, 0)
-        if action in (0, 1):
-            return Result.ACCEPTED
-        if action == 2 and not self.commander.armed:
-            for definition in self.hooks.parameters.definitions:
-                self.hooks.parameters.set(definition.name, definition.default, check_range=False)
-            return Result.ACCEPTED
-        return None

@@ -1,103 +1,316 @@
-"""MAVLink FTP of an autopilot without a file system.
+"""MAVLink FTP: the vehicle's files for ground stations.
 
-Both firmwares say that they speak FTP (MAV_PROTOCOL_CAPABILITY_FTP), so clients ask for files first: MAVProxy
-and QGroundControl for ArduPilot's packed parameters, QGroundControl for PX4's component metadata. Refused at
-once, they fall back to the other protocols; without an answer they wait through all their time-outs.
+Every client (system and component on a channel) has sessions of its own. A request that comes again, because
+its reply was lost, gets the same reply and is not carried out twice. Bursts and checksums of long files go on
+at 50 Hz, a piece at a time, so that they neither hold the vehicle up nor flood a line.
 
-Source: MAVLink file transfer protocol (header, opcodes, error codes), https://mavlink.io/en/services/ftp.html.
+A session gets the number that the client proposes, if it is free, else the lowest free one: PX4's clients
+take the number in the reply, ArduPilot's expect the one they have sent.
+
+Source: MAVLink file transfer protocol, https://mavlink.io/en/services/ftp.html.
 """
 
-import struct
-from enum import IntEnum
+import errno
+from collections.abc import Callable, Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
+from autopilot_bridge.services.ftp_protocol import (
+    HEADER,
+    MAX_DATA,
+    FtpError,
+    FtpRefusal,
+    Opcode,
+    Request,
+    crc32,
+    parse_request,
+    reply_payload,
+    uint32,
+)
+from autopilot_bridge.services.ftp_sessions import Burst, Client, Clients, Session
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.storage import FileStore, Mode, OpenFile, parse_path
 
-_HEADER: Final = struct.Struct("<HBBBBBxI")
-"""Sequence, session, opcode, size, requested opcode, burst complete, offset."""
-_PAYLOAD_BYTES: Final = 251
+BURST_REPLIES: Final = 100
+"""Replies in one burst; then the client asks on, which keeps it from being flooded at any speed."""
+REPLIES_PER_TICK: Final = 20
+"""On one channel: 240 kB/s of vehicle time, as over USB."""
+_CHECKSUM_BYTES_PER_TICK: Final = 512 * 1024
+_CHECK_US: Final = 1_000_000
+_MAX_SESSION: Final = 256
+_NOT_REPEATED: Final = frozenset(
+    {
+        Opcode.TERMINATE_SESSION,
+        Opcode.OPEN_FILE_RO,
+        Opcode.OPEN_FILE_WO,
+        Opcode.CREATE_FILE,
+        Opcode.REMOVE_FILE,
+        Opcode.CREATE_DIRECTORY,
+        Opcode.REMOVE_DIRECTORY,
+        Opcode.RENAME,
+    }
+)
+"""Requests that do something else when they are carried out twice."""
 
-
-class Opcode(IntEnum):
-    """Requests and replies."""
-
-    NONE = 0
-    TERMINATE_SESSION = 1
-    RESET_SESSIONS = 2
-    LIST_DIRECTORY = 3
-    OPEN_FILE_RO = 4
-    READ_FILE = 5
-    CREATE_FILE = 6
-    WRITE_FILE = 7
-    REMOVE_FILE = 8
-    CREATE_DIRECTORY = 9
-    REMOVE_DIRECTORY = 10
-    OPEN_FILE_WO = 11
-    TRUNCATE_FILE = 12
-    RENAME = 13
-    CALC_FILE_CRC32 = 14
-    BURST_READ_FILE = 15
-    ACK = 128
-    NAK = 129
-
-
-class FtpError(IntEnum):
-    """First data byte of a refusal."""
-
-    INVALID_SESSION = 4
-    END_OF_FILE = 6
-    UNKNOWN_COMMAND = 7
-    FILE_PROTECTED = 9
-    FILE_NOT_FOUND = 10
-
-
-_ROOT: Final = frozenset({b"", b"/", b"."})
-_ACCEPTED: Final = frozenset({Opcode.NONE, Opcode.TERMINATE_SESSION, Opcode.RESET_SESSIONS})
-_REFUSALS: Final = {
-    Opcode.OPEN_FILE_RO: FtpError.FILE_NOT_FOUND,
-    Opcode.READ_FILE: FtpError.INVALID_SESSION,
-    Opcode.CREATE_FILE: FtpError.FILE_PROTECTED,
-    Opcode.WRITE_FILE: FtpError.INVALID_SESSION,
-    Opcode.REMOVE_FILE: FtpError.FILE_NOT_FOUND,
-    Opcode.CREATE_DIRECTORY: FtpError.FILE_PROTECTED,
-    Opcode.REMOVE_DIRECTORY: FtpError.FILE_NOT_FOUND,
-    Opcode.OPEN_FILE_WO: FtpError.FILE_PROTECTED,
-    Opcode.TRUNCATE_FILE: FtpError.FILE_NOT_FOUND,
-    Opcode.RENAME: FtpError.FILE_NOT_FOUND,
-    Opcode.CALC_FILE_CRC32: FtpError.FILE_NOT_FOUND,
-    Opcode.BURST_READ_FILE: FtpError.INVALID_SESSION,
-}
+_Reply = tuple[bytes, int | None]
+"""Data of an acknowledgement, and the session it is about (None: as in the request)."""
 
 
-class FileTransferService:
-    """Answers every request as a file system with one empty directory."""
+class _Checksum:
+    """A checksum being made of a long file."""
+
+    __slots__ = ("client", "crc", "file", "offset", "request")
+
+    def __init__(self, client: Client, request: Request, file: OpenFile) -> None:
+        self.client = client
+        self.request = request
+        self.file = file
+        self.offset = 0
+        self.crc = 0
+
+
+class FileTransferService(Microservice):
+    """Answers FILE_TRANSFER_PROTOCOL from a tree of files.
+
+    Args:
+        files: what there is.
+    """
+
+    def __init__(self, files: FileStore) -> None:
+        self._files = files
+        self._clients = Clients()
+        self._checksums: list[_Checksum] = []
+        self._bursting = False
+        self._next_check_us = 0
+        self._handlers: Mapping[int, Callable[[Client, Request, int], _Reply | None]] = {
+            Opcode.NONE: lambda client, request, time_us: (b"", None),
+            Opcode.TERMINATE_SESSION: self._terminate,
+            Opcode.RESET_SESSIONS: self._reset,
+            Opcode.LIST_DIRECTORY: self._list,
+            Opcode.OPEN_FILE_RO: self._opener(Mode.READ),
+            Opcode.OPEN_FILE_WO: self._opener(Mode.WRITE),
+            Opcode.CREATE_FILE: self._opener(Mode.REPLACE),
+            Opcode.READ_FILE: self._read,
+            Opcode.BURST_READ_FILE: self._burst,
+            Opcode.WRITE_FILE: self._write,
+            Opcode.REMOVE_FILE: lambda client, request, time_us: self._at_path(request, files.remove),
+            Opcode.CREATE_DIRECTORY: lambda client, request, time_us: self._at_path(
+                request, files.make_directory
+            ),
+            Opcode.REMOVE_DIRECTORY: lambda client, request, time_us: self._at_path(
+                request, files.remove_directory
+            ),
+            Opcode.TRUNCATE_FILE: lambda client, request, time_us: self._at_path(
+                request, lambda path: files.truncate(path, request.offset)
+            ),
+            Opcode.RENAME: self._rename,
+            Opcode.CALC_FILE_CRC32: self._checksum,
+        }
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take FILE_TRANSFER_PROTOCOL; replies from others (ACK, NAK) are let pass."""
+        """Take FILE_TRANSFER_PROTOCOL; replies of others (ACK, NAK) are let pass."""
         if message.get_msgId() != mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
             return False
-        request = bytes(message.payload)
-        sequence, session, opcode, size, *_, offset = _HEADER.unpack_from(request)
-        if opcode in (Opcode.ACK, Opcode.NAK):
+        payload = bytes(message.payload)
+        request = parse_request(payload)
+        if request.opcode in (Opcode.ACK, Opcode.NAK):
             return True
-        error = refusal(opcode, request[_HEADER.size : _HEADER.size + size])
-        reply = Opcode.ACK if error is None else Opcode.NAK
-        data = b"" if error is None else bytes((error,))
-        payload = _HEADER.pack(sequence + 1 & 0xFFFF, session, reply, len(data), opcode, 0, offset) + data
-        source.channel.send(
-            mavlink.MAVLink_file_transfer_protocol_message(
-                0, source.system_id, source.component_id, payload.ljust(_PAYLOAD_BYTES, b"\0")
-            )
-        )
+        client = self._clients.client(source, time_us)
+        raw = payload[: HEADER.size + request.size]
+        reply = client.repeated(raw, time_us)
+        if reply is None:
+            reply = self._answer(client, request, time_us)
+            if reply is not None and request.opcode in _NOT_REPEATED:
+                client.remember(raw, reply, time_us)
+        if reply is not None:
+            _send(client, reply)
         return True
 
+    def tick(self, time_us: int) -> None:
+        """Go on with bursts and checksums; close what is left open."""
+        if self._bursting:
+            self._bursting = False
+            for client in tuple(self._clients):  # what is sent may be answered at once
+                self._continue_bursts(client)
+        if self._checksums:
+            self._continue_checksum()
+        if time_us >= self._next_check_us:
+            self._next_check_us = time_us + _CHECK_US
+            self._clients.close_idle(time_us)
 
-def refusal(opcode: int, data: bytes) -> FtpError | None:
-    """Why a request is refused; None when it is not."""
-    if opcode in _ACCEPTED:
-        return None
-    if opcode == Opcode.LIST_DIRECTORY:
-        return FtpError.END_OF_FILE if data.rstrip(b"\0") in _ROOT else FtpError.FILE_NOT_FOUND
-    return _REFUSALS.get(opcode, FtpError.UNKNOWN_COMMAND)  # type: ignore[call-overload]
+    def close(self) -> None:
+        """Close every session: the vehicle goes down."""
+        for client in self._clients:
+            client.close_all()
+        for work in self._checksums:
+            work.file.close()
+        self._checksums.clear()
+
+    def _answer(self, client: Client, request: Request, time_us: int) -> bytes | None:
+        """The reply to a request; None when it comes later."""
+        try:
+            handler = self._handlers.get(request.opcode)
+            if handler is None:
+                raise FtpRefusal.of(FtpError.UNKNOWN_COMMAND)
+            if request.size > MAX_DATA and request.opcode not in (Opcode.READ_FILE, Opcode.BURST_READ_FILE):
+                raise FtpRefusal.of(FtpError.INVALID_DATA_SIZE)
+            done = handler(client, request, time_us)
+        except FtpRefusal as refusal:
+            return reply_payload(request, Opcode.NAK, refusal.data)
+        except OSError as failure:
+            return reply_payload(request, Opcode.NAK, FtpRefusal.of_os_error(failure).data)
+        return None if done is None else reply_payload(request, Opcode.ACK, done[0], session=done[1])
+
+    # sessions
+
+    def _opener(self, mode: Mode) -> Callable[[Client, Request, int], _Reply]:
+        def open_file(client: Client, request: Request, time_us: int) -> _Reply:
+            path = parse_path(request.data)
+            self._clients.make_room(client, time_us)
+            file = self._files.open(path, mode)
+            number = request.session
+            if number in client.sessions:
+                number = next(free for free in range(_MAX_SESSION) if free not in client.sessions)
+            client.sessions[number] = Session(number, file, mode is not Mode.READ, time_us)
+            return uint32(file.size), number
+
+        return open_file
+
+    def _terminate(self, client: Client, request: Request, time_us: int) -> _Reply:
+        session = client.session(request.session, time_us)
+        del client.sessions[request.session]
+        client.replies.clear()
+        session.close()
+        return b"", None
+
+    def _reset(self, client: Client, request: Request, time_us: int) -> _Reply:
+        client.close_all()
+        client.replies.clear()
+        return b"", None
+
+    # files
+
+    def _list(self, client: Client, request: Request, time_us: int) -> _Reply:
+        entries = self._files.entries(parse_path(request.data))
+        data = b""
+        for entry in entries[request.offset :]:
+            text = f"D{entry.name}" if entry.is_directory else f"F{entry.name}\t{entry.size}"
+            line = text.encode() + b"\0"
+            if len(line) > MAX_DATA:
+                line = b"S\0"  # a name too long for a reply still counts as an entry
+            if len(data) + len(line) > MAX_DATA:
+                break
+            data += line
+        if not data:
+            raise FtpRefusal.of(FtpError.END_OF_FILE)
+        return data, None
+
+    def _read(self, client: Client, request: Request, time_us: int) -> _Reply:
+        session = _readable(client.session(request.session, time_us))
+        data = session.file.read(request.offset, _chunk(request))
+        if not data:
+            raise FtpRefusal.of(FtpError.END_OF_FILE)
+        return data, None
+
+    def _burst(self, client: Client, request: Request, time_us: int) -> None:
+        session = _readable(client.session(request.session, time_us))
+        session.burst = Burst(request, request.offset, _chunk(request), request.sequence, BURST_REPLIES)
+        self._bursting = True
+
+    def _write(self, client: Client, request: Request, time_us: int) -> _Reply:
+        session = client.session(request.session, time_us)
+        if not session.writable:
+            raise OSError(errno.EBADF, "not open for writing")
+        session.file.write(request.offset, request.data)
+        return uint32(len(request.data)), None
+
+    def _at_path(self, request: Request, do: Callable[[tuple[str, ...]], None]) -> _Reply:
+        do(parse_path(request.data))
+        return b"", None
+
+    def _rename(self, client: Client, request: Request, time_us: int) -> _Reply:
+        old, separator, new = request.data.partition(b"\0")
+        if not separator or not new.rstrip(b"\0"):
+            raise FtpRefusal.of(FtpError.INVALID_DATA_SIZE)
+        self._files.rename(parse_path(old), parse_path(new))
+        return b"", None
+
+    def _checksum(self, client: Client, request: Request, time_us: int) -> None:
+        """The reply follows when the file was read; asked again meanwhile, it is still one."""
+        if not any(work.client is client and work.request == request for work in self._checksums):
+            path = parse_path(request.data)
+            self._clients.make_room(client, time_us)
+            file = self._files.open(path, Mode.READ)
+            for work in [work for work in self._checksums if work.client is client]:
+                work.file.close()
+                self._checksums.remove(work)
+            self._checksums.append(_Checksum(client, request, file))
+
+    # what goes on by itself
+
+    def _continue_bursts(self, client: Client) -> None:
+        bursting = [session for session in client.sessions.values() if session.burst is not None]
+        for session in bursting:
+            for _ in range(max(1, REPLIES_PER_TICK // len(bursting))):
+                if session.burst is None or is_congested(client.channel):
+                    break
+                self._send_piece(client, session, session.burst)
+        self._bursting |= any(session.burst is not None for session in bursting)
+
+    def _send_piece(self, client: Client, session: Session, burst: Burst) -> None:
+        refusal = FtpRefusal.of(FtpError.END_OF_FILE)
+        try:
+            data = session.file.read(burst.offset, burst.size)
+        except OSError as failure:
+            data, refusal = b"", FtpRefusal.of_os_error(failure)
+        burst.left -= 1
+        if not data or burst.left == 0:
+            session.burst = None
+        _send(
+            client,
+            reply_payload(
+                burst.request,
+                Opcode.ACK if data else Opcode.NAK,
+                data or refusal.data,
+                sequence=burst.sequence,
+                offset=burst.offset,
+                burst_complete=session.burst is None,
+            ),
+        )
+        burst.sequence = burst.sequence + 1 & 0xFFFF
+        burst.offset += len(data)
+
+    def _continue_checksum(self) -> None:
+        work = self._checksums[0]
+        try:
+            data = work.file.read(work.offset, _CHECKSUM_BYTES_PER_TICK)
+        except OSError as failure:
+            reply = reply_payload(work.request, Opcode.NAK, FtpRefusal.of_os_error(failure).data)
+        else:
+            work.crc = crc32(data, work.crc)
+            work.offset += len(data)
+            if len(data) == _CHECKSUM_BYTES_PER_TICK:
+                return
+            reply = reply_payload(work.request, Opcode.ACK, uint32(work.crc))
+        work.file.close()
+        self._checksums.pop(0)
+        _send(work.client, reply)
+
+
+def _readable(session: Session) -> Session:
+    if session.writable:
+        raise OSError(errno.EBADF, "open for writing only")
+    return session
+
+
+def _chunk(request: Request) -> int:
+    """Bytes in a reply: as asked for, as far as they fit; 0 is as many as fit."""
+    return min(request.size or MAX_DATA, MAX_DATA)
+
+
+def _send(client: Client, payload: bytes) -> None:
+    client.channel.send(
+        mavlink.MAVLink_file_transfer_protocol_message(0, client.system_id, client.component_id, payload)
+    )

@@ -17,6 +17,7 @@ from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, Channel, MavlinkMessage, Source
 from autopilot_bridge.services.command_common import Handler
+from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.telemetry.streams import Builder
 from flightsim.interface import SensorReadings
 
@@ -38,6 +39,7 @@ class AutopilotParts:
         stores: the uploaded plans, by type.
         broadcast: all channels.
         announce: sends a STATUSTEXT.
+        memory: card, clock and power of the computer it runs on.
         spoil: failures of what comes in by messages; None: nothing fails.
     """
 
@@ -50,6 +52,7 @@ class AutopilotParts:
     stores: Mapping[MissionType, MissionStore]
     broadcast: Broadcast
     announce: Announce
+    memory: VehicleMemory
     spoil: Spoil | None = None
 
 

@@ -139,7 +139,7 @@ class ParameterService:
             case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
                 self._read(message, source.channel)
             case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
-                self._start_list(source.channel)
+                self.list_on(source.channel)
             case mavlink.MAVLINK_MSG_ID_PARAM_SET:
                 self._set(message, source.channel)
             case _:
@@ -168,7 +168,8 @@ class ParameterService:
         if found is not None:
             channel.send(self._value_message(found, index=self._index_in_reply(found), name=name))
 
-    def _start_list(self, channel: Channel) -> None:
+    def list_on(self, channel: Channel) -> None:
+        """Send all parameters on a channel, from the next tick on."""
         running = next((listing for listing in self._listings if listing.channel is channel), None)
         if running is not None:
             running.next_index = 0  # PX4 skips the hash when a list is asked for again before its end

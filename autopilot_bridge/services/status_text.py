@@ -59,7 +59,11 @@ class StatusTextService:
                 channel.send(message)
 
     def _listens(self, channel: Channel) -> bool:
-        return not self._flavour.text_needs_heartbeat or channel.name in self._greeted
+        return (
+            not self._flavour.text_needs_heartbeat
+            or channel.name in self._greeted
+            or getattr(channel, "hears_all", False)  # a log
+        )
 
     def _messages(self, severity: int, text: str) -> list[MavlinkMessage]:
         """One message, or the chunks of a long text: id and chunk_seq as in MAVLink's STATUSTEXT."""

@@ -6,7 +6,10 @@ autopilots.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.flavours import get_flavour
@@ -14,6 +17,7 @@ from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.mavlink.signing import signing_time
 from autopilot_bridge.payload import PayloadStation
+from autopilot_bridge.services.vehicle_memory import PowerAction
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.failures import FailureInjector
@@ -22,6 +26,7 @@ from autopilot_bridge.sitl.shared_link import SharedLink
 from autopilot_bridge.sitl.signing import SigningParameters, VehicleSigning
 from autopilot_bridge.sitl.switchboard import Switchboard
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder, TruthEncoder
+from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.tlog import TlogWriter
 from flightsim.airframe import Airframe, AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
@@ -42,6 +47,8 @@ TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a frame of truth."""
 
 _NEVER_US: Final = 1 << 62
+REBOOT_US: Final = 1_000_000
+"""From when a rebooting autopilot goes down until it starts again."""
 _NOT_SIGNED: Final = SigningParameters()
 
 
@@ -65,6 +72,7 @@ class SitlVehicle:
         world: World,
         targets: GroundTargets,
         signing: SigningParameters,
+        card: MemoryCard,
     ) -> None:
         streams = world.streams
         self.specification = specification
@@ -82,7 +90,9 @@ class SitlVehicle:
             truth=self.vehicle.truth,
             seeds=lambda name: streams.child("vehicle", index, "sensor", name),
         )
-        self.autopilot = Autopilot(
+        failures = FailureInjector(self.vehicle, self.sensors)
+        self._new_autopilot = partial(
+            Autopilot,
             flavour,
             system_id=specification.system_id,
             readings=self.sensors.readings,
@@ -92,15 +102,18 @@ class SitlVehicle:
                 **specification.parameters,
             },
             envelope=_envelope(airframe, configuration) if aircraft else None,
-            unix_epoch_us=configuration.unix_epoch_us,
-            inject_failure=FailureInjector(self.vehicle, self.sensors).inject,
+            inject_failure=failures.inject,
+            card=card,
+            power=self._on_power,
         )
+        self._epoch_us = configuration.unix_epoch_us
+        self._boot_us = 0
+        self._power: PowerAction | None = None
+        self._power_us = _NEVER_US  # when it goes down, or boots
+        self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us)
         self._actuators = self.autopilot.actuators  # written in place
-        self._crew = (
-            None
-            if self.vehicle.launcher is None
-            else LaunchCrew(self.vehicle, self.autopilot.commander, step_us=world.step_us)
-        )
+        self._crew_of = partial(LaunchCrew, self.vehicle, step_us=world.step_us)
+        self._crew = None if self.vehicle.launcher is None else self._crew_of(self.autopilot.commander)
         self.links = Switchboard(
             self.autopilot,
             system_id=specification.system_id,
@@ -148,9 +161,13 @@ class SitlVehicle:
 
     def step(self, time_us: int) -> None:
         """One physics step, ending at `time_us`."""
+        if time_us >= self._power_us:
+            self._power_cycle(time_us)
+        boot_us = self._boot_us
         self.vehicle.step(self._actuators)
-        self.sensors.step(time_us)
-        self.autopilot.step(time_us)
+        self.sensors.step(time_us - boot_us)
+        if time_us > boot_us:
+            self.autopilot.step(time_us - boot_us)
         if self.payload is not None:
             self.payload.step(time_us)
         if self._crew is not None and self._crew.watch(time_us):
@@ -159,6 +176,25 @@ class SitlVehicle:
             self.crashed = True
             text = self.truth_encoder.encode_text(f"Simulator: {self.vehicle.crash}")
             self.links.send_to_all(text)
+
+    def _on_power(self, action: PowerAction) -> None:
+        self._power, self._power_us = action, 0
+
+    def _power_cycle(self, time_us: int) -> None:
+        """The autopilot goes down, to boot again a moment later unless it was shut down; or it boots."""
+        if self._power is None:
+            self._boot_us, self._power_us = time_us, _NEVER_US
+            self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us + time_us)
+            self._actuators = self.autopilot.actuators
+            self.links.restart(self.autopilot)
+            if self._crew is not None:
+                self._crew = self._crew_of(self.autopilot.commander)
+            return
+        again = self._power is PowerAction.REBOOT
+        self._boot_us = self._power_us = time_us + REBOOT_US if again else _NEVER_US
+        self._power = None
+        self._actuators = np.zeros_like(self._actuators)
+        self.links.restart(None)
 
     def open(
         self,
@@ -210,6 +246,7 @@ class Sitl:
     Args:
         configuration: what it holds.
         signing: how the vehicles sign what they say, and what they believe.
+        cards: the vehicles' memory cards; None: empty ones in memory, without logs.
 
     Attributes:
         configuration: as given.
@@ -222,7 +259,13 @@ class Sitl:
         ValueError: a model, flavour or parameter that does not exist or is out of range.
     """
 
-    def __init__(self, configuration: SitlConfiguration, *, signing: SigningParameters = _NOT_SIGNED) -> None:
+    def __init__(
+        self,
+        configuration: SitlConfiguration,
+        *,
+        signing: SigningParameters = _NOT_SIGNED,
+        cards: Sequence[MemoryCard] | None = None,
+    ) -> None:
         self.configuration = configuration
         self.world = World(
             WorldParameters(
@@ -236,9 +279,10 @@ class Sitl:
         self.targets = GroundTargets(
             configuration.targets, seeds=lambda target: streams.child("target", target)
         )
+        cards = [MemoryCard() for _ in configuration.vehicles] if cards is None else cards
         self.vehicles = tuple(
-            SitlVehicle(specification, index, configuration, self.world, self.targets, signing)
-            for index, specification in enumerate(configuration.vehicles)
+            SitlVehicle(specification, index, configuration, self.world, self.targets, signing, card)
+            for index, (specification, card) in enumerate(zip(configuration.vehicles, cards, strict=True))
         )
         self.shared_links: list[SharedLink] = []
         self._step_us = 1_000_000 // configuration.physics_rate_hz

@@ -38,7 +38,8 @@ class Switchboard:
         self.channels: list[LinkChannel] = []
         self.echoes = 0
         self.signing = signing
-        self._autopilot = autopilot
+        self._autopilot: Autopilot | None = autopilot
+        self._roles: dict[LinkChannel, str] = {}
         self._system_id = system_id
         self._router: Router[LinkChannel] = Router()
         self._loops = LoopGuard()
@@ -71,7 +72,9 @@ class Switchboard:
         self.channels.append(channel)
         self._router.add(channel)
         self._reach[channel] = reach
-        self._autopilot.add_channel(channel, role=role)
+        self._roles[channel] = role
+        if self._autopilot is not None:
+            self._autopilot.add_channel(channel, role=role)
         return channel
 
     def close(self, channel: LinkChannel) -> None:
@@ -79,8 +82,15 @@ class Switchboard:
         self.channels.remove(channel)
         self._autopilot.remove_channel(channel)
         self._router.remove(channel)
-        del self._reach[channel]
+        del self._reach[channel], self._roles[channel]
         channel.link.close()
+
+    def restart(self, autopilot: Autopilot | None) -> None:
+        """Give the links to an autopilot that starts; None: there is none, and nobody answers."""
+        self._autopilot = autopilot
+        if autopilot is not None:
+            for channel in self.channels:
+                autopilot.add_channel(channel, role=self._roles[channel])
 
     def send_to_all(self, raw: bytes) -> None:
         """Send a frame of a component of the vehicle on every link."""

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander.events import RebootRequested
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
@@ -80,8 +79,6 @@ PX4_TABLE = [
     (300, (0, 0), "ready", [2]),
     (189, (), "ready", [6]),
     (185, (1,), "flying", [2]),
-    (246, (1,), "ready", [2]),
-    (246, (0,), "ready", [0]),
     (115, (90, 30, 0, 0), "flying", [3]),
     (209, (1,), "ready", [3]),
     (183, (9, 1500), "ready", [3]),
@@ -98,7 +95,6 @@ PX4_TABLE = [
     (1000, (), "ready", []),
     (3000, (4,), "ready", []),
     (530, (), "ready", []),
-    (245, (7,), "ready", []),
     (420, (4, 1, 0), "ready", [0]),
     (401, (), "ready", [0]),
     (410, (), "ready", [0]),
@@ -159,15 +155,12 @@ ARDUPILOT_TABLE = [
     (211, (), "ready", [4]),
     (207, (1,), "ready", [0]),
     (241, (), "ready", [3]),
-    (245, (99,), "ready", [2]),
     (401, (), "ready", [0]),
     (410, (), "ready", [0]),
     (520, (1,), "ready", [0]),
     (224, (77,), "ready", [2]),
     (224, (-1,), "ready", [2]),
     (224, (0,), "ready", [0]),
-    (246, (1,), "ready", [0]),
-    (246, (1,), "flying", [4]),
 ]
 
 
@@ -354,12 +347,6 @@ def test_fence_switch_sets_the_parameter() -> None:
     rig = rig_of("ardupilot", "ready")
     assert rig.long(207, 1) == [0]
     assert rig.store.get("FENCE_ENABLE") == 1
-
-
-def test_reboot_is_asked_of_the_autopilot() -> None:
-    rig = rig_of("ardupilot", "ready")
-    rig.long(246, 1)
-    assert any(isinstance(event, RebootRequested) for event in rig.events)
 
 
 def test_failures_reach_the_hook() -> None:

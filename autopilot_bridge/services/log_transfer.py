@@ -1,0 +1,180 @@
+"""Log list and download: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE, LOG_REQUEST_END.
+
+Every client (system and component on a channel) has its own list and download. Answers go out at 50 Hz, a few
+at a time and none while the line is congested. Several ranges may be asked for one behind the other, as
+clients do to fill what was lost.
+
+Source: MAVLink log download (mavlink.io/en/messages/common.html, LOG_ENTRY, LOG_DATA).
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
+from autopilot_bridge.services.log_book import LogBook, LogFile
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.storage import OpenFile, VehiclePath
+
+DATA_BYTES: Final = 90
+REPLIES_PER_TICK: Final = 40
+"""On one channel: 180 kB/s of vehicle time."""
+_MAX_RANGES: Final = 64
+_MAX_CLIENTS: Final = 16
+_IDLE_US: Final = 60_000_000
+
+
+@dataclass(slots=True)
+class _Download:
+    """What a client is being sent.
+
+    Attributes:
+        source: who.
+        entries: of the list, still to be sent.
+        ranges: (offset, end) of the log's bytes, still to be sent.
+        number, file: the log that is open; -1: none is.
+        used_us: when it asked last.
+    """
+
+    source: Source
+    used_us: int
+    entries: deque[MavlinkMessage] = field(default_factory=deque)
+    ranges: deque[tuple[int, int]] = field(default_factory=deque)
+    number: int = -1
+    file: OpenFile | None = None
+
+    def close(self) -> None:
+        """Nothing more is to be sent."""
+        self.entries.clear()
+        self.ranges.clear()
+        self.number = -1
+        if self.file is not None:
+            self.file.close()
+            self.file = None
+
+
+class LogTransferService(Microservice):
+    """Lists the logs on the card and sends them.
+
+    Args:
+        book: the logs.
+        recording: path of the log that is being written, which is not erased; None: none is.
+    """
+
+    def __init__(self, book: LogBook, recording: Callable[[], VehiclePath | None]) -> None:
+        self._book = book
+        self._recording = recording
+        self._logs: list[LogFile] = []  # as they were listed: numbers keep their meaning
+        self._downloads: dict[tuple[str, int, int], _Download] = {}
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Take the requests of the log protocol."""
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_LIST:
+                self._list(message, self._download(source, time_us))
+            case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_DATA:
+                self._request(message, self._download(source, time_us))
+            case mavlink.MAVLINK_MSG_ID_LOG_ERASE:
+                self._erase()
+            case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_END:
+                self._download(source, time_us).close()
+            case _:
+                return False
+        return True
+
+    def tick(self, time_us: int) -> None:
+        """Send what was asked for; forget who went away."""
+        if not self._downloads:
+            return
+        for key, download in tuple(self._downloads.items()):
+            self._continue(download)
+            if time_us - download.used_us > _IDLE_US and not download.ranges:
+                download.close()
+                del self._downloads[key]
+
+    def close(self) -> None:
+        """Close what is open: the vehicle goes down."""
+        for download in self._downloads.values():
+            download.close()
+
+    def _download(self, source: Source, time_us: int) -> _Download:
+        key = (source.channel.name, source.system_id, source.component_id)
+        download = self._downloads.get(key)
+        if download is None or download.source.channel is not source.channel:
+            if len(self._downloads) >= _MAX_CLIENTS:
+                oldest = min(self._downloads, key=lambda each: self._downloads[each].used_us)
+                self._downloads.pop(oldest).close()
+            download = self._downloads[key] = _Download(source, time_us)
+        download.used_us = time_us
+        return download
+
+    def _list(self, message: MavlinkMessage, download: _Download) -> None:
+        self._logs = self._book.logs()
+        logs = self._logs
+        last = logs[-1].number if logs else 0
+        chosen = [log for log in logs if message.start <= log.number <= message.end]
+        download.entries = deque(
+            mavlink.MAVLink_log_entry_message(
+                log.number, len(logs), last, log.time_utc_s, min(log.size, 0xFFFFFFFF)
+            )
+            for log in chosen
+        )
+        if not logs:
+            download.entries.append(mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0))
+
+    def _request(self, message: MavlinkMessage, download: _Download) -> None:
+        if download.number != message.id:
+            download.close()
+            if not self._logs:
+                self._logs = self._book.logs()
+            log = next((log for log in self._logs if log.number == message.id), None)
+            if log is None:
+                return
+            try:
+                download.file = self._book.open(log)
+            except OSError:  # erased since it was listed
+                return
+            download.number = message.id
+        if download.file is None:
+            return
+        end = min(message.ofs + message.count, download.file.size)
+        if message.count > DATA_BYTES * 1000:
+            download.ranges.clear()  # all of it, from here on: what was asked before is in it
+        if (message.ofs, end) not in download.ranges and len(download.ranges) < _MAX_RANGES:
+            download.ranges.append((message.ofs, end))
+
+    def _erase(self) -> None:
+        for download in self._downloads.values():
+            download.close()
+        self._logs = []
+        try:
+            self._book.erase(but=self._recording())
+        except OSError:  # the list shows what is left
+            return
+
+    def _continue(self, download: _Download) -> None:
+        channel = download.source.channel
+        for _ in range(REPLIES_PER_TICK):
+            if is_congested(channel):
+                return
+            if download.entries:
+                channel.send(download.entries.popleft())
+            elif download.ranges and download.file is not None:
+                channel.send(self._next_data(download, download.file))
+            else:
+                return
+
+    def _next_data(self, download: _Download, file: OpenFile) -> MavlinkMessage:
+        offset, end = download.ranges.popleft()
+        try:
+            data = file.read(offset, max(0, min(DATA_BYTES, end - offset)))
+        except OSError:
+            data = b""
+        if data and offset + len(data) < end:
+            download.ranges.appendleft((offset + len(data), end))
+        return mavlink.MAVLink_log_data_message(
+            download.number, offset, len(data), data.ljust(DATA_BYTES, b"\0")
+        )

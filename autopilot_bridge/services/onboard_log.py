@@ -1,0 +1,177 @@
+"""The log that the vehicle writes of itself while it flies: what it says, on a channel of its own.
+
+Begins and ends as the firmware's parameters say. Records are handed to the card at 50 Hz, whole ones only, so
+the log can be read to its end whatever stops the process.
+"""
+
+import contextlib
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.events import Armed, Disarmed, Event
+from autopilot_bridge.flavours.card_layout import CardLayout, LogTimes
+from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.channel import Announce, MavlinkMessage
+from autopilot_bridge.services.log_book import LogBook
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.vehicle_memory import LOG_ROLE
+from autopilot_bridge.storage import OpenFile, VehiclePath
+from autopilot_bridge.telemetry.motion import MotionMessages
+from autopilot_bridge.tlog import append_records
+
+_STOP_AFTER_US: Final = 2_000_000
+"""A log goes on so long after disarming, so that the end of the flight is in it."""
+
+
+class LogChannel:
+    """An autopilot's channel that ends in a log.
+
+    Args:
+        system_id: the vehicle's.
+        unix_us: the time now, microseconds of the Unix epoch.
+
+    Attributes:
+        motion: set by the autopilot that the channel is added to.
+        buffer: records that are not on the card yet.
+        hears_all: texts are for it, whether somebody has greeted or not.
+        line: what it can carry: whatever there is.
+    """
+
+    name = "onboard log"
+    hears_all = True
+    line = None
+
+    def __init__(self, system_id: int, unix_us: Callable[[], int]) -> None:
+        self.motion: MotionMessages | None = None
+        self.buffer = bytearray()
+        self._encoder = FrameEncoder(system_id, 1)
+        self._unix_us = unix_us
+
+    def send(self, message: MavlinkMessage) -> None:
+        """Log a message."""
+        append_records(self.buffer, self._unix_us(), self._encoder.encode(message))
+
+    def send_payload(self, message_id: int, payload: bytes) -> None:
+        """Log a packed payload."""
+        append_records(self.buffer, self._unix_us(), self._encoder.encode_payload(message_id, payload))
+
+    def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Log what is due together."""
+        packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
+        packet += b"".join(self._encoder.encode_payloads(payloads))
+        append_records(self.buffer, self._unix_us(), packet)
+
+
+class OnboardLog(Microservice):
+    """Writes the vehicle's log.
+
+    Args:
+        book: the logs on the card.
+        layout: when to log.
+        parameters: they say so.
+        announce: sends a STATUSTEXT.
+        system_id: the vehicle's.
+        unix_us: the time now, microseconds of the Unix epoch.
+        add_channel, remove_channel: of the autopilot.
+
+    Attributes:
+        path: of the log that is written now; None: none is.
+    """
+
+    def __init__(
+        self,
+        book: LogBook,
+        layout: CardLayout,
+        parameters: ParameterStore,
+        announce: Announce,
+        *,
+        system_id: int,
+        unix_us: Callable[[], int],
+        add_channel: Callable[[LogChannel, str], None],
+        remove_channel: Callable[[LogChannel], None],
+    ) -> None:
+        self._book = book
+        self._layout = layout
+        self._parameters = parameters
+        self._announce = announce
+        self._channel = LogChannel(system_id, unix_us)
+        self._unix_us = unix_us
+        self._add_channel = add_channel
+        self._remove_channel = remove_channel
+        self._file: OpenFile | None = None
+        self._size = 0
+        self._stop_us: int | None = None
+        self._booted = False
+        self.path: VehiclePath | None = None
+
+    @property
+    def _times(self) -> LogTimes | None:
+        return self._layout.log_times(self._parameters)
+
+    def tick(self, time_us: int) -> None:
+        """Hand what was logged to the card."""
+        if not self._booted:
+            self._booted = True
+            times = self._times
+            if times is not None and times.from_boot:
+                self._start()
+        if self._channel.buffer:
+            self._flush()
+        if self._stop_us is not None and time_us >= self._stop_us:
+            self.close()
+            times = self._times
+            if times is not None and times.after_disarming and times.new_at_disarming:
+                self._start()
+
+    def follow(self, event: Event) -> None:
+        """Begin at arming, end after disarming, where the parameters say so."""
+        times = self._times
+        if isinstance(event, Armed):
+            self._stop_us = None
+            if self._file is None and times is not None:
+                self._start()
+        elif isinstance(event, Disarmed) and (
+            times is None or not times.after_disarming or times.new_at_disarming
+        ):
+            self._stop_us = event.time_us + _STOP_AFTER_US
+
+    def close(self) -> None:
+        """End the log; does nothing when there is none."""
+        self._stop_us = None
+        file, self._file = self._file, None
+        if file is None:
+            return
+        self._remove_channel(self._channel)
+        if self._channel.buffer:
+            with contextlib.suppress(OSError):
+                file.write(self._size, bytes(self._channel.buffer))
+        self._channel.buffer.clear()
+        file.close()
+        self.path = None
+
+    def _start(self) -> None:
+        try:
+            self.path, self._file = self._book.create(self._unix_us())
+        except OSError as failure:
+            self._announce(mavlink.MAV_SEVERITY_ERROR, f"Logging failed: {failure.strerror}")
+            return
+        self._size = 0
+        self._add_channel(self._channel, LOG_ROLE)
+
+    def _flush(self) -> None:
+        if self._file is None:
+            self._channel.buffer.clear()
+            return
+        data = bytes(self._channel.buffer)
+        try:
+            self._file.write(self._size, data)
+        except OSError as failure:
+            self._channel.buffer.clear()
+            self.close()
+            self._announce(mavlink.MAV_SEVERITY_ERROR, f"Logging stopped: {failure.strerror}")
+            return
+        self._size += len(data)
+        self._channel.buffer.clear()

@@ -1,0 +1,21 @@
+"""The vehicle's memory card: files that outlive a boot, behind one interface, and what lies on it."""
+
+from autopilot_bridge.storage.files import Entry, FileStore, Mode, OpenFile
+from autopilot_bridge.storage.memory import MemoryStore
+from autopilot_bridge.storage.mounts import MountTable
+from autopilot_bridge.storage.paths import VehiclePath, parse_path
+from autopilot_bridge.storage.quota import FOLDER_QUOTA, MEMORY_QUOTA, Quota
+
+__all__ = [
+    "FOLDER_QUOTA",
+    "MEMORY_QUOTA",
+    "Entry",
+    "FileStore",
+    "MemoryStore",
+    "Mode",
+    "MountTable",
+    "OpenFile",
+    "Quota",
+    "VehiclePath",
+    "parse_path",
+]

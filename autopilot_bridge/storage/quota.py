@@ -1,0 +1,54 @@
+"""How much a store may hold, and how much it holds."""
+
+import errno
+from dataclasses import dataclass
+from typing import Final
+
+from autopilot_bridge.storage.paths import error
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Quota:
+    """The size of a memory card.
+
+    Attributes:
+        size_bytes: of all files together.
+        files: files and directories.
+    """
+
+    size_bytes: int
+    files: int
+
+    def __post_init__(self) -> None:
+        for name in ("size_bytes", "files"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} {getattr(self, name)} is not at least 1")
+
+
+MEMORY_QUOTA: Final = Quota(size_bytes=4 * 1024**2, files=256)
+FOLDER_QUOTA: Final = Quota(size_bytes=8 * 1024**3, files=20_000)
+
+
+class Usage:
+    """Counts what a store holds against its quota.
+
+    Attributes:
+        size_bytes, files: in use.
+    """
+
+    __slots__ = ("_quota", "files", "size_bytes")
+
+    def __init__(self, quota: Quota) -> None:
+        self._quota = quota
+        self.size_bytes = 0
+        self.files = 0
+
+    def check_file(self) -> None:
+        """ENOSPC when there is no room for one more file."""
+        if self.files >= self._quota.files:
+            raise error(errno.ENOSPC)
+
+    def check_growth(self, size_bytes: int) -> None:
+        """ENOSPC when there is no room for so many bytes more."""
+        if size_bytes > 0 and self.size_bytes + size_bytes > self._quota.size_bytes:
+            raise error(errno.ENOSPC)
