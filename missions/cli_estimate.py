@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from missions.cli_signing import key_from, key_option, warn_if_open
 from missions.cli_types import FiniteRange
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ class _Teller:
 )  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/ESTIMATOR-N]")
 @click.option("--no-picture", is_flag=True, help="Don't draw errors.png.")
+@key_option
 def estimate(**given: Any) -> int:
     """Run an estimator (attitude, lissajous, target-fusion, or a Python file of your own) on a live link.
 
@@ -77,6 +79,7 @@ def estimate(**given: Any) -> int:
     usage, 130 interrupted before --duration was over.
     """
     from autopilot_bridge.errors import AddressError, BridgeError
+    from autopilot_bridge.links import parse_address
     from estimators.errors import EstimatorError
     from missions.errors import PlanError
     from missions.estimation.live import LiveRequest
@@ -85,6 +88,8 @@ def estimate(**given: Any) -> int:
 
     teller = _Teller()
     try:
+        key = key_from(given["signing_key"])
+        warn_if_open(parse_address(given["connect"]), key)
         result = run_estimator(
             LiveRequest(
                 estimator=given["name"],
@@ -100,6 +105,7 @@ def estimate(**given: Any) -> int:
                 out=given["out"],
                 picture=not given["no_picture"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),
+                signing_key=key,
             ),
             teller,
         )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli_fly_report import ProgressLine, tell
+from missions.cli_signing import key_from, key_option, warn_if_open
 from missions.cli_types import SPEEDUP
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 
@@ -178,6 +179,7 @@ def _owners(option_name: str) -> list[str]:
 )
 @click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
 @click.option("--arg", multiple=True, metavar="NAME=VALUE", help="For a mission of your own.")
+@key_option
 def fly(**given: Any) -> int:
     """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, a mission
     file (.plan, .waypoints), or a Python file of your own.
@@ -190,6 +192,8 @@ def fly(**given: Any) -> int:
 
     if given["connect"]:
         _refuse_embedded_options(click.get_current_context())
+    elif given["signing_key"] is not None:
+        raise click.UsageError("--signing-key is for vehicles elsewhere; give --connect too, or leave it out")
     try:
         return _fly(given)
     except PlanError as error:
@@ -275,6 +279,7 @@ def _fly(given: dict[str, Any]) -> int:
     if terminal and not given["connect"]:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
+    from autopilot_bridge.links import parse_address
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
     from missions.session import RunRequest
     from missions.session import fly as fly_mission
@@ -282,6 +287,9 @@ def _fly(given: dict[str, Any]) -> int:
 
     line = ProgressLine()
     try:
+        key = key_from(given["signing_key"])
+        for address in map(parse_address, given["connect"]):
+            warn_if_open(address, key)
         result = fly_mission(
             mission,
             RunRequest(
@@ -307,6 +315,7 @@ def _fly(given: dict[str, Any]) -> int:
                 estimator=given["estimator"],
                 estimator_settings=given["settings"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),
+                signing_key=key,
             ),
             line if terminal else None,
         )

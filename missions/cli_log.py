@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from autopilot_bridge.errors import BridgeError
+from missions.cli_signing import key_from, key_option, warn_if_open
 from missions.cli_types import FiniteRange
 
 if TYPE_CHECKING:
@@ -232,13 +233,23 @@ def mutate(
     help="Log seconds per wall second, from 0.1; or max.",
 )
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
-def play(path: Path, dialect: str | None, link: str, speed: str, loop: bool, **given: Any) -> None:
+@key_option
+def play(
+    path: Path,
+    dialect: str | None,
+    link: str,
+    speed: str,
+    loop: bool,
+    signing_key: Path | None,
+    **given: Any,
+) -> None:
     """Play a telemetry log to a link, as if the vehicle were there; --from seeks."""
 
     def work() -> None:
         from autopilot_bridge.links import open_link, parse_address
         from missions.log_play import MIN_SPEED, Played
         from missions.log_play import play as send
+        from missions.signing import client_signing
 
         try:
             factor = math.inf if speed == "max" else float(speed)
@@ -248,6 +259,7 @@ def play(path: Path, dialect: str | None, link: str, speed: str, loop: bool, **g
             raise click.UsageError(f"--speed {speed} is not accepted; give {MIN_SPEED:g} or more, or max")
         try:
             address = parse_address(link)
+            key = key_from(signing_key)
         except BridgeError as error:
             raise click.UsageError(str(error)) from error
         opened = _open(path, dialect)
@@ -258,11 +270,21 @@ def play(path: Path, dialect: str | None, link: str, speed: str, loop: bool, **g
             if terminal:
                 click.echo(f"\r{played.log_s:8.1f} s  {played.frames} frames", err=True, nl=False)
 
+        warn_if_open(address, key)
+        signing = client_signing(key)
         connection = open_link(address)
         if not connection.peers:
             click.echo(f"waiting for somebody on {connection.description}", err=True)
         try:
-            played = send(opened, selections, connection, speed=factor, loop=loop, on_progress=show)
+            played = send(
+                opened,
+                selections,
+                connection,
+                speed=factor,
+                loop=loop,
+                on_progress=show,
+                sign=None if signing is None else signing.sign_again,
+            )
         finally:
             connection.close()
             if terminal:

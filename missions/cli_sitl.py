@@ -5,30 +5,30 @@ import signal
 import sys
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
 
 import click
 
 from autopilot_bridge.errors import BridgeError
+from missions.cli_signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli_types import SLOWEST, FiniteRange
-from missions.cli_video import start_video, video_options
 from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
+
+if TYPE_CHECKING:
+    from autopilot_bridge.sitl import Port
 
 _LOG_RATE_HZ = 4
 _LOGGER = 255, 190  # MAV_COMP_ID_MISSIONPLANNER of a ground station
 
 
-def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...], count: int):  # type: ignore[no-untyped-def]
-    """Links per vehicle from the options; None when the flavour's own are to be opened."""
+def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
+    """Links from the options; none: the flavour's own are to be opened."""
     from autopilot_bridge.links import parse_address
     from autopilot_bridge.sitl import Port
 
-    if not links and not gcs_links:
-        return None
-    if count > 1:
-        raise click.UsageError("--link and --gcs-link name links of one vehicle; leave them out with --count")
     chosen = [Port(parse_address(link), "onboard") for link in links]
     chosen += [Port(parse_address(link), "gcs") for link in gcs_links]
-    return [chosen]
+    return chosen
 
 
 def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
@@ -122,7 +122,12 @@ def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
     show_default=True,
     help="Simulated seconds per wall second; 0: as fast as possible.",
 )
-@click.option("--link", "links", multiple=True, help="Link with onboard streams instead of the usual ports.")
+@click.option(
+    "--link",
+    "links",
+    multiple=True,
+    help="Link with onboard streams instead of the usual ports; with --count, all vehicles share it.",
+)
 @click.option("--gcs-link", "gcs_links", multiple=True, help="Link with ground-station streams.")
 @click.option("--home", help="lat,lon,alt[,heading]; default: where the firmware's own SITL stands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
@@ -150,7 +155,20 @@ def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
 @click.option(
     "--map-target", metavar="NORTH,EAST", help="A target's magnetic signature there, m from the map's home."
 )
-@video_options
+@key_option
+@click.option(
+    "--unsigned",
+    type=click.Choice(["none", "local", "all"]),
+    default="local",
+    show_default=True,
+    help="Who takes unsigned frames while there is a key: no link, those of this machine and serial ones, all.",
+)
+@click.option(
+    "--signing-store",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Keep keys that clients set, and times, over restarts.",
+)
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
@@ -173,8 +191,9 @@ def sitl(
     targets: tuple[str, ...],
     map_file: str | None,
     map_target: str | None,
-    video: str | None,
-    pictures: Path | None,
+    signing_key: Path | None,
+    unsigned: str,
+    signing_store: Path | None,
     params: str | None,
     log: str | None,
     no_wait: bool,
@@ -211,7 +230,8 @@ def sitl(
         stop.append(number)
 
     try:
-        ports = _ports(links, gcs_links, count)
+        ports = _ports(links, gcs_links)
+        signing = vehicle_signing(signing_key, unsigned, signing_store)
         wind_speed_m_s, wind_from_deg = parse_wind(wind)
         place = None if home is None else parse_home(home)
         heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
@@ -233,12 +253,16 @@ def sitl(
             ),
             seed=seed,
         )
-        world = Sitl(equipped(configuration, _scenario(camera, targets, map_file, map_target)))
+        world = Sitl(
+            equipped(configuration, _scenario(camera, targets, map_file, map_target)), signing=signing
+        )
         compile_flight_code(world.configuration.vehicles)
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
-        pictured = start_video(world, video, pictures)
         recorder = None if log is None else TlogWriter(log)
-        opened = server.open(ports)
+        if count > 1 and ports:
+            opened = server.open([()] * count, shared=ports)
+        else:
+            opened = server.open([ports] if ports else None)
         if recorder is not None:
             for listener in world.record(recorder):
                 if autopilot == "ardupilot":  # which sends what it is asked for only
@@ -248,12 +272,13 @@ def sitl(
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
     for vehicle, port, address in opened:
         system_id = vehicle.specification.system_id
-        click.echo(f"vehicle {system_id} ({autopilot} {vehicle.specification.model}): {address} {port.role}")
-    for uri in () if pictured is None else pictured.uris:
-        click.echo(f"video: {uri}")
+        kind = f"{autopilot} {vehicle.specification.model}"
+        click.echo(f"vehicle {system_id} ({kind}): {address} {port.role}{signed_how(signing, port.address)}")
+    for named in dict.fromkeys(port.address for _, port, _ in opened):
+        warn_if_unsigned(named, signing)
     click.echo("ready, Ctrl-C ends it")
     sys.stdout.flush()
-    waits = autopilot == "ardupilot" and ports is None and not no_wait
+    waits = autopilot == "ardupilot" and not ports and not no_wait
 
     def report(pace: PaceReport) -> None:
         click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
@@ -269,8 +294,6 @@ def sitl(
         )
     finally:
         world.close()
-        if pictured is not None:
-            pictured.close()
         if recorder is not None:
             recorder.close()
         for number, handler in before.items():

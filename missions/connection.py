@@ -14,13 +14,16 @@ from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.mavlink import (
     Frame,
     FrameEncoder,
+    Intake,
+    LinkSigning,
     MAVLinkMessage,
     decode,
     definition,
     dialect,
 )
+from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 from missions.errors import LinkClosed
-from missions.peers import NewestFrames, PeerParsers
+from missions.peers import NewestFrames
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Link
@@ -59,9 +62,11 @@ class Connection:
         recorder: gets every frame of both directions.
         identity: own system and component id.
         vehicle_system_id: of the vehicle whose time the clock tells; None: of the first autopilot heard.
+        signing: signs what is sent; what it does not admit is not heard. None: unsigned.
 
     Attributes:
         parsers: one for each of the newest peers; their counters account for every byte ever received.
+        signing: as given.
     """
 
     def __init__(
@@ -72,9 +77,11 @@ class Connection:
         *,
         identity: tuple[int, int] = GROUND_STATION,
         vehicle_system_id: int | None = None,
+        signing: LinkSigning | None = None,
     ) -> None:
         self.clock = clock
-        self.parsers = PeerParsers()
+        self.signing = signing
+        self.parsers: Intake[object] = Intake(None if signing is None else signing.admit)
         self.system_id, self.component_id = identity
         self._link = link
         self._recorder = recorder
@@ -133,7 +140,7 @@ class Connection:
             self._on_bytes(peer, data)
 
     def _on_bytes(self, peer: object, data: bytes) -> None:
-        frames = self.parsers.feed(peer, data)
+        frames = self.parsers.parse(peer, data)
         if frames:
             self._on_frames(frames)
 
@@ -145,7 +152,7 @@ class Connection:
             put(frame)
             if self._observed is not None and message_id in _TIMESTAMPED:
                 time_us = self._observe(frame)
-            if recorder is not None:
+            if recorder is not None and message_id != SETUP_SIGNING:  # a log holds no keys
                 recorder.record(frame.raw, time_us)
             if message_id in listeners:
                 for listener in tuple(listeners[message_id]):
@@ -192,7 +199,9 @@ class Connection:
         if self._closed:
             raise LinkClosed("the connection to the vehicle is closed")
         data = self._encoder.encode(message)
-        if self._recorder is not None:
+        if self.signing is not None and self.signing.signs:
+            data = self.signing.sign(data)
+        if self._recorder is not None and type(message).id != SETUP_SIGNING:
             self._recorder.record(data, self.clock.time_us)
         self._link.send(data)
 

@@ -38,6 +38,7 @@ def play(
     speed: float = 1.0,
     loop: bool = False,
     on_progress: Callable[[Played], None] | None = None,
+    sign: Callable[[bytes], bytes] | None = None,
 ) -> Played:
     """Send the frames of a log when their time has come; blocks until all are sent.
 
@@ -52,6 +53,7 @@ def play(
         speed: log seconds per wall second, from 0.1; infinity: as fast as possible.
         loop: begin again at the end, until interrupted.
         on_progress: called a few times a second.
+        sign: puts a signature under each frame; None: they are sent as they are in the log.
 
     Raises:
         LogError: the speed is too small, or nothing is selected.
@@ -83,7 +85,7 @@ def play(
             while pace is None and link.congested:
                 link.receive()
                 _wait()
-            link.send(frame)
+            link.send(frame if sign is None else sign(frame))
             played.frames += 1
             played.log_s = due_us * 1e-6
         _tell(played, round(played.log_s * 1e6), on_progress)

@@ -1,65 +1,16 @@
-"""What a connection keeps of those it hears: a parser for each peer, the newest frames of each component.
+"""What a connection keeps of those it hears: the newest frames of each component.
 
-Peers and components come and go, and anybody can send with any ids: both are kept for a limited number.
+Components come and go, and anybody can send with any ids: they are kept for a limited number.
 """
 
-from dataclasses import fields
 from typing import Final
 
-from autopilot_bridge.mavlink import Frame, FrameParser, MAVLinkMessage, ParserCounters, decode
+from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode
 
-MAX_PARSERS: Final = 64
 MAX_COMPONENTS: Final = 64
 
 ComponentId = tuple[int, int]
 """System and component id."""
-
-
-class PeerParsers:
-    """A parser for each of the newest 64 peers of a link."""
-
-    __slots__ = ("_parsers", "_retired")
-
-    def __init__(self) -> None:
-        self._parsers: dict[object, FrameParser] = {}
-        self._retired = ParserCounters()
-
-    def __len__(self) -> int:
-        return len(self._parsers)
-
-    @property
-    def counters(self) -> ParserCounters:
-        """Where every received byte went, over all peers ever heard; `sources` is left out."""
-        total = ParserCounters()
-        for counters in (self._retired, *(parser.counters for parser in self._parsers.values())):
-            _add(total, counters)
-        return total
-
-    @property
-    def pending_bytes(self) -> int:
-        """Bytes of frames that are not complete yet."""
-        return sum(parser.pending_bytes for parser in self._parsers.values())
-
-    def feed(self, peer: object, data: bytes) -> list[Frame]:
-        """The good frames in bytes of one peer, which may come in any pieces."""
-        parser = self._parsers.get(peer)
-        if parser is None:
-            if len(self._parsers) >= MAX_PARSERS:
-                self._retire(next(iter(self._parsers)))
-            parser = self._parsers[peer] = FrameParser()
-        return parser.feed(data)
-
-    def _retire(self, peer: object) -> None:
-        parser = self._parsers.pop(peer)
-        _add(self._retired, parser.counters)
-        self._retired.bytes_junk += parser.pending_bytes
-
-
-def _add(total: ParserCounters, more: ParserCounters) -> None:
-    for field in fields(ParserCounters):
-        value = getattr(more, field.name)
-        if isinstance(value, int):
-            setattr(total, field.name, getattr(total, field.name) + value)
 
 
 class NewestFrames:

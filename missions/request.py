@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from autopilot_bridge.mavlink import SigningKey
 from missions.connection import GROUND_STATION
 from missions.options import FlightOptions, MissionOptions
 from missions.planning.limits import FORECAST_WIND_M_S
@@ -32,6 +33,7 @@ class RunRequest:
         estimator: one to run beside the flight: its name, or the path of a user's file; None: none.
         estimator_settings: its parameters as NAME=VALUE.
         command: the command line, for the summary.
+        signing_key: shared with vehicles elsewhere; None: unsigned.
     """
 
     options: MissionOptions = field(default_factory=FlightOptions)
@@ -56,6 +58,7 @@ class RunRequest:
     estimator: str | None = None
     estimator_settings: Sequence[str] = ()
     command: str = ""
+    signing_key: SigningKey | None = None
 
     @property
     def models(self) -> list[str]:

@@ -36,6 +36,7 @@ from missions.run import (
     versions,
     write_summary,
 )
+from missions.signing import client_signing
 from missions.together import together
 from missions.vehicle.vehicle import Vehicle
 
@@ -179,9 +180,16 @@ async def _fly(
 ) -> None:
     async with AsyncExitStack() as stack:
         system_ids: Sequence[int | None] = request.system_ids or [None] * len(stage.links)
-        for link, clock, system_id in zip(stage.links, stage.clocks, system_ids, strict=True):
+        for number, (link, clock, system_id) in enumerate(
+            zip(stage.links, stage.clocks, system_ids, strict=True)
+        ):
             connection = Connection(
-                link, clock, recorder, identity=request.identity, vehicle_system_id=system_id
+                link,
+                clock,
+                recorder,
+                identity=request.identity,
+                vehicle_system_id=system_id,
+                signing=client_signing(request.signing_key, link_id=number & 0xFF),
             )
             await stack.enter_async_context(connection)
             flight.vehicles.append(Vehicle(connection, system_id))
@@ -208,6 +216,9 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
         which = "" if wanted is None else f" with system id {wanted}"
         others = ", ".join(map(str, vehicle.connection.autopilots_heard))
         heard = f" (heard: vehicle {others})" if others else ""
+        signing = vehicle.connection.signing
+        if signing is not None and signing.counters.refused_frames:
+            heard += f" (refused by the signing key: {signing.counters.reasons})"
         raise MissionError(
             f"no vehicle{which} was heard{where}{heard}: {error}; is it on, and sending there?"
         ) from error

@@ -69,6 +69,10 @@ class Intake(Generic[PeerT]):
         self._retired = ParserCounters()
         self._takes = 0
 
+    def __len__(self) -> int:
+        """Number of peers."""
+        return len(self._inboxes)
+
     @property
     def counters(self) -> ParserCounters:
         """Where every byte that was looked at went, over all peers ever heard; `sources` is left out."""
@@ -93,7 +97,7 @@ class Intake(Generic[PeerT]):
         return inbox is not None and inbox.understood
 
     def parse(self, peer: PeerT, data: bytes) -> list[Frame]:
-        """The frames in bytes of one peer, at once and whatever they cost: for memory links."""
+        """The frames in bytes of one peer, at once and whatever they cost: for a link of one's own."""
         inbox = self._inbox(peer)
         frames = inbox.parser.feed(data)
         if self._admit is not None and frames:

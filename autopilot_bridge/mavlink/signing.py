@@ -21,6 +21,7 @@ from autopilot_bridge.mavlink.frame import (
     CHECKSUM_SIZE,
     HEADER_SIZE_V2,
     INCOMPAT_SIGNED,
+    MAGIC_V2,
     SIGNATURE_SIZE,
     Frame,
 )
@@ -206,6 +207,11 @@ class SigningCounters:
     refused: dict[Refusal, int] = field(default_factory=lambda: dict.fromkeys(Refusal, 0))
 
     @property
+    def reasons(self) -> str:
+        """What was refused, in words: "3 unsigned, 1 replayed"; empty when nothing was."""
+        return ", ".join(f"{count} {reason}" for reason, count in self.refused.items() if count)
+
+    @property
     def refused_frames(self) -> int:
         """Frames that were dropped, for any reason."""
         return sum(self.refused.values())
@@ -250,6 +256,18 @@ class LinkSigning:
         self.counters.sent += len(signed)
         return b"".join(signed)
 
+    def sign_again(self, raw: bytes) -> bytes:
+        """Somebody's frame under a signature of ours, instead of its own if it has one.
+
+        A MAVLink 1 frame, and a message the dialect doesn't know, are given back as they are.
+        """
+        message_id = raw[7] | raw[8] << 8 | raw[9] << 16 if raw[0] == MAGIC_V2 else -1
+        if message_id not in DEFINITIONS:
+            return raw
+        self.counters.sent += 1
+        bare = raw[:-SIGNATURE_SIZE] if raw[2] & INCOMPAT_SIGNED else raw
+        return self.state.sign(bare, self.link_id)
+
     def admit(self, frames: list[Frame]) -> list[Frame]:
         """Those of the frames that may be believed; after it, `Frame.signed` means verified."""
         if not self.state.active or self.policy is INTERNAL:
@@ -277,4 +295,4 @@ class LinkSigning:
 
 def is_unsigned_v2(raw: bytes) -> bool:
     """The frame could be given a signature."""
-    return raw[0] == 0xFD and not raw[2] & INCOMPAT_SIGNED
+    return raw[0] == MAGIC_V2 and not raw[2] & INCOMPAT_SIGNED

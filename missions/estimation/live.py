@@ -18,7 +18,7 @@ from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, ReplayLog, open_link, parse_address
-from autopilot_bridge.mavlink import MAVLinkMessage
+from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
 from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError
 from estimators.fleet import Fleet
@@ -33,6 +33,7 @@ from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
 from missions.records import FlightRecorder
 from missions.run import LOG_NAME, create_run_folder
+from missions.signing import client_signing
 
 __all__ = ["LiveProgress", "LiveRequest", "estimate"]
 
@@ -59,6 +60,7 @@ class LiveRequest:
         out: run folder; None: the next `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
         command: the command line, for the summary.
+        signing_key: shared with the vehicle; None: unsigned.
     """
 
     estimator: str
@@ -74,6 +76,7 @@ class LiveRequest:
     out: Path | None = None
     picture: bool = True
     command: str = ""
+    signing_key: SigningKey | None = None
 
     def __post_init__(self) -> None:
         if self.component_id not in ESTIMATOR_COMPONENTS:
@@ -146,6 +149,7 @@ class _Process:
             self._tap,
             identity=(request.system_id or (TEAM_SYSTEM if fleet.team else 1), request.component_id),
             vehicle_system_id=request.system_id,
+            signing=client_signing(request.signing_key),
         )
 
     def stop(self) -> None:

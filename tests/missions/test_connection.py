@@ -8,12 +8,13 @@ import pytest
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.links import memory_pair, open_link
-from autopilot_bridge.mavlink import FrameEncoder, dialect
+from autopilot_bridge.mavlink import FrameEncoder, Intake, dialect
+from autopilot_bridge.mavlink.intake import MAX_PEERS
 from missions.connection import ONBOARD_COMPUTER, Connection
 from missions.errors import LinkClosed
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
-from missions.peers import MAX_COMPONENTS, MAX_PARSERS, PeerParsers
+from missions.peers import MAX_COMPONENTS
 from missions.session import RunRequest, fly
 from missions.vehicle import Vehicle
 
@@ -120,14 +121,14 @@ def test_garbage_is_counted_and_does_no_harm():
 
 
 def test_peers_that_come_and_go_are_forgotten_and_their_bytes_are_not():
-    parsers = PeerParsers()
+    parsers = Intake()
     whole = FrameEncoder(1, 1).encode(attitude(1))
     fed = 0
     for peer in range(500):
         data = b"junk" + whole + whole[: peer % len(whole)]
-        assert len(parsers.feed(peer, data)) == 1
+        assert len(parsers.parse(peer, data)) == 1
         fed += len(data)
-    assert len(parsers) == MAX_PARSERS
+    assert len(parsers) == MAX_PEERS
     counters = parsers.counters
     assert counters.frames == 500
     assert counters.bytes_in == fed

@@ -1,0 +1,83 @@
+"""What the commands that speak on links have in common: the option for a key, the warning without one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from autopilot_bridge.links import Address
+    from autopilot_bridge.mavlink import SigningKey
+    from autopilot_bridge.sitl import SigningParameters
+
+key_option = click.option(
+    "--signing-key",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Sign with the key in it (32 bytes, 64 hex digits, or a passphrase), and believe nobody else.",
+)
+
+
+def key_from(path: Path | None) -> "SigningKey | None":
+    """The key in the file that the option names; None without the option.
+
+    Raises:
+        SigningKeyError: the file can't be read, or holds no key; the message names the file.
+    """
+    if path is None:
+        return None
+    from missions.signing import read_key
+
+    return read_key(path)
+
+
+def warn_if_open(address: "Address", key: "SigningKey | None") -> None:
+    """Say in one line that a link listens to a network, when whoever speaks there is believed."""
+    from autopilot_bridge.links import listens_to_network, open_unsigned
+
+    if key is None and listens_to_network(address):
+        click.echo(f"flightstack: warning: {open_unsigned(address)}", err=True)
+
+
+def vehicle_signing(key: Path | None, unsigned: str, store: Path | None) -> "SigningParameters":
+    """Signing of simulated vehicles, for clients that live in real time.
+
+    Args:
+        key: file with the key of all vehicles.
+        unsigned: from whom unsigned frames are taken: "none", "local" or "all".
+        store: file in which keys and times are kept.
+
+    Raises:
+        SigningKeyError: a file can't be read, or holds something else; the message names it.
+    """
+    from autopilot_bridge.sitl import SigningParameters, SigningStore, UnsignedFrom
+    from missions.signing import now
+
+    return SigningParameters(
+        key=key_from(key),
+        unsigned_from=UnsignedFrom(unsigned),
+        clock=now,
+        store=None if store is None else SigningStore(store),
+    )
+
+
+def signed_how(signing: "SigningParameters", address: "Address") -> str:
+    """What a link takes, for the line that names it; empty while nothing is signed."""
+    from autopilot_bridge.links import reach_of
+    from autopilot_bridge.sitl.signing import POLICIES
+
+    if signing.key is None:
+        return ""
+    policy = POLICIES[signing.unsigned_from][reach_of(address)]
+    return ", signed; takes unsigned frames too" if policy.accept_unsigned else ", signatures required"
+
+
+def warn_if_unsigned(address: "Address", signing: "SigningParameters") -> None:
+    """Say in one line that a vehicle can be flown by whoever is on the network."""
+    from autopilot_bridge.links import Reach, open_unsigned, reach_of
+    from autopilot_bridge.sitl.signing import POLICIES
+
+    reach = reach_of(address)
+    required = signing.key is not None and not POLICIES[signing.unsigned_from][reach].accept_unsigned
+    if reach is Reach.NETWORK and not required:
+        click.echo(f"flightstack: warning: {open_unsigned(address)}", err=True)
