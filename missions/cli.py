@@ -24,6 +24,11 @@ _COMMANDS: Final = {
         "replay",
         "Logs through an estimator, and how far off it was.",
     ),
+    "vehicle": (
+        "missions.cli_vehicle",
+        "vehicle",
+        "Talk to a vehicle: info, parameters, logs, health.",
+    ),
     "study": ("missions.cli_study", "study", "Monte Carlo: the papers' experiments."),
 }
 

@@ -149,8 +149,8 @@ class FileMission(Mission[FileOptions]):
         lines = [f"places reached: {len(reached & places)} of {len(places)}"]
         if block["cross_track_rms_m"] is not None:
             lines.append(
-                f"cross-track {block['cross_track_rms_m']:.2f} m RMS, {block['cross_track_max_m']:.2f} m at most, "
-                f"over {len(block['legs'])} legs"
+                f"cross-track {block['cross_track_rms_m']:.2f} m RMS, {block['cross_track_max_m']:.2f} m at "
+                f"most, over {len(block['legs'])} legs"
             )
         return lines
 

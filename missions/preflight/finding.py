@@ -1,0 +1,48 @@
+"""One thing that was looked at."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Level(StrEnum):
+    """How a finding stands in the way of a flight."""
+
+    OK = "ok"
+    WARNING = "warning"
+    PROBLEM = "problem"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """What was found, and what to do about it.
+
+    Attributes:
+        level: a problem keeps the vehicle from arming, or the mission from being flown.
+        subject: a word or two.
+        text: what was found.
+        advice: what to do; "" where nothing is to be done.
+    """
+
+    level: Level
+    subject: str
+    text: str
+    advice: str = ""
+
+    def __str__(self) -> str:
+        told = f"{self.level:<8} {self.subject}: {self.text}"
+        return f"{told}; {self.advice}" if self.advice else told
+
+
+def ok(subject: str, text: str) -> Finding:
+    """Nothing to do."""
+    return Finding(level=Level.OK, subject=subject, text=text)
+
+
+def warning(subject: str, text: str, advice: str) -> Finding:
+    """Worth a thought."""
+    return Finding(level=Level.WARNING, subject=subject, text=text, advice=advice)
+
+
+def problem(subject: str, text: str, advice: str) -> Finding:
+    """In the way."""
+    return Finding(level=Level.PROBLEM, subject=subject, text=text, advice=advice)

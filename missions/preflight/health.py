@@ -1,0 +1,223 @@
+"""Checks of what the autopilot says of itself: sensors, arming, GPS, filter, home, battery, pilot."""
+
+import math
+from typing import Final
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect
+from missions.preflight.finding import Finding, ok, problem, warning
+from missions.preflight.snapshot import Snapshot
+
+PREARM_BIT: Final = dialect.MAV_SYS_STATUS_PREARM_CHECK
+_RC_BIT: Final = dialect.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+_NEEDED: Final = (
+    dialect.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | dialect.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | dialect.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | dialect.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | dialect.MAV_SYS_STATUS_SENSOR_GPS
+    | dialect.MAV_SYS_STATUS_AHRS
+)
+_SAID_ELSEWHERE: Final = PREARM_BIT | _RC_BIT | dialect.MAV_SYS_STATUS_SENSOR_BATTERY
+_REASONS: Final = ("PreArm", "Arm:", "Arming denied", "Preflight Fail", "Preflight:")
+_UNKNOWN_EPH: Final = 65535
+_SATELLITES: Final = 6
+_HDOP_WARN: Final = 2.0
+_RATIO_BAD, _RATIO_WARN = 1.0, 0.5
+_VARIANCE_BAD, _VARIANCE_WARN = 0.8, 0.5
+_EKF_NEEDED: Final = 0x01 | 0x02 | 0x04 | 0x10 | 0x20  # attitude, velocities, absolute positions
+_EKF_CONST_POS: Final = 0x80
+_HOME_AWAY_M: Final = 30.0
+_BATTERY_LOW, _BATTERY_HALF = 20, 50
+
+
+def health_findings(snapshot: Snapshot) -> list[Finding]:
+    """All of them, in the order in which a person looks."""
+    return [
+        *sensors(snapshot),
+        arming(snapshot),
+        gps(snapshot),
+        navigation(snapshot),
+        home(snapshot),
+        battery(snapshot),
+        remote_control(snapshot),
+    ]
+
+
+def sensors(snapshot: Snapshot) -> list[Finding]:
+    """SYS_STATUS: what is fitted and enabled, and not healthy."""
+    enabled = snapshot.whole("SYS_STATUS", "onboard_control_sensors_enabled")
+    health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health")
+    present = snapshot.whole("SYS_STATUS", "onboard_control_sensors_present")
+    if enabled is None or health is None or present is None:
+        return [
+            problem(
+                "sensors", "the autopilot has not told how they are (SYS_STATUS)", "wait, or look at the link"
+            )
+        ]
+    sick = enabled & present & ~health & ~_SAID_ELSEWHERE
+    missing = _NEEDED & ~present & ~dialect.MAV_SYS_STATUS_AHRS
+    findings = []
+    if missing:
+        findings.append(
+            warning(
+                "sensors", f"not fitted: {_bit_names(missing)}", "see that this vehicle is meant to fly so"
+            )
+        )
+    if sick & _NEEDED:
+        findings.append(
+            problem("sensors", f"not healthy: {_bit_names(sick & _NEEDED)}", "calibrate or mend, and reboot")
+        )
+    if sick & ~_NEEDED:
+        findings.append(warning("sensors", f"not healthy: {_bit_names(sick & ~_NEEDED)}", "look at each"))
+    return findings or [ok("sensors", f"healthy: {_bit_names(enabled & present & health & _NEEDED)}")]
+
+
+def _bit_names(bits: int) -> str:
+    names = []
+    for bit in range(32):
+        if bits & 1 << bit:
+            entry = dialect.enums["MAV_SYS_STATUS_SENSOR"].get(1 << bit)
+            name = entry.name if entry else f"bit {bit}"
+            for prefix in ("MAV_SYS_STATUS_SENSOR_", "MAV_SYS_STATUS_"):
+                name = name.removeprefix(prefix)
+            names.append(name.lower().replace("_", " "))
+    return ", ".join(names)
+
+
+def reasons_against_arming(texts: tuple[str, ...]) -> list[str]:
+    """The texts in which autopilots say why they don't arm, each once."""
+    return list(dict.fromkeys(t.strip() for t in texts if t.startswith(_REASONS)))
+
+
+def arming(snapshot: Snapshot) -> Finding:
+    """Whether it could be armed, and what it said if not."""
+    health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health")
+    base_mode = snapshot.whole("HEARTBEAT", "base_mode") or 0
+    if base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
+        return warning("arming", "the vehicle is armed", "keep away from it")
+    said = reasons_against_arming(snapshot.texts)
+    if health is None:
+        return problem("arming", "it is not known whether it could be armed", "wait, or look at the link")
+    if health & PREARM_BIT:
+        return ok("arming", "the pre-arm checks are passed")
+    why = ": " + " / ".join(said) if said else ", and the autopilot does not say why"
+    return problem("arming", f"the pre-arm checks are not passed{why}", "mend what it names")
+
+
+def gps(snapshot: Snapshot) -> Finding:
+    """Fix, satellites and dilution."""
+    fix = snapshot.whole("GPS_RAW_INT", "fix_type")
+    if fix is None:
+        return warning("GPS", "nothing was told of a receiver", "a flight to places needs one")
+    satellites = snapshot.whole("GPS_RAW_INT", "satellites_visible") or 0
+    eph = snapshot.whole("GPS_RAW_INT", "eph")
+    hdop = None if eph is None or eph == _UNKNOWN_EPH else eph / 100.0
+    shown = f"{satellites} satellites" + ("" if hdop is None else f", HDOP {hdop:.1f}")
+    if fix < dialect.GPS_FIX_TYPE_3D_FIX:
+        entry = dialect.enums["GPS_FIX_TYPE"].get(fix)
+        name = entry.name.removeprefix("GPS_FIX_TYPE_") if entry else f"fix type {fix}"
+        return problem("GPS", f"{name}, {shown}", "wait for a 3D fix, under open sky")
+    if satellites < _SATELLITES or (hdop is not None and hdop > _HDOP_WARN):
+        return warning(
+            "GPS", f"3D fix, {shown}", f"wait for {_SATELLITES} satellites and HDOP {_HDOP_WARN:g}"
+        )
+    return ok("GPS", f"3D fix, {shown}")
+
+
+def navigation(snapshot: Snapshot) -> Finding:
+    """The filter's flags and how well its measurements fit."""
+    if "EKF_STATUS_REPORT" in snapshot.messages:
+        return _ekf_status_report(snapshot)
+    flags = snapshot.whole("ESTIMATOR_STATUS", "flags")
+    if flags is None:
+        return warning("navigation", "the filter's state is not told", "ask for it, or look at the link")
+    if not flags & dialect.ESTIMATOR_POS_HORIZ_ABS or not flags & dialect.ESTIMATOR_ATTITUDE:
+        return problem(
+            "navigation", "the filter has no position or no attitude", "wait for GPS, keep it still"
+        )
+    ratios = {
+        name: snapshot.number("ESTIMATOR_STATUS", f"{name}_ratio") or 0.0
+        for name in ("vel", "pos_horiz", "pos_vert", "mag")
+    }
+    return _fit(ratios, "test ratio", _RATIO_WARN, _RATIO_BAD)
+
+
+def _ekf_status_report(snapshot: Snapshot) -> Finding:
+    flags = snapshot.whole("EKF_STATUS_REPORT", "flags") or 0
+    if flags & _EKF_NEEDED != _EKF_NEEDED or flags & _EKF_CONST_POS:
+        return problem(
+            "navigation", "the filter has no position or no attitude", "wait for GPS, keep it still"
+        )
+    names = ("velocity", "pos_horiz", "pos_vert", "compass")
+    variances = {n: snapshot.number("EKF_STATUS_REPORT", f"{n}_variance") or 0.0 for n in names}
+    return _fit(variances, "variance", _VARIANCE_WARN, _VARIANCE_BAD)
+
+
+def _fit(values: dict[str, float], what: str, warn: float, bad: float) -> Finding:
+    name, worst = max(values.items(), key=lambda entry: entry[1])
+    text = f"position and attitude are estimated, largest {what} {worst:.2f} ({name})"
+    if worst > bad:
+        return problem("navigation", text, f"measurements don't fit: wait until it is below {bad:g}")
+    if worst > warn:
+        return warning("navigation", text, "measurements fit badly: look at compass and GPS")
+    return ok("navigation", text)
+
+
+def home(snapshot: Snapshot) -> Finding:
+    """Home is set, and where the vehicle is."""
+    lat = snapshot.number("HOME_POSITION", "latitude")
+    lon = snapshot.number("HOME_POSITION", "longitude")
+    alt = snapshot.number("HOME_POSITION", "altitude")
+    if lat is None or lon is None or alt is None or (lat == 0 and lon == 0):
+        return problem(
+            "home", "not set: there would be no way back", "wait for GPS; it is set when it is ready"
+        )
+    place = GeodeticPosition(lat_deg=lat * 1e-7, lon_deg=lon * 1e-7, alt_m=alt * 1e-3)
+    text = f"{place.lat_deg:.6f}, {place.lon_deg:.6f}, {place.alt_m:.0f} m"
+    lat, lon = snapshot.number("GLOBAL_POSITION_INT", "lat"), snapshot.number("GLOBAL_POSITION_INT", "lon")
+    if lat is not None and lon is not None:
+        north, east, _ = LocalFrame(place).ned_from_geodetic(lat * 1e-7, lon * 1e-7, place.alt_m)
+        away_m = math.hypot(north, east)
+        armed = (snapshot.whole("HEARTBEAT", "base_mode") or 0) & dialect.MAV_MODE_FLAG_SAFETY_ARMED
+        if away_m > _HOME_AWAY_M and not armed:
+            return warning(
+                "home", f"{text}, {away_m:.0f} m from the vehicle", "arming sets it anew, or set it"
+            )
+    return ok("home", text)
+
+
+def battery(snapshot: Snapshot) -> Finding:
+    """Voltage and charge."""
+    voltage_mv = snapshot.whole("SYS_STATUS", "voltage_battery")
+    remaining = snapshot.whole("SYS_STATUS", "battery_remaining")
+    if voltage_mv in (None, 0, 0xFFFF) and remaining in (None, -1):
+        return warning(
+            "battery", "not measured", "there will be no warning before it is empty: set the monitor up"
+        )
+    parts = []
+    if voltage_mv not in (None, 0, 0xFFFF):
+        parts.append(f"{(voltage_mv or 0) * 1e-3:.1f} V")
+    if remaining in (None, -1):
+        return warning("battery", f"{parts[0]}, charge not known", "see that it is full")
+    parts.append(f"{remaining} %")
+    assert remaining is not None
+    if remaining < _BATTERY_LOW:
+        return problem("battery", ", ".join(parts), "charge it")
+    if remaining < _BATTERY_HALF:
+        return warning("battery", ", ".join(parts), "see that it lasts")
+    return ok("battery", ", ".join(parts))
+
+
+def remote_control(snapshot: Snapshot) -> Finding:
+    """Whether a pilot could take over."""
+    present = snapshot.whole("SYS_STATUS", "onboard_control_sensors_present") or 0
+    health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
+    channels = snapshot.whole("RC_CHANNELS", "chancount") or 0
+    if channels > 0 or present & health & _RC_BIT:
+        rssi = snapshot.whole("RC_CHANNELS", "rssi")
+        strength = "" if rssi in (None, 255, 0) else f", signal {100 * (rssi or 0) // 254} %"
+        return ok("remote control", f"heard{strength}")
+    return warning(
+        "remote control", "none is heard", "nobody could take over but by this link: fly so on purpose only"
+    )

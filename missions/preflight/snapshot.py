@@ -1,0 +1,41 @@
+"""What a vehicle has told, for checks that don't care how it was heard."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from missions.kind import VehicleKind
+
+Fields = Mapping[str, Any]
+"""A message's fields by name, in wire units. What is not a number is None or NaN."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Snapshot:
+    """The newest of everything.
+
+    Attributes:
+        flavour: "px4" or "ardupilot"; "" for another autopilot.
+        kind: class of vehicle; None: one that isn't flown here.
+        messages: newest of each name, from the autopilot.
+        texts: what it said, oldest first.
+        parameters: those that are known.
+        fence_items: of the vehicle's geofence; None: not known.
+    """
+
+    flavour: str
+    kind: VehicleKind | None
+    messages: Mapping[str, Fields]
+    texts: tuple[str, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    fence_items: int | None = None
+
+    def number(self, message: str, name: str) -> float | None:
+        """A field of a message, when both are there."""
+        value = self.messages.get(message, {}).get(name)
+        return value if isinstance(value, int | float) and value == value else None
+
+    def whole(self, message: str, name: str) -> int | None:
+        """The same of a whole number."""
+        value = self.number(message, name)
+        return None if value is None else int(value)

@@ -1,0 +1,37 @@
+"""Our connection strings as MAVSDK takes them."""
+
+from autopilot_bridge.links import (
+    Address,
+    ReplayLog,
+    SerialPort,
+    TcpClient,
+    TcpServer,
+    UdpClient,
+    UdpPeer,
+    UdpServer,
+)
+from missions.errors import PlanError
+
+
+def mavsdk_url(address: Address) -> str:
+    """The same link for MAVSDK.
+
+    Raises:
+        PlanError: a kind of link that MAVSDK has not.
+    """
+    match address:
+        case UdpServer():
+            return f"udpin://{address.host}:{address.port}"
+        case UdpClient():
+            return f"udpout://{address.host}:{address.port}"
+        case TcpClient():
+            return f"tcpout://{address.host}:{address.port}"
+        case TcpServer():
+            return f"tcpin://{address.host}:{address.port}"
+        case SerialPort():
+            return f"serial://{address.device}:{address.baud}"
+        case UdpPeer() | ReplayLog():
+            raise PlanError(
+                f"--connect {address}: not for this command; accepted: udpin:, udpout:, tcp:, tcpin:, "
+                "serial: or DEVICE,BAUD"
+            )

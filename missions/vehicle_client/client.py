@@ -1,0 +1,235 @@
+"""A vehicle through MAVSDK: connected, told apart, and its newest messages kept."""
+
+import asyncio
+import json
+import math
+from collections import Counter
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager, suppress
+from typing import Any, Final
+
+from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, MavsdkConnectionError, System
+from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.logging import log_subscribe
+from mavsdk.plugins.mavlink_direct import MavlinkDirectError, MavlinkMessage
+
+from autopilot_bridge.errors import BridgeError
+from autopilot_bridge.links import Address
+from autopilot_bridge.mavlink import definition, dialect
+from missions.errors import MissionError, VehicleTimeout
+from missions.kind import KIND_OF_TYPE, VehicleKind
+from missions.preflight.snapshot import Snapshot
+from missions.vehicle.link_view import ADAPTERS
+from missions.vehicle_client.addresses import mavsdk_url
+from missions.vehicle_client.listening import listen
+
+_AUTOPILOT: Final = 1
+_FLAVOURS: Final = {dialect.MAV_AUTOPILOT_PX4: "px4", dialect.MAV_AUTOPILOT_ARDUPILOTMEGA: "ardupilot"}
+_LOOK_S: Final = 0.05
+_LISTEN_S: Final = 2.0
+_KEPT_TEXTS: Final = 100
+
+WANTED: Final[Mapping[str, tuple[str, ...]]] = {
+    "px4": ("SYS_STATUS", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "HOME_POSITION", "ESTIMATOR_STATUS",
+            "BATTERY_STATUS", "EXTENDED_SYS_STATE"),
+    "ardupilot": ("SYS_STATUS", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "HOME_POSITION", "EKF_STATUS_REPORT",
+                  "BATTERY_STATUS", "EXTENDED_SYS_STATE", "RC_CHANNELS", "SYSTEM_TIME"),
+}  # fmt: skip
+"""Messages that tell how a vehicle is."""
+
+
+class VehicleClient:
+    """One vehicle that MAVSDK has found; made by `open_client`.
+
+    Attributes:
+        system: MAVSDK's, for its plugins.
+        system_id: MAVLink system id.
+        direct: MAVSDK's plugin for messages as they are.
+        messages: the newest of each name from the autopilot.
+        counts: how many of each name came.
+        texts: what the vehicle said, oldest first.
+    """
+
+    def __init__(self, system: System, system_id: int) -> None:
+        self.system = system
+        self.system_id = system_id
+        self.direct = MavlinkDirectAsync(system)
+        self.messages: dict[str, Mapping[str, Any]] = {}
+        self.counts: Counter[str] = Counter()
+        self.texts: list[str] = []
+        self.parameter_types: dict[str, int] = {}
+        self._tasks: list[asyncio.Task[None]] = []
+
+    def start(self) -> None:
+        """Begin to keep what it says."""
+        loop = asyncio.get_running_loop()
+        self._tasks = [loop.create_task(self._keep_messages()), loop.create_task(self._keep_texts())]
+
+    async def stop(self) -> None:
+        """Keep nothing more."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def _keep_messages(self) -> None:
+        async for message in self.direct.subscribe_message(""):
+            if message.component_id != _AUTOPILOT or message.system_id != self.system_id:
+                continue
+            with suppress(ValueError):  # NaN in a field is no JSON
+                fields = json.loads(message.fields_json)
+                self.messages[message.message_name] = fields
+                self.counts[message.message_name] += 1
+                if message.message_name == "PARAM_VALUE":
+                    self.parameter_types[str(fields.get("param_id", ""))] = int(fields.get("param_type", 0))
+
+    async def _keep_texts(self) -> None:
+        async for text in TelemetryAsync(self.system).subscribe_status_text():
+            self.texts = [*self.texts[-_KEPT_TEXTS:], text.text.strip()]
+
+    # who it is
+
+    @property
+    def flavour(self) -> str:
+        """ "px4" or "ardupilot"; "" for another autopilot."""
+        return _FLAVOURS.get(int(self.messages.get("HEARTBEAT", {}).get("autopilot", -1)), "")
+
+    @property
+    def kind(self) -> VehicleKind | None:
+        """Class of vehicle; None: one that isn't flown here."""
+        return KIND_OF_TYPE.get(int(self.messages.get("HEARTBEAT", {}).get("type", -1)))
+
+    @property
+    def mode(self) -> str:
+        """Flight mode, as the firmware calls it."""
+        custom_mode = int(self.messages.get("HEARTBEAT", {}).get("custom_mode", 0))
+        if self.kind is None or (self.flavour, self.kind) not in ADAPTERS:
+            return f"mode {custom_mode}"
+        return ADAPTERS[self.flavour, self.kind]().mode_name(custom_mode)
+
+    def snapshot(
+        self, parameters: Mapping[str, float] | None = None, fence_items: int | None = None
+    ) -> Snapshot:
+        """What it has told so far."""
+        return Snapshot(
+            flavour=self.flavour,
+            kind=self.kind,
+            messages=dict(self.messages),
+            texts=tuple(self.texts),
+            parameters=parameters or {},
+            fence_items=fence_items,
+        )
+
+    # asking
+
+    async def wait_for(self, *names: str, timeout_s: float) -> list[str]:
+        """Wait until messages of these names have come; gives those that have not."""
+        end_s = asyncio.get_running_loop().time() + timeout_s
+        while missing := [name for name in names if name not in self.messages]:
+            if asyncio.get_running_loop().time() >= end_s:
+                return missing
+            await asyncio.sleep(_LOOK_S)
+        return []
+
+    async def command(self, command: int, *parameters: float) -> int | None:
+        """COMMAND_LONG; its MAV_RESULT, or None without an answer."""
+        fields = {f"param{k}": value for k, value in enumerate((*parameters, *(0.0,) * 7)[:7], start=1)}
+        fields |= {"target_system": self.system_id, "target_component": _AUTOPILOT, "command": command}
+        message = MavlinkMessage(
+            message_name="COMMAND_LONG",
+            system_id=0,
+            component_id=0,
+            target_system_id=self.system_id,
+            target_component_id=_AUTOPILOT,
+            fields_json=json.dumps(fields),
+        )
+        try:
+            ack = await self.direct.send_command(message)
+            return int(json.loads(ack.fields_json)["result"])
+        except (MavlinkDirectError, ValueError, KeyError):
+            return None
+
+    async def ask_for(self, names: Sequence[str], rate_hz: float = 2.0) -> None:
+        """Have messages streamed that are not (ArduPilot sends only what it was asked for)."""
+        for name in names:
+            if name not in self.messages:
+                await self.command(
+                    dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(definition(name).message_id), 1e6 / rate_hz
+                )
+            if name == "HOME_POSITION" and name not in self.messages:
+                await self.command(dialect.MAV_CMD_REQUEST_MESSAGE, float(definition(name).message_id))
+
+
+@asynccontextmanager
+async def open_client(
+    address: Address, *, timeout_s: float = 10.0, system_id: int | None = None
+) -> AsyncIterator[VehicleClient]:
+    """Connect, and find the vehicle.
+
+    Args:
+        timeout_s: to hear an autopilot.
+        system_id: of the vehicle; None: the first one heard.
+
+    Raises:
+        PlanError: a link that MAVSDK has not.
+        MissionError: it can't be opened, or no autopilot is heard there; says what was heard.
+    """
+    url = mavsdk_url(address)
+    said: list[str] = []
+
+    def keep(_level: object, message: str, _file: object, _line: int) -> bool:
+        said.append(message)
+        return True  # not to the terminal
+
+    log_subscribe(keep)
+    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+    mavsdk = Mavsdk(configuration)
+    client: VehicleClient | None = None
+    try:
+        try:
+            await mavsdk.add_any_connection(url)
+        except MavsdkConnectionError as error:
+            why = said[-1] if said else str(error)
+            raise MissionError(f"{address} can't be opened: {why}") from error
+        system = await _find(mavsdk, timeout_s, system_id)
+        if system is not None:
+            client = VehicleClient(system, await system.get_system_id())
+            client.start()
+            if await client.wait_for("HEARTBEAT", timeout_s=max(3.0, timeout_s)):
+                raise VehicleTimeout(f"vehicle {client.system_id} on {address} went silent")
+            yield client
+    finally:
+        if client is not None:
+            await client.stop()
+        mavsdk.destroy()
+    if client is None:
+        which = "autopilot" if system_id is None else f"autopilot with system id {system_id}"
+        raise VehicleTimeout(
+            f"no {which} was heard on {address} within {timeout_s:g} s; {await _heard(address)}"
+        )
+
+
+async def _find(mavsdk: Mavsdk, timeout_s: float, system_id: int | None) -> System | None:
+    if system_id is None:
+        return await mavsdk.first_autopilot(timeout_s=timeout_s)
+    end_s = asyncio.get_running_loop().time() + timeout_s
+    while asyncio.get_running_loop().time() < end_s:
+        for system in await mavsdk.get_systems():
+            if await system.get_system_id() == system_id and await system.has_autopilot():
+                return system
+        await asyncio.sleep(_LOOK_S)
+    return None
+
+
+async def _heard(address: Address) -> str:
+    """What there is on a link without the autopilot that was looked for."""
+    try:
+        quality = await listen(address, _LISTEN_S)
+    except BridgeError as error:
+        return str(error)
+    return quality.heard()
+
+
+def finite(value: float | None) -> float | None:
+    """A number for JSON: None for NaN and infinity."""
+    return value if value is not None and math.isfinite(value) else None

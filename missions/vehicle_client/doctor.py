@@ -1,0 +1,147 @@
+"""How a vehicle is, and what keeps it from arming."""
+
+import asyncio
+from typing import Final
+
+from mavsdk.asyncio.plugins.events import EventsAsync
+from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+from mavsdk.plugins.events import EventsError
+from mavsdk.plugins.mission_raw import MissionRawError
+
+from autopilot_bridge.links import Address
+from autopilot_bridge.mavlink import dialect
+from missions.errors import MissionError
+from missions.preflight.finding import Finding, ok, problem, warning
+from missions.preflight.health import PREARM_BIT, health_findings
+from missions.preflight.lost_link import lost_link_words
+from missions.preflight.settings import fence, settings_findings
+from missions.preflight.snapshot import Snapshot
+from missions.vehicle_client.client import WANTED, VehicleClient, open_client
+from missions.vehicle_client.listening import LinkQuality, listen
+from missions.vehicle_client.parameters import read_all
+
+_LISTEN_S: Final = 3.0
+_WAIT_S: Final = 5.0
+_TEXTS_S: Final = 1.5
+_REPORT_S: Final = 1.0
+_LOSS_WARN, _LOSS_BAD = 0.02, 0.2
+_CLOCK_S: Final = 5.0
+_SLOW_HEARTBEAT_HZ: Final = 0.7
+_RUN_PREARM_CHECKS: Final = 401
+
+
+async def examine(
+    address: Address, *, timeout_s: float, system_id: int | None, unix_time_us: int
+) -> list[Finding]:
+    """All findings, in the order in which a person looks.
+
+    Args:
+        unix_time_us: this machine's clock, when the examination begins.
+
+    Raises:
+        MissionError: no vehicle is heard.
+        BridgeError: the link can't be opened.
+    """
+    begun_s = asyncio.get_running_loop().time()
+    quality = await listen(address, _LISTEN_S, system_id)
+    async with open_client(address, timeout_s=timeout_s, system_id=system_id) as client:
+        findings = [_who(client)]
+        wanted = WANTED.get(client.flavour, WANTED["px4"])
+        await client.ask_for(wanted)
+        await client.command(_RUN_PREARM_CHECKS)  # the reasons are told again
+        missing = await client.wait_for(*wanted, timeout_s=_WAIT_S)
+        await asyncio.sleep(_TEXTS_S)
+        try:
+            parameters = {name: float(value.number) for name, value in (await read_all(client)).items()}
+        except MissionError as error:
+            parameters = {}
+            findings.append(problem("parameters", str(error), "look at the link"))
+        snapshot = client.snapshot(parameters, await _fence_items(client))
+        findings += health_findings(snapshot)
+        findings += await _events(client, snapshot)
+        findings += [fence(snapshot), _clock(snapshot, unix_time_us, begun_s)]
+        findings += [*settings_findings(snapshot), *_lost_link(snapshot)]
+        findings.append(_link(quality, client, missing))
+    return findings
+
+
+def _who(client: VehicleClient) -> Finding:
+    type_ = dialect.enums["MAV_TYPE"].get(int(client.messages["HEARTBEAT"]["type"]))
+    name = type_.name.removeprefix("MAV_TYPE_").lower() if type_ else "unknown type"
+    text = (
+        f"{client.flavour or 'another autopilot'}, {name}, system id {client.system_id}, mode {client.mode}"
+    )
+    if not client.flavour or client.kind is None:
+        return warning(
+            "vehicle", text, "missions are flown with PX4 and ArduPilot, multicopters and aircraft"
+        )
+    return ok("vehicle", text)
+
+
+async def _fence_items(client: VehicleClient) -> int | None:
+    try:
+        return len(await MissionRawAsync(client.system).download_geofence())
+    except MissionRawError:
+        return None
+
+
+async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
+    """What PX4's arming checks report by events; nothing where there are none, or MAVSDK has no names."""
+    health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
+    try:
+        report = await asyncio.wait_for(
+            EventsAsync(client.system).get_health_and_arming_checks_report(), _REPORT_S
+        )
+    except (EventsError, TimeoutError):
+        return []
+    found = []
+    for entry in report.all_problems:
+        text = f"{entry.message} {entry.description}".strip()
+        told = problem if entry.log_level <= 3 and not health & PREARM_BIT else warning
+        found.append(told("arming check", text, f"look at {entry.health_component or 'it'}"))
+    return found
+
+
+def _clock(snapshot: Snapshot, unix_time_us: int, begun_s: float) -> Finding:
+    told_us = snapshot.whole("SYSTEM_TIME", "time_unix_usec")
+    if not told_us:
+        return warning(
+            "clock", "the vehicle doesn't tell the date", "its logs are undated until it has GPS time"
+        )
+    now_us = unix_time_us + (asyncio.get_running_loop().time() - begun_s) * 1e6
+    off_s = (told_us - now_us) * 1e-6
+    if abs(off_s) > _CLOCK_S:
+        return warning(
+            "clock", f"{off_s:+.0f} s off this machine's", "set this machine's, or wait for GPS time"
+        )
+    return ok("clock", f"{off_s:+.1f} s off this machine's")
+
+
+def _lost_link(snapshot: Snapshot) -> list[Finding]:
+    if snapshot.kind is None or not snapshot.flavour:
+        return []
+    words = lost_link_words(snapshot.flavour, snapshot.kind, snapshot.parameters)
+    if not words:
+        return []
+    goes_on = [w for w in words if " goes on (" in w]
+    text = "; ".join(words)
+    if goes_on:
+        return [warning("lost link", text, "see that this is what you want")]
+    return [ok("lost link", text)]
+
+
+def _link(quality: LinkQuality, client: VehicleClient, missing: list[str]) -> Finding:
+    rate_hz = quality.frames / quality.seconds
+    text = f"{rate_hz:.0f} messages/s of {len(quality.rates_hz)} kinds, {100.0 * quality.loss:.1f} % lost"
+    if quality.loss > _LOSS_BAD:
+        return problem("link", text, "a mission upload would fail: look at antennas, cable, baud rate")
+    if quality.loss > _LOSS_WARN:
+        return warning("link", text, "look at antennas, cable, baud rate")
+    if quality.rates_hz.get("HEARTBEAT", 0.0) < _SLOW_HEARTBEAT_HZ:
+        return warning("link", f"{text}; heartbeats at {quality.rates_hz.get('HEARTBEAT', 0.0):.1f} Hz",
+                       "they should come once a second")  # fmt: skip
+    if missing:
+        return warning(
+            "link", f"{text}; not sent when asked for: {', '.join(missing)}", "is it too slow a line?"
+        )
+    return ok("link", text)

@@ -1,0 +1,105 @@
+"""Listening to a link with our own parser: who is there, and how much gets lost.
+
+MAVSDK hands messages over without their sequence numbers and keeps no count of losses, and it says nothing of
+what it hears of a link without an autopilot; both are told by the frames themselves.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from autopilot_bridge.links import Address, open_link
+from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, dialect
+
+_LOOK_S = 0.02
+_GCS_HEARTBEAT_S = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkQuality:
+    """What came in over a while.
+
+    Attributes:
+        seconds: of listening.
+        frames, lost: good frames of the autopilot, and those missing in its sequence.
+        bytes_total, bytes_junk: received, and of those what was no frame.
+        rates_hz: of the autopilot's messages by name.
+        components: (system, component) heard.
+    """
+
+    seconds: float
+    frames: int
+    lost: int
+    bytes_total: int
+    bytes_junk: int
+    rates_hz: Mapping[str, float]
+    components: tuple[tuple[int, int], ...]
+
+    @property
+    def loss(self) -> float:
+        """Share of the autopilot's frames that did not come, 0..1."""
+        return self.lost / max(1, self.frames + self.lost)
+
+    def heard(self) -> str:
+        """In words, for an error."""
+        if not self.bytes_total:
+            return f"nothing was received in {self.seconds:.0f} s: is it on, is this the right link?"
+        if not self.components:
+            return (
+                f"{self.bytes_total} bytes were received in {self.seconds:.0f} s, and none of it is MAVLink: "
+                "is the baud rate right?"
+            )
+        names = ", ".join(f"{system}/{component}" for system, component in self.components)
+        return f"heard were components {names} (system/component), none of them an autopilot's heartbeat"
+
+
+async def listen(address: Address, seconds: float, system_id: int | None = None) -> LinkQuality:
+    """Listen to a link of our own for so long, with heartbeats of a ground station.
+
+    Args:
+        system_id: of the autopilot whose frames count; None: the lowest heard.
+
+    Raises:
+        BridgeError: the link can't be opened.
+    """
+    loop = asyncio.get_running_loop()
+    link = open_link(address)
+    parser, encoder = FrameParser(), FrameEncoder(255, 190)
+    counts: dict[tuple[int, int], Counter[int]] = {}
+    last: dict[tuple[int, int], int] = {}
+    lost: Counter[tuple[int, int]] = Counter()
+    total, started_s, beat_s = 0, loop.time(), 0.0
+    heartbeat = dialect.MAVLink_heartbeat_message(
+        dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
+    )
+    try:
+        while (now_s := loop.time()) - started_s < seconds:
+            if now_s >= beat_s:
+                link.send(encoder.encode(heartbeat))
+                beat_s = now_s + _GCS_HEARTBEAT_S
+            for _, data in link.receive():
+                total += len(data)
+                for frame in parser.feed(data):
+                    who = (frame.system_id, frame.component_id)
+                    if who in last:
+                        gap = (frame.sequence - last[who] - 1) & 0xFF
+                        if gap < 128:  # a larger one is a frame that came late
+                            lost[who] += gap
+                    last[who] = frame.sequence
+                    counts.setdefault(who, Counter())[frame.message_id] += 1
+            await asyncio.sleep(_LOOK_S)
+    finally:
+        link.close()
+    autopilots = sorted(who for who in counts if who[1] == 1 and system_id in (None, who[0]))
+    chosen = autopilots[0] if autopilots else (0, 0)
+    own = counts.get(chosen, Counter())
+    return LinkQuality(
+        seconds=seconds,
+        frames=sum(own.values()),
+        lost=lost[chosen],
+        bytes_total=total,
+        bytes_junk=parser.counters.bytes_junk,
+        rates_hz={DEFINITIONS[k].name: n / seconds for k, n in sorted(own.items())},
+        components=tuple(sorted(counts)),
+    )

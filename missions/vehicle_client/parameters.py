@@ -1,0 +1,201 @@
+"""A vehicle's parameters through MAVSDK: read, set, saved, loaded, compared."""
+
+import asyncio
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from mavsdk.asyncio.plugins.param import ParamAsync
+from mavsdk.plugins.param import ParamError, ParamResult
+
+from autopilot_bridge.parameter_files import (
+    MAVPROXY_SUFFIXES,
+    QGC_SUFFIX,
+    format_mavproxy,
+    format_qgc,
+)
+from autopilot_bridge.parameters import ParameterDefinition, ParameterType
+from missions.errors import CommandRejected, MissionError, PlanError, VehicleTimeout
+from missions.vehicle_client.client import VehicleClient
+
+_LIST_TRIES: Final = 3
+_INTEGERS: Final = frozenset((1, 2, 3, 4, 5, 6))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Value:
+    """A parameter's value as the vehicle stores it.
+
+    Attributes:
+        number: an int, or a float in single precision.
+        type: MAV_PARAM_TYPE.
+    """
+
+    number: float
+    type: int
+
+    def __str__(self) -> str:
+        """The shortest decimal that reads back as the same value."""
+        return str(self.number) if isinstance(self.number, int) else str(np.float32(self.number))
+
+
+def same(a: float, b: float) -> bool:
+    """Whether two numbers are one value of a vehicle, which stores single precision."""
+    if math.isnan(a) or math.isnan(b):
+        return math.isnan(a) and math.isnan(b)
+    return a == b or np.float32(a) == np.float32(b)
+
+
+async def read_all(client: VehicleClient) -> dict[str, Value]:
+    """All parameters by name, in alphabetical order.
+
+    MAVSDK knows int and float only; the exact types are those of the PARAM_VALUE messages that it asked for.
+
+    Raises:
+        VehicleTimeout: the vehicle doesn't list them.
+    """
+    plugin = ParamAsync(client.system)
+    for _ in range(_LIST_TRIES):
+        listed = await plugin.get_all_params()
+        if listed.int_params or listed.float_params:
+            break
+    else:
+        raise VehicleTimeout(
+            f"vehicle {client.system_id} did not list its parameters ({_LIST_TRIES} attempts)"
+        )
+    await asyncio.sleep(0.1)  # the last messages are on their way to us
+    values = {
+        p.name: Value(number=int(p.value), type=client.parameter_types.get(p.name, int(ParameterType.INT32)))
+        for p in listed.int_params
+    }
+    values |= {
+        p.name: Value(number=float(p.value), type=int(ParameterType.REAL32)) for p in listed.float_params
+    }
+    return dict(sorted(values.items()))
+
+
+async def read_one(client: VehicleClient, name: str) -> Value:
+    """One parameter.
+
+    Raises:
+        PlanError: the vehicle has none of that name.
+    """
+    plugin = ParamAsync(client.system)
+    try:
+        return Value(number=float(await plugin.get_param_float(name)), type=int(ParameterType.REAL32))
+    except ParamError as error:
+        if error.result is not ParamResult.WRONG_TYPE:
+            raise PlanError(await _unknown(client, name, error)) from error
+    try:
+        number = int(await plugin.get_param_int(name))
+    except ParamError as error:
+        raise PlanError(await _unknown(client, name, error)) from error
+    return Value(number=number, type=client.parameter_types.get(name, int(ParameterType.INT32)))
+
+
+async def _unknown(client: VehicleClient, name: str, error: ParamError) -> str:
+    if len(name) > 16 or not name.isascii() or not name:
+        return f"parameter {name!r}: accepted: names of 1 to 16 ASCII characters"
+    try:
+        known: Iterable[str] = await read_all(client)
+    except MissionError:
+        known = ()
+    close = get_close_matches(name.upper(), list(known), n=3, cutoff=0.6)
+    hint = f"; did you mean {' or '.join(close)}?" if close else ""
+    return f"parameter {name}: the vehicle does not answer for it ({error.result.name.lower()}){hint}"
+
+
+async def write_one(client: VehicleClient, name: str, number: float, type_: int) -> Value:
+    """Set a parameter, and read it back.
+
+    Raises:
+        PlanError: not a value of this type.
+        CommandRejected: the vehicle kept another one.
+    """
+    plugin = ParamAsync(client.system)
+    try:
+        if type_ in _INTEGERS:
+            if not math.isfinite(number) or number != int(number):
+                raise PlanError(f"parameter {name} = {number:g}: accepted: a whole number")
+            await plugin.set_param_int(name, int(number))
+        else:
+            if not math.isfinite(number):
+                raise PlanError(f"parameter {name} = {number:g}: accepted: a finite number")
+            await plugin.set_param_float(name, float(number))
+    except ParamError as error:
+        raise CommandRejected(
+            f"the vehicle did not take {name} = {number:g}: {error.result.name.lower()}", 0
+        ) from error
+    kept = await read_one(client, name)
+    if not same(kept.number, number):
+        raise CommandRejected(f"the vehicle kept {name} = {kept} instead of {number:g}", 0)
+    return kept
+
+
+def format_values(path: Path, values: Mapping[str, Value], system_id: int) -> str:
+    """Values in the format that a file's suffix names, types kept where the format has them.
+
+    Raises:
+        PlanError: the suffix names none.
+    """
+    numbers = {name: value.number for name, value in values.items()}
+    suffix = path.suffix.lower()
+    if suffix == QGC_SUFFIX:
+        definitions = [
+            ParameterDefinition(name=name, type=_known_type(value.type), default=value.number)
+            for name, value in values.items()
+            if math.isfinite(value.number)
+        ]
+        finite = {name: number for name, number in numbers.items() if math.isfinite(number)}
+        return format_qgc(finite, definitions, system_id=system_id)
+    if suffix in MAVPROXY_SUFFIXES:
+        return format_mavproxy(numbers)
+    accepted = ", ".join((QGC_SUFFIX, *MAVPROXY_SUFFIXES))
+    raise PlanError(f"parameter file {path}: suffix {path.suffix!r}; accepted: {accepted}")
+
+
+def _known_type(type_: int) -> ParameterType:
+    try:
+        return ParameterType(type_)
+    except ValueError:
+        return ParameterType.INT32
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """A parameter that two sides don't agree on; None: it has none of that name."""
+
+    name: str
+    vehicle: Value | None
+    other: float | None
+
+
+def differences(values: Mapping[str, Value], other: Mapping[str, float]) -> list[Difference]:
+    """All of them, by name. Parameters that only the vehicle has are none: a file may hold a part."""
+    found = []
+    for name, number in sorted(other.items()):
+        own = values.get(name)
+        if own is None or not same(own.number, number):
+            found.append(Difference(name=name, vehicle=own, other=number))
+    return found
+
+
+async def load(
+    client: VehicleClient, changes: Iterable[Difference], tell: Callable[[str], None]
+) -> list[str]:
+    """Set all that differ; gives the names that the vehicle did not take, with its reasons."""
+    refused = []
+    for change in changes:
+        if change.vehicle is None or change.other is None:
+            continue
+        try:
+            kept = await write_one(client, change.name, change.other, change.vehicle.type)
+        except (MissionError, PlanError) as error:
+            refused.append(str(error))
+            continue
+        tell(f"{change.name}: {change.vehicle} -> {kept}")
+    return refused
