@@ -29,6 +29,7 @@ from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Channel, Service, Source, TimedService
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
+from autopilot_bridge.services.geofence import MissionFence
 from autopilot_bridge.services.message_interval import MessageIntervalService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.mission import MissionService, new_stores
@@ -183,6 +184,7 @@ class Autopilot:
         )
         self.context.health = self.navigation.health
         stores = new_stores()
+        self.context.rally = stores[MissionType.RALLY]
         self.commander = Commander(
             self.context,
             policy=flavour.policy,
@@ -208,6 +210,7 @@ class Autopilot:
             progress=self._progress,
             on_plan_changed=self._on_plan_changed,
             parameters=self.parameters,
+            fence=MissionFence(self.commander),
         )
         self._status = StatusReport(flavour, self.commander)
         self._view = TelemetryView(self.context, self.navigation.state, readings)
@@ -224,6 +227,7 @@ class Autopilot:
                 broadcast=self,
                 announce=self._texts.announce,
                 memory=memory,
+                execute=lambda command: self._commands.carry_out(command),
             )
         )
         self._cache = PayloadCache(merged(self._messages.builders(), *(more.builders for more in self._more)))
@@ -258,15 +262,16 @@ class Autopilot:
             *(more for more in self._more if type(more).tick is not Microservice.tick),
             self.intervals,
         )
+        self._commands = CommandService.for_flavour(
+            flavour.name,
+            self.commander,
+            hooks,
+            flavour.command_address(system_id),
+            merged(*(more.commands for more in self._more)),
+        )
         self._services: tuple[Service, ...] = (
             SetpointService(flavour.name, self.commander),
-            CommandService.for_flavour(
-                flavour.name,
-                self.commander,
-                hooks,
-                flavour.command_address(system_id),
-                merged(*(more.commands for more in self._more)),
-            ),
+            self._commands,
             self._parameter_service,
             self.missions,
             TimeSyncService(answers_ping=firmware.answers_ping),

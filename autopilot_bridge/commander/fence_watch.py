@@ -8,12 +8,7 @@ from typing import Final
 
 from autopilot_bridge.commander.events import Event, FenceBreached, FenceSwitched
 from autopilot_bridge.commander.geofence import Geofence, Place
-from autopilot_bridge.commander.geofence_parameters import (
-    ALL_FENCES,
-    AutoEnable,
-    FenceParameters,
-    FenceType,
-)
+from autopilot_bridge.commander.geofence_parameters import AutoEnable, FenceParameters, FenceType
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionStore
 
@@ -83,8 +78,11 @@ class FenceWatch:
     def switch(self, walls: FenceType, *, on: bool) -> None:
         """Switch some of the walls (DO_FENCE_ENABLE), until they are switched again."""
         self._off = self._off & ~walls if on else self._off | walls
-        if not on and walls == ALL_FENCES:
-            self._auto_on = False
+
+    def forget_switches(self) -> None:
+        """Only the parameters say what is on."""
+        self._off = _NOTHING
+        self._auto_on = False
 
     def allows(self, place_ned_m: Place, frame: LocalFrame | None) -> bool:
         """A place is inside of what is on."""

@@ -6,7 +6,7 @@ Message fields are untrusted: whatever they hold, a service neither raises nor s
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 MavlinkMessage = Any
 """A message object of `pymavlink.dialects.v20.all` (pymavlink carries no types)."""
@@ -41,6 +41,19 @@ class Source(NamedTuple):
     channel: Channel
     system_id: int
     component_id: int
+
+
+class _Nowhere:
+    """A channel that drops everything."""
+
+    name = "nowhere"
+
+    def send(self, message: MavlinkMessage, /) -> None:
+        """Drop the message."""
+
+
+NOBODY: Final = Source(channel=_Nowhere(), system_id=0, component_id=0)
+"""The source of what the autopilot asks of itself."""
 
 
 class Service(Protocol):

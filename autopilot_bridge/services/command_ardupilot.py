@@ -54,7 +54,6 @@ class ArduPilotCommands(CommandHandlers):
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.terminate,
             mavlink.MAV_CMD_DO_SET_SERVO: self.set_servo,
             mavlink.MAV_CMD_DO_GRIPPER: self.fail,
-            mavlink.MAV_CMD_DO_FENCE_ENABLE: self.enable_fence,
             mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self.calibrate,
         }
 
@@ -185,15 +184,6 @@ class ArduPilotCommands(CommandHandlers):
     def fail(self, command: Command, source: Source) -> Result:
         """FAILED: there is no such device."""
         return Result.FAILED
-
-    def enable_fence(self, command: Command, source: Source) -> Result:
-        """DO_FENCE_ENABLE: 0 off, 1 on, 2 off near the ground only."""
-        action = whole(command.p1)
-        if action not in (0, 1, 2):
-            return Result.FAILED
-        if action != 2 and "FENCE_ENABLE" in self.hooks.parameters:
-            self.hooks.parameters.set("FENCE_ENABLE", action)
-        return Result.ACCEPTED
 
     def calibrate(self, command: Command, source: Source) -> Result:
         """PREFLIGHT_CALIBRATION: gyro and pressure are in order; nothing or more is unsupported."""

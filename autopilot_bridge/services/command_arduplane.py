@@ -27,7 +27,6 @@ _DEFAULT_SPEED: Final = -2.0
 _COURSE, _HEADING = 0, 1  # HEADING_TYPE
 _LEAST_TURN_M_S2: Final = 0.05
 _AUTOLAND_OFF: Final = 0  # RTL_AUTOLAND
-_FENCE_SHAPES: Final = 1 | 2 | 8  # of FENCE_TYPE: heights and circle, which need no uploaded points
 _SWITCH_HIGH: Final = 2
 _SWITCHES: Final = {
     4: FlightMode.RETURN,
@@ -211,13 +210,6 @@ class ArduPlaneCommands(ArduPilotCommands):
             self.hooks.announce(_INFO, "AFS not enabled, can't terminate the vehicle")
             return Result.FAILED
         return super().terminate(command, source)
-
-    def enable_fence(self, command: Command, source: Source) -> Result:
-        """DO_FENCE_ENABLE: there must be a fence to switch on."""
-        shapes = int(self.hooks.parameters.get("FENCE_TYPE"))
-        if not shapes & _FENCE_SHAPES and not self.hooks.fence_item_count():
-            return Result.FAILED
-        return super().enable_fence(command, source)
 
 
 _NAVIGATING: Final = ardupilot_plane_modes.NAVIGATING_MODES

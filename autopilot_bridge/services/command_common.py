@@ -127,7 +127,6 @@ class CommandHooks:
         announce: sends a STATUSTEXT.
         set_current_item: goes on from another mission item; False refuses.
         mission_item_count: stored items.
-        fence_item_count: stored items of the fence.
         inject_failure: switches sensor failures; None: this vehicle has none.
     """
 
@@ -137,7 +136,6 @@ class CommandHooks:
     set_current_item: Callable[[int], bool]
     mission_item_count: Callable[[], int]
     inject_failure: FailureHook | None = None
-    fence_item_count: Callable[[], int] = lambda: 0
 
 
 Handler = Callable[[Command, Source], Result | None]

@@ -7,10 +7,11 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.services.channel import AddressRule, MavlinkMessage, Source
+from autopilot_bridge.services.channel import NOBODY, AddressRule, MavlinkMessage, Source
 from autopilot_bridge.services.command_arducopter import ArduCopterCommands
 from autopilot_bridge.services.command_arduplane import ArduPlaneCommands
 from autopilot_bridge.services.command_common import (
+    Command,
     CommandHandlers,
     CommandHooks,
     Handler,
@@ -77,12 +78,17 @@ class CommandService:
             return True
         return bool(message_id == _CANCEL)  # nothing here takes long enough to be cancelled
 
+    def carry_out(self, command: Command, source: Source | None = None) -> Result | None:
+        """Do what a command says, unacknowledged; without a source, answers go nowhere."""
+        asker = NOBODY if source is None else source
+        handler = self._more.get(command.id)
+        return self._handlers.execute(command, asker) if handler is None else handler(command, asker)
+
     def _execute(self, message: MavlinkMessage, source: Source) -> None:
         command = command_from_message(message)
         if command.id in self._handlers.double_ack:
             _acknowledge(command.id, Result.ACCEPTED, source)
-        handler = self._more.get(command.id)
-        result = self._handlers.execute(command, source) if handler is None else handler(command, source)
+        result = self.carry_out(command, source)
         if result is not None:
             _acknowledge(command.id, result, source)
 

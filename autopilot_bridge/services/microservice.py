@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event
+from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flavours.flavour import Flavour
 from autopilot_bridge.mission_plan import MissionStore, MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, Channel, MavlinkMessage, Source
-from autopilot_bridge.services.command_common import Handler
+from autopilot_bridge.services.command_common import Command, Handler
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.telemetry.streams import Builder
 from flightsim.interface import SensorReadings
@@ -41,6 +42,7 @@ class AutopilotParts:
         announce: sends a STATUSTEXT.
         memory: card, clock and power of the computer it runs on.
         spoil: failures of what comes in by messages; None: nothing fails.
+        execute: carries a command out as if a client had sent it; None: nobody does.
     """
 
     flavour: Flavour
@@ -54,6 +56,7 @@ class AutopilotParts:
     announce: Announce
     memory: VehicleMemory
     spoil: Spoil | None = None
+    execute: Callable[[Command], Result | None] | None = None
 
 
 class Microservice:

@@ -6,7 +6,7 @@ firmware does its own way. Missions, fences and rally points share the protocol,
 
 import math
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -37,6 +37,20 @@ class _Judged(NamedTuple):
     landed: bool
     home_alt_m: float | None
     aircraft: AircraftRules | None
+    fence: object
+
+
+class FenceJudge(Protocol):
+    """Says whether the items of a mission keep inside the geofence."""
+
+    @property
+    def state(self) -> object:
+        """Equal while the answers are."""
+        ...
+
+    def excludes(self, item: MissionItem) -> bool:
+        """A place of the mission lies outside."""
+        ...
 
 
 HomeOf = Callable[[], GeodeticPosition | None]
@@ -63,6 +77,7 @@ class MissionService:
         on_plan_changed: called after a plan was replaced or cleared.
         on_guided_item: takes an item as a target for guided mode; False refuses (ArduPilot only).
         parameters: what an aircraft's missions are judged by; None: the firmware's defaults.
+        fence: what missions must keep inside (PX4); None: nothing.
     """
 
     def __init__(
@@ -78,6 +93,7 @@ class MissionService:
         on_plan_changed: Callable[[MissionType], None] | None = None,
         on_guided_item: Callable[[MissionItem], bool] | None = None,
         parameters: ParameterStore | None = None,
+        fence: FenceJudge | None = None,
     ) -> None:
         self._policy = policy
         self._stores = dict(stores)
@@ -88,6 +104,7 @@ class MissionService:
         self._on_plan_changed = on_plan_changed
         self._on_guided_item = on_guided_item
         self._parameters = ParameterStore(()) if parameters is None else parameters
+        self._fence = fence
         self._sessions = Sessions()
         self._uploads = MissionUploads(policy, self._stores, self._sessions, announce, self._store_plan)
         self._downloads = MissionDownloads(policy, self._stores, self._sessions, announce, self._read_plan)
@@ -120,9 +137,16 @@ class MissionService:
         if self._policy.aircraft and self._rules is None:
             self._rules = AircraftRules.of(self._parameters)
         aircraft = self._rules
-        key = _Judged(store.version, landed, home_alt_m, aircraft)
+        fence = self._fence
+        key = _Judged(store.version, landed, home_alt_m, aircraft, None if fence is None else fence.state)
         if self._judged is None or self._judged[0] != key:
-            problems = mission_problems(store.items, home_alt_m=home_alt_m, landed=landed, aircraft=aircraft)
+            problems = mission_problems(
+                store.items,
+                home_alt_m=home_alt_m,
+                landed=landed,
+                aircraft=aircraft,
+                outside=None if fence is None else fence.excludes,
+            )
             self._judged = (key, problems)
         return self._judged[1]
 

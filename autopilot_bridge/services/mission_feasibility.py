@@ -5,6 +5,7 @@ An infeasible mission is stored and acknowledged, but mission mode and arming in
 `mission_feasibility_aircraft`.
 """
 
+from collections.abc import Callable
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
@@ -43,6 +44,7 @@ def mission_problems(
     home_alt_m: float | None = None,
     landed: bool = True,
     aircraft: AircraftRules | None = None,
+    outside: Callable[[MissionItem], bool] | None = None,
 ) -> tuple[str, ...]:
     """Why a mission may not be flown, as PX4 words it; empty when it may. An empty mission has no problems.
 
@@ -51,6 +53,7 @@ def mission_problems(
         home_alt_m: home altitude above mean sea level, for takeoffs given in AMSL; None: not known.
         landed: the vehicle stands on the ground.
         aircraft: what a fixed wing asks of a mission; None: the vehicle is none.
+        outside: says whether an item lies outside the geofence; None: there is none.
     """
     problems: list[str] = []
     placed = False
@@ -67,6 +70,8 @@ def mission_problems(
                 problems.append("Mission rejected: takeoff not first waypoint item")
         if not placed and landed and item.command == mavlink.MAV_CMD_NAV_LAND:
             problems.append("Mission rejected: starts with landing")
+        if outside is not None and outside(item):
+            problems.append(f"Mission rejected: Geofence violation for waypoint {seq + 1}")
         placed = placed or item.command in _POSITION_COMMANDS
     if aircraft is not None and items:
         problems += aircraft_problems(items, aircraft, home_alt_m=home_alt_m)

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.services.channel import NOBODY, Channel, MavlinkMessage, Source
 
 GLOBAL_FRAMES: Final = frozenset((mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT))
 RELATIVE_FRAMES: Final = frozenset(
@@ -214,19 +214,8 @@ def message_checksum(message: MavlinkMessage, previous: int) -> int:
 
 def plan_checksum(items: tuple[MissionItem, ...], mission_type: MissionType = MissionType.MISSION) -> int:
     """Identifier of a plan as PX4 would compute it from an upload in MISSION_ITEM_INT; 0 when empty."""
-    nobody = Source(channel=_NOWHERE, system_id=0, component_id=0)
     checksum = 0
     for seq, item in enumerate(items):
-        message = item_message(nobody, item, seq, mission_type, current=False, as_int=True)
+        message = item_message(NOBODY, item, seq, mission_type, current=False, as_int=True)
         checksum = message_checksum(message, checksum)
     return checksum
-
-
-class _Nowhere:
-    name = "nowhere"
-
-    def send(self, message: MavlinkMessage, /) -> None:
-        """Drop the message."""
-
-
-_NOWHERE: Final = _Nowhere()

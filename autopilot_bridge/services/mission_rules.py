@@ -45,6 +45,15 @@ HERE_COMMANDS: Final = frozenset(
 """Commands whose unset latitude and longitude mean the place where the vehicle is."""
 
 
+PLACED_COMMANDS: Final = HERE_COMMANDS | {
+    mavlink.MAV_CMD_NAV_WAYPOINT,
+    mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+    mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+    mavlink.MAV_CMD_NAV_VTOL_LAND,
+}
+"""Commands that take the vehicle to a place."""
+
+
 class ItemRules(Protocol):
     """How one firmware judges, stores and reads back mission items."""
 

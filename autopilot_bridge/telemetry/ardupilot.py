@@ -32,6 +32,7 @@ STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
             _M.MAVLINK_MSG_ID_MISSION_CURRENT,
             _M.MAVLINK_MSG_ID_GPS_RAW_INT,
             _M.MAVLINK_MSG_ID_NAV_CONTROLLER_OUTPUT,
+            _M.MAVLINK_MSG_ID_FENCE_STATUS,
             _M.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
         ),
         _M.MAV_DATA_STREAM_RC_CHANNELS: (

@@ -5,9 +5,11 @@ from typing import Any
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
+from autopilot_bridge.services.geofence import ArdupilotGeofence
 from autopilot_bridge.services.manual import ManualService, manual_rules
 from autopilot_bridge.services.setpoints import SetpointService
 from autopilot_bridge.services.status_text import StatusTextService
@@ -76,10 +78,15 @@ class ServiceRig(Rig):
             set_current_item=self._set_current,
             mission_item_count=lambda: len(self.missions.items),
             inject_failure=self._inject,
-            fence_item_count=lambda: len(self.fence.items),
+        )
+        stores = {MissionType.MISSION: self.missions, MissionType.FENCE: self.fence}
+        more = (
+            ArdupilotGeofence(self.commander, self.store, stores, self).commands
+            if flavour == "ardupilot"
+            else {}
         )
         self.commands = CommandService.for_flavour(
-            flavour, self.commander, hooks, self.flavour.command_address(1)
+            flavour, self.commander, hooks, self.flavour.command_address(1), more
         )
         self.setpoints = SetpointService(flavour, self.commander)
         self.manual = ManualService(

@@ -1,0 +1,152 @@
+"""The geofence to clients: FENCE_STATUS, DO_FENCE_ENABLE, and whether a mission keeps inside.
+
+Source: ArduPilot 4.6 GCS_Fence; PX4 1.16 MissionFeasibility (checkMissionAgainstGeofence). PX4 knows neither
+the message nor the command.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.events import Event, FenceBreached
+from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, FenceType
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.flight.plan_reading import target_of
+from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
+from autopilot_bridge.services.command_common import Command, Handler, whole
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.mission_rules import PLACED_COMMANDS
+from autopilot_bridge.telemetry.streams import Builder, Values
+
+_STATUS: Final = mavlink.MAVLINK_MSG_ID_FENCE_STATUS
+_OFF, _ON, _FLOOR_OFF = 0, 1, 2  # of DO_FENCE_ENABLE
+_TOTALS: Final = {MissionType.FENCE: "FENCE_TOTAL", MissionType.RALLY: "RALLY_TOTAL"}
+_MOST: Final = 127  # the parameters are of eight bits
+
+
+class ArdupilotGeofence(Microservice):
+    """What an ArduPilot tells of its fence, and takes about it.
+
+    Args:
+        commander: has the fence.
+        parameters: FENCE_ENABLE and the totals.
+        stores: the uploaded plans, by type.
+        broadcast: all channels.
+    """
+
+    def __init__(
+        self,
+        commander: Commander,
+        parameters: ParameterStore,
+        stores: Mapping[MissionType, MissionStore],
+        broadcast: Broadcast,
+    ) -> None:
+        self._commander = commander
+        self._parameters = parameters
+        self._stores = stores
+        self._broadcast = broadcast
+        self._versions = dict.fromkeys(_TOTALS, 0)
+
+    @classmethod
+    def of(cls, parts: AutopilotParts) -> "ArdupilotGeofence":
+        """The one of an autopilot."""
+        return cls(parts.commander, parts.parameters, parts.stores, parts.broadcast)
+
+    @property
+    def commands(self) -> Mapping[int, Handler]:
+        """DO_FENCE_ENABLE."""
+        return {mavlink.MAV_CMD_DO_FENCE_ENABLE: self._enable}
+
+    @property
+    def builders(self) -> Mapping[int, Builder]:
+        """FENCE_STATUS."""
+        return {_STATUS: self._status}
+
+    def tick(self, time_us: int) -> None:
+        """FENCE_TOTAL and RALLY_TOTAL follow what was uploaded."""
+        for kind, name in _TOTALS.items():
+            store = self._stores[kind]
+            if store.version != self._versions[kind]:
+                self._versions[kind] = store.version
+                if name in self._parameters:
+                    count = min(len(store.items), _MOST)
+                    self._parameters.set(name, count, check_range=False)
+
+    def follow(self, event: Event) -> None:
+        """A breach is told at once."""
+        if isinstance(event, FenceBreached):
+            values = self._status()
+            if values is not None:
+                send_to_all(self._broadcast, mavlink.MAVLink_fence_status_message(*values))
+
+    def _status(self) -> Values | None:
+        """FENCE_STATUS (162), while the fence is on."""
+        watch = self._commander.fence
+        if not watch.enabled(self._commander.parameters.fence):
+            return None
+        kind = mavlink.FENCE_BREACH_NONE
+        if FenceType.HEIGHT_MIN in watch.broken:
+            kind = mavlink.FENCE_BREACH_MINALT
+        if FenceType.HEIGHT_MAX in watch.broken:
+            kind = mavlink.FENCE_BREACH_MAXALT
+        if watch.broken & (FenceType.CIRCLE | FenceType.SHAPES):
+            kind = mavlink.FENCE_BREACH_BOUNDARY
+        time_ms = (watch.breach_time_us // 1000) & 0xFFFFFFFF
+        return (int(bool(watch.broken)), watch.breaches, kind, time_ms, mavlink.FENCE_MITIGATE_NONE)
+
+    def _enable(self, command: Command, source: Source) -> Result:
+        """DO_FENCE_ENABLE: p1 0 off, 1 on, 2 the floor off; p2 FENCE_TYPE bits, 0: all."""
+        action, bits = whole(command.p1), whole(command.p2, 0) or 0
+        watch, parameters = self._commander.fence, self._commander.parameters.fence
+        if action not in (_OFF, _ON, _FLOOR_OFF) or not watch.present(parameters):
+            return Result.FAILED
+        walls = FenceType(bits & int(ALL_FENCES)) if bits > 0 else ALL_FENCES
+        if action == _FLOOR_OFF:
+            watch.switch(FenceType.HEIGHT_MIN, on=False)
+        elif walls != ALL_FENCES and (action == _OFF or parameters.enabled):
+            watch.switch(walls, on=action == _ON)
+        else:
+            watch.forget_switches()
+            if walls != ALL_FENCES:
+                watch.switch(ALL_FENCES & ~walls, on=False)
+            self._parameters.set("FENCE_ENABLE", action)
+        return Result.ACCEPTED
+
+
+class MissionFence:
+    """Whether the items of a mission keep inside the geofence (PX4).
+
+    Args:
+        commander: has the fence.
+    """
+
+    def __init__(self, commander: Commander) -> None:
+        self._commander = commander
+
+    @property
+    def state(self) -> object:
+        """Equal while the answers are."""
+        commander = self._commander
+        home = commander.home.position
+        return (commander.fence.geofence.version, commander.parameters.fence, home)
+
+    def excludes(self, item: MissionItem) -> bool:
+        """A place of the mission lies outside."""
+        commander = self._commander
+        context = commander.context
+        if item.command not in PLACED_COMMANDS or not math.isfinite(item.x + item.y):
+            return False
+        place = target_of(item, context)
+        if place is None:
+            return False
+        home_north, home_east, home_down = context.home_ned_m.tolist()
+        home = (home_north, home_east, home_down) if math.isfinite(home_north) else None
+        north, east, down = place.tolist()
+        fence = commander.parameters.fence
+        watch = commander.fence.geofence
+        return bool(watch.broken((north, east, down), home, context.frame, fence, fence.walls))
