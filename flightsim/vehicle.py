@@ -331,6 +331,30 @@ class Vehicle:
         """Let an actuator of a fixed-wing vehicle stay where its command is now, or set it free."""
         self._fixed_wing_actuators().set_stuck(role, stuck)
 
+    def set_wind(
+        self, wind_ned_m_s: tuple[float, float, float], *, wind_at_20_ft_m_s: float | None = None
+    ) -> None:
+        """The air moves like this around this vehicle from now on.
+
+        Args:
+            wind_ned_m_s: of the air over ground.
+            wind_at_20_ft_m_s: intensity of Dryden turbulence that begins now, 0: none; None: as it was.
+        """
+        for axis, speed in zip(("north", "east", "down"), wind_ned_m_s, strict=True):
+            self._fdm.set_property_value(f"atmosphere/wind-{axis}-fps", speed / _FT)
+        if wind_at_20_ft_m_s is None:
+            return
+        self._turbulence = None
+        for set_gust in self._set_gust:
+            set_gust(0.0)
+        if wind_at_20_ft_m_s > 0.0:
+            self._turbulence = DrydenTurbulence(
+                wind_at_20_ft_m_s=wind_at_20_ft_m_s,
+                wind_ned_m_s=wind_ned_m_s,
+                dt_s=1.0 / self.physics_rate_hz,
+                seed_sequence=self._seed_sequence,
+            )
+
     def _fixed_wing_actuators(self) -> FixedWingActuators:
         if self._surfaces is None:
             raise ValueError(

@@ -34,11 +34,19 @@ class PilotInput:
     def move(self, *, roll: float, pitch: float, throttle: float, yaw: float, time_us: int) -> None:
         """New sticks, each -1..1 (clamped); throttle 0 is the middle. Not-a-number input is ignored."""
         values = (roll, pitch, throttle, yaw)
-        if self.muted or not all(math.isfinite(value) for value in values):
+        lost = self.radio_failed_since_us is not None
+        if self.muted or lost or not all(math.isfinite(value) for value in values):
             return
         roll, pitch, throttle, yaw = (min(1.0, max(-1.0, value)) for value in values)
         self._sticks = ManualInput(roll=roll, pitch=pitch, throttle=throttle, yaw=yaw, valid=True)
         self._time_us = time_us
+
+    def lose_signal(self, lost: bool, time_us: int) -> None:
+        """The radio's signal is lost, sticks arrive no more; or it is back."""
+        if lost and self.radio_failed_since_us is None:
+            self.radio_failed_since_us = time_us
+        elif not lost:
+            self.radio_failed_since_us = None
 
     def release(self) -> None:
         """The sender lets go of the sticks."""

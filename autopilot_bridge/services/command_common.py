@@ -249,7 +249,8 @@ class CommandHandlers(ABC):
         unit, kind, instance = whole(command.p1), whole(command.p2), whole(command.p3, 0)
         if self.hooks.inject_failure is None:
             return Result.UNSUPPORTED
-        if unit is None or kind is None or instance is None:
+        disabled = "SYS_FAILURE_EN" in self.hooks.parameters and not self.hooks.parameters.get("SYS_FAILURE_EN")
+        if disabled or unit is None or kind is None or instance is None:
             return Result.DENIED
         return self.hooks.inject_failure(unit, kind, instance)
 

@@ -145,7 +145,7 @@ class ExternalOdometryService(Microservice):
         self._parameters = parts.parameters
         self._broadcast = parts.broadcast
         self._system_id = parts.system_id
-        self._spoil = parts.spoil
+        self._simulation = parts.simulation
         self._policy = POLICIES[parts.flavour.name]
         self.wrong_frames = 0
 
@@ -164,7 +164,7 @@ class ExternalOdometryService(Microservice):
         sample = _READERS[message_id](self, message, time_us)
         if sample is None:
             self.wrong_frames += 1
-        elif self._spoil is None or self._spoil(_VIO, sample.values):
+        elif self._simulation is None or self._simulation.spoil(_VIO, sample.values):
             self._navigation.take_external(sample)
         return True
 

@@ -5,5 +5,7 @@ from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 
 
 def incoming_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
-    """Those of one autopilot."""
+    """Those of one autopilot; a simulated world gets to know it."""
+    if parts.simulation is not None:
+        parts.simulation.attend(parts)
     return (ExternalOdometryService(parts),)

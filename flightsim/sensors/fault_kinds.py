@@ -29,6 +29,7 @@ class SensorUnit(IntEnum):
     DISTANCE_SENSOR = 7
     AIRSPEED = 8
     BATTERY = 100
+    AVOIDANCE = 103
 
 
 class FaultType(IntEnum):

@@ -106,6 +106,15 @@ class FaultPoint:
         self.fault = fault
         self.failure = failure
 
+    def deliver(self, values: Array) -> bool:
+        """Spoil a sample that comes from elsewhere, in place; False when it isn't delivered."""
+        fault = self.fault
+        if fault is not None and not fault.apply(values[self.target.channels]):
+            return False
+        self._reading.values[:] = values
+        self._reading.time_us = 0
+        return True
+
     def _vector(self, name: str, given: Sequence[float] | None, default: tuple[float, ...]) -> Array:
         if given is None:
             return np.array(default)

@@ -11,6 +11,7 @@ from flightsim.interface import Reading, SensorReadings
 from flightsim.sensors.airspeed import AirspeedParameters
 from flightsim.sensors.barometer import BarometerParameters
 from flightsim.sensors.battery import BatteryMonitorParameters
+from flightsim.sensors.fault_kinds import FaultTarget
 from flightsim.sensors.fault_stage import FaultPoint
 from flightsim.sensors.faults import FaultPanel
 from flightsim.sensors.flow_vane import FlowVaneParameters
@@ -156,6 +157,21 @@ class SensorSuite:
             fault_points=points,
         )
         self._schedule = Schedule(self._sensors.values())
+
+    def add_elsewhere(self, target: FaultTarget, *, size: int, rate_hz: float) -> FaultPoint:
+        """A unit that fails like the others although its samples come from elsewhere (`FaultPoint.deliver`).
+
+        Args:
+            target: the unit.
+            size: of a sample.
+            rate_hz: about how many come in a second.
+
+        Raises:
+            ValueError: the unit is there already.
+        """
+        point = FaultPoint(target, Reading(size), 1.0 / rate_hz, self._fault_generator(target.unit.name))
+        self.faults.add((point,))
+        return point
 
     def step(self, time_us: int) -> None:
         """Take and deliver what is due; `time_us` is the vehicle time of the truth vector."""

@@ -354,7 +354,7 @@ def test_intermittent_keeps_its_mean_times() -> None:
 
 @pytest.mark.parametrize("unit", SensorUnit, ids=lambda unit: unit.name)
 def test_units_have_mavlinks_numbers(unit: SensorUnit) -> None:
-    kind = "SYSTEM" if unit == SensorUnit.BATTERY else "SENSOR"
+    kind = "SYSTEM" if unit >= SensorUnit.BATTERY else "SENSOR"
     assert getattr(mavlink, f"FAILURE_UNIT_{kind}_{unit.name}") == unit
 
 

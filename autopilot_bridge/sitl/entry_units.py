@@ -1,0 +1,49 @@
+"""Units that can fail although their samples come by messages: external odometry, the avoidance sensor."""
+
+import math
+from typing import Final, NamedTuple
+
+from autopilot_bridge.navigation.external import SAMPLE_SIZE
+from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
+
+OBSTACLE_SECTORS: Final = 72
+"""Of OBSTACLE_DISTANCE."""
+
+_NAN4: Final = (math.nan,) * 4
+
+
+class EntryUnit(NamedTuple):
+    """A unit, the size of its samples and about how many come in a second."""
+
+    target: FaultTarget
+    size: int
+    rate_hz: float
+
+
+ENTRY_UNITS: Final = (
+    EntryUnit(
+        FaultTarget(
+            unit=SensorUnit.VIO,
+            channels=slice(0, SAMPLE_SIZE),
+            wrong_bias=(2.0, -1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.5, -0.3, 0.1),
+            drift_per_s=(0.2, -0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            garbage_low=(-50.0, -50.0, -50.0, *_NAN4, -20.0, -20.0, -20.0),
+            garbage_high=(50.0, 50.0, 50.0, *_NAN4, 20.0, 20.0, 20.0),
+        ),
+        SAMPLE_SIZE,
+        30.0,
+    ),
+    EntryUnit(
+        FaultTarget(
+            unit=SensorUnit.AVOIDANCE,
+            channels=slice(0, OBSTACLE_SECTORS),
+            wrong_bias=(2.0,) * OBSTACLE_SECTORS,
+            drift_per_s=(0.1,) * OBSTACLE_SECTORS,
+            garbage_low=(0.0,) * OBSTACLE_SECTORS,
+            garbage_high=(20.0,) * OBSTACLE_SECTORS,
+        ),
+        OBSTACLE_SECTORS,
+        10.0,
+    ),
+)
+"""Position m, attitude and velocity m/s of odometry; distances m by sector."""
