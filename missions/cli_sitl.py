@@ -11,6 +11,7 @@ import click
 
 from autopilot_bridge.errors import BridgeError
 from missions.cli_signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
+from missions.cli_storage import VehicleCards, storage_option
 from missions.cli_types import SLOWEST, FiniteRange
 from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
 
@@ -169,6 +170,7 @@ def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
     metavar="FILE",
     help="Keep keys that clients set, and times, over restarts.",
 )
+@storage_option
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
 @click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
@@ -194,6 +196,7 @@ def sitl(
     signing_key: Path | None,
     unsigned: str,
     signing_store: Path | None,
+    storage: str | None,
     params: str | None,
     log: str | None,
     no_wait: bool,
@@ -253,8 +256,12 @@ def sitl(
             ),
             seed=seed,
         )
+        memory = VehicleCards(storage, count)
+        click.get_current_context().call_on_close(memory.close)
         world = Sitl(
-            equipped(configuration, _scenario(camera, targets, map_file, map_target)), signing=signing
+            equipped(configuration, _scenario(camera, targets, map_file, map_target)),
+            signing=signing,
+            cards=memory.cards,
         )
         compile_flight_code(world.configuration.vehicles)
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
@@ -294,6 +301,8 @@ def sitl(
         )
     finally:
         world.close()
+        if pictured is not None:
+            pictured.close()
         if recorder is not None:
             recorder.close()
         for number, handler in before.items():

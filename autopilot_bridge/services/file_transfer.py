@@ -141,7 +141,7 @@ class FileTransferService(Microservice):
             self._clients.close_idle(time_us)
 
     def close(self) -> None:
-        """Close every session: the vehicle goes down."""
+        """Close every session."""
         for client in self._clients:
             client.close_all()
         for work in self._checksums:

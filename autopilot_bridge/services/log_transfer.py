@@ -96,7 +96,7 @@ class LogTransferService(Microservice):
                 del self._downloads[key]
 
     def close(self) -> None:
-        """Close what is open: the vehicle goes down."""
+        """Close what is open."""
         for download in self._downloads.values():
             download.close()
 

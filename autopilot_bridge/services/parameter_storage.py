@@ -105,8 +105,8 @@ class ParameterStorageService(Microservice):
         if self._due_us is not None and time_us >= self._due_us:
             self._save()
 
-    def flush(self) -> None:
-        """Store at once what is waiting for it: the vehicle goes down."""
+    def close(self) -> None:
+        """Store at once what is waiting for it."""
         if self._due_us is not None:
             self._save()
 

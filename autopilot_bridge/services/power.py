@@ -4,7 +4,7 @@ What can restart the vehicle is outside the autopilot; this service asks for it 
 PX4's SITL build refuses to reboot, its hardware does not: here it reboots, as hardware does.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
@@ -70,16 +70,12 @@ class PowerService(Microservice):
         policy: the firmware's answers.
         commander: armed or not.
         act: carries out; None: this autopilot can't be restarted.
-        before: called when it goes down (files are closed).
     """
 
-    def __init__(
-        self, policy: PowerPolicy, commander: Commander, act: PowerHook | None, before: Callable[[], None]
-    ) -> None:
+    def __init__(self, policy: PowerPolicy, commander: Commander, act: PowerHook | None) -> None:
         self._policy = policy
         self._commander = commander
         self._act = act
-        self._before = before
         self._time_us = 0
         self._wanted: tuple[int, PowerAction, bool] | None = None
 
@@ -95,7 +91,6 @@ class PowerService(Microservice):
         action, forced = self._wanted[1:]
         self._wanted = None
         if self._act is not None and (forced or not self._commander.armed):  # armed since then: it stays up
-            self._before()
             self._act(action)
 
     def _command(self, command: Command, source: Source) -> Result:

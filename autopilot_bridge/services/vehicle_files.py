@@ -38,15 +38,7 @@ def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
     storage = ParameterStorageService(
         memory.stored, parts.parameters, parts.commander, STORAGE_POLICIES[name], layout, parts.announce
     )
-
-    def before_power() -> None:
-        storage.flush()
-        logs.close()
-        files.close()
-        if recorder is not None:
-            recorder.close()
-
-    power = PowerService(POWER_POLICIES[name], parts.commander, memory.power, before_power)
+    power = PowerService(POWER_POLICIES[name], parts.commander, memory.power)
     return (files, logs, storage, power, *(() if recorder is None else (recorder,)))
 
 

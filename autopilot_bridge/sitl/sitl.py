@@ -103,7 +103,6 @@ class SitlVehicle:
             },
             envelope=_envelope(airframe, configuration) if aircraft else None,
             inject_failure=failures.inject,
-            simulation=failures,
             card=card,
             power=self._on_power,
         )
@@ -195,6 +194,7 @@ class SitlVehicle:
         self._boot_us = self._power_us = time_us + REBOOT_US if again else _NEVER_US
         self._power = None
         self._actuators = np.zeros_like(self._actuators)
+        self.autopilot.close()
         self.links.restart(None)
 
     def open(
@@ -411,7 +411,8 @@ class Sitl:
             self._next_truth_us = self._time_us + self._truth_interval_us
 
     def close(self) -> None:
-        """Close every link."""
+        """Close every link, and what the autopilots have open."""
         for vehicle in self.vehicles:
+            vehicle.autopilot.close()
             for channel in list(vehicle.channels):
                 vehicle.close(channel)

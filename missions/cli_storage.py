@@ -1,0 +1,64 @@
+"""The memory cards of a SITL's vehicles: in a folder that stays, in one that goes, or in memory."""
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import click
+
+if TYPE_CHECKING:
+    pass
+
+NONE: Final = "none"
+
+storage_option = click.option(
+    "--storage",
+    metavar="DIR|none",
+    help="Folder that keeps the vehicles' memory cards: logs, parameters, files. none: in memory, no logs. "
+    "[default: a temporary folder, gone at the end]",
+)
+
+
+class VehicleCards:
+    """Memory cards for the vehicles of a SITL.
+
+    Args:
+        storage: as on the command line; None: the default.
+        count: vehicles; the first one's card is the folder `vehicle1`, and so on.
+
+    Attributes:
+        cards: one for each vehicle.
+
+    Raises:
+        ValueError: the folder can't be made, or another run uses it.
+    """
+
+    def __init__(self, storage: str | None, count: int) -> None:
+        from autopilot_bridge.storage.card import MemoryCard
+        from autopilot_bridge.storage.folder import FolderStore
+
+        self._stores: list[FolderStore] = []
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+        if storage == NONE:
+            self.cards: list[MemoryCard] = [MemoryCard() for _ in range(count)]
+            return
+        if storage is None:
+            self._temporary = tempfile.TemporaryDirectory(prefix="flightstack-sitl-")
+        folder = Path(self._temporary.name if self._temporary is not None else str(storage))
+        try:
+            for number in range(1, count + 1):
+                self._stores.append(FolderStore(folder / f"vehicle{number}"))
+        except OSError as error:
+            self.close()
+            raise ValueError(
+                f"--storage {storage}: {error.filename or folder} {error.strerror}; "
+                f"accepted: a folder of one's own, or {NONE}"
+            ) from error
+        self.cards = [MemoryCard(files=store, logs=True) for store in self._stores]
+
+    def close(self) -> None:
+        """Give the folders back; a temporary one is removed."""
+        for store in self._stores:
+            store.close()
+        if self._temporary is not None:
+            self._temporary.cleanup()
