@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 _GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
+_SENDINGS: Final = 3
+_STUCK_S: Final = 6.0  # PX4 gives a transfer up after 5 s
+_ERRORS_BORNE: Final = 2
 _DO_JUMP: Final = 177
 _NAMES: Final = {
     MissionType.MISSION: "mission",
@@ -90,7 +93,7 @@ async def upload(
     *,
     before: int = 0,
 ) -> None:
-    """Send a whole plan, numbered as the vehicle numbers it.
+    """Send a whole plan, numbered as the vehicle numbers it; anew from the start when a transfer gets stuck.
 
     Args:
         before: how many of the items are not the user's own (ArduPilot's home): an item that is refused is
@@ -100,6 +103,19 @@ async def upload(
         CommandRejected: the vehicle refused it; names the item where it says which.
         VehicleTimeout: it stopped asking for items.
     """
+    for sending in range(_SENDINGS):
+        try:
+            await _send_plan(vehicle, items, mission_type, before)
+        except VehicleTimeout:
+            if sending + 1 == _SENDINGS:
+                raise
+        else:
+            return
+
+
+async def _send_plan(
+    vehicle: "Vehicle", items: Sequence[MissionItem], mission_type: MissionType, before: int
+) -> None:
     what = _NAMES[mission_type]
     names = ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK")
     asked = -1
@@ -107,30 +123,41 @@ async def upload(
         count = dialect.MAVLink_mission_count_message(vehicle.system_id, 1, len(items), int(mission_type))
         vehicle.send(count)
         attempts = 0
+        errors = 0
         while True:
+            all_sent = asked + 1 >= len(items)
             try:
                 async with vehicle.deadline(
-                    _RETRY_S if asked < 0 else 6.0, f"a request for an item of the {what}"
+                    _RETRY_S if asked < 0 or all_sent else _STUCK_S, f"a request for an item of the {what}"
                 ):
                     reply = await anext(replies)
             except TimeoutError:
                 attempts += 1
-                if asked >= 0 or attempts > _RETRIES:
+                if attempts > _RETRIES or not (asked < 0 or all_sent):
                     raise VehicleTimeout(
                         f"the vehicle stopped asking for items of the {what} after {asked + 1} of "
                         f"{len(items)}; {vehicle.heard()}"
                     ) from None
-                vehicle.send(count)
+                if asked < 0:
+                    vehicle.send(count)
+                else:  # its acknowledgement was lost: PX4 repeats it
+                    vehicle.send(item_message(items[-1], len(items) - 1, vehicle.system_id, mission_type))
                 continue
             if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
                 continue
             if reply.get_type() == "MISSION_ACK":
                 if reply.type == dialect.MAV_MISSION_ACCEPTED:
-                    if asked + 1 >= len(items):
+                    if all_sent:
                         return
                     continue  # of an earlier transfer
                 if reply.type == dialect.MAV_MISSION_INVALID_SEQUENCE:
                     continue  # to an item that was sent twice: the transfer stays open (ArduPilot)
+                if reply.type == dialect.MAV_MISSION_ERROR and all_sent and asked >= 0:
+                    # "no transfer": it is over, and how it ended was lost
+                    raise VehicleTimeout(f"how the vehicle took the {what} is not known; {vehicle.heard()}")
+                errors += 1
+                if reply.type == dialect.MAV_MISSION_ERROR and asked < 0 and errors <= _ERRORS_BORNE:
+                    continue  # perhaps to an item of an earlier transfer that came twice
                 where = ""
                 if asked >= 0:
                     where = f" at item {asked - before + 1} ({_command_name(items[asked].command)})"
@@ -143,43 +170,57 @@ async def upload(
                 vehicle.send(item_message(items[reply.seq], reply.seq, vehicle.system_id, mission_type))
 
 
+async def _ask(
+    vehicle: "Vehicle", message: Any, name: str, mission_type: MissionType, sequence: int | None = None
+) -> Any:
+    """Send a request until its answer comes."""
+    with vehicle.messages(name) as replies:
+        for _ in range(_RETRIES):
+            vehicle.send(message)
+            try:
+                async with vehicle.deadline(_RETRY_S, name):
+                    async for reply in replies:
+                        if (
+                            vehicle.addressed_here(reply)
+                            and reply.mission_type == mission_type
+                            and (sequence is None or reply.seq == sequence)
+                        ):
+                            return reply
+            except TimeoutError:
+                continue
+    raise VehicleTimeout(f"no {name} came while downloading the {_NAMES[mission_type]}; {vehicle.heard()}")
+
+
+async def _ask_count(vehicle: "Vehicle", mission_type: MissionType) -> int:
+    message = dialect.MAVLink_mission_request_list_message(vehicle.system_id, 1, int(mission_type))
+    return int((await _ask(vehicle, message, "MISSION_COUNT", mission_type)).count)
+
+
+def _end_download(vehicle: "Vehicle", mission_type: MissionType) -> None:
+    vehicle.send(
+        dialect.MAVLink_mission_ack_message(
+            vehicle.system_id, 1, dialect.MAV_MISSION_ACCEPTED, int(mission_type)
+        )
+    )
+
+
 async def download(vehicle: "Vehicle", mission_type: MissionType = MissionType.MISSION) -> list[MissionItem]:
     """The whole plan the vehicle holds, as it numbers it."""
-    system_id, what = vehicle.system_id, _NAMES[mission_type]
-
-    async def ask(message: Any, name: str, sequence: int | None = None) -> Any:
-        with vehicle.messages(name) as replies:
-            for _ in range(_RETRIES):
-                vehicle.send(message)
-                try:
-                    async with vehicle.deadline(_RETRY_S, name):
-                        async for reply in replies:
-                            if (
-                                vehicle.addressed_here(reply)
-                                and reply.mission_type == mission_type
-                                and (sequence is None or reply.seq == sequence)
-                            ):
-                                return reply
-                except TimeoutError:
-                    continue
-        raise VehicleTimeout(f"no {name} came while downloading the {what}; {vehicle.heard()}")
-
-    count = await ask(
-        dialect.MAVLink_mission_request_list_message(system_id, 1, int(mission_type)), "MISSION_COUNT"
-    )
     items = []
-    for k in range(count.count):
-        request = dialect.MAVLink_mission_request_int_message(system_id, 1, k, int(mission_type))
-        items.append(item_from_message(await ask(request, "MISSION_ITEM_INT", k)))
-    vehicle.send(
-        dialect.MAVLink_mission_ack_message(system_id, 1, dialect.MAV_MISSION_ACCEPTED, int(mission_type))
-    )
+    for k in range(await _ask_count(vehicle, mission_type)):
+        request = dialect.MAVLink_mission_request_int_message(vehicle.system_id, 1, k, int(mission_type))
+        items.append(item_from_message(await _ask(vehicle, request, "MISSION_ITEM_INT", mission_type, k)))
+    _end_download(vehicle, mission_type)
     return items
 
 
 async def clear(vehicle: "Vehicle", mission_type: MissionType = MissionType.MISSION) -> None:
-    """Delete the plan the vehicle holds."""
+    """Delete the plan the vehicle holds, and see that it is gone.
+
+    An acknowledgement does not tell what it is for: one of an earlier upload may come late.
+    """
     what = _NAMES[mission_type]
+    errors = 0
     with vehicle.messages("MISSION_ACK") as replies:
         for _ in range(_RETRIES):
             vehicle.send(dialect.MAVLink_mission_clear_all_message(vehicle.system_id, 1, int(mission_type)))
@@ -188,12 +229,18 @@ async def clear(vehicle: "Vehicle", mission_type: MissionType = MissionType.MISS
                     async for reply in replies:
                         if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
                             continue
-                        if reply.type != dialect.MAV_MISSION_ACCEPTED:
+                        if reply.type == dialect.MAV_MISSION_ACCEPTED:
+                            break
+                        errors += 1
+                        if reply.type != dialect.MAV_MISSION_ERROR or errors > _ERRORS_BORNE:
                             raise CommandRejected(
                                 f"the vehicle refused to clear the {what}: {_result_name(reply.type)}",
                                 reply.type,
                             )
-                        return
             except TimeoutError:
                 continue
+            left = await _ask_count(vehicle, mission_type)
+            _end_download(vehicle, mission_type)
+            if left == 0:
+                return
     raise VehicleTimeout(f"clearing the {what} was not answered; {vehicle.heard()}")
