@@ -7,6 +7,7 @@ memory is kept.
 """
 
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -66,14 +67,11 @@ class Campaign:
     def run(self, count: int, *, told: Callable[[str], None] = lambda text: None) -> Figures:
         """Fire so many messages: five of six in rounds that are harmless."""
         figures = self.figures
-        flying = self._fresh()
         while figures.messages < count:
-            left = count - figures.messages
-            self._fire(flying, min(left, HARMLESS_ROUND), orders=False)
-            if left > HARMLESS_ROUND or self._round % 2:
-                self._fire(flying, min(max(0, left - HARMLESS_ROUND), ORDERS_ROUND), orders=True)
-                if figures.messages < count:
-                    flying = self._fresh()
+            flying = self._fresh()
+            self._fire(flying, min(count - figures.messages, HARMLESS_ROUND), orders=False)
+            if figures.messages < count:
+                self._fire(flying, min(count - figures.messages, ORDERS_ROUND), orders=True)
             figures.memory_bytes.append(resident_bytes())
             told(f"{self.name}: {figures.messages} messages")
         return figures
@@ -110,8 +108,10 @@ class Campaign:
                     link.send(frame)
                 sitl.advance()
             except Exception as error:  # whatever it is, it is what is looked for
-                self._complain(orders, sent, f"{type(error).__name__}: {error}", batch)
-                raise
+                where = traceback.extract_tb(error.__traceback__)[-1]
+                what = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
+                self._complain(orders, sent, what, batch)
+                break
             taken_s = min(time.perf_counter() - wall_s, time.thread_time() - start_s)
             figures.longest_s = max(figures.longest_s, taken_s)
             if taken_s > LONGEST_S:
