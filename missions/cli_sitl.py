@@ -301,8 +301,6 @@ def sitl(
         )
     finally:
         world.close()
-        if pictured is not None:
-            pictured.close()
         if recorder is not None:
             recorder.close()
         for number, handler in before.items():

@@ -31,7 +31,7 @@ from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
 from autopilot_bridge.services.geofence import MissionFence
 from autopilot_bridge.services.message_interval import MessageIntervalService
-from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice, Simulation
 from autopilot_bridge.services.mission import MissionService, new_stores
 from autopilot_bridge.services.parameters import ParameterService
 from autopilot_bridge.services.radio import RadioService
@@ -112,6 +112,7 @@ class Autopilot:
         envelope: what the aircraft can do; None for a multicopter.
         unix_epoch_us: Unix time of boot.
         inject_failure: takes MAV_CMD_INJECT_FAILURE; None: not supported.
+        simulation: the simulated world; None: there is none.
         card: its memory card; None: an empty one in memory.
         power: restarts the vehicle, or shuts it down; None: nobody can.
 
@@ -135,6 +136,7 @@ class Autopilot:
         envelope: "FlightEnvelope | None" = None,
         unix_epoch_us: int = 0,
         inject_failure: FailureHook | None = None,
+        simulation: Simulation | None = None,
         card: MemoryCard | None = None,
         power: PowerHook | None = None,
     ) -> None:
@@ -145,6 +147,7 @@ class Autopilot:
         self.system_id = system_id
         self.channels: list[AutopilotChannel] = []
         self._firmware = firmware
+        self._simulation = simulation
         self._readings = readings
         self._address = firmware.address(system_id)
         self._step_us = MICROSECONDS // physics_rate_hz
@@ -227,6 +230,7 @@ class Autopilot:
                 broadcast=self,
                 announce=self._texts.announce,
                 memory=memory,
+                simulation=simulation,
                 execute=lambda command: self._commands.carry_out(command),
             )
         )
@@ -357,6 +361,8 @@ class Autopilot:
         if frame.system_id == self.system_id and frame.component_id == _COMPONENT:
             return
         message = decode(frame)
+        if self._simulation is not None and self._simulation.deaf_to(getattr(message, "command", None)):
+            return
         if frame.message_id not in _ALWAYS_ANSWERED and not self._address.accepts(message):
             return
         source = Source(channel, frame.system_id, frame.component_id)

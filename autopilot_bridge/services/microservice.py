@@ -5,6 +5,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,21 @@ from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.telemetry.streams import Builder
 from flightsim.interface import SensorReadings
 
-Spoil = Callable[[int, NDArray[np.float64]], bool]
-"""Spoils the values of a FAILURE_UNIT's sample in place; False: the sample doesn't arrive."""
+
+class Simulation(Protocol):
+    """The simulated world's side of an autopilot, where there is one: failures of what comes in."""
+
+    def attend(self, parts: "AutopilotParts") -> None:
+        """An autopilot has booted."""
+        ...
+
+    def spoil(self, unit: int, values: NDArray[np.float64]) -> bool:
+        """Spoil the values of a FAILURE_UNIT's sample in place; False: the sample doesn't arrive."""
+        ...
+
+    def deaf_to(self, command: int | None) -> bool:
+        """No message arrives; `command` is the MAV_CMD of one, None: it is another message."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +55,7 @@ class AutopilotParts:
         broadcast: all channels.
         announce: sends a STATUSTEXT.
         memory: card, clock and power of the computer it runs on.
-        spoil: failures of what comes in by messages; None: nothing fails.
+        simulation: the simulated world; None: there is none.
         execute: carries a command out as if a client had sent it; None: nobody does.
     """
 
@@ -55,7 +69,7 @@ class AutopilotParts:
     broadcast: Broadcast
     announce: Announce
     memory: VehicleMemory
-    spoil: Spoil | None = None
+    simulation: Simulation | None = None
     execute: Callable[[Command], Result | None] | None = None
 
 

@@ -103,6 +103,7 @@ class SitlVehicle:
             },
             envelope=_envelope(airframe, configuration) if aircraft else None,
             inject_failure=failures.inject,
+            simulation=failures,
             card=card,
             power=self._on_power,
         )
