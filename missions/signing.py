@@ -5,7 +5,7 @@ from pathlib import Path
 from autopilot_bridge.clock.pacing import unix_time_us
 from autopilot_bridge.errors import SigningKeyError
 from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState
-from autopilot_bridge.mavlink.signing import signing_time
+from autopilot_bridge.mavlink.signing import RADIO, signing_time
 
 
 def now() -> int:
@@ -34,4 +34,4 @@ def client_signing(key: SigningKey | None, *, link_id: int = 0) -> LinkSigning |
         key: shared with the vehicle.
         link_id: different for the links of one client.
     """
-    return None if key is None else LinkSigning(SigningState(key, clock=now), link_id=link_id)
+    return None if key is None else LinkSigning(SigningState(key, clock=now), link_id=link_id, policy=RADIO)

@@ -14,11 +14,13 @@ class Reach(StrEnum):
 
     Attributes:
         PROCESS: only parts of this process (memory).
-        MACHINE: programs of this machine (loopback), or who has the cable (serial, USB).
+        CABLE: who has the cable (serial, USB), or a radio at its end.
+        MACHINE: programs of this machine (loopback).
         NETWORK: whoever is on the network.
     """
 
     PROCESS = "process"
+    CABLE = "cable"
     MACHINE = "machine"
     NETWORK = "network"
 
@@ -26,7 +28,7 @@ class Reach(StrEnum):
 def reach_of(address: Address) -> Reach:
     """Who can get at a link of this address. Names other than "localhost" count as the network."""
     if isinstance(address, SerialPort | ReplayLog):
-        return Reach.MACHINE
+        return Reach.CABLE
     return Reach.MACHINE if _is_loopback(address.host) else Reach.NETWORK
 
 

@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.errors import SigningKeyError
 from autopilot_bridge.links import Reach
 from autopilot_bridge.mavlink import Frame, LinkSigning, LinkSigningPolicy, SigningKey, SigningState, decode
-from autopilot_bridge.mavlink.signing import INTERNAL, MINUTE, REQUIRED, TRUSTED, UNSIGNED_TOO
+from autopilot_bridge.mavlink.signing import INTERNAL, MINUTE, RADIO, REQUIRED, TRUSTED, UNSIGNED_TOO
 
 _KEY_REMOVED: Final = "Signing key removed"
 _KEY_TAKEN: Final = "Signing key set"
@@ -36,9 +36,9 @@ class UnsignedFrom(StrEnum):
 
 POLICIES: Final[Mapping[UnsignedFrom, Mapping[Reach, LinkSigningPolicy]]] = MappingProxyType(
     {
-        UnsignedFrom.NONE: {Reach.MACHINE: REQUIRED, Reach.NETWORK: REQUIRED},
-        UnsignedFrom.LOCAL: {Reach.MACHINE: TRUSTED, Reach.NETWORK: REQUIRED},
-        UnsignedFrom.ALL: {Reach.MACHINE: TRUSTED, Reach.NETWORK: UNSIGNED_TOO},
+        UnsignedFrom.NONE: {Reach.CABLE: RADIO, Reach.MACHINE: REQUIRED, Reach.NETWORK: REQUIRED},
+        UnsignedFrom.LOCAL: {Reach.CABLE: TRUSTED, Reach.MACHINE: TRUSTED, Reach.NETWORK: REQUIRED},
+        UnsignedFrom.ALL: {Reach.CABLE: TRUSTED, Reach.MACHINE: TRUSTED, Reach.NETWORK: UNSIGNED_TOO},
     }
 )
 """What a link takes, by who can get at it; links within the process are never signed."""

@@ -14,6 +14,7 @@ from autopilot_bridge.mavlink.signing import (
     MAX_STREAMS,
     MAX_TIMESTAMP,
     MINUTE,
+    RADIO,
     REQUIRED,
     TRUSTED,
     UNSIGNED_TOO,
@@ -187,7 +188,8 @@ def test_mavlink_1_is_refused():
 @pytest.mark.parametrize("message_id", ["radio_status", "radio"])
 def test_a_radio_has_no_key(message_id):
     message = getattr(dialect, f"MAVLink_{message_id}_message")(100, 100, 50, 10, 10, 0, 0)
-    ours = link()
+    ours = link(RADIO)
+    assert refused(link(), FrameEncoder(51, 68).encode(message)) is Refusal.UNSIGNED
     assert refused(ours, FrameEncoder(51, 68).encode(message)) is None
     assert ours.counters.tolerated == 1
 
@@ -251,7 +253,7 @@ def test_a_new_key_begins_anew():
 
 @pytest.mark.parametrize(
     ("policy", "unsigned", "wrong"),
-    [(REQUIRED, 0, 0), (UNSIGNED_TOO, 1, 0), (TRUSTED, 1, 1), (INTERNAL, 1, 1)],
+    [(REQUIRED, 0, 0), (RADIO, 0, 0), (UNSIGNED_TOO, 1, 0), (TRUSTED, 1, 1), (INTERNAL, 1, 1)],
 )
 def test_policies(policy, unsigned, wrong):
     assert len(link(policy).admit(frames_of(FrameEncoder(255, 190).encode(command())))) == unsigned

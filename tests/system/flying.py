@@ -8,8 +8,17 @@ from typing import Any, TypeVar
 from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.links import Reach
+from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState
+from autopilot_bridge.mavlink.signing import signing_time
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, VehicleSpecification
+from autopilot_bridge.sitl import (
+    SigningParameters,
+    Sitl,
+    SitlConfiguration,
+    SitlVehicle,
+    VehicleSpecification,
+)
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.payload import MagneticField, PayloadParameters
@@ -31,6 +40,8 @@ class Flying:
     model: str = "iris"
     payload: PayloadParameters = field(default_factory=PayloadParameters)
     magnetic_field: MagneticField | None = None
+    key: SigningKey | None = None
+    reach: Reach = Reach.PROCESS
 
     def __post_init__(self) -> None:
         specification = VehicleSpecification(
@@ -42,9 +53,17 @@ class Flying:
                 seed=self.seed,
                 environment=self.environment,
                 magnetic_field=self.magnetic_field,
-            )
+            ),
+            signing=SigningParameters(key=self.key),
         )
-        self.link = self.sitl.connect(0)
+        self.link = self.sitl.connect(0, reach=self.reach)
+        self.signing: LinkSigning | None = None
+        if self.key is not None:
+            self.signing = LinkSigning(SigningState(self.key, clock=self.now), link_id=0)
+
+    def now(self) -> int:
+        """The vehicle's time, as a timestamp of signatures."""
+        return signing_time(self.sitl.configuration.unix_epoch_us + self.sitl.time_us)
 
     @property
     def vehicle(self) -> SitlVehicle:
@@ -85,7 +104,7 @@ class Flying:
         sitl = self.sitl
 
         async def main() -> T:
-            connection = Connection(_Borrowed(self.link, sendings), LoopClock())
+            connection = Connection(_Borrowed(self.link, sendings), LoopClock(), signing=self.signing)
             async with connection:
                 vehicle = Vehicle(connection)
                 await vehicle.wait_heartbeat()
