@@ -3,6 +3,7 @@
 from autopilot_bridge.services.incoming import incoming_services
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.mission_services import mission_services
+from autopilot_bridge.services.payload_commands import PayloadCommands
 from autopilot_bridge.services.small_services import small_services
 from autopilot_bridge.services.vehicle_files import vehicle_files
 
@@ -14,4 +15,5 @@ def microservices(parts: AutopilotParts) -> tuple[Microservice, ...]:
         *incoming_services(parts),
         *small_services(parts),
         *vehicle_files(parts),
+        PayloadCommands(parts),
     )

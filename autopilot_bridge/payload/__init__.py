@@ -6,7 +6,8 @@ frames out.
 
 from autopilot_bridge.payload.camera import CAMERA_COMPONENT, CameraComponent
 from autopilot_bridge.payload.component import Component
-from autopilot_bridge.payload.gimbal import GIMBAL_COMPONENT, GimbalComponent
+from autopilot_bridge.payload.gimbal import GimbalComponent
+from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MAGNETOMETER_COMPONENT, MagnetometerComponent
 from autopilot_bridge.payload.station import PayloadStation
 

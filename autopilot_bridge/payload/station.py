@@ -5,7 +5,8 @@ from collections.abc import Callable
 from autopilot_bridge.mavlink import FrameParser
 from autopilot_bridge.payload.camera import CameraComponent
 from autopilot_bridge.payload.component import Component
-from autopilot_bridge.payload.gimbal import GIMBAL_COMPONENT, GimbalComponent
+from autopilot_bridge.payload.gimbal import GimbalComponent
+from autopilot_bridge.payload.gimbal_messages import GIMBAL_COMPONENT
 from autopilot_bridge.payload.magnetometer import MagnetometerComponent
 from flightsim.payload import Payload
 

@@ -1,0 +1,104 @@
+"""What a gimbal looks at by itself: a place, or another system that tells where it is."""
+
+import math
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.vehicle_heard import STALE_US, VehicleHeard
+
+_RELATIVE_FRAMES: Final = frozenset(
+    (
+        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
+        mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,  # the ground is taken as level with home
+        mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
+    )
+)
+_HAS_POSITION: Final = 1  # of FOLLOW_TARGET.est_capabilities
+_HAS_VELOCITY: Final = 2
+_FASTEST_M_S: Final = 1000.0
+
+
+class GimbalAim:
+    """A region of interest.
+
+    Attributes:
+        system_id: of the system that is followed; 0: none.
+    """
+
+    def __init__(self, heard: VehicleHeard) -> None:
+        self._heard = heard
+        self._place: GeodeticPosition | None = None
+        self._velocity_ned_m_s = (0.0, 0.0, 0.0)
+        self._told_us = 0
+        self.system_id = 0
+
+    @property
+    def active(self) -> bool:
+        """There is something to look at."""
+        return self._place is not None or self.system_id != 0
+
+    def clear(self) -> None:
+        """Look at nothing any more."""
+        self._place, self.system_id = None, 0
+
+    def look_at(self, lat_deg: float, lon_deg: float, alt_m: float, frame: int) -> bool | None:
+        """Look at a place; False: it makes no sense; None: where it is can't be told yet."""
+        if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0 and abs(alt_m) < 1e5):
+            return False
+        if frame in _RELATIVE_FRAMES:
+            alt_m += self._heard.home_alt_m
+        if self._heard.position is None or math.isnan(alt_m):
+            return None
+        self._place = GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
+        self._velocity_ned_m_s = (0.0, 0.0, 0.0)
+        self.system_id = 0
+        return True
+
+    def follow(self, system_id: int) -> None:
+        """Look at another system, as soon and as long as it tells where it is."""
+        if system_id != self.system_id:
+            self._place = None
+        self.system_id = system_id
+
+    def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> None:
+        """Take GLOBAL_POSITION_INT or FOLLOW_TARGET of the system that is followed."""
+        if sender[0] != self.system_id or not self.system_id:
+            return
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT:
+                alt_m = 1e-3 * message.alt
+                velocity = (1e-2 * message.vx, 1e-2 * message.vy, 1e-2 * message.vz)
+            case mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET if message.est_capabilities & _HAS_POSITION:
+                alt_m = float(message.alt)
+                moves = message.est_capabilities & _HAS_VELOCITY
+                north, east, down = message.vel if moves else (0.0, 0.0, 0.0)
+                velocity = (float(north), float(east), float(down))
+            case _:
+                return
+        fits = abs(message.lat) <= 900_000_000 and abs(message.lon) <= 1_800_000_000 and abs(alt_m) < 1e5
+        if not fits or not all(abs(speed) < _FASTEST_M_S for speed in velocity):
+            return
+        self._place = GeodeticPosition(lat_deg=1e-7 * message.lat, lon_deg=1e-7 * message.lon, alt_m=alt_m)
+        self._velocity_ned_m_s = velocity
+        self._told_us = time_us
+
+    def direction(self, time_us: int) -> tuple[float, float] | None:
+        """(pitch, yaw from north), radians, of what is looked at; None: not known now.
+
+        What moves is taken on in a straight line for up to three seconds after it was heard.
+        """
+        here, place = self._heard.position, self._place
+        if here is None or place is None:
+            return None
+        north, east, down = LocalFrame(here).ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
+        if self.system_id:
+            elapsed_us = time_us - self._told_us
+            if elapsed_us > STALE_US:
+                return None
+            ways = (1e-6 * elapsed_us * speed for speed in self._velocity_ned_m_s)
+            north, east, down = (value + way for value, way in zip((north, east, down), ways, strict=True))
+        if north == east == down == 0.0:
+            return None
+        return -math.atan2(down, math.hypot(north, east)), math.atan2(east, north)

@@ -1,0 +1,116 @@
+"""What the gimbal component tells, as device and as manager of gimbal protocol v2."""
+
+import math
+from typing import Any, Final
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.component import fixed_text
+from flightsim.payload import Gimbal, GimbalFlags
+
+GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
+
+_CAPABILITIES: Final = int(
+    mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_RETRACT
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_NEUTRAL
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_AXIS
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_FOLLOW
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_PITCH_LOCK
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_AXIS
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_FOLLOW
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_YAW_LOCK
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_YAW_IN_EARTH_FRAME
+)
+_ROLL_CAPABILITIES: Final = int(
+    mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_AXIS
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_LOCK
+    | mavlink.GIMBAL_MANAGER_CAP_FLAGS_HAS_ROLL_FOLLOW
+)
+_ENDLESS: Final = int(mavlink.GIMBAL_MANAGER_CAP_FLAGS_SUPPORTS_INFINITE_YAW)
+_POINTS_AT_PLACE: Final = int(mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATION_GLOBAL)
+
+
+def status_flags(gimbal: Gimbal) -> int:
+    """Flags of the command in force, with the frame that yaw is told in."""
+    flags = int(gimbal.flags) & ~int(GimbalFlags.YAW_IN_VEHICLE_FRAME | GimbalFlags.YAW_IN_EARTH_FRAME)
+    locked = flags & GimbalFlags.YAW_LOCK
+    frame = GimbalFlags.YAW_IN_EARTH_FRAME if locked else GimbalFlags.YAW_IN_VEHICLE_FRAME
+    return flags | int(frame) | int(mavlink.GIMBAL_DEVICE_FLAGS_ACCEPTS_YAW_IN_EARTH_FRAME)
+
+
+def attitude_status(gimbal: Gimbal) -> Any:
+    """GIMBAL_DEVICE_ATTITUDE_STATUS."""
+    flags = status_flags(gimbal)
+    in_earth = bool(flags & GimbalFlags.YAW_IN_EARTH_FRAME)
+    earth, vehicle = gimbal.measured_q_ned_from_gimbal, gimbal.measured_q_heading_from_gimbal
+    delta_yaw = math.remainder(_yaw(earth.tolist()) - _yaw(vehicle.tolist()), math.tau)
+    rates = gimbal.measured_rates_rad_s.tolist()
+    failure = mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT if gimbal.limits_reached[1] else 0
+    failure |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT if gimbal.limits_reached[2] else 0
+    failure |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_ROLL_LIMIT if gimbal.limits_reached[0] else 0
+    return mavlink.MAVLink_gimbal_device_attitude_status_message(
+        0,
+        0,
+        (max(0, gimbal.time_us) // 1000) & 0xFFFFFFFF,
+        flags,
+        (earth if in_earth else vehicle).tolist(),
+        rates[0],
+        rates[1],
+        rates[2],
+        failure,
+        delta_yaw=delta_yaw,
+        delta_yaw_velocity=math.nan,
+        gimbal_device_id=0,
+    )
+
+
+def mount_orientation(gimbal: Gimbal, time_ms: int) -> Any:
+    """MOUNT_ORIENTATION, of the protocol's first version: roll and pitch against the horizon, degrees."""
+    w, x, y, z = gimbal.measured_q_heading_from_gimbal.tolist()
+    return mavlink.MAVLink_mount_orientation_message(
+        time_ms,
+        math.degrees(math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))),
+        math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))),
+        math.degrees(_yaw([w, x, y, z])),
+        math.degrees(_yaw(gimbal.measured_q_ned_from_gimbal.tolist())) % 360.0,
+    )
+
+
+def manager_information(gimbal: Gimbal, time_ms: int) -> Any:
+    """GIMBAL_MANAGER_INFORMATION."""
+    capabilities = _device_capabilities(gimbal) | _POINTS_AT_PLACE
+    return mavlink.MAVLink_gimbal_manager_information_message(
+        time_ms, capabilities, GIMBAL_COMPONENT, *_limits(gimbal)
+    )
+
+
+def device_information(gimbal: Gimbal, time_ms: int) -> Any:
+    """GIMBAL_DEVICE_INFORMATION."""
+    return mavlink.MAVLink_gimbal_device_information_message(
+        time_ms,
+        fixed_text("flightstack", 32),
+        fixed_text("simulated gimbal", 32),
+        fixed_text("", 32),
+        0x01000000,
+        0x01000000,
+        0,
+        _device_capabilities(gimbal) & 0xFFFF,
+        0,
+        *_limits(gimbal),
+    )
+
+
+def _limits(gimbal: Gimbal) -> tuple[float, float, float, float, float, float]:
+    p = gimbal.parameters
+    roll = p.roll_limit_rad if p.axes == 3 else 0.0
+    return -roll, roll, p.pitch_min_rad, p.pitch_max_rad, -p.yaw_limit_rad, p.yaw_limit_rad
+
+
+def _device_capabilities(gimbal: Gimbal) -> int:
+    p = gimbal.parameters
+    capabilities = _CAPABILITIES | (_ROLL_CAPABILITIES if p.axes == 3 else 0)
+    return capabilities | (_ENDLESS if p.yaw_limit_rad >= math.pi else 0)
+
+
+def _yaw(q: list[float]) -> float:
+    w, x, y, z = q
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

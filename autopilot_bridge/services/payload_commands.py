@@ -1,0 +1,188 @@
+"""Commands for camera and gimbal that clients send to the autopilot, which passes them on.
+
+ArduPilot passes on what its camera and mount libraries know, and acknowledges at once (4.6 AP_Camera,
+AP_Mount). PX4's gimbal manager and camera trigger do the same for theirs, while cameras with a component id
+of their own are spoken to directly (PX4 1.16 gimbal, camera_trigger; Commander.cpp leaves these commands to
+them, and nobody answers when they do not run). A device is there when its heartbeat has been heard.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.command_common import Command, Handler
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+
+_CAMERA: Final = int(mavlink.MAV_COMP_ID_CAMERA)
+_GIMBAL: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
+_CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+_NONE: Final = mavlink.MAV_CMD_DO_SET_ROI_NONE
+_PRESENT_US: Final = 5_000_000
+_NOBODY: Final = (0, 0)
+_TAKE, _GIVE_UP = -2.0, -3.0
+
+_TRIGGER: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    )
+)
+_PX4_TRIGGER: Final = _TRIGGER | {
+    mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
+    mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
+}
+_ARDUPILOT_CAMERA: Final = _TRIGGER | {
+    mavlink.MAV_CMD_SET_CAMERA_ZOOM,
+    mavlink.MAV_CMD_SET_CAMERA_FOCUS,
+    mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+    mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+    mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+    mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+    mavlink.MAV_CMD_CAMERA_TRACK_POINT,
+    mavlink.MAV_CMD_CAMERA_TRACK_RECTANGLE,
+    mavlink.MAV_CMD_CAMERA_STOP_TRACKING,
+}
+_GIMBAL_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        _CONFIGURE,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
+    )
+)
+_ROI: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+        mavlink.MAV_CMD_DO_SET_ROI_SYSID,
+        _NONE,
+    )
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PayloadPolicy:
+    """What a firmware does with commands for its payload.
+
+    Attributes:
+        camera: commands it passes on to a camera.
+        absent: what it answers while the device is not there; None: nothing.
+    """
+
+    camera: frozenset[int]
+    absent: Result | None
+
+
+PX4_PAYLOAD: Final = PayloadPolicy(camera=_PX4_TRIGGER, absent=None)
+ARDUPILOT_PAYLOAD: Final = PayloadPolicy(camera=_ARDUPILOT_CAMERA, absent=Result.UNSUPPORTED)
+
+
+class PayloadCommands(Microservice):
+    """Passes commands on to camera and gimbal.
+
+    Args:
+        parts: of the autopilot.
+    """
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._parts = parts
+        self._policy = PX4_PAYLOAD if parts.flavour.name == "px4" else ARDUPILOT_PAYLOAD
+        self._heard_us: dict[int, int] = {}
+        self._in_control: frozenset[tuple[int, int]] = frozenset()
+
+    @property
+    def commands(self) -> Mapping[int, Handler]:
+        """Those that are passed on. Regions of interest are accepted without a gimbal too."""
+        return {
+            **dict.fromkeys(self._policy.camera, self._to_camera),
+            **dict.fromkeys(_GIMBAL_COMMANDS, self._to_gimbal),
+            **dict.fromkeys(_ROI, self._look),
+        }
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Notice devices of this vehicle, and who controls the gimbal."""
+        if source.system_id == self._parts.system_id and source.component_id in (_CAMERA, _GIMBAL):
+            kind = message.get_msgId()
+            if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+                self._heard_us[source.component_id] = time_us
+            elif kind == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS:
+                primary = (message.primary_control_sysid, message.primary_control_compid)
+                secondary = (message.secondary_control_sysid, message.secondary_control_compid)
+                self._in_control = frozenset() if primary == _NOBODY else frozenset((primary, secondary))
+        return False
+
+    def _is_there(self, component: int) -> bool:
+        heard_us = self._heard_us.get(component)
+        return heard_us is not None and self._parts.commander.time_us - heard_us < _PRESENT_US
+
+    def _may_point(self, source: Source) -> bool:
+        return not self._in_control or (source.system_id, source.component_id) in self._in_control
+
+    def _to_camera(self, command: Command, source: Source) -> Result | None:
+        if not self._is_there(_CAMERA):
+            return self._policy.absent
+        self._pass_on(_CAMERA, command)
+        return Result.ACCEPTED
+
+    def _to_gimbal(self, command: Command, source: Source) -> Result | None:
+        if not self._is_there(_GIMBAL):
+            return self._policy.absent
+        if command.id == _CONFIGURE:
+            command = self._configured(command, source)
+        elif not self._may_point(source):
+            return Result.DENIED
+        self._pass_on(_GIMBAL, command)
+        return Result.ACCEPTED
+
+    def _look(self, command: Command, source: Source) -> Result | None:
+        if self._is_there(_GIMBAL):
+            if not self._may_point(source):
+                return Result.DENIED
+            self._pass_on(_GIMBAL, command)
+        return Result.ACCEPTED
+
+    def _configured(self, command: Command, source: Source) -> Command:
+        """The client itself is meant by -2 and -3, not the autopilot that passes its words on."""
+        asker = (source.system_id, source.component_id)
+        pairs = [(command.p1, command.p2), (command.p3, command.p4)]
+        for index, pair in enumerate(pairs):
+            if _TAKE in pair:
+                pairs[index] = (float(asker[0]), float(asker[1]))
+            elif _GIVE_UP in pair:
+                pairs[index] = (0.0, 0.0) if asker in self._in_control else (-1.0, -1.0)
+        (p1, p2), (p3, p4) = pairs
+        return command._replace(p1=p1, p2=p2, p3=p3, p4=p4)
+
+    def _pass_on(self, component: int, command: Command) -> None:
+        send_to_all(self._parts.broadcast, forwarded(command, self._parts.system_id, component))
+
+
+def forwarded(command: Command, system_id: int, component: int) -> MavlinkMessage:
+    """The message that carries a command on, in the form in which it came."""
+    first = (command.p1, command.p2, command.p3, command.p4)
+    if command.frame is None:
+        return mavlink.MAVLink_command_long_message(
+            system_id, component, command.id, 0, *first, command.x, command.y, command.z
+        )
+    return mavlink.MAVLink_command_int_message(
+        system_id,
+        component,
+        command.frame,
+        command.id,
+        0,
+        0,
+        *first,
+        _e7(command.x),
+        _e7(command.y),
+        command.z,
+    )
+
+
+def _e7(degrees: float) -> int:
+    scaled = round(degrees * 1e7) if math.isfinite(degrees) else 0
+    return max(-(2**31), min(2**31 - 1, scaled))
