@@ -6,6 +6,7 @@ no batch of messages (with the step of the vehicle after it) takes long, all it 
 memory is kept.
 """
 
+import gc
 import time
 import traceback
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameParser
+from autopilot_bridge.sitl.server import objects_kept
 from flightsim import truth as t
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
 from tests.fuzz.generator import Generator
@@ -66,9 +68,15 @@ class Campaign:
 
     def run(self, count: int, *, told: Callable[[str], None] = lambda text: None) -> Figures:
         """Fire so many messages: five of six in rounds that are harmless."""
+        with objects_kept():
+            return self._run(count, told)
+
+    def _run(self, count: int, told: Callable[[str], None]) -> Figures:
         figures = self.figures
         while figures.messages < count:
             flying = self._fresh()
+            gc.collect()  # the one before
+            gc.freeze()
             self._fire(flying, min(count - figures.messages, HARMLESS_ROUND), orders=False)
             if figures.messages < count:
                 self._fire(flying, min(count - figures.messages, ORDERS_ROUND), orders=True)
@@ -78,7 +86,9 @@ class Campaign:
 
     def one_round(self, count: int, *, orders: bool) -> Figures:
         """One round on a new vehicle."""
-        self._fire(self._fresh(), count, orders=orders)
+        flying = self._fresh()
+        with objects_kept():
+            self._fire(flying, count, orders=orders)
         return self.figures
 
     def _fresh(self) -> Flying:
@@ -107,7 +117,7 @@ class Campaign:
                 for frame in batch:
                     link.send(frame)
                 sitl.advance()
-            except Exception as error:  # whatever it is, it is what is looked for
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is what is looked for
                 where = traceback.extract_tb(error.__traceback__)[-1]
                 what = f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"
                 self._complain(orders, sent, what, batch)
