@@ -10,9 +10,11 @@ from collections.abc import Iterable
 from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.sitl import Sitl
 from flightsim.airframe import AirframeKind, load_airframe
+from flightsim.environment import Environment
 
 _BOOT_S: Final = 5.0
 _PHASE_S: Final = 2.5
@@ -30,10 +32,17 @@ def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpeci
     """
     for kind in sorted({load_airframe(vehicle.model).kind for vehicle in vehicles}):
         specification = VehicleSpecification(model=_MODELS[kind])
-        sitl = Sitl(SitlConfiguration(vehicles=(specification,)))
+        # rough air and another's estimate of the position may come at any time of a flight
+        air = Environment.from_wind(speed_m_s=2.0, from_deg=0.0, turbulence="light")
+        sitl = Sitl(SitlConfiguration(vehicles=(specification,), environment=air))
         link = sitl.connect(0)
         fly = _fly_aircraft if kind is AirframeKind.FIXED_WING else _fly_multicopter
         fly(sitl)
+        encoder = FrameEncoder(1, 191)
+        for k in range(5):
+            time_us = sitl.time_us
+            link.send(encoder.encode(dialect.MAVLink_vision_position_estimate_message(time_us, *(0.0,) * 6)))
+            _advance(sitl, 0.1 * (k + 1))
         link.receive()
         sitl.close()
 
