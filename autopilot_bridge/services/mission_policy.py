@@ -176,5 +176,7 @@ ARDUPILOT_MISSION_POLICY: Final = MissionPolicy(
 PX4_PLANE_MISSION_POLICY: Final = replace(PX4_MISSION_POLICY, aircraft=True)
 
 ARDUPLANE_MISSION_POLICY: Final = replace(
-    ARDUPILOT_MISSION_POLICY, capacity={**ARDUPILOT_MISSION_POLICY.capacity, MissionType.MISSION: 655}
+    ARDUPILOT_MISSION_POLICY,
+    rules=ArdupilotItemRules(aircraft=True),
+    capacity={**ARDUPILOT_MISSION_POLICY.capacity, MissionType.MISSION: 655},
 )

@@ -105,11 +105,21 @@ def check_special(item: MissionItem, seq: int, count: int) -> int:
                 return int(mavlink.MAV_MISSION_INVALID_PARAM1)
             if not -1.0 <= item.param2 <= 65535.0:
                 return int(mavlink.MAV_MISSION_INVALID_PARAM2)
+        case mavlink.MAV_CMD_DO_JUMP_TAG:
+            if not -1.0 <= item.param2 <= 65535.0:
+                return int(mavlink.MAV_MISSION_INVALID_PARAM2)
         case mavlink.MAV_CMD_DO_CHANGE_SPEED:
             # -1 keeps the speed, -2 returns to the default one.
             if not (item.param2 >= 0.0 or item.param2 in (-1.0, -2.0)):
                 return int(mavlink.MAV_MISSION_INVALID_PARAM2)
-        case mavlink.MAV_CMD_NAV_WAYPOINT | mavlink.MAV_CMD_NAV_LOITER_TIME:
+        case (
+            mavlink.MAV_CMD_NAV_WAYPOINT
+            | mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT
+            | mavlink.MAV_CMD_NAV_LOITER_TIME
+            | mavlink.MAV_CMD_NAV_DELAY  # a time of day isn't waited for
+            | mavlink.MAV_CMD_CONDITION_DELAY
+            | mavlink.MAV_CMD_CONDITION_DISTANCE
+        ):
             if item.param1 < 0.0:
                 return int(mavlink.MAV_MISSION_INVALID_PARAM1)
     return int(ACCEPTED)

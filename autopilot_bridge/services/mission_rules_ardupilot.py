@@ -29,7 +29,6 @@ POSITION_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
         mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
         mavlink.MAV_CMD_NAV_VTOL_LAND,
-        mavlink.MAV_CMD_NAV_PAYLOAD_PLACE,
         mavlink.MAV_CMD_DO_SET_HOME,
         mavlink.MAV_CMD_DO_LAND_START,
         mavlink.MAV_CMD_DO_RETURN_PATH_START,
@@ -43,11 +42,8 @@ POSITION_COMMANDS: Final = frozenset(
 PLAIN_COMMANDS: Final = frozenset(
     (
         mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
-        mavlink.MAV_CMD_NAV_GUIDED_ENABLE,
         mavlink.MAV_CMD_NAV_DELAY,
         mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
-        mavlink.MAV_CMD_NAV_SCRIPT_TIME,
-        mavlink.MAV_CMD_NAV_ATTITUDE_TIME,
         mavlink.MAV_CMD_CONDITION_DELAY,
         mavlink.MAV_CMD_CONDITION_DISTANCE,
         mavlink.MAV_CMD_CONDITION_YAW,
@@ -67,13 +63,11 @@ PLAIN_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
         mavlink.MAV_CMD_DO_FENCE_ENABLE,
         mavlink.MAV_CMD_DO_PARACHUTE,
-        mavlink.MAV_CMD_DO_INVERTED_FLIGHT,
         mavlink.MAV_CMD_DO_GRIPPER,
         mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,
         mavlink.MAV_CMD_DO_SPRAYER,
         mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
         mavlink.MAV_CMD_DO_AUX_FUNCTION,
-        mavlink.MAV_CMD_DO_GUIDED_LIMITS,
         mavlink.MAV_CMD_DO_ENGINE_CONTROL,
         mavlink.MAV_CMD_SET_CAMERA_ZOOM,
         mavlink.MAV_CMD_SET_CAMERA_FOCUS,
@@ -87,7 +81,28 @@ PLAIN_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_DO_WINCH,
     )
 )
-"""Mission commands without a position; their frame is not looked at."""
+"""Mission commands without a position; their frame is not looked at.
+
+The firmware knows some more that are not flown here, so they are refused: NAV_GUIDED_ENABLE with
+DO_GUIDED_LIMITS, NAV_SCRIPT_TIME, NAV_ATTITUDE_TIME, NAV_PAYLOAD_PLACE, DO_INVERTED_FLIGHT.
+"""
+
+PASSED_OVER: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
+        mavlink.MAV_CMD_DO_SET_REVERSE,
+        mavlink.MAV_CMD_DO_PARACHUTE,
+        mavlink.MAV_CMD_DO_SPRAYER,
+        mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
+        mavlink.MAV_CMD_DO_ENGINE_CONTROL,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
+    )
+)
+"""Taken and passed over, by the firmware too, on vehicles without what they are for."""
+
+AIRCRAFT_REFUSED: Final = frozenset((mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,))
+"""What aircraft don't fly."""
 
 _MARKERS: Final = frozenset(
     (
@@ -118,7 +133,14 @@ _YAW_IN_PARAM4: Final = frozenset(
 
 
 class ArdupilotItemRules:
-    """`ItemRules` of ArduPilot 4.6."""
+    """`ItemRules` of ArduPilot 4.6.
+
+    Args:
+        aircraft: for ArduPlane.
+    """
+
+    def __init__(self, *, aircraft: bool = False) -> None:
+        self._refused = AIRCRAFT_REFUSED if aircraft else frozenset()
 
     def check(self, item: MissionItem, mission_type: MissionType, seq: int, count: int) -> int:
         if mission_type is MissionType.FENCE:
@@ -127,6 +149,8 @@ class ArdupilotItemRules:
             return check_rally(item)
         if seq == 0:  # home: whatever it holds is replaced
             return int(mavlink.MAV_MISSION_ACCEPTED)
+        if item.command in self._refused:
+            return int(mavlink.MAV_MISSION_UNSUPPORTED)
         placeless = item.command in _MARKERS and item.frame == mavlink.MAV_FRAME_MISSION
         if item.command in POSITION_COMMANDS and not placeless:
             if item.frame not in GEODETIC_FRAMES and not _without_place(item):

@@ -33,7 +33,6 @@ POSITION_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
         mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
         mavlink.MAV_CMD_NAV_VTOL_LAND,
-        mavlink.MAV_CMD_CONDITION_GATE,
     )
 )
 """Mission commands taken in a global frame."""
@@ -63,7 +62,6 @@ PLAIN_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_DO_CONTROL_VIDEO,
         mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
         mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
-        mavlink.MAV_CMD_OBLIQUE_SURVEY,
         mavlink.MAV_CMD_DO_VTOL_TRANSITION,
         mavlink.MAV_CMD_NAV_DELAY,
         mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
@@ -76,7 +74,20 @@ PLAIN_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
     )
 )
-"""Mission commands taken in MAV_FRAME_MISSION."""
+"""Mission commands taken in MAV_FRAME_MISSION.
+
+The firmware knows CONDITION_GATE and OBLIQUE_SURVEY too, which are not flown here, so they are refused.
+"""
+
+PASSED_OVER: Final = frozenset(
+    (
+        mavlink.MAV_CMD_CONDITION_DELAY,
+        mavlink.MAV_CMD_CONDITION_DISTANCE,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_DO_WINCH,
+    )
+)
+"""Taken and passed over by the firmware too."""
 
 _POSITION_FRAMES: Final = GLOBAL_FRAMES | RELATIVE_FRAMES
 _UNSET_EVERYWHERE: Final = (True, True, True, True)
