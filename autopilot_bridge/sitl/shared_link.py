@@ -1,21 +1,17 @@
 """One link for several vehicles, as behind one telemetry radio: each frame goes to the vehicle it is for."""
 
-from typing import Final
-
 from autopilot_bridge.links import Link, LinkCounters, PeerId, Reach
 from autopilot_bridge.mavlink import Frame, Intake
 from autopilot_bridge.routing import LoopGuard
 from autopilot_bridge.sitl.channel import LinkChannel, PeerExchange
 from autopilot_bridge.sitl.switchboard import AUTOPILOT_COMPONENT, Switchboard
 
-ALL_SYSTEMS: Final = 0
-
 
 class SharedLink:
     """A link that several vehicles speak on.
 
     Everybody's frames reach the clients. A client's frame goes to the vehicle whose system it is addressed
-    to, or to all of them when it is addressed to none; and to other clients of the link by the routing rules.
+    to, or to all of them when it is addressed to none of them; and to other clients by the routing rules.
 
     Args:
         link: where bytes go and come from.
@@ -58,30 +54,27 @@ class SharedLink:
         intake = self._intake
         if not arrived and not intake.waiting:
             return
-        believed: set[PeerId] = set()
-        for peer, frames in intake.take(arrived):
-            for frame in frames:
-                if frame.component_id == AUTOPILOT_COMPONENT and frame.system_id in self._members:
-                    self.echoes += 1
-                elif self._deliver(frame):
-                    believed.add(peer)
-                    for other in self._peers.others(frame, peer):
-                        self.link.send(frame.raw, other)
-        self._peers.forget({peer for peer, _ in arrived} - believed)
+        believed = [
+            (peer, frame, members)
+            for peer, frames in intake.take(arrived)
+            for frame in frames
+            if (members := self._believing(frame))
+        ]
+        self._peers.forget({peer for peer, _ in arrived} - {peer for peer, _, _ in believed})
+        for peer, frame, members in believed:
+            for switchboard, channel in members:
+                switchboard.take(channel, (frame,))
+            for other in self._peers.others(frame, peer):
+                self.link.send(frame.raw, other)
 
-    def _deliver(self, frame: Frame) -> bool:
-        """Give a frame to the vehicles it is for; False when no vehicle believes it."""
-        target = frame.target_system
-        addressed = self._members.get(target)
-        if addressed is not None:
-            return _take(*addressed, frame)
-        if target == ALL_SYSTEMS:
-            taken = [_take(*member, frame) for member in self._members.values()]
-            return any(taken)
-        for _, channel in self._members.values():  # between clients: believed when any vehicle does
-            if channel.signing is None or channel.signing.admit([frame]):
-                return True
-        return False
+    def _believing(self, frame: Frame) -> list[tuple[Switchboard, LinkChannel]]:
+        """The vehicles a frame is for, or that may know the way, and that believe it."""
+        if frame.component_id == AUTOPILOT_COMPONENT and frame.system_id in self._members:
+            self.echoes += 1
+            return []
+        addressed = self._members.get(frame.target_system)
+        members = self._members.values() if addressed is None else (addressed,)
+        return [member for member in members if member[1].signing is None or member[1].signing.admit([frame])]
 
     def forward(self, raw: bytes, member: int) -> None:
         """Send a frame that came to vehicle `member` on another link; from several vehicles, once."""
@@ -93,12 +86,6 @@ class SharedLink:
         self._members.pop(member, None)
         if not self._members:
             self.link.close()
-
-
-def _take(switchboard: Switchboard, channel: LinkChannel, frame: Frame) -> bool:
-    admitted = [frame] if channel.signing is None else channel.signing.admit([frame])
-    switchboard.take(channel, admitted)
-    return bool(admitted)
 
 
 class _Port:
