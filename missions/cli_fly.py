@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from missions.cli_confirm import confirmation
 from missions.cli_fly_report import ProgressLine, tell
 from missions.cli_signing import key_from, key_option, warn_if_open
-from missions.cli_types import SPEEDUP
+from missions.cli_types import SECONDS, SPEEDUP
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 
 if TYPE_CHECKING:
@@ -39,6 +40,9 @@ _EMBEDDED_ONLY: Final = (
     "turbulence",
     "speedup",
 )
+
+
+_CONNECTED_ONLY: Final = ("yes", "check", "regain", "signing_key")
 
 
 def _command_of(module: str) -> "MissionCommand":
@@ -163,6 +167,19 @@ def _owners(option_name: str) -> list[str]:
     "--on-failure", type=click.Choice(["return", "land", "hold"]), default="return", help="Or on Ctrl-C."
 )
 @click.option(
+    "--yes", is_flag=True, help="With a real vehicle: fly without asking, when nothing is found against it."
+)
+@click.option(
+    "--check",
+    is_flag=True,
+    help="Look at the vehicle and ask before the flight, on links of this machine too.",
+)
+@click.option(
+    "--regain",
+    type=SECONDS,
+    help="So long a lost link may take to come back, s. [default: 60]",
+)
+@click.option(
     "--max-error",
     type=float,
     metavar="M",
@@ -190,10 +207,7 @@ def fly(**given: Any) -> int:
     """
     from missions.errors import PlanError
 
-    if given["connect"]:
-        _refuse_embedded_options(click.get_current_context())
-    elif given["signing_key"] is not None:
-        raise click.UsageError("--signing-key is for vehicles elsewhere; give --connect too, or leave it out")
+    _refuse_options_of_the_other(click.get_current_context(), connected=bool(given["connect"]))
     try:
         return _fly(given)
     except PlanError as error:
@@ -209,9 +223,16 @@ def _chosen(context: click.Context) -> frozenset[str]:
     )
 
 
-def _refuse_embedded_options(context: click.Context) -> None:
+def _refuse_options_of_the_other(context: click.Context, *, connected: bool) -> None:
     """A vehicle elsewhere has its own wind: an option that would do nothing is not passed over in silence."""
     chosen = _chosen(context)
+    if not connected:
+        given = [f"--{name.replace('_', '-')}" for name in _CONNECTED_ONLY if name in chosen]
+        if given:
+            raise click.UsageError(
+                f"{', '.join(given)}: for vehicles elsewhere; give --connect too, or leave it out"
+            )
+        return
     given = [f"--{name}" for name in _EMBEDDED_ONLY if name in chosen]
     if given:
         raise click.UsageError(
@@ -281,10 +302,17 @@ def _fly(given: dict[str, Any]) -> int:
     from autopilot_bridge.errors import AddressError, BridgeError
     from autopilot_bridge.links import parse_address
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
+    from missions.request import REGAIN_S
     from missions.session import RunRequest
     from missions.session import fly as fly_mission
     from missions.vehicle.adapter import Mode
 
+    confirm = None
+    if given["connect"]:
+        try:
+            confirm = confirmation(given["connect"], yes=given["yes"], check=given["check"])
+        except AddressError as error:
+            raise click.UsageError(str(error)) from error
     line = ProgressLine()
     try:
         key = key_from(given["signing_key"])
@@ -312,6 +340,8 @@ def _fly(given: dict[str, Any]) -> int:
                 identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
                 on_failure=Mode(given["on_failure"]),
                 max_error_m=given["max_error"],
+                confirm=confirm,
+                regain_s=REGAIN_S if given["regain"] is None else given["regain"],
                 estimator=given["estimator"],
                 estimator_settings=given["settings"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),

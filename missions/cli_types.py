@@ -20,3 +20,6 @@ class FiniteRange(click.FloatRange):
 SLOWEST: Final = 0.001
 SPEEDUP: Final = FiniteRange(min=SLOWEST, max=1e6)
 """Simulated seconds per wall second."""
+
+SECONDS: Final = FiniteRange(min=0.0, max=86_400.0)
+"""A time of up to a day."""

@@ -16,6 +16,7 @@ from missions.mission import Debriefing, Mission
 from missions.occupancy.mission import OccupancyMission
 from missions.options import FlightOptions
 from missions.orbit.mission import OrbitMission
+from missions.outline import Outline
 from missions.patterns import (
     Curve,
     Lap,
@@ -71,6 +72,11 @@ class PatternMission(Mission[FlightOptions]):
     def curve(self, options: FlightOptions) -> Curve:
         """The pattern around its centre, as often as asked."""
         return self._make_curve(options)
+
+    async def outline(self, vehicle: Vehicle, options: FlightOptions) -> Outline:
+        from missions.pattern_flight import pattern_outline
+
+        return pattern_outline(vehicle, options, self.curve(options))
 
     async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
         from missions.pattern_flight import fly_pattern

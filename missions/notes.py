@@ -38,6 +38,14 @@ class Phase:
     end_us: int
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkLoss:
+    """A time without the vehicle, in its own time; `end_us` None: it never came back."""
+
+    start_us: int
+    end_us: int | None = None
+
+
 @dataclass(slots=True)
 class FlightNotes:
     """Notes of one vehicle's flight; a mission writes them, the run reads them.
@@ -50,6 +58,8 @@ class FlightNotes:
         options: as the vehicle flies them.
         left: how the vehicle was left when the flight failed or was interrupted; "": it was not.
         warnings: what the user should know, each once.
+        link_losses: when the link was lost, and back.
+        lost_link: what the autopilot does without its ground station, in words; "": not known.
         reached: items of a mission file (index from 0) and when, in their order.
         marks: moments and figures that the mission gives a name to, for its own score.
     """
@@ -63,6 +73,8 @@ class FlightNotes:
     options: MissionOptions | None = None
     left: str = ""
     warnings: list[str] = field(default_factory=list)
+    link_losses: list[LinkLoss] = field(default_factory=list)
+    lost_link: str = ""
     reached: list[tuple[int, int]] = field(default_factory=list)
     marks: dict[str, float] = field(default_factory=dict)
     _open: tuple[str, int] | None = None

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mission_plan import MissionItem
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,10 +14,10 @@ class Outline:
         points_ned_m: places it flies through, from home.
         duration_s: of the flight without takeoff and landing; None: not known.
         plan_home: where the plan begins; None: wherever the vehicle stands.
-        brings_fence: the mission uploads a fence of its own.
+        fence: that the mission uploads; empty: the vehicle keeps its own.
     """
 
     points_ned_m: tuple[tuple[float, float, float], ...] = ()
     duration_s: float | None = None
     plan_home: GeodeticPosition | None = None
-    brings_fence: bool = False
+    fence: tuple[MissionItem, ...] = ()

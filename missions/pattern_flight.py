@@ -14,6 +14,7 @@ from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError, VehicleTimeout
 from missions.notes import PATTERN, CommandedPath
 from missions.options import FlightOptions, Via
+from missions.outline import Outline
 from missions.patterns.curve import ArcLengthTable, Array, Curve
 from missions.patterns.polyline import Polyline
 from missions.planning.limits import FixedWingLimits, Limits, MulticopterLimits
@@ -35,6 +36,7 @@ from missions.wings.pattern import check_wings, fly_pattern_with_wings
 _SETTLE_S: Final = 1.5
 _SAME_PLACE_M: Final = 0.3
 _PATH_STEP_M: Final = 0.25
+_OUTLINE_STEP_M: Final = 5.0
 _TRANSIT_M_S: Final = 5.0
 _SPEED_STEP_M_S: Final = 0.5
 
@@ -101,15 +103,31 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
         trajectory = plan_pattern(curve, options, limits)
     else:  # heartbeats go on
         trajectory = await asyncio.to_thread(plan_pattern, curve, options, limits)
-    centre = (0.0, 0.0, 0.0)
-    if options.centre is not None:
-        c = options.centre
-        north, east, _ = LocalFrame(vehicle.home).ned_from_geodetic(c.lat_deg, c.lon_deg, c.alt_m)
-        centre = (north, east, 0.0)
+    centre = _centre(vehicle, options)
     if options.via is Via.SETPOINTS:
         await _fly_setpoints(vehicle, options, limits, trajectory, centre)
     else:
         await _fly_waypoints(vehicle, options, curve, trajectory, centre)
+
+
+def pattern_outline(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> Outline:
+    """Where and how long a pattern is flown, before it is planned in detail."""
+    table = ArcLengthTable.of(curve, _OUTLINE_STEP_M)
+    north_m, east_m, _ = _centre(vehicle, options)
+    points = [(float(n) + north_m, float(e) + east_m, -options.own_altitude_m) for n, e in table.points_m]
+    duration_s = float(table.arc_m[-1]) / options.speed_m_s
+    return Outline(
+        points_ned_m=tuple(points), duration_s=min(duration_s, options.search_time_s or duration_s)
+    )
+
+
+def _centre(vehicle: Vehicle, options: FlightOptions) -> Vector:
+    """The pattern's centre, from home."""
+    c = options.centre
+    if c is None:
+        return 0.0, 0.0, 0.0
+    north, east, _ = LocalFrame(vehicle.home).ned_from_geodetic(c.lat_deg, c.lon_deg, c.alt_m)
+    return north, east, 0.0
 
 
 def setpoint_at(point: TrajectoryPoint, centre: Vector) -> Setpoint:

@@ -3,12 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import SigningKey
 from missions.connection import GROUND_STATION
 from missions.options import FlightOptions, MissionOptions
 from missions.planning.limits import FORECAST_WIND_M_S
 from missions.vehicle.adapter import Mode
+
+if TYPE_CHECKING:
+    from missions.preflight.before_flight import Confirm
+
+REGAIN_S: Final = 60.0
+"""How long a lost link may take to come back."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +39,10 @@ class RunRequest:
         max_error_m: a check: the run has failed when the path error exceeds it; None: no check.
         estimator: one to run beside the flight: its name, or the path of a user's file; None: none.
         estimator_settings: its parameters as NAME=VALUE.
+        confirm: shown what was found of the vehicles before they fly, says whether to go on; None: they are
+            not looked at.
+        regain_s: how long a lost link may take to come back before the mission is given up, in seconds of
+            this machine's clock.
         command: the command line, for the summary.
         signing_key: shared with vehicles elsewhere; None: unsigned.
     """
@@ -57,6 +68,8 @@ class RunRequest:
     max_error_m: float | None = None
     estimator: str | None = None
     estimator_settings: Sequence[str] = ()
+    confirm: "Confirm | None" = None
+    regain_s: float = REGAIN_S
     command: str = ""
     signing_key: SigningKey | None = None
 

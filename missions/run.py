@@ -123,6 +123,10 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
         "acceptance_m": None if notes.commanded is None else round(notes.commanded.acceptance_m, 3),
         "tracking": tracking(notes, score),
         "left": notes.left,
+        "link_losses": [
+            {"start_s": loss.start_us / 1e6, "end_s": None if loss.end_us is None else loss.end_us / 1e6}
+            for loss in notes.link_losses
+        ],
         "warnings": list(notes.warnings),
         "messages_not_finite": score.messages_not_finite,
         "progress": _rounded(notes.progress),

@@ -223,6 +223,7 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
             f"no vehicle{which} was heard{where}{heard}: {error}; is it on, and sending there?"
         ) from error
     vehicle.notes.system_id = vehicle.system_id
+    vehicle.regain_s = request.regain_s if request.connect else 0.0
     vehicle.notes.autopilot = vehicle.autopilot
     vehicle.notes.kind = str(vehicle.kind)
     if request.connect:
@@ -242,6 +243,11 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         own, _ = adapted(mission, asked, limits, home.alt_m)
         options.append(own)
         vehicle.notes.options = own
+    if request.confirm is not None:
+        from missions.preflight.before_flight import confirmed, look
+
+        looks = [await look(vehicle, mission, own) for vehicle, own in zip(vehicles, options, strict=True)]
+        await confirmed(looks, request.confirm)
     if not mission.together:
         await together(
             [

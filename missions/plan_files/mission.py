@@ -85,7 +85,7 @@ class FileMission(Mission[FileOptions]):
             if route.endless
             else route.duration_s(own_speed_m_s(self.document, vehicle.kind)),
             plan_home=self.document.home,
-            brings_fence=bool(self.document.fence),
+            fence=self.document.fence,
         )
 
     @property

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, definition, dialect
-from missions.connection import AUTOPILOT_COMPONENT
+from missions.connection import AUTOPILOT_COMPONENT, Connection
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.vehicle.adapter import Mode
 from missions.vehicle.link_view import VehicleView, command_name, describe_ack
@@ -19,6 +19,10 @@ _IN_PROGRESS: Final = 5
 
 class VehicleCommands(VehicleView):
     """The commanding half of a vehicle."""
+
+    def __init__(self, connection: Connection, system_id: int | None = None) -> None:
+        super().__init__(connection, system_id)
+        self._rates_hz: dict[str, float] = {}  # asked for by this mission
 
     _arming_us: int | None = None  # when arming was asked for, or granted
 
@@ -57,6 +61,7 @@ class VehicleCommands(VehicleView):
 
     async def set_message_rate(self, name: str, rate_hz: float) -> None:
         """Have a message streamed at a rate; a vehicle that refuses keeps what it had."""
+        self._rates_hz[name] = rate_hz
         interval_us = 1e6 / rate_hz
         await self.try_command(
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL, float(definition(name).message_id), interval_us

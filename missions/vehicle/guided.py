@@ -24,7 +24,11 @@ _LEAD: Final = (
 
 
 class GuidedSession:
-    """Setpoints streamed to one vehicle, at a fixed rate of vehicle time."""
+    """Setpoints streamed to one vehicle, at a fixed rate of vehicle time.
+
+    While the vehicle is not heard, the last place is held; a source goes on from there when it is back, if it
+    is still in the guided mode.
+    """
 
     def __init__(self, vehicle: "Vehicle", rate_hz: float, home_offset_ned_m: Vector) -> None:
         if not _SLOWEST_HZ <= rate_hz <= 200.0:
@@ -86,7 +90,10 @@ class GuidedSession:
         vehicle, clock = self._vehicle, self._vehicle.clock
         due_us = clock.time_us
         while True:
-            if self._source is not None:
+            if vehicle.link_quiet:  # nobody knows where the vehicle is: it shall not be led on
+                self._start_us += self._period_us
+                self._last = _held(self._last)
+            elif self._source is not None:
                 elapsed_s = max(0.0, (due_us - self._start_us + _LEAD * self._period_us) * 1e-6)
                 setpoint = _setpoint_of(self._source, elapsed_s)
                 if setpoint is None:
@@ -106,6 +113,8 @@ class GuidedSession:
         left = asyncio.get_running_loop().create_future()
 
         def look(_frame: object) -> None:
+            if self._vehicle.link_just_back:
+                return  # PX4 goes back to OFFBOARD by itself when setpoints come again
             if not left.done() and self._vehicle.custom_mode != target:
                 left.set_result(self._vehicle.mode)
 
@@ -125,6 +134,13 @@ class GuidedSession:
             done.cancel()
             left.cancel()
             self._source = None
+
+
+def _held(setpoint: AnySetpoint | None) -> AnySetpoint | None:
+    """The setpoint to wait with: the same place, at rest; what has no place as it is."""
+    if not isinstance(setpoint, Setpoint) or setpoint.position_ned_m is None:
+        return Setpoint(velocity_ned_m_s=(0.0, 0.0, 0.0)) if isinstance(setpoint, Setpoint) else setpoint
+    return Setpoint(position_ned_m=setpoint.position_ned_m, yaw_rad=setpoint.yaw_rad)
 
 
 def _setpoint_of(source: SetpointSource, time_s: float) -> AnySetpoint | None:

@@ -16,7 +16,7 @@ from autopilot_bridge.mavlink import MAVLinkMessage, decode, dialect
 from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.errors import VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
-from missions.notes import FlightNotes
+from missions.notes import FlightNotes, LinkLoss
 from missions.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 from missions.vehicle.adapter import Adapter
 from missions.vehicle.ardupilot import ArduCopter
@@ -72,6 +72,8 @@ class VehicleView:
         self.first_heard_us = 0
         self._assembler = StatusTextAssembler()
         self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
+        self._watch.on_lost = self._link_lost
+        self._watch.on_regained = self._link_regained
         connection.listen("STATUSTEXT", self._on_status_text)
         connection.listen("COMMAND_ACK", self._on_ack)
         connection.listen("HEARTBEAT", self._on_heartbeat)
@@ -124,6 +126,42 @@ class VehicleView:
             self.first_heard_us = self.clock.time_us
         self._heard_us = self.clock.time_us
         self._watch.on_heartbeat()
+
+    @property
+    def regain_s(self) -> float:
+        """How long a lost link may take to come back, in seconds of this machine's clock; 0: not at all."""
+        return self._watch.regain_s
+
+    @regain_s.setter
+    def regain_s(self, seconds: float) -> None:
+        self._watch.regain_s = seconds
+
+    @property
+    def link_quiet(self) -> bool:
+        """Whether nothing has come from the vehicle for three seconds, while something of it is awaited."""
+        return self._watch.quiet
+
+    @property
+    def link_lost(self) -> bool:
+        """Whether the link counts as lost, and may still come back."""
+        return self._watch.lost
+
+    @property
+    def link_just_back(self) -> bool:
+        """Whether the vehicle was heard again a moment ago, after a silence."""
+        return self._watch.just_back
+
+    def _link_lost(self) -> None:
+        since_us = self.clock.time_us if self._heard_us is None else self._heard_us
+        self.notes.link_losses.append(LinkLoss(start_us=since_us))
+
+    def _link_regained(self) -> None:
+        loss = self.notes.link_losses[-1]
+        self.notes.link_losses[-1] = LinkLoss(start_us=loss.start_us, end_us=self.clock.time_us)
+        lost_s = (self.clock.time_us - loss.start_us) * 1e-6
+        self.notes.warn(
+            f"the link was lost for {lost_s:.0f} s at {loss.start_us * 1e-6:.0f} s, and came back"
+        )
 
     def _on_status_text(self, frame: Any) -> None:
         if frame.system_id == self._system_id and frame.component_id == AUTOPILOT_COMPONENT:
@@ -238,6 +276,9 @@ class VehicleView:
             parts.append(f"no heartbeat for {silent_s:.0f} s")
         if self._last_ack is not None:
             parts.append(f"answer {describe_ack(self._last_ack)}")
+        if self.notes.link_losses and self.notes.link_losses[-1].end_us is not None:
+            loss = self.notes.link_losses[-1]
+            parts.append(f"the link had been lost for {((loss.end_us or 0) - loss.start_us) * 1e-6:.0f} s")
         if self.status_texts:
             parts.append("texts " + " / ".join(repr(t.text) for t in list(self.status_texts)[-3:]))
         return ", ".join(parts)

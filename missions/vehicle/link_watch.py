@@ -1,4 +1,4 @@
-"""Whether a vehicle is still there: waits end when its heartbeats stop."""
+"""Whether a vehicle is still there: waits end when its heartbeats stop, unless they come back in time."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -9,11 +9,13 @@ from autopilot_bridge.clock import Clock, TelemetryClock
 from missions.errors import LinkClosed
 
 LOST_AFTER_S: Final = 10.0
+QUIET_AFTER_S: Final = 3.0
 _LOOK_EVERY_S: Final = 1.0
+_JUST_BACK_S: Final = 5.0
 
 
 class LinkWatch:
-    """Ends waits when no heartbeat has come for 10 s of the event loop's time.
+    """Ends waits when no heartbeat has come for 10 s of the event loop's time, and `regain_s` more.
 
     That is wall time for a vehicle elsewhere, however fast it simulates, and vehicle time in the loop of an
     embedded one. A vehicle slower than real time gets 10 s of its own. Time in which this process was busy
@@ -22,22 +24,45 @@ class LinkWatch:
     Args:
         clock: vehicle time.
         heard: what was heard last, for the error.
+
+    Attributes:
+        regain_s: how long a lost link may take to come back.
+        quiet: no heartbeat for 3 s, while somebody waits.
+        lost: the link counts as lost.
+        on_lost, on_regained: called when it is lost, and when it is back.
     """
 
     def __init__(self, clock: Clock, heard: Callable[[], str]) -> None:
+        self.regain_s = 0.0
+        self.quiet = False
+        self.lost = False
+        self.on_lost: Callable[[], None] = lambda: None
+        self.on_regained: Callable[[], None] = lambda: None
         self._clock = clock
         self._heard = heard
         self._heard_s: float | None = None
+        self._back_s: float | None = None
         self._scopes: list[asyncio.Timeout] = []
         self._timer: asyncio.TimerHandle | None = None
 
     def on_heartbeat(self) -> None:
         """A heartbeat of the vehicle came just now."""
         self._heard_s = asyncio.get_running_loop().time()
+        if self.quiet:
+            self.quiet = False
+            self._back_s = self._heard_s
+        if self.lost:
+            self.lost = False
+            self.on_regained()
+
+    @property
+    def just_back(self) -> bool:
+        """Whether a silence ended a moment ago: the autopilot may not have taken notice yet."""
+        return self._back_s is not None and asyncio.get_running_loop().time() - self._back_s < _JUST_BACK_S
 
     @asynccontextmanager
     async def guard(self, awaited: Callable[[], str]) -> AsyncIterator[None]:
-        """Raises LinkClosed when the heartbeats stop while the block waits.
+        """Raises LinkClosed when the heartbeats stop, and don't come back in time, while the block waits.
 
         Args:
             awaited: what the block waits for, for the error.
@@ -62,9 +87,10 @@ class LinkWatch:
     def _silence_s(self) -> float:
         return 0.0 if self._heard_s is None else asyncio.get_running_loop().time() - self._heard_s
 
-    def _limit_s(self) -> float:
+    def _slowness(self) -> float:
+        """Wall seconds in which a vehicle slower than real time lives one."""
         rate = self._clock.rate if isinstance(self._clock, TelemetryClock) else 1.0
-        return LOST_AFTER_S / min(1.0, rate)
+        return 1.0 / min(1.0, rate)
 
     def _start(self) -> None:
         # goes on over the many short waits of a command, and ends with the last of them
@@ -79,7 +105,12 @@ class LinkWatch:
         now_s = asyncio.get_running_loop().time()
         if self._heard_s is not None:
             self._heard_s = min(now_s, self._heard_s + max(0.0, now_s - due_s))
-        if self._silence_s() >= self._limit_s():
+        silence_s, slowness = self._silence_s(), self._slowness()
+        self.quiet = self.quiet or silence_s >= QUIET_AFTER_S * slowness
+        if silence_s >= LOST_AFTER_S * slowness and not self.lost:
+            self.lost = True
+            self.on_lost()
+        if silence_s >= LOST_AFTER_S * slowness + self.regain_s:
             for scope in self._scopes:
                 if not scope.expired():
                     scope.reschedule(now_s)

@@ -37,6 +37,19 @@ class Vehicle(FixedWingFlight):
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
         super().__init__(connection, system_id)
         self._local_origin: GeodeticPosition | None = None
+        self._resuming: asyncio.Task[None] | None = None
+
+    def _link_regained(self) -> None:
+        super()._link_regained()
+        if self._resuming is None or self._resuming.done():
+            self._resuming = asyncio.get_running_loop().create_task(self._ask_again())
+
+    async def _ask_again(self) -> None:
+        """Streams as before: a link that was away may have begun anew with its own."""
+        with suppress(MissionError):
+            await self.adapter.start_streams(self)
+            for name, rate_hz in tuple(self._rates_hz.items()):
+                await self.set_message_rate(name, rate_hz)
 
     # beginning
 

@@ -205,7 +205,7 @@ def test_mission_upload_download_clear_and_flight(flown, flavour):
 def test_refused_mission_names_the_item(flown):
     async def script(vehicle, autopilot):
         items = [MissionItem(command=16, x=47.0, y=8.0, z=10.0)] * 4
-        with pytest.raises(CommandRejected, match=r"at item 2 \(command 16\): UNSUPPORTED"):
+        with pytest.raises(CommandRejected, match=r"at item 3 \(NAV_WAYPOINT\): UNSUPPORTED"):
             await vehicle.upload_mission(items)
 
     def refuse(autopilot):

@@ -1,0 +1,57 @@
+"""The question before a flight with a real vehicle."""
+
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from missions.preflight.before_flight import Confirm, Look
+
+
+def is_hardware(connections: Sequence[str]) -> bool:
+    """Whether a link may lead to a real vehicle: serial, or a network beyond this machine.
+
+    Raises:
+        AddressError: a connection string that is none.
+    """
+    from autopilot_bridge.links import SerialPort, parse_address
+    from autopilot_bridge.links.reach import Reach, reach_of
+
+    addresses = [parse_address(text) for text in connections]
+    return any(isinstance(a, SerialPort) or reach_of(a) is Reach.NETWORK for a in addresses)
+
+
+def confirmation(connections: Sequence[str], *, yes: bool, check: bool) -> "Confirm | None":
+    """How the flight is confirmed; None: not asked for, on links of this machine.
+
+    Raises:
+        click.UsageError: a real vehicle, nobody to ask, and no --yes.
+    """
+    hardware = is_hardware(connections)
+    if not (hardware or check):
+        return None
+    if not yes and not sys.stdin.isatty():
+        raise click.UsageError(
+            f"{', '.join(connections)}: may be a real vehicle, and nobody can be asked; give --yes "
+            "to fly it when nothing is found against it"
+        )
+
+    def confirm(looks: "Sequence[Look]") -> bool:
+        for look in looks:
+            click.echo(f"vehicle {look.system_id}:", err=True)
+            for finding in look.findings:
+                click.echo(f"  {finding}", err=True)
+        problems = sum(len(look.problems) for look in looks)
+        if yes:
+            return not problems
+        word = "fly anyway" if problems else "yes"
+        question = f"{problems} problems. " if problems else ""
+        try:
+            answer = click.prompt(f"{question}Fly? Type {word}", default="", show_default=False, err=True)
+        except click.Abort:
+            return False
+        return bool(answer.strip().lower() == word)
+
+    return confirm

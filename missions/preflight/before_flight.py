@@ -1,0 +1,219 @@
+"""The look at a vehicle before a mission is flown with it."""
+
+import asyncio
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from missions.errors import MissionError
+from missions.mission import Mission
+from missions.options import MissionOptions
+from missions.outline import Outline
+from missions.preflight.fence_geometry import areas, first_outside
+from missions.preflight.finding import Finding, Level, ok, problem, warning
+from missions.preflight.health import health_findings
+from missions.preflight.lost_link import PARAMETERS, lost_link_words
+from missions.preflight.settings import FENCE_PARAMETERS, RULES, fence, settings_findings
+from missions.preflight.snapshot import Snapshot
+from missions.vehicle.vehicle import Vehicle
+
+FARTHEST_M: Final = 10_000.0
+_FAR_M: Final = 1000.0
+_PLAN_HOME_M: Final = 200.0
+_RESERVE: Final = 1.3
+_ASKED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
+_FILTER: Final = {"px4": "ESTIMATOR_STATUS", "ardupilot": "EKF_STATUS_REPORT"}
+_SHOWN: Final = (*_ASKED, *_FILTER.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
+_LISTEN_S: Final = 1.5
+_PARAMETERS_AT_ONCE: Final = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Look:
+    """What was found of one vehicle."""
+
+    system_id: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def problems(self) -> tuple[Finding, ...]:
+        """What stands in the way."""
+        return tuple(f for f in self.findings if f.level is Level.PROBLEM)
+
+
+Confirm = Callable[[Sequence[Look]], bool]
+"""Shown what was found, says whether to fly; may block."""
+
+
+async def look(vehicle: Vehicle, mission: Mission[Any], options: MissionOptions) -> Look:
+    """Look at a vehicle that is ready to arm, and at what is to be flown with it."""
+    snapshot, fence_items = await _snapshot(vehicle)
+    outline = await mission.outline(vehicle, options)
+    own_fence = tuple(fence_items) if outline is None or not outline.fence else outline.fence
+    findings = [
+        *_match(vehicle, mission),
+        *health_findings(snapshot),
+        fence(snapshot),
+        *_way(vehicle, outline, own_fence, snapshot.parameters),
+        _endurance(snapshot, outline),
+        *settings_findings(snapshot),
+        _lost_link(vehicle, snapshot.parameters),
+    ]
+    return Look(system_id=vehicle.system_id, findings=tuple(findings))
+
+
+async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
+    """Ask; heartbeats go on meanwhile.
+
+    Raises:
+        MissionError: it was not to be flown.
+    """
+    if await asyncio.to_thread(confirm, looks):
+        return
+    problems = [
+        f"vehicle {found.system_id}: {f.subject}: {f.text}" for found in looks for f in found.problems
+    ]
+    raise MissionError("not flown: " + ("; ".join(problems) if problems else "not confirmed"))
+
+
+async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
+    for name in (*_ASKED, _FILTER[vehicle.autopilot]):
+        if vehicle.message(name) is None:
+            await vehicle.set_message_rate(name, 2.0)
+    await vehicle.clock.sleep(_LISTEN_S)
+    parameters = await _parameters(vehicle)
+    try:
+        fence_items = await vehicle.download_plan(MissionType.FENCE)
+    except MissionError:  # an autopilot without a fence
+        fence_items = []
+    messages: dict[str, Mapping[str, Any]] = {}
+    for name in _SHOWN:
+        message = vehicle.message(name)
+        if message is not None:
+            messages[name] = message.to_dict()
+    return Snapshot(
+        flavour=vehicle.autopilot,
+        kind=vehicle.kind,
+        messages=messages,
+        texts=tuple(text.text for text in vehicle.status_texts),
+        parameters=parameters,
+        fence_items=len(fence_items),
+    ), fence_items
+
+
+async def _parameters(vehicle: Vehicle) -> dict[str, float]:
+    """Those that are looked at, as far as the vehicle has them; a few at a time, for slow lines."""
+    names = dict.fromkeys(
+        (
+            *(r.name for r in RULES[vehicle.autopilot] if r.kind in (None, vehicle.kind)),
+            *FENCE_PARAMETERS[vehicle.autopilot],
+            *PARAMETERS[vehicle.autopilot, vehicle.kind],
+        )
+    )
+    gate = asyncio.Semaphore(_PARAMETERS_AT_ONCE)
+
+    async def read(name: str) -> float | None:
+        async with gate:
+            value = await vehicle.parameter_or(name, math.nan)
+        return None if math.isnan(value) else value
+
+    values = await asyncio.gather(*(read(name) for name in names))
+    return {name: value for name, value in zip(names, values, strict=True) if value is not None}
+
+
+def _match(vehicle: Vehicle, mission: Mission[Any]) -> list[Finding]:
+    text = f"{vehicle.autopilot} {vehicle.kind}, system id {vehicle.system_id}, mode {vehicle.mode}"
+    findings = []
+    if vehicle.kind not in mission.kinds:
+        kinds = " or a ".join(mission.kinds)
+        findings.append(
+            problem("vehicle", f"{text}; {mission.name} is for a {kinds}", "choose the right one")
+        )
+    planned = mission.world_defaults.autopilot
+    if planned not in (None, vehicle.autopilot):
+        findings.append(
+            warning("vehicle", f"{text}; {mission.name} was planned for {planned}", "see that it fits")
+        )
+    return findings or [ok("vehicle", text)]
+
+
+def _way(
+    vehicle: Vehicle, outline: Outline | None, items: Sequence[MissionItem], parameters: Mapping[str, float]
+) -> list[Finding]:
+    """Where the mission leads: near home, and inside the fence."""
+    if outline is None or not outline.points_ned_m:
+        return [warning("way", "the mission does not tell where it flies", "know it yourself")]
+    points = outline.points_ned_m
+    farthest_m = max(math.hypot(n, e) for n, e, _ in points)
+    highest_m = max(-d for _, _, d in points)
+    text = f"up to {farthest_m:.0f} m from home and {highest_m:.0f} m above it"
+    findings = []
+    if farthest_m > FARTHEST_M:
+        findings.append(problem("way", text, "it seems to be for another place"))
+    elif farthest_m > _FAR_M:
+        findings.append(warning("way", text, "see that the link reaches as far"))
+    else:
+        findings.append(ok("way", text))
+    if outline.plan_home is not None:
+        place = outline.plan_home
+        north, east, _ = LocalFrame(vehicle.home).ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
+        away_m = math.hypot(north, east)
+        if away_m > _PLAN_HOME_M:
+            findings.append(
+                warning(
+                    "way", f"the plan's home is {away_m:.0f} m from the vehicle's", "see that it fits here"
+                )
+            )
+    outside = first_outside(areas(items, vehicle.home), [(n, e) for n, e, _ in points])
+    if outside is not None:
+        findings.append(
+            problem(
+                "way",
+                f"leaves the geofence {outside[0]:.0f} m north and {outside[1]:.0f} m east of home",
+                "change the plan or the fence",
+            )
+        )
+    limits = (
+        ("GF_MAX_HOR_DIST", farthest_m, bool(parameters.get("GF_MAX_HOR_DIST"))),
+        ("GF_MAX_VER_DIST", highest_m, bool(parameters.get("GF_MAX_VER_DIST"))),
+        ("FENCE_RADIUS", farthest_m, _fence_type(parameters, 2)),
+        ("FENCE_ALT_MAX", highest_m, _fence_type(parameters, 1)),
+    )
+    for name, reach_m, counts in limits:
+        if counts and reach_m > parameters.get(name, math.inf):
+            findings.append(
+                problem(
+                    "way", f"{reach_m:.0f} m is beyond {name} {parameters[name]:g} m", "change one of them"
+                )
+            )
+    return findings
+
+
+def _fence_type(parameters: Mapping[str, float], bit: int) -> bool:
+    return bool(parameters.get("FENCE_ENABLE")) and bool(int(parameters.get("FENCE_TYPE", 0.0)) & bit)
+
+
+def _endurance(snapshot: Snapshot, outline: Outline | None) -> Finding:
+    """Whether the battery lasts, as far as both are known."""
+    duration_s = None if outline is None else outline.duration_s
+    if duration_s is None:
+        return warning("duration", "the mission does not tell how long it flies", "know it yourself")
+    text = f"about {duration_s / 60.0:.1f} min of mission"
+    left_s = snapshot.whole("BATTERY_STATUS", "time_remaining")
+    if not left_s:
+        return ok("duration", f"{text}; the autopilot does not tell how long the battery lasts")
+    text += f", {left_s / 60.0:.1f} min of battery"
+    if left_s < _RESERVE * duration_s:
+        return problem("duration", text, "charge it, or fly less")
+    return ok("duration", text)
+
+
+def _lost_link(vehicle: Vehicle, parameters: Mapping[str, float]) -> Finding:
+    words = lost_link_words(vehicle.autopilot, vehicle.kind, parameters)
+    vehicle.notes.lost_link = "; ".join(words)
+    if not words:
+        return warning("lost link", "the autopilot does not tell what it would do", "look at its parameters")
+    return ok("lost link", "; ".join(words))
