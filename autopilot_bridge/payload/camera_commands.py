@@ -238,6 +238,8 @@ class CameraCommands:
             return _UNSUPPORTED
         if whole(number, -1) not in (0, STREAM_ID):
             return _DENIED
+        # MAVSDK 4.1 asks for the status only, and learns the address from nothing but the information
+        self._camera.send(stream.information(self._fov_deg()))
         self._camera.send(stream.status(self._fov_deg()))
         return _ACCEPTED
 

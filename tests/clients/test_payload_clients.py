@@ -15,7 +15,7 @@ from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
 
 SPEEDUP = 8.0
-OPTIONS = ("--model", "aerosonde", "--camera", "--target", "3,0")
+OPTIONS = ("--model", "aerosonde", "--camera", "--target", "3,0", "--video", "0")
 CAMERA, GIMBAL = 100, 154
 
 
@@ -75,7 +75,7 @@ async def use_gimbal(system: Any) -> None:
 
 async def use_camera(system: Any) -> None:
     from mavsdk.asyncio.plugins.camera import CameraAsync
-    from mavsdk.plugins.camera import Mode
+    from mavsdk.plugins.camera import Mode, PhotosRange
 
     from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
 
@@ -98,6 +98,57 @@ async def use_camera(system: Any) -> None:
     await camera.start_photo_interval(number, 0.5)
     assert await asyncio.wait_for(pictures(taken, 3), WALL_DEADLINE_S) == [1, 2, 3]
     await camera.stop_photo_interval(number)
+    assert len(await camera.list_photos(number, PhotosRange.ALL)) >= 4
+
+
+async def use_lens_and_video(system: Any) -> None:
+    from mavsdk.asyncio.plugins.camera import CameraAsync
+    from mavsdk.asyncio.plugins.gimbal import GimbalAsync
+    from mavsdk.plugins.camera import CameraError, Mode
+    from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode
+
+    from tests.clients.mavsdk_waiting import first
+
+    camera, gimbal = CameraAsync(system), GimbalAsync(system)
+    await first(camera.subscribe_camera_list(), lambda known: known.cameras, "camera")
+    await camera.zoom_range(CAMERA, 50.0)
+    await camera.zoom_in_start(CAMERA)
+    await camera.zoom_stop(CAMERA)
+    await camera.zoom_range(CAMERA, 0.0)
+    await camera.focus_meters(CAMERA, 20.0)
+    await camera.focus_in_start(CAMERA)
+    await camera.focus_stop(CAMERA)
+    await camera.focus_auto_continuous(CAMERA)
+    await camera.set_mode(CAMERA, Mode.VIDEO)
+    assert await camera.get_mode(CAMERA) == Mode.VIDEO
+    await camera.start_video(CAMERA)
+    await first(camera.subscribe_storage(), lambda update: update.storage.video_on, "a running video")
+    await camera.stop_video(CAMERA)
+    shown = await first(
+        camera.subscribe_video_stream_info(), lambda u: u.video_stream_info.settings.uri, "video stream"
+    )
+    assert shown.video_stream_info.settings.uri.startswith("rtsp://127.0.0.1:")
+    await camera.stop_video_streaming(CAMERA, 1)
+    await camera.start_video_streaming(CAMERA, 1)
+
+    found = await first(gimbal.subscribe_gimbal_list(), lambda known: known.gimbals, "gimbal")
+    number = found.gimbals[0].gimbal_id
+    await gimbal.take_control(number, ControlMode.PRIMARY)
+    with pytest.raises(CameraError):
+        await camera.track_point(CAMERA, 0.01, 0.99, 0.001)  # nothing is there
+    await gimbal.set_angles(number, 0.0, -6.0, 0.0, GimbalMode.YAW_FOLLOW, SendMode.ONCE)
+    for _ in range(50):
+        try:
+            await camera.track_rectangle(CAMERA, 0.2, 0.2, 0.8, 0.8)
+            break
+        except CameraError:  # not there yet, or not detected in this very frame
+            await asyncio.sleep(0.1)
+    else:
+        raise AssertionError("the target was not tracked")
+    await camera.track_stop(CAMERA)
+    await gimbal.release_control(number)
+    await camera.format_storage(CAMERA, 1)
+    await camera.reset_settings(CAMERA)
 
 
 def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
@@ -112,6 +163,7 @@ def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
             assert system is not None
             await use_gimbal(system)
             await use_camera(system)
+            await use_lens_and_video(system)
 
     _, port, _ = vehicle
     asyncio.run(use(f"udpin://127.0.0.1:{port}"))
