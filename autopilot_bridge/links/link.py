@@ -10,7 +10,7 @@ PeerId = tuple[str, int]
 
 MAX_BACKLOG_BYTES: Final = 256 * 1024
 MAX_READS: Final = 256  # of one `receive`, so that a flood on one link can't starve the others
-MAX_READ_BYTES: Final = 1 << 20  # of one `receive`
+MAX_READ_BYTES: Final = 1 << 18  # of one `receive`
 READ_SIZE: Final = 65536
 
 

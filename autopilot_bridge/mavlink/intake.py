@@ -15,11 +15,13 @@ from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
 MAX_PEERS: Final = 64
 INBOX_BYTES: Final = 256 * 1024
 """What may wait for one peer."""
-SHARE: Final = 768
+SHARE: Final = 400
 """Work for one peer in one `take`, in units of about a microsecond."""
-TOTAL: Final = 2048
+TOTAL: Final = 1000
 """Work for all peers in one `take`."""
 _FRAME_WORK: Final = 20  # to decode and handle a frame
+_SIGNATURE_WORK: Final = 6  # to check whether a frame may be believed
+_PIECE_WORK: Final = 2
 _FAILURE_WORK: Final = 1  # to find that something is no frame
 _BYTES_OF_WORK: Final = 64
 _SLICE_BYTES: Final = 512
@@ -155,10 +157,10 @@ class Intake(Generic[PeerT]):
             before = counters.bad_crc + counters.unsupported_flags + counters.unknown_message
             found = inbox.parser.feed(piece)
             failures = counters.bad_crc + counters.unsupported_flags + counters.unknown_message - before
-            work += 1 + len(piece) // _BYTES_OF_WORK + failures * _FAILURE_WORK
+            work += _PIECE_WORK + len(piece) // _BYTES_OF_WORK + failures * _FAILURE_WORK
             if found:
-                work += len(found) * (1 if self._admit is None else 2)
                 if self._admit is not None:
+                    work += len(found) * _SIGNATURE_WORK
                     found = self._admit(found)
                 work += len(found) * _FRAME_WORK
                 frames += found
