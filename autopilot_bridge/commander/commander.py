@@ -417,6 +417,8 @@ class Commander:
     def _mode_obstacle(self, mode: FlightMode) -> Reason | None:
         if self.terminated:
             return Reason.TERMINATED
+        if mode is FlightMode.FOLLOW and not self.parameters.follow_enabled:
+            return Reason.MODE_UNAVAILABLE
         if not self.armed:
             return None if mode in self.policy.ground_modes else Reason.MODE_UNAVAILABLE
         if mode not in self.policy.flown_modes:

@@ -13,6 +13,7 @@ from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
+from autopilot_bridge.flight.follow import FollowTask
 from autopilot_bridge.flight.goto import RepositionTask
 from autopilot_bridge.flight.guided import GuidedKind, GuidedTask
 from autopilot_bridge.flight.hold import BrakeTask, HoldTask, IdleTask
@@ -23,6 +24,7 @@ from autopilot_bridge.flight.mission import MissionTask
 from autopilot_bridge.flight.offboard import OffboardKind, OffboardTask
 from autopilot_bridge.flight.orbit import OrbitTask, OrbitYaw, circle_ahead
 from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.flight.precision_land import PrecisionLandTask, landing_task
 from autopilot_bridge.flight.return_home import ReturnTask
 from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
@@ -88,8 +90,14 @@ class MulticopterTasks:
                 return self.guided
             case FlightMode.RETURN | FlightMode.SMART_RETURN | FlightMode.AUTO_RETURN:
                 return ReturnTask(self._missions, first_item=policy.mission_first_item, habits=policy.plans)
-            case FlightMode.LAND | FlightMode.PRECISION_LAND | FlightMode.DESCEND:
+            case FlightMode.LAND:
+                return landing_task(context)
+            case FlightMode.PRECISION_LAND:
+                return PrecisionLandTask()
+            case FlightMode.DESCEND:
                 return LandTask()
+            case FlightMode.FOLLOW:
+                return FollowTask()
             case FlightMode.ORBIT:
                 return OrbitTask(np.full(3, math.nan))
             case FlightMode.CIRCLE:
@@ -145,7 +153,7 @@ class MulticopterTasks:
 
     def ends_on_ground(self, task: FlightTask | None) -> bool:
         """Landings, returns and missions end on the ground."""
-        return isinstance(task, LandTask | ReturnTask | MissionTask)
+        return isinstance(task, LandTask | PrecisionLandTask | ReturnTask | MissionTask)
 
     def wants_up(self, context: FlightContext) -> bool:
         """Whatever turns the motors faster than idle lifts."""

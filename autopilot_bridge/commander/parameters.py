@@ -32,6 +32,7 @@ class CommanderParameters:
         stick_override: moved sticks take over from automatic flight (PX4 COM_RC_OVERRIDE, bit 0).
         stick_override_offboard: and from OFFBOARD (bit 1).
         stick_override_threshold: stick travel, 0..1, that counts as moved.
+        follow_enabled: the mode that follows a target may be chosen (FOLL_ENABLE).
         check_arming: False skips the arming checks that may be skipped.
     """
 
@@ -73,6 +74,7 @@ class CommanderParameters:
     attitude_pitch_max_rad: float = 0.0
     attitude_time_s: float = 0.3
     attitude_action: FailsafeAction = FailsafeAction.NONE
+    follow_enabled: bool = True
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -34,6 +34,7 @@ _FLOWN: Final = frozenset(
         FlightMode.POSHOLD,
         FlightMode.BRAKE,
         FlightMode.GUIDED_NOGPS,
+        FlightMode.FOLLOW,
     }
 )
 _GROUND_ONLY: Final = frozenset(

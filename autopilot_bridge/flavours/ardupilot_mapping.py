@@ -16,6 +16,11 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours.external_mapping import ardupilot_external
 from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
+from autopilot_bridge.flavours.surroundings_mapping import (
+    ardupilot_avoidance,
+    ardupilot_follow,
+    ardupilot_precision,
+)
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
 from autopilot_bridge.flight.return_rules import RallyRule
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -223,6 +228,7 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         stick_override_offboard=False,
         stick_override_threshold=1.0,
         check_arming=integer(store, "ARMING_CHECK", 1) != 0,
+        follow_enabled=integer(store, "FOLL_ENABLE", 0) != 0,
     )
 
 
@@ -305,6 +311,9 @@ def flight_parameters(store: ParameterStore) -> FlightParameters:
     fixed["return_stays_at_m"] = clamp(number(store, "RTL_ALT_FINAL", 0.0) * _CM, 0.0, 1000.0)
     fixed["rally"] = rally_rule(store, within_fence=True)
     fixed["nose_follows_roi"] = not integer(store, "MNT1_TYPE", 0)
+    fixed["follow"] = ardupilot_follow(store)
+    fixed["precision"] = ardupilot_precision(store)
+    fixed["avoidance"] = ardupilot_avoidance(store)
     return build(FlightParameters, store, FLIGHT, **fixed)
 
 

@@ -31,6 +31,7 @@ CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
         FlightMode.AVOID: 19,
         FlightMode.GUIDED_NOGPS: 20,
         FlightMode.SMART_RETURN: 21,
+        FlightMode.FOLLOW: 23,
         FlightMode.ZIGZAG: 24,
         FlightMode.AUTO_RETURN: 27,
         FlightMode.TERMINATION: 0,  # no mode of its own
@@ -55,6 +56,7 @@ MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
         FlightMode.AVOID: "AVOID_ADSB",
         FlightMode.GUIDED_NOGPS: "GUIDED_NOGPS",
         FlightMode.SMART_RETURN: "SMART_RTL",
+        FlightMode.FOLLOW: "FOLLOW",
         FlightMode.ZIGZAG: "ZIGZAG",
         FlightMode.AUTO_RETURN: "AUTO RTL",
         FlightMode.TERMINATION: "STABILIZE",
@@ -66,7 +68,6 @@ REFUSED_NAMES: Final[Mapping[int, str]] = MappingProxyType(
         14: "FLIP",
         15: "AUTOTUNE",
         22: "FLOWHOLD",
-        23: "FOLLOW",
         25: "SYSTEMID",
         27: "AUTO RTL",
         28: "TURTLE",

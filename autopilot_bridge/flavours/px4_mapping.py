@@ -10,6 +10,12 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours.external_mapping import px4_external
 from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
+from autopilot_bridge.flavours.surroundings_mapping import (
+    px4_avoidance,
+    px4_follow,
+    px4_precision,
+    px4_return_precision,
+)
 from autopilot_bridge.flight.parameters import FlightParameters, YawBehaviour
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -219,6 +225,10 @@ def flight_parameters(store: ParameterStore) -> FlightParameters:
         FlightParameters,
         store,
         FLIGHT,
+        return_precision=px4_return_precision(store),
+        follow=px4_follow(store),
+        precision=px4_precision(store),
+        avoidance=px4_avoidance(store),
         return_destination=destination,
         rally=rally,
         nose_follows_roi=not integer(store, "MIS_MNT_YAW_CTL", 0),

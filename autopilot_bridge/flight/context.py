@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.control import fixed_wing_setpoint
 from autopilot_bridge.control.setpoint import SETPOINT_SIZE
 from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.flight.surroundings import Surroundings
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
@@ -159,6 +160,7 @@ class FlightContext:
         sticks: newest pilot input.
         frame: local frame of the filter's origin, None before it is known.
         rally: the uploaded rally points; None: there are none.
+        surroundings: what others tell of targets and obstacles.
         within_fence: says whether a place, local NED, (3,), is inside the geofence; None: nobody knows.
         events: what happened since the autopilot last emptied the list.
         hover_thrust: the controller's estimate, 0..1.
@@ -182,6 +184,7 @@ class FlightContext:
         "rally",
         "setpoint",
         "sticks",
+        "surroundings",
         "time_us",
         "within_fence",
     )
@@ -215,6 +218,7 @@ class FlightContext:
         self.sticks = ManualInput()
         self.frame: LocalFrame | None = None
         self.rally: MissionStore | None = None
+        self.surroundings = Surroundings()
         self.within_fence: Callable[[Array], bool] | None = None
         self.events: list[FlightEvent] = []
         self.hover_thrust = 0.5

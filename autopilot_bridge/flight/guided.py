@@ -11,6 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.flight.avoidance import limited_velocity
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.goto import GotoTask
 from autopilot_bridge.flight.ground import TakeoffRamp
@@ -238,6 +239,9 @@ class GuidedTask:
         trajectory = motion.trajectory
         if self.kind is GuidedKind.VELOCITY:
             north, east, down = (float(v) for v in self._velocity)
+            if ctx.multicopter.avoidance.guided:
+                heading = float(ctx.nav[nav_layout.EULER_RAD][2])
+                north, east = limited_velocity(ctx, north, east, heading)
             trajectory.track_velocity(north, east, down, ctx.dt_s)
         elif self.kind is GuidedKind.ACCELERATION:
             self._integrate_acceleration(ctx, motion)

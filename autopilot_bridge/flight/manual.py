@@ -6,6 +6,7 @@ from enum import IntEnum
 import numpy as np
 
 from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.flight.avoidance import limited_velocity
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.motion import SmoothMotion
@@ -172,6 +173,8 @@ class ManualTask:
         c, s = math.cos(heading), math.sin(heading)
         north = scale * (pitch * c - roll * s)
         east = scale * (pitch * s + roll * c)
+        if p.avoidance.enabled:
+            north, east = limited_velocity(ctx, north, east, heading)
         motion.trajectory.wait_for(ctx.nav[nav_layout.POS_NED_M], p.trajectory_error_max_m)
         dt = ctx.dt_s * motion.trajectory.stretch
         motion.trajectory.track_velocity(north, east, -climb_m_s, dt)

@@ -10,7 +10,6 @@ from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.corners import Point, passing_speed, turn_in_distance
 from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.hold import HoldTask
-from autopilot_bridge.flight.land import LandTask
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.nose import Nose
 from autopilot_bridge.flight.orbit import OrbitTask
@@ -29,6 +28,8 @@ from autopilot_bridge.flight.region_of_interest import heading_to
 from autopilot_bridge.flight.return_home import ReturnTask
 from autopilot_bridge.flight.spline import SplineCurve, SplineFlight
 from autopilot_bridge.flight.takeoff import TakeoffTask
+from autopilot_bridge.flight.precision_land import landing_task
+from autopilot_bridge.flight.precision_parameters import Precision
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.flight.trajectory import SPEED
 from autopilot_bridge.flight.yaw import wrap_pi
@@ -125,7 +126,9 @@ class MissionTask(PlanTask):
             self._set_sub(ctx, TakeoffTask(base - float(target[2])))
             return True
         if command in (Command.NAV_LAND, Command.NAV_VTOL_LAND):
-            self._set_sub(ctx, LandTask(target, self._item_yaw(ctx, item)))
+            asked = int(item.param2) if item.param2 in tuple(Precision) else Precision.NONE
+            yaw_rad = self._item_yaw(ctx, item)
+            self._set_sub(ctx, landing_task(ctx, target, yaw_rad, precision=Precision(asked)))
             return True
         if command == Command.NAV_LOITER_TURNS:
             turns = item.param1 if math.isfinite(item.param1) and item.param1 > 0.0 else 1.0

@@ -5,8 +5,12 @@ from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import Final
 
+from autopilot_bridge.flight.avoidance_parameters import AvoidanceParameters
+from autopilot_bridge.flight.follow_parameters import FollowParameters
+from autopilot_bridge.flight.precision_parameters import Precision, PrecisionParameters
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
 
+_NESTED: Final = FollowParameters | PrecisionParameters | AvoidanceParameters
 _MAY_BE_ZERO: Final = frozenset(
     {
         "spoolup_time_s",
@@ -101,13 +105,18 @@ class FlightParameters:
 
     guided_timeout_s: float = 3.0  # GUID_TIMEOUT
 
+    return_precision: Precision = Precision.NONE  # RTL_PLD_MD
+    follow: FollowParameters = field(default_factory=FollowParameters)  # FLW_TGT_* | FOLL_*
+    precision: PrecisionParameters = field(default_factory=PrecisionParameters)  # PLD_* | PLND_*
+    avoidance: AvoidanceParameters = field(default_factory=AvoidanceParameters)  # CP_* | AVOID_*
+
     def __post_init__(self) -> None:
         for each in fields(self):
             name = each.name
             value = getattr(self, name)
             if name in ("return_min_distance_m", "return_height_max_m") and value == math.inf:
                 continue
-            if isinstance(value, bool | RallyRule | IntEnum):
+            if isinstance(value, _NESTED | bool | RallyRule | IntEnum):
                 continue
             if not math.isfinite(value):
                 raise ValueError(f"{name} = {value} is not a finite number")

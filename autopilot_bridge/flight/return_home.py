@@ -7,10 +7,10 @@ import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.ground import TakeoffRamp
-from autopilot_bridge.flight.land import LandTask
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.precision_land import landing_task
 from autopilot_bridge.flight.return_place import ReturnPlace, choose_return, plan_landing
 from autopilot_bridge.flight.return_plan import ReturnPlan
 from autopilot_bridge.flight.return_rules import ALONG_PLAN
@@ -87,7 +87,7 @@ class ReturnTask:
         self._habits = habits
         self._motion: SmoothMotion | None = None
         self._ramp: TakeoffRamp | None = None
-        self._land: LandTask | None = None
+        self._land: FlightTask | None = None
         self._plan: FlightTask | None = None
         self._target: Array = np.zeros(3)
         self._wait_s = 0.0
@@ -155,9 +155,11 @@ class ReturnTask:
         self.phase = ReturnPhase.LAND
         place = self.place if ctx.position_valid else None
         yaw = math.nan if place is not None and place.rally else ctx.home_yaw_rad
-        self._land = LandTask(
+        self._land = landing_task(
+            ctx,
             None if place is None else place.ned_m.copy(),
             yaw if place is not None and math.isfinite(yaw) else None,
+            precision=ctx.multicopter.return_precision,
         )
         self._land.activate(ctx)
 

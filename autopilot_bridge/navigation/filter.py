@@ -28,7 +28,7 @@ from autopilot_bridge.navigation.layout import (
 )
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
-from autopilot_bridge.navigation.states import GYRO, GYRO_LAST
+from autopilot_bridge.navigation.states import GYRO, GYRO_LAST, HISTORY_Q
 from flightsim.interface import SensorReadings
 from flightsim.kernels import compiled_for
 
@@ -150,6 +150,21 @@ class NavigationFilter:
         """
         if self._aligned:
             self._aiding.take_external(sample)
+
+    def past_pose(
+        self, measured_us: int, time_us: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """(position NED m, q_ned_from_frd) at a past time, as seen now; None when it's too long ago.
+
+        Args:
+            measured_us: that time.
+            time_us: the present.
+        """
+        solution = self._solution
+        row = solution.row_at(measured_us, time_us) if self._aligned else -1
+        if row < 0:
+            return None
+        return solution.past_position(row), solution.history[row, HISTORY_Q : HISTORY_Q + 4].copy()
 
     @property
     def external_counts(self) -> ExternalCounts | None:

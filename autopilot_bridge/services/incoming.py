@@ -1,11 +1,19 @@
 """What a vehicle takes in by messages besides commands: odometry, targets, obstacles."""
 
 from autopilot_bridge.services.external_odometry import ExternalOdometryService
+from autopilot_bridge.services.follow import FollowService
+from autopilot_bridge.services.landing_target import LandingTargetService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.obstacles import ObstacleService
 
 
 def incoming_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
     """Those of one autopilot; a simulated world gets to know it."""
     if parts.simulation is not None:
         parts.simulation.attend(parts)
-    return (ExternalOdometryService(parts),)
+    return (
+        ExternalOdometryService(parts),
+        FollowService(parts),
+        LandingTargetService(parts),
+        ObstacleService(parts),
+    )

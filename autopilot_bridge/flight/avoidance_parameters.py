@@ -1,0 +1,39 @@
+"""How far a vehicle stays away from obstacles: PX4's CP_*, ArduPilot's AVOID_*."""
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AvoidanceParameters:
+    """How far to stay away.
+
+    Attributes:
+        enabled: pilots are kept from obstacles (CP_DIST not negative; AVOID_ENABLE bit 1 with PRX1_TYPE).
+        guided: so are streamed velocities (ArduPilot).
+        margin_m: kept from obstacles (CP_DIST, AVOID_MARGIN).
+        delay_s: of sensor and control (CP_DELAY).
+        guard_rad: obstacles within this angle of the direction of flight count (PX4).
+        go_without_data: fly also where no sensor looks (CP_GO_NO_DATA; ArduPilot always).
+        slide: along obstacles (AVOID_BEHAVE 0).
+        timeout_s: what was told longer ago counts no more.
+        deceleration_m_s2: with which it stops (AVOID_ACCEL_MAX).
+    """
+
+    enabled: bool = False
+    guided: bool = False
+    margin_m: float = 2.0
+    delay_s: float = 0.4
+    guard_rad: float = math.radians(30.0)
+    go_without_data: bool = True
+    slide: bool = False
+    timeout_s: float = 0.5
+    deceleration_m_s2: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name in ("margin_m", "delay_s", "guard_rad", "timeout_s", "deceleration_m_s2"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"{name} = {value} is not accepted: zero or more is")
+        if self.deceleration_m_s2 == 0.0:
+            raise ValueError("deceleration_m_s2 = 0.0 is not accepted: a positive number is")

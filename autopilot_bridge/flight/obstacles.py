@@ -1,0 +1,102 @@
+"""Distances to what is around the vehicle, by direction: what OBSTACLE_DISTANCE and DISTANCE_SENSOR tell.
+
+The horizontal circle has 72 sectors of 5 degrees, clockwise from the nose. A sector knows its distance, when
+it was told, and whether there was anything within reach.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SECTORS: Final = 72
+SECTOR_RAD: Final = math.tau / SECTORS
+
+
+class ObstacleMap:
+    """The circle.
+
+    Attributes:
+        distances_m: by sector; infinite: nothing within reach; NaN: never told.
+        told_us: when each was told; -1: never.
+    """
+
+    __slots__ = ("distances_m", "newest_us", "told_us")
+
+    def __init__(self) -> None:
+        self.distances_m: Array = np.full(SECTORS, math.nan)
+        self.told_us: NDArray[np.int64] = np.full(SECTORS, -1, dtype=np.int64)
+        self.newest_us = -1
+
+    def take(self, first_rad: float, width_rad: float, distance_m: float, time_us: int) -> None:
+        """One direction: the sectors it covers at least in part get its distance.
+
+        Args:
+            first_rad: middle of the direction, clockwise from the nose.
+            width_rad: its full angle.
+            distance_m: infinite: nothing within reach.
+        """
+        half = max(0.0, 0.5 * width_rad)
+        first = math.floor((first_rad - half) / SECTOR_RAD + 0.5 + 1e-9)
+        last = math.ceil((first_rad + half) / SECTOR_RAD - 0.5 - 1e-9)
+        count = min(SECTORS, max(1, last - first + 1))
+        for k in range(count):
+            sector = (first + k) % SECTORS
+            fresh = self.told_us[sector] == time_us
+            known = float(self.distances_m[sector])
+            self.distances_m[sector] = min(known, distance_m) if fresh else distance_m
+            self.told_us[sector] = time_us
+        self.newest_us = time_us
+
+    def speed_limit(
+        self,
+        direction_rad: float,
+        time_us: int,
+        *,
+        margin_m: float,
+        acceleration_m_s2: float,
+        delay_s: float,
+        guard_rad: float,
+        timeout_us: int,
+    ) -> float:
+        """Greatest speed in a direction from which the vehicle still stops before the margin.
+
+        Of a sector at angle a from the direction with distance d, the room along the direction is
+        (d - margin) / cos(a). With the delay T and the deceleration b: v T + v^2 / (2 b) = room.
+
+        Args:
+            direction_rad: clockwise from the nose.
+            guard_rad: sectors within this angle count.
+            timeout_us: sectors told before that count no more.
+
+        Returns:
+            Infinite where nothing is in the way; 0 at the margin.
+        """
+        limit = math.inf
+        reach = math.ceil(guard_rad / SECTOR_RAD)
+        middle = round(direction_rad / SECTOR_RAD)
+        for k in range(middle - reach, middle + reach + 1):
+            sector = k % SECTORS
+            off = math.remainder(k * SECTOR_RAD - direction_rad, math.tau)
+            told = int(self.told_us[sector])
+            distance_m = float(self.distances_m[sector])
+            if (
+                abs(off) > guard_rad
+                or told < 0
+                or time_us - told > timeout_us
+                or not math.isfinite(distance_m)
+            ):
+                continue
+            room = max(0.0, distance_m - margin_m) / math.cos(off)
+            b, t = acceleration_m_s2, delay_s
+            limit = min(limit, b * (math.sqrt(t * t + 2.0 * room / b) - t))
+        return limit
+
+    def known(self, direction_rad: float, time_us: int, *, timeout_us: int) -> bool:
+        """Somebody has told of this direction lately."""
+        sector = round(direction_rad / SECTOR_RAD) % SECTORS
+        told = int(self.told_us[sector])
+        return told >= 0 and time_us - told <= timeout_us

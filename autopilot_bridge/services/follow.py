@@ -1,0 +1,106 @@
+"""Whom to follow: FOLLOW_TARGET, and on ArduPilot the GLOBAL_POSITION_INT of another system.
+
+Sources: MAVLink common.xml; PX4 1.16 takes FOLLOW_TARGET, ArduPilot 4.6 (AP_Follow) both, once FOLL_ENABLE is
+set, of the system FOLL_SYSID or of the first one heard.
+"""
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+
+_FOLLOW: Final = mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET
+_POSITION: Final = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
+_AUTOPILOT: Final = 1
+_HAS_POSITION: Final = 1  # of est_capabilities
+_HAS_VELOCITY: Final = 2
+_MAX_SPEED_M_S: Final = 200.0
+_SIGMA_M: Final = 1.0
+_FORGET_S: Final = 10.0  # then another system may be followed
+
+
+class FollowService(Microservice):
+    """Keeps `surroundings.leader` up to date.
+
+    Attributes:
+        leader_id: system that is followed; 0: nobody was heard.
+    """
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._context = parts.commander.context
+        self._system_id = parts.system_id
+        self._by_position = parts.flavour.name == "ardupilot"
+        self.leader_id = 0
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Take one message; positions are left to others too."""
+        message_id = message.get_msgId()
+        if message_id == _FOLLOW:
+            self._take(message, source, time_us, *_of_follow(message))
+            return True
+        if message_id == _POSITION and self._by_position and source.component_id == _AUTOPILOT:
+            self._take(message, source, time_us, *self._of_position(message))
+        return False
+
+    def _take(
+        self,
+        message: MavlinkMessage,
+        source: Source,
+        time_us: int,
+        alt_m: float,
+        velocity: tuple[float, float, float] | None,
+        sigma_m: float,
+    ) -> None:
+        parameters: Any = getattr(self._context.parameters, "follow", None)
+        frame, leader = self._context.frame, self._context.surroundings.leader
+        if parameters is None or not parameters.enabled or frame is None:
+            return
+        if source.system_id == self._system_id:
+            return
+        if parameters.system_id not in (0, source.system_id):
+            return
+        if parameters.system_id == 0 and source.system_id != self.leader_id:
+            if self.leader_id and leader.age_s(time_us) <= _FORGET_S:
+                return
+            leader.forget()
+        lat_deg, lon_deg = _of_degrees(message)
+        if not (math.isfinite(alt_m) and abs(alt_m) < 1e5 and abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+            return
+        if lat_deg == 0.0 and lon_deg == 0.0:
+            return
+        self.leader_id = source.system_id
+        place = np.array(frame.ned_from_geodetic(lat_deg, lon_deg, alt_m))
+        if float(np.abs(place).max()) < 1e6:
+            leader.take(time_us, place, None if velocity is None else np.array(velocity), sigma_m=sigma_m)
+
+    def _of_position(self, message: MavlinkMessage) -> tuple[float, tuple[float, float, float] | None, float]:
+        """(altitude over mean sea level, velocity, 1-sigma) of a GLOBAL_POSITION_INT."""
+        context = self._context
+        alt_m = message.alt * 1e-3
+        parameters: Any = getattr(context.parameters, "follow", None)
+        home_down_m = float(context.home_ned_m[2])
+        if parameters is not None and parameters.relative_altitude and context.frame is not None:
+            over_home_m = message.relative_alt * 1e-3
+            alt_m = context.frame.origin.alt_m - (home_down_m if math.isfinite(home_down_m) else 0.0)
+            alt_m += over_home_m
+        return alt_m, (message.vx * 1e-2, message.vy * 1e-2, message.vz * 1e-2), _SIGMA_M
+
+
+def _of_degrees(message: MavlinkMessage) -> tuple[float, float]:
+    return message.lat * 1e-7, message.lon * 1e-7
+
+
+def _of_follow(message: MavlinkMessage) -> tuple[float, tuple[float, float, float] | None, float]:
+    """(altitude over mean sea level, velocity, 1-sigma) of a FOLLOW_TARGET."""
+    capabilities = int(message.est_capabilities)
+    north, east, down = (float(part) for part in message.vel)
+    told = capabilities & _HAS_VELOCITY and max(abs(north), abs(east), abs(down)) < _MAX_SPEED_M_S
+    velocity = (north, east, down) if told and not math.isnan(north + east + down) else None
+    said = float(message.position_cov[0])
+    sigma_m = min(30.0, max(_SIGMA_M, said)) if said > 0.0 else _SIGMA_M
+    alt_m = float(message.alt) if capabilities & _HAS_POSITION else math.nan
+    return alt_m, velocity, sigma_m
