@@ -114,7 +114,7 @@ class CameraLens:
         if kind in (mavlink.FOCUS_TYPE_AUTO, mavlink.FOCUS_TYPE_AUTO_CONTINUOUS):
             self._camera.focus_distance_m = None
         elif kind == mavlink.FOCUS_TYPE_AUTO_SINGLE:
-            self._hold()
+            self._camera.focus_distance_m = self._camera.autofocus_m
         elif not math.isfinite(value):
             return False
         elif kind == mavlink.FOCUS_TYPE_STEP:
