@@ -16,6 +16,7 @@ from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
 if TYPE_CHECKING:
     from missions.mission import Mission
     from missions.mission_command import MissionCommand
+    from missions.session import RunRequest
 
 _PATTERNS: Final = "missions.pattern_command"
 _OWN: Final = "missions.own_command"
@@ -194,6 +195,12 @@ def _owners(option_name: str) -> list[str]:
 @click.option(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
 )
+@click.option(
+    "--export-plan",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Don't fly: write the mission that would be uploaded (.plan, .waypoints).",
+)
 @click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
 @click.option("--arg", multiple=True, metavar="NAME=VALUE", help="For a mission of your own.")
 @key_option
@@ -266,6 +273,19 @@ def _models(
     return models * count if len(models) == 1 else models
 
 
+def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
+    """Write the mission's file instead of flying it."""
+    from missions.errors import MissionError
+    from missions.plan_files.export import export_plan
+
+    try:
+        count = export_plan(mission, request, path)
+    except MissionError as error:
+        raise click.ClickException(str(error)) from error
+    click.echo(f"{count} items: {path}")
+    return 0
+
+
 def _fly(given: dict[str, Any]) -> int:
     from missions.library import find_mission
     from missions.options import check_positive, parameters_from_file, parse_wind
@@ -303,14 +323,15 @@ def _fly(given: dict[str, Any]) -> int:
     from autopilot_bridge.links import parse_address
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
     from missions.request import REGAIN_S
-    from missions.session import RunRequest
+    from missions.session import RunRequest as Request
     from missions.session import fly as fly_mission
     from missions.vehicle.adapter import Mode
 
     confirm = None
     if given["connect"]:
         try:
-            confirm = confirmation(given["connect"], yes=given["yes"], check=given["check"])
+            if given["export_plan"] is None:
+                confirm = confirmation(given["connect"], yes=given["yes"], check=given["check"])
         except AddressError as error:
             raise click.UsageError(str(error)) from error
     line = ProgressLine()
@@ -318,37 +339,36 @@ def _fly(given: dict[str, Any]) -> int:
         key = key_from(given["signing_key"])
         for address in map(parse_address, given["connect"]):
             warn_if_open(address, key)
-        result = fly_mission(
-            mission,
-            RunRequest(
-                options=options,
-                connect=given["connect"],
-                system_ids=given["system_id"],
-                autopilot=given["autopilot"] or world.autopilot or "px4",
-                model=models,
-                launch=given["launch"],
-                seed=given["seed"],
-                speedup=given["speedup"],
-                wind_speed_m_s=wind_speed_m_s,
-                wind_from_deg=wind_from_deg,
-                turbulence=given["turbulence"] or world.turbulence,
-                expected_wind_m_s=forecast_m_s,
-                home=given["home"] or (None if given["connect"] else world.home),
-                parameters=parameters,
-                out=given["out"],
-                picture=not given["no_picture"],
-                identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
-                on_failure=Mode(given["on_failure"]),
-                max_error_m=given["max_error"],
-                confirm=confirm,
-                regain_s=REGAIN_S if given["regain"] is None else given["regain"],
-                estimator=given["estimator"],
-                estimator_settings=given["settings"],
-                command=" ".join(["flightstack", *sys.argv[1:]]),
-                signing_key=key,
-            ),
-            line if terminal else None,
+        request = Request(
+            options=options,
+            connect=given["connect"],
+            system_ids=given["system_id"],
+            autopilot=given["autopilot"] or world.autopilot or "px4",
+            model=models,
+            launch=given["launch"],
+            seed=given["seed"],
+            speedup=given["speedup"],
+            wind_speed_m_s=wind_speed_m_s,
+            wind_from_deg=wind_from_deg,
+            turbulence=given["turbulence"] or world.turbulence,
+            expected_wind_m_s=forecast_m_s,
+            home=given["home"] or (None if given["connect"] else world.home),
+            parameters=parameters,
+            out=given["out"],
+            picture=not given["no_picture"],
+            identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
+            on_failure=Mode(given["on_failure"]),
+            max_error_m=given["max_error"],
+            confirm=confirm,
+            regain_s=REGAIN_S if given["regain"] is None else given["regain"],
+            estimator=given["estimator"],
+            estimator_settings=given["settings"],
+            command=" ".join(["flightstack", *sys.argv[1:]]),
+            signing_key=key,
         )
+        if given["export_plan"] is not None:
+            return _export(mission, request, given["export_plan"])
+        result = fly_mission(mission, request, line if terminal else None)
     except (AddressError, BridgeError) as error:
         raise click.UsageError(str(error)) from error
     finally:

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from autopilot_bridge.errors import BridgeError
+from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import MissionError, PlanError
 from missions.mission import Debriefing, Mission
 from missions.occupancy.mission import OccupancyMission
@@ -72,6 +73,11 @@ class PatternMission(Mission[FlightOptions]):
     def curve(self, options: FlightOptions) -> Curve:
         """The pattern around its centre, as often as asked."""
         return self._make_curve(options)
+
+    async def plan_items(self, vehicle: Vehicle, options: FlightOptions) -> Sequence[MissionItem]:
+        from missions.pattern_flight import pattern_items
+
+        return await pattern_items(vehicle, options, self.curve(options))
 
     async def outline(self, vehicle: Vehicle, options: FlightOptions) -> Outline:
         from missions.pattern_flight import pattern_outline

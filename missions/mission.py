@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from autopilot_bridge.geodesy import GeodeticPosition
+    from autopilot_bridge.mission_plan import MissionItem
     from missions.notes import FlightNotes
     from missions.outline import Outline
     from missions.records import FlightRecords
@@ -95,6 +96,14 @@ class Mission(Generic[AnyOptions]):
     async def outline(self, vehicle: "Vehicle", options: AnyOptions) -> "Outline | None":
         """Where one vehicle, which is ready to arm, would fly; None: it can't be told."""
         return None
+
+    async def plan_items(self, vehicle: "Vehicle", options: AnyOptions) -> "Sequence[MissionItem]":
+        """What would be uploaded to one vehicle, which is ready to arm, for mission files.
+
+        Raises:
+            PlanError: this mission is not flown by uploaded waypoints.
+        """
+        raise PlanError(f"mission {self.name} is not flown by uploaded waypoints; there is no file of it")
 
     async def fly(self, vehicle: "Vehicle", options: AnyOptions) -> None:
         """Fly one vehicle, which is ready to arm, from the ground back to the ground."""

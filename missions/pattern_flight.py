@@ -31,7 +31,8 @@ from missions.telemetry import Attitude
 from missions.vehicle.guided import GuidedSession
 from missions.vehicle.setpoint import Setpoint, Vector
 from missions.vehicle.vehicle import Vehicle
-from missions.wings.pattern import check_wings, fly_pattern_with_wings
+from missions.wings.pattern import check_wings, fly_pattern_with_wings, pattern_flight_of
+from missions.wings.waypoints import mission_items
 
 _SETTLE_S: Final = 1.5
 _SAME_PLACE_M: Final = 0.3
@@ -282,18 +283,43 @@ def _speed_item(speed_m_s: float) -> MissionItem:
     )
 
 
-async def _fly_waypoints(
+def _length_m(options: FlightOptions) -> float | None:
+    """Length of a pattern that ends by its search time."""
+    return None if options.search_time_s is None else options.search_time_s * options.speed_m_s
+
+
+def _points_and_plan(
     vehicle: Vehicle, options: FlightOptions, curve: Curve, trajectory: Trajectory, centre: Vector
-) -> None:
-    notes, clock = vehicle.notes, vehicle.clock
-    length_m = None if options.search_time_s is None else options.search_time_s * options.speed_m_s
-    points = waypoints_along(curve, length_m=length_m)
-    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
+) -> tuple[list[tuple[float, float]], WaypointPlan]:
+    """The pattern's waypoints around its centre, and the plan to upload."""
+    points = waypoints_along(curve, length_m=_length_m(options))
     # a polyline's corners are the vehicle's own business: its long legs are flown at full speed
     speeds = [options.speed_m_s] * len(points)
     if not isinstance(curve, Polyline):
         speeds = leg_speeds(points, trajectory)
-    plan = waypoint_plan(vehicle, points, speeds, options, centre)
+    return points, waypoint_plan(vehicle, points, speeds, options, centre)
+
+
+async def pattern_items(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> list[MissionItem]:
+    """The mission that flies a pattern, takeoff and landing included, as it would be uploaded.
+
+    Raises:
+        PlanError: the vehicle's parameters don't allow the pattern.
+    """
+    limits = await vehicle.limits(options.own_altitude_m)
+    if isinstance(limits, FixedWingLimits):
+        return mission_items(vehicle, pattern_flight_of(vehicle, options, curve, limits)).items
+    trajectory = plan_pattern(curve, options, limits)
+    return _points_and_plan(vehicle, options, curve, trajectory, _centre(vehicle, options))[1].items
+
+
+async def _fly_waypoints(
+    vehicle: Vehicle, options: FlightOptions, curve: Curve, trajectory: Trajectory, centre: Vector
+) -> None:
+    notes, clock = vehicle.notes, vehicle.clock
+    length_m = _length_m(options)
+    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
+    points, plan = _points_and_plan(vehicle, options, curve, trajectory, centre)
     down_m = -options.own_altitude_m
     offset = np.array(centre)
     notes.commanded = CommandedPath(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.mission import Debriefing, Mission, WorldDefaults
@@ -74,6 +75,9 @@ class FileMission(Mission[FileOptions]):
 
     async def fly(self, vehicle: "Vehicle", options: FileOptions) -> None:
         await fly_document(vehicle, options, self.document)
+
+    async def plan_items(self, vehicle: "Vehicle", options: FileOptions) -> Sequence[MissionItem]:
+        return self.document.items
 
     async def outline(self, vehicle: "Vehicle", options: FileOptions) -> "Outline":
         from missions.outline import Outline

@@ -85,6 +85,9 @@ class MissionWatch:
 
     @property
     def _flown(self) -> bool:
+        coming_down = self._document.items[self._current].command in (NAV_LAND, NAV_RETURN_TO_LAUNCH)
+        if coming_down and self._current > self._final:
+            return True
         return self._done >= len(self._stops) and self._highest >= self._final and not self._endless
 
     def _take(self, message: Any) -> bool:
@@ -118,8 +121,8 @@ class MissionWatch:
         notes.reached.append((index, clock.time_us))
         self._highest = max(self._highest, index)
         notes.progress = min(1.0, (index + 1) / len(items))
-        if self._done < len(self._stops) and self._stops[self._done].index <= index:
-            self._done += 1
+        ahead = (k for k in range(self._done, len(self._stops)) if self._stops[k].index == index)
+        self._done = next(ahead, self._done - 1) + 1  # messages may have been lost: places between are done
         if index == self._scored_from and notes.current == "takeoff":
             notes.begin(self._phase, clock.time_us)
         if self._flown and notes.current == self._phase:

@@ -48,6 +48,22 @@ async def fly_pattern_with_wings(
     vehicle: Vehicle, options: FlightOptions, curve: Curve, limits: FixedWingLimits
 ) -> None:
     """From the ground back to the ground; see `missions.pattern_flight.fly_pattern`."""
+    flight = pattern_flight_of(vehicle, options, curve, limits)
+    vehicle.note_runway()
+    if options.via is Via.SETPOINTS:
+        await fly_setpoints(vehicle, flight)
+    else:
+        await fly_waypoints(vehicle, flight)
+
+
+def pattern_flight_of(
+    vehicle: Vehicle, options: FlightOptions, curve: Curve, limits: FixedWingLimits
+) -> PatternFlight:
+    """The pattern as the aircraft can fly it.
+
+    Raises:
+        PlanError: it can't.
+    """
     radius_m = check_wings(curve, options, limits)
     path = flyable_path(curve, radius_m, roll_in_m(options.speed_m_s, limits))
     if options.search_time_s is not None:
@@ -56,15 +72,10 @@ async def fly_pattern_with_wings(
         c = options.centre
         north, east, _ = LocalFrame(vehicle.home).ned_from_geodetic(c.lat_deg, c.lon_deg, c.alt_m)
         path = path.moved(north, east)
-    flight = PatternFlight(
+    return PatternFlight(
         options=options,
         limits=limits,
         path=path,
         route=with_leads(path, limits.true_airspeed_m_s(options.speed_m_s) + limits.wind_m_s),
         turn_radius_m=radius_m,
     )
-    vehicle.note_runway()
-    if options.via is Via.SETPOINTS:
-        await fly_setpoints(vehicle, flight)
-    else:
-        await fly_waypoints(vehicle, flight)

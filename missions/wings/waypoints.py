@@ -1,6 +1,7 @@
 """A pattern as an uploaded mission: takeoff, a circle to begin it from, its waypoints, the landing."""
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.geodesy import LocalFrame
@@ -19,15 +20,30 @@ _SPACING_MIN_S: Final = 1.6
 _SPACING_MAX_M: Final = 300.0
 
 
-async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
-    """From the ground back to the ground."""
-    notes, clock, options = vehicle.notes, vehicle.clock, flight.options
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PatternItems:
+    """A plan to upload, and where the pattern is in it.
+
+    Attributes:
+        items: the plan.
+        waypoints: of the pattern, north and east of home.
+        first, last: indices of the pattern's first and last waypoint.
+    """
+
+    items: list[MissionItem]
+    waypoints: list[tuple[float, float]]
+    first: int
+    last: int
+
+
+def mission_items(vehicle: Vehicle, flight: PatternFlight) -> PatternItems:
+    """From the takeoff to the landing."""
+    options = flight.options
     waypoints = flight.path.waypoints(
         deviation_m=_DEVIATION_M,
         spacing_min_m=_SPACING_MIN_S * options.speed_m_s,
         spacing_max_m=_SPACING_MAX_M,
     )
-    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
     items = _way_in(vehicle, flight)
     first = len(items)
     items += [_waypoint(vehicle, options, north, east) for north, east in waypoints]
@@ -35,9 +51,18 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     out, _, _ = flight.route.at(flight.route.length_m)
     items.append(_waypoint(vehicle, options, *out))
     items += flight.approach(vehicle).items()
-    notes.commanded = flight.commanded(vehicle, waypoints, acceptance_m)
+    return PatternItems(items=items, waypoints=list(waypoints), first=first, last=last)
+
+
+async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
+    """From the ground back to the ground."""
+    notes, clock, options = vehicle.notes, vehicle.clock, flight.options
+    acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
+    plan = mission_items(vehicle, flight)
+    first, last = plan.first, plan.last
+    notes.commanded = flight.commanded(vehicle, plan.waypoints, acceptance_m)
     notes.begin("upload", clock.time_us)
-    start = await vehicle.upload_mission(items)
+    start = await vehicle.upload_mission(plan.items)
     notes.begin("takeoff", clock.time_us)
     await vehicle.start_mission()
     place = PlaceOnPath(vehicle, flight.route, -options.speed_m_s)

@@ -1,0 +1,74 @@
+"""A mission written to a file of a ground station instead of being flown."""
+
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from missions.errors import MissionError, PlanError
+from missions.mission import Mission
+from missions.options import MissionOptions
+from missions.plan_files.files import check_suffix, write_mission_file
+from missions.planning.limits import Limits
+from missions.request import RunRequest
+
+if TYPE_CHECKING:
+    from autopilot_bridge.geodesy import GeodeticPosition
+    from missions.vehicle.vehicle import Vehicle
+
+
+def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
+    """Write what a mission would upload to its vehicle; gives the number of items.
+
+    The vehicle, embedded or elsewhere, is asked for its home and its limits, and nothing else.
+
+    Raises:
+        PlanError: the mission uploads none, can't be flown, or the file can't be written.
+        MissionError: the vehicle is not heard, or not ready.
+    """
+    from missions.session import COMPLETED, fly
+
+    check_suffix(path)
+    if request.options.vehicles > 1:
+        raise PlanError("a mission file is for one vehicle; leave --vehicles out")
+    exported = _Exported(mission, path)
+    with TemporaryDirectory() as folder:
+        asked = replace(request, out=Path(folder) / "run", picture=False, confirm=None, estimator=None)
+        result = fly(exported, asked)
+    if result.outcome != COMPLETED:
+        raise MissionError(result.reason)
+    return exported.count
+
+
+class _Exported(Mission[MissionOptions]):
+    """A mission whose flight is the writing of its plan."""
+
+    def __init__(self, mission: Mission[Any], path: Path) -> None:
+        self.name = mission.name
+        self.kinds = mission.kinds
+        self.world_defaults = mission.world_defaults
+        self.count = 0
+        self._mission, self._path = mission, path
+
+    def adapted(self, options: MissionOptions, limits: Limits) -> MissionOptions:
+        adapted: MissionOptions = self._mission.adapted(options, limits)
+        return adapted
+
+    def check(self, options: MissionOptions, limits: Limits) -> None:
+        self._mission.check(options, limits)
+
+    def check_place(self, options: MissionOptions, limits: Limits, home: "GeodeticPosition") -> None:
+        self._mission.check_place(options, limits, home)
+
+    async def fly(self, vehicle: "Vehicle", options: MissionOptions) -> None:
+        vehicle.note_runway()
+        items = await self._mission.plan_items(vehicle, options)
+        write_mission_file(
+            self._path,
+            tuple(items),
+            vehicle.home,
+            firmware=vehicle.autopilot,
+            kind=vehicle.kind,
+            speed_m_s=getattr(options, "speed_m_s", 5.0),
+        )
+        self.count = len(items)
