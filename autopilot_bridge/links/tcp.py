@@ -14,8 +14,8 @@ from autopilot_bridge.links.link import MAX_READS, READ_SIZE, LinkCounters, Peer
 CONNECT_TIMEOUT_S: Final = 5.0
 RECONNECT_INTERVAL_S: Final = 1.0
 MAX_CLIENTS: Final = 32
-MAX_CLIENT_READS: Final = 2
-"""Pieces read from one client of a server at once; more waits where it comes from."""
+CLIENT_READ_SIZE: Final = 8192
+"""Bytes read from one client of a server at once; more waits where it comes from."""
 REPLACE_S: Final = 5.0
 STALLED_S: Final = 2.0
 DEAF_S: Final = 60.0
@@ -74,7 +74,7 @@ class TcpServerLink:
         received: list[tuple[PeerId, bytes]] = []
         for peer, client in tuple(self._clients.items()):
             before = len(received)
-            alive = client.receive(peer, received, MAX_CLIENT_READS)
+            alive = client.receive(peer, received, 1, CLIENT_READ_SIZE)
             if len(received) > before:
                 client.heard_s = self._monotonic()
             if not alive or (client.queue.congested and client.deaf_s(self._monotonic()) > DEAF_S):
@@ -281,13 +281,19 @@ class _Stream:
             return False
         return True
 
-    def receive(self, peer: PeerId, received: list[tuple[PeerId, bytes]], reads: int = MAX_READS) -> bool:
+    def receive(
+        self,
+        peer: PeerId,
+        received: list[tuple[PeerId, bytes]],
+        reads: int = MAX_READS,
+        size: int = READ_SIZE,
+    ) -> bool:
         """Append what has arrived; False when the connection is closed or broken."""
         counters = self._counters
         try:
             self.queue.flush(self.socket.send)
             for _ in range(reads):
-                data = self.socket.recv(READ_SIZE)
+                data = self.socket.recv(size)
                 if not data:
                     return False
                 counters.reads += 1
