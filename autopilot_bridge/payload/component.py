@@ -144,6 +144,8 @@ class Component(ABC):
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
         if not math.isfinite(interval_us) or interval_us < -1.0:
             return int(mavlink.MAV_RESULT_DENIED)
+        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:  # without it nobody knows that there is a device
+            return int(mavlink.MAV_RESULT_DENIED)
         if interval_us == -1.0:
             self._intervals_us.pop(message_id, None)
             self._due_us.pop(message_id, None)
