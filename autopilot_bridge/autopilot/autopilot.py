@@ -118,7 +118,7 @@ class Autopilot:
 
     Attributes:
         actuators: motor commands of the newest step (flightsim.interface).
-        commander, navigation, controller, parameters, context: the parts, for tests and benchmarks.
+        commander, navigation, controller, parameters, context, commands: the parts, for tests and benchmarks.
 
     Raises:
         ParameterError: an override names an unknown parameter or is out of its range.
@@ -231,7 +231,7 @@ class Autopilot:
                 announce=self._texts.announce,
                 memory=memory,
                 simulation=simulation,
-                execute=lambda command: self._commands.carry_out(command),
+                execute=lambda command: self.commands.carry_out(command),
             )
         )
         self._cache = PayloadCache(merged(self._messages.builders(), *(more.builders for more in self._more)))
@@ -266,7 +266,7 @@ class Autopilot:
             *(more for more in self._more if type(more).tick is not Microservice.tick),
             self.intervals,
         )
-        self._commands = CommandService.for_flavour(
+        self.commands = CommandService.for_flavour(
             flavour.name,
             self.commander,
             hooks,
@@ -275,7 +275,7 @@ class Autopilot:
         )
         self._services: tuple[Service, ...] = (
             SetpointService(flavour.name, self.commander),
-            self._commands,
+            self.commands,
             self._parameter_service,
             self.missions,
             TimeSyncService(answers_ping=firmware.answers_ping),

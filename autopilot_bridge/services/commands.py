@@ -78,6 +78,10 @@ class CommandService:
             return True
         return bool(message_id == _CANCEL)  # nothing here takes long enough to be cancelled
 
+    def knows(self, command: int) -> bool:
+        """Somebody carries this MAV_CMD out."""
+        return command in self._more or command in self._handlers.table
+
     def carry_out(self, command: Command, source: Source | None = None) -> Result | None:
         """Do what a command says, unacknowledged; without a source, answers go nowhere."""
         asker = NOBODY if source is None else source

@@ -97,6 +97,7 @@ PASSED_OVER: Final = frozenset(
         mavlink.MAV_CMD_DO_ENGINE_CONTROL,
         mavlink.MAV_CMD_DO_VTOL_TRANSITION,
         mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
+        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,  # a plane's
     )
 )
 """Taken and passed over, by the firmware too, on vehicles without what they are for."""
@@ -178,6 +179,8 @@ class ArdupilotItemRules:
 
     @staticmethod
     def _check_params(item: MissionItem) -> int:
+        if item.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:  # NaN: no angle, or no rate
+            return check_params(item, nan_allowed=(True, True, True, True))
         vtol_land = item.command == mavlink.MAV_CMD_NAV_VTOL_LAND
         yaw_may_be_nan = vtol_land or item.command in _YAW_IN_PARAM4
         return check_params(item, nan_allowed=(False, False, vtol_land, yaw_may_be_nan))

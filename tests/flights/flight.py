@@ -15,6 +15,7 @@ from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
+from flightsim.payload import PayloadParameters
 from missions.telemetry import StatusTextAssembler
 
 FLAVOURS: Final = ("px4", "ardupilot")
@@ -59,6 +60,7 @@ class Flight:
         parameters: that differ from the flavour's defaults.
         environment: the air.
         model, launch: the vehicle, and how it gets into the air.
+        payload: what it carries; None: nothing.
 
     Attributes:
         heartbeats: (time s, custom_mode, base_mode, system_status).
@@ -77,9 +79,14 @@ class Flight:
         environment: Environment | None = None,
         model: str = "iris",
         launch: str | None = None,
+        payload: PayloadParameters | None = None,
     ) -> None:
         specification = VehicleSpecification(
-            flavour=flavour, parameters=parameters or {}, model=model, launch=launch
+            flavour=flavour,
+            parameters=parameters or {},
+            model=model,
+            launch=launch,
+            payload=payload or PayloadParameters(),
         )
         self.sitl = Sitl(
             SitlConfiguration(vehicles=(specification,), seed=seed, environment=environment or Environment())
