@@ -37,8 +37,9 @@ class RtspServer:
 
     async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One connection, from its beginning to its end."""
-        player = RtspPlayer(self._streams, writer, full=self._players >= MAX_PLAYERS)
-        self._players += 1
+        full = self._players >= MAX_PLAYERS
+        player = RtspPlayer(self._streams, writer)
+        self._players += not full
         requests = RequestReader()
         try:
             while True:
@@ -47,11 +48,13 @@ class RtspServer:
                 if not data:
                     break
                 for request in requests.feed(data):
-                    writer.write(await player.answer(request))
+                    writer.write(response(503, request) if full else await player.answer(request))
+                if full:
+                    break
         except (RtspError, OSError, TimeoutError):
             pass
         finally:
-            self._players -= 1
+            self._players -= not full
             player.close()
             writer.close()
             with suppress(OSError):
@@ -61,12 +64,9 @@ class RtspServer:
 class RtspPlayer:
     """One connection's session."""
 
-    def __init__(
-        self, streams: Mapping[str, CameraStream], writer: asyncio.StreamWriter, *, full: bool = False
-    ) -> None:
+    def __init__(self, streams: Mapping[str, CameraStream], writer: asyncio.StreamWriter) -> None:
         self._streams = streams
         self._writer = writer
-        self._full = full
         self._stream: CameraStream | None = None
         self._transport: Transport | None = None
         self._udp: list[asyncio.DatagramTransport] = []
@@ -76,8 +76,6 @@ class RtspPlayer:
 
     async def answer(self, request: Request) -> bytes:
         """Do what is asked, and say so."""
-        if self._full:
-            return response(503, request)
         match request.method:
             case "OPTIONS":
                 return response(200, request, {"Public": _METHODS})

@@ -28,7 +28,7 @@ DEFAULT_PORT: Final = 8554
 _PORTS_TRIED: Final = 50
 _BACKLOG: Final = 16
 _QUEUE_BYTES: Final = 4 << 20  # photos that the picture process has not taken yet
-_END_S: Final = 5.0
+_END_S: Final = 30.0  # to write what was told to be written
 
 
 class VideoError(BridgeError):

@@ -1,0 +1,205 @@
+"""RTSP on the wire, and the server against FFmpeg's client and hostile ones."""
+
+import asyncio
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from autopilot_bridge.video.messages import CameraSetup, StudioSetup
+from autopilot_bridge.video.rtsp import RequestReader, RtspError, Transport, parse_transport, response
+from autopilot_bridge.video.rtsp_server import MAX_PLAYERS, RtspServer
+from autopilot_bridge.video.studio import CameraStream
+from flightsim.payload import CameraView, PinholeModel
+
+# RFC 2326, appendix of examples: requests as players send them
+DESCRIBE = b"DESCRIBE rtsp://127.0.0.1:8554/camera1 RTSP/1.0\r\nCSeq: 2\r\nAccept: application/sdp\r\n\r\n"
+RECEIVER_REPORT = b"$\x01\x00\x08" + b"\x80\xc9\x00\x01abcd"
+VIEW = CameraView(time_us=0, eye_ned_m=(0.0, 0.0, -30.0), q_ned_from_mount=(0.9, 0.0, -0.43589, 0.0))
+
+
+def test_requests_come_whole_from_any_pieces_and_reports_are_passed_over():
+    stream = (
+        DESCRIBE + RECEIVER_REPORT + b"GET_PARAMETER * RTSP/1.0\r\nContent-Length: 4\r\n\r\nping" + DESCRIBE
+    )
+    for size in (1, 3, 7, 1000):
+        reader = RequestReader()
+        found = [
+            request
+            for start in range(0, len(stream), size)
+            for request in reader.feed(stream[start : start + size])
+        ]
+        assert [request.method for request in found] == ["DESCRIBE", "GET_PARAMETER", "DESCRIBE"]
+        assert found[0].path == "camera1"
+        assert found[0].headers["cseq"] == "2"
+
+
+@given(st.binary(max_size=400))
+def test_anything_else_is_refused_or_waited_for(data):
+    reader = RequestReader()
+    try:
+        found = reader.feed(data)
+    except RtspError:
+        return
+    assert all(request.method for request in found)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"x" * 9000,
+        b"PLAY * RTSP/1.0\r\nContent-Length: -1\r\n\r\n",
+        b"PLAY * RTSP/1.0\r\nContent-Length: 99999\r\n\r\n",
+    ],
+)
+def test_what_is_no_rtsp_ends_the_connection(data):
+    with pytest.raises(RtspError):
+        RequestReader().feed(data)
+
+
+@pytest.mark.parametrize(
+    ("header", "transport"),
+    [
+        ("RTP/AVP/TCP;unicast;interleaved=0-1", Transport(True, 0, 1)),
+        ("RTP/AVP;unicast;client_port=5000-5001", Transport(False, 5000, 5001)),
+        ("RTP/AVP/UDP;unicast;client_port=5000", Transport(False, 5000, 5001)),
+        ("RTP/AVP;multicast,RTP/AVP/TCP;interleaved=4-5", Transport(True, 4, 5)),
+        ("RTP/AVP;multicast", None),
+        ("RTP/AVP;unicast;client_port=22-23", None),
+        ("RTP/AVP;unicast;client_port=65535", None),
+        ("RTP/AVP/TCP;interleaved=300-301", None),
+        ("", None),
+    ],
+)
+def test_transports(header, transport):
+    assert parse_transport(header) == transport
+
+
+def test_an_answer_carries_the_number_of_its_request():
+    (request,) = RequestReader().feed(DESCRIBE)
+    assert response(200, request, {"Public": "PLAY"}, "v=0\r\n") == (
+        b"RTSP/1.0 200 OK\r\nCSeq: 2\r\nPublic: PLAY\r\nContent-Length: 5\r\n\r\nv=0\r\n"
+    )
+
+
+class Talk:
+    """A server with one camera, and connections to it."""
+
+    def __init__(self) -> None:
+        async def ask():
+            self.asked += 1
+            return VIEW
+
+        self.asked = 0
+        model = PinholeModel(width_px=64, height_px=48)
+        setup = StudioSetup(cameras=(CameraSetup(name="camera1", model=model, blur_px_m=0.0),), width_px=64)
+        self.stream = CameraStream(setup.cameras[0], setup, ask)
+        self.rtsp = RtspServer([self.stream])
+
+    async def __aenter__(self):
+        self.server = await asyncio.start_server(self.rtsp.accept, "127.0.0.1", 0)
+        self.port = self.server.sockets[0].getsockname()[1]
+        return self
+
+    async def __aexit__(self, *_):
+        self.server.close()
+
+    async def connect(self):
+        return await asyncio.open_connection("127.0.0.1", self.port)
+
+    async def ask_for(
+        self, connection, method: str, path: str = "camera1", **headers: str
+    ) -> tuple[int, str]:
+        reader, writer = connection
+        lines = [f"{method} rtsp://127.0.0.1/{path} RTSP/1.0", "CSeq: 1"]
+        lines += [f"{name.title()}: {value}" for name, value in headers.items()]
+        writer.write(("\r\n".join(lines) + "\r\n\r\n").encode())
+        while True:  # media may come between
+            first = await asyncio.wait_for(reader.readexactly(1), 20.0)
+            if first != b"$":
+                break
+            head = await reader.readexactly(3)
+            await reader.readexactly(int.from_bytes(head[1:], "big"))
+        head = (first + await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), 20.0)).decode()
+        body = re.search(r"Content-Length: (\d+)", head)
+        text = (await reader.readexactly(int(body[1]))).decode() if body else ""
+        return int(head.split()[1]), head + text
+
+    async def play(self, connection) -> None:
+        transport = "RTP/AVP/TCP;unicast;interleaved=0-1"
+        status, answer = await self.ask_for(connection, "SETUP", "camera1/trackID=0", transport=transport)
+        assert status == 200
+        session = re.search(r"Session: (\w+)", answer)[1]
+        assert (await self.ask_for(connection, "PLAY", session=session))[0] == 200
+
+
+async def packet(reader: asyncio.StreamReader) -> tuple[int, bytes]:
+    mark, channel, *size = await asyncio.wait_for(reader.readexactly(4), 20.0)
+    assert mark == ord("$")
+    return channel, await reader.readexactly(int.from_bytes(bytes(size), "big"))
+
+
+def test_a_player_gets_h264_from_a_key_picture_on():
+    async def watch() -> None:
+        async with Talk() as talk:
+            reader, writer = connection = await talk.connect()
+            assert (await talk.ask_for(connection, "OPTIONS"))[0] == 200
+            status, answer = await talk.ask_for(connection, "DESCRIBE")
+            assert status == 200 and "a=rtpmap:96 H264/90000" in answer
+            assert talk.asked == 0  # nobody watches yet
+            await talk.play(connection)
+            channel, first = await packet(reader)
+            while channel != 0:
+                channel, first = await packet(reader)
+            assert (first[0] >> 6, first[1] & 0x7F) == (2, 96)
+            assert first[12] & 0x1F in (7, 24)  # parameter sets first: SPS, or SPS and PPS together
+            writer.close()
+            async with asyncio.timeout(20.0):
+                while talk.stream._players:
+                    await asyncio.sleep(0.01)
+            await asyncio.sleep(0.1)
+            asked = talk.asked
+            await asyncio.sleep(0.2)
+            assert talk.asked == asked  # nobody watches any more
+
+    asyncio.run(watch())
+
+
+def test_what_can_not_be_is_refused():
+    async def ask() -> None:
+        async with Talk() as talk:
+            connection = await talk.connect()
+            assert (await talk.ask_for(connection, "DESCRIBE", "elsewhere"))[0] == 404
+            assert (await talk.ask_for(connection, "SETUP", transport="RTP/AVP;multicast"))[0] == 461
+            assert (await talk.ask_for(connection, "PLAY", session="1"))[0] == 455
+            assert (await talk.ask_for(connection, "RECORD"))[0] == 405
+            await talk.play(connection)
+            assert (await talk.ask_for(connection, "TEARDOWN", session="other"))[0] == 454
+            reader, writer = await talk.connect()
+            writer.write(b"\x00\xff garbage \r\n\r\n")
+            assert await asyncio.wait_for(reader.read(), 20.0) == b""  # closed
+
+    asyncio.run(ask())
+
+
+def test_too_many_players_are_turned_away():
+    async def crowd() -> None:
+        async with Talk() as talk:
+            connections = [await talk.connect() for _ in range(MAX_PLAYERS)]
+            for connection in connections:
+                assert (await talk.ask_for(connection, "OPTIONS"))[0] == 200
+            late = await talk.connect()
+            assert (await talk.ask_for(late, "OPTIONS"))[0] == 503
+            connections[0][1].close()
+            async with asyncio.timeout(20.0):
+                while True:
+                    again = await talk.connect()
+                    status, _ = await talk.ask_for(again, "OPTIONS")
+                    again[1].close()
+                    if status == 200:
+                        break
+                    await asyncio.sleep(0.01)
+
+    asyncio.run(crowd())
