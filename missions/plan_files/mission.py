@@ -131,13 +131,17 @@ class FileMission(Mission[FileOptions]):
         route = route_of(self.document, notes.commanded.origin)
         stops = scored_stops(route, with_takeoff=notes.kind == VehicleKind.MULTICOPTER)
         legs: list[Mapping[str, Any]] = []
-        times = list(notes.reached)
+        times = notes.reached
+        place = 0
         for a, b in pairwise(stops):
-            while times and times[0][0] != a.index:
-                times.pop(0)
-            if len(times) < 2 or times[1][0] != b.index or {a.command, b.command} & LOITERS:
+            start = next((k for k in range(place, len(times)) if times[k][0] == a.index), None)
+            if start is None:
                 continue
-            flown = track.between(times[0][1], times[1][1]).pos_ned_m
+            place = start  # messages of items between the two places (speed, camera) may lie between theirs
+            stop = next((k for k in range(start + 1, len(times)) if times[k][0] == b.index), None)
+            if stop is None or {a.command, b.command} & LOITERS:
+                continue
+            flown = track.between(times[start][1], times[stop][1]).pos_ned_m
             if len(flown) > 1:
                 legs.append({"from": a.index + 1, "to": b.index + 1, **_cross_track(a, b, flown)})
         return legs

@@ -1,0 +1,199 @@
+"""What is found of a vehicle by its messages and parameters."""
+
+import copy
+import math
+from typing import Any
+
+import pytest
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mission_plan import MissionItem
+from missions.kind import VehicleKind
+from missions.preflight.fence_geometry import areas, first_outside
+from missions.preflight.finding import Finding, Level
+from missions.preflight.health import health_findings, reasons_against_arming
+from missions.preflight.lost_link import lost_link_words
+from missions.preflight.settings import fence, settings_findings
+from missions.preflight.snapshot import Snapshot
+
+HEALTH, PRESENT = "onboard_control_sensors_health", "onboard_control_sensors_present"
+COPTER, PLANE = VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING
+HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
+READY: dict[str, dict[str, Any]] = {
+    "HEARTBEAT": {"base_mode": 0x1D, "type": 2, "autopilot": 12},
+    "SYS_STATUS": {
+        "onboard_control_sensors_present": 0x0300402F | 0x10000,
+        "onboard_control_sensors_enabled": 0x0301402F,
+        "onboard_control_sensors_health": 0x1320C83F | 0x10000,
+        "voltage_battery": 16200,
+        "battery_remaining": 95,
+    },
+    "GPS_RAW_INT": {"fix_type": 3, "satellites_visible": 10, "eph": 70},
+    "ESTIMATOR_STATUS": {"flags": 831, "vel_ratio": 0.1, "pos_horiz_ratio": 0.1, "mag_ratio": 0.1},
+    "HOME_POSITION": {"latitude": 473977400, "longitude": 85455900, "altitude": 489400},
+    "GLOBAL_POSITION_INT": {"lat": 473977410, "lon": 85455910, "alt": 489400},
+}  # fmt: skip
+
+
+def found(changes: dict[str, dict[str, Any] | None], texts: tuple[str, ...] = ()) -> dict[str, Finding]:
+    """Findings by subject, of a ready vehicle with some fields changed (None: message not heard)."""
+    messages = copy.deepcopy(READY)
+    for name, fields in changes.items():
+        if fields is None:
+            messages.pop(name)
+        else:
+            messages.setdefault(name, {}).update(fields)
+    snapshot = Snapshot(flavour="px4", kind=COPTER, messages=messages, texts=texts)
+    return {finding.subject: finding for finding in health_findings(snapshot)}
+
+
+def test_a_ready_vehicle_is_ok() -> None:
+    assert {finding.level for finding in found({}).values()} == {Level.OK}
+
+
+@pytest.mark.parametrize(
+    ("changes", "subject", "level", "words"),
+    [
+        ({"SYS_STATUS": None}, "sensors", Level.PROBLEM, "has not told"),
+        ({"SYS_STATUS": {HEALTH: 0x1320C83B}}, "sensors", Level.PROBLEM, "3d mag"),
+        ({"SYS_STATUS": {HEALTH: 0x0320C83F}}, "arming", Level.PROBLEM, "not passed"),
+        ({"HEARTBEAT": {"base_mode": 0x9D}}, "arming", Level.WARNING, "is armed"),
+        ({"GPS_RAW_INT": {"fix_type": 2}}, "GPS", Level.PROBLEM, "2D_FIX, 10 satellites"),
+        ({"GPS_RAW_INT": {"satellites_visible": 5}}, "GPS", Level.WARNING, "5 satellites"),
+        ({"GPS_RAW_INT": {"eph": 300}}, "GPS", Level.WARNING, "HDOP 3.0"),
+        ({"GPS_RAW_INT": None}, "GPS", Level.WARNING, "nothing was told"),
+        ({"ESTIMATOR_STATUS": {"flags": 1}}, "navigation", Level.PROBLEM, "no position"),
+        ({"ESTIMATOR_STATUS": {"mag_ratio": 1.5}}, "navigation", Level.PROBLEM, "1.50 (mag)"),
+        ({"ESTIMATOR_STATUS": {"vel_ratio": 0.6}}, "navigation", Level.WARNING, "0.60 (vel)"),
+        ({"EKF_STATUS_REPORT": {"flags": 831 | 0x80}}, "navigation", Level.PROBLEM, "no position"),
+        ({"EKF_STATUS_REPORT": {"flags": 831, "compass_variance": 0.9}}, "navigation", Level.PROBLEM, "0.90"),
+        ({"HOME_POSITION": None}, "home", Level.PROBLEM, "not set"),
+        ({"GLOBAL_POSITION_INT": {"lat": 473987410}}, "home", Level.WARNING, "m from the vehicle"),
+        ({"SYS_STATUS": {"battery_remaining": 10}}, "battery", Level.PROBLEM, "16.2 V, 10 %"),
+        ({"SYS_STATUS": {"battery_remaining": 40}}, "battery", Level.WARNING, "40 %"),
+        ({"SYS_STATUS": {"battery_remaining": -1}}, "battery", Level.WARNING, "charge not known"),
+        ({"SYS_STATUS": {"battery_remaining": -1, "voltage_battery": 0}}, "battery", Level.WARNING, "not mea"),
+        ({"SYS_STATUS": {PRESENT: 0x0300402F}}, "remote control", Level.WARNING, "none"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_found(changes: dict, subject: str, level: Level, words: str) -> None:
+    finding = found(changes)[subject]
+    assert finding.level is level
+    assert words in finding.text
+    assert finding.advice
+
+
+def test_the_reasons_are_the_autopilots_own() -> None:
+    texts = (
+        "Frame: QUAD",
+        "PreArm: Compass not calibrated",
+        "PreArm: Compass not calibrated",
+        "Arm: Hardware",
+    )
+    assert reasons_against_arming(texts) == ["PreArm: Compass not calibrated", "Arm: Hardware"]
+    sick = {"SYS_STATUS": {HEALTH: 0x0320C83F}}
+    assert "PreArm: Compass not calibrated / Arm: Hardware" in found(sick, texts)["arming"].text
+
+
+def snapshot(
+    flavour: str, parameters: dict[str, float], kind: VehicleKind = COPTER, items: int = 0
+) -> Snapshot:
+    return Snapshot(flavour=flavour, kind=kind, messages={}, parameters=parameters, fence_items=items)
+
+
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "level", "words"),
+    [
+        ("px4", {"SYS_AUTOSTART": 0.0}, Level.PROBLEM, "SYS_AUTOSTART is 0: no airframe"),
+        ("px4", {"COM_LOW_BAT_ACT": 0.0}, Level.WARNING, "COM_LOW_BAT_ACT is 0"),
+        ("px4", {"MPC_XY_P": math.nan}, Level.PROBLEM, "MPC_XY_P is nan"),
+        ("px4", {"SYS_AUTOSTART": 4001.0}, Level.OK, "nothing unusual"),
+        ("ardupilot", {"ARMING_CHECK": 0.0}, Level.WARNING, "all pre-arm checks are off"),
+        ("ardupilot", {"ARMING_CHECK": 14.0}, Level.WARNING, "some pre-arm checks are off"),
+        ("ardupilot", {"THR_FAILSAFE": 0.0}, Level.OK, "nothing unusual"),  # of a plane only
+    ],
+)
+def test_settings(flavour: str, parameters: dict, level: Level, words: str) -> None:
+    (finding,) = settings_findings(snapshot(flavour, parameters))
+    assert finding.level is level
+    assert words in finding.text
+
+
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "items", "level", "words"),
+    [
+        ("px4", {}, 0, Level.WARNING, "there is none"),
+        ("px4", {"GF_MAX_HOR_DIST": 300.0}, 4, Level.OK, "4 points of areas, within 300 m of home"),
+        (
+            "ardupilot",
+            {"FENCE_ENABLE": 0.0},
+            4,
+            Level.WARNING,
+            "none is enabled (4 points of one are stored)",
+        ),
+        (
+            "ardupilot",
+            {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_ALT_MAX": 100.0, "FENCE_RADIUS": 300.0},
+            4,
+            Level.OK,
+            "up to 100 m, within 300 m of home, 4 points of areas",
+        ),
+    ],
+)
+def test_fence(flavour: str, parameters: dict, items: int, level: Level, words: str) -> None:
+    finding = fence(snapshot(flavour, parameters, items=items))
+    assert finding.level is level
+    assert words in finding.text
+
+
+@pytest.mark.parametrize(
+    ("flavour", "kind", "parameters", "words"),
+    [
+        ("px4", COPTER, {"NAV_DLL_ACT": 0}, "goes on (NAV_DLL_ACT 0)"),
+        ("px4", PLANE, {"NAV_DLL_ACT": 2, "COM_DL_LOSS_T": 10}, "returns after 10 s (NAV_DLL_ACT 2)"),
+        ("px4", COPTER, {"COM_OBL_RC_ACT": 4, "COM_OF_LOSS_T": 1}, "without setpoints it lands after 1 s"),
+        ("ardupilot", COPTER, {"FS_GCS_ENABLE": 1, "FS_GCS_TIMEOUT": 5}, "returns after 5 s"),
+        ("ardupilot", COPTER, {"FS_GCS_ENABLE": 1, "FS_OPTIONS": 2}, "in a mission it goes on"),
+        ("ardupilot", COPTER, {"GUID_TIMEOUT": 3}, "stops and stays after 3 s (GUID_TIMEOUT)"),
+        ("ardupilot", PLANE, {"FS_GCS_ENABL": 0}, "goes on (FS_GCS_ENABL 0)"),
+        (
+            "ardupilot",
+            PLANE,
+            {"FS_GCS_ENABL": 1, "FS_LONG_ACTN": 1, "FS_LONG_TIMEOUT": 5},
+            "returns after 5 s",
+        ),
+        ("px4", COPTER, {"NAV_DLL_ACT": 77}, "does action 77"),
+    ],
+)
+def test_what_happens_without_a_link(flavour: str, kind: VehicleKind, parameters: dict, words: str) -> None:
+    assert words in "; ".join(lost_link_words(flavour, kind, parameters))
+
+
+def items(command: int, param1: float, *places: tuple[float, float]) -> list[MissionItem]:
+    frame = LocalFrame(HOME)
+    geodetic = [frame.geodetic_from_ned(n, e, 0.0) for n, e in places]
+    return [MissionItem(command=command, frame=0, param1=param1, x=lat, y=lon) for lat, lon, _ in geodetic]
+
+
+SQUARE = ((-100.0, -100.0), (-100.0, 100.0), (100.0, 100.0), (100.0, -100.0))
+
+
+@pytest.mark.parametrize(
+    ("fences", "way", "outside"),
+    [
+        (items(5001, 4, *SQUARE), [(0.0, 0.0), (90.0, 90.0)], None),
+        (items(5001, 4, *SQUARE), [(0.0, 0.0), (120.0, 0.0)], (100.0, 0.0)),
+        (items(5002, 4, *SQUARE), [(200.0, -200.0), (200.0, 200.0)], None),
+        (items(5002, 4, *SQUARE), [(200.0, 0.0), (-200.0, 0.0)], (100.0, 0.0)),  # through it, not to it
+        (items(5003, 50.0, (0.0, 0.0)), [(0.0, 0.0), (0.0, 60.0)], (0.0, 50.0)),
+        (items(5004, 50.0, (0.0, 0.0)), [(60.0, 0.0), (60.0, 60.0)], None),
+        ([], [(1e6, 0.0)], None),
+    ],
+)
+def test_ways_and_fences(fences: list, way: list, outside: tuple[float, float] | None) -> None:
+    place = first_outside(areas(fences, HOME), way)
+    if outside is None:
+        assert place is None
+    else:
+        assert place is not None
+        assert math.dist(place, outside) < 6.0  # found in steps of 5 m
