@@ -69,16 +69,14 @@ class Px4Actuators(Microservice):
             )
 
     def _gripper(self, command: Command, source: Source) -> Result | None:
-        """DO_GRIPPER: p2 GRIPPER_ACTIONS; done after PD_GRIPPER_TO seconds."""
-        if self._parameters.get("PD_GRIPPER_TYPE") < 0:
-            return None
-        if whole(command.p2) not in _GRIPPER_ACTIONS:
+        """DO_GRIPPER: p2 GRIPPER_ACTIONS; acknowledged when it is done, after PD_GRIPPER_TO seconds."""
+        if self._parameters.get("PD_GRIPPER_TYPE") < 0 or whole(command.p2) not in _GRIPPER_ACTIONS:
             return Result.FAILED
-        seconds = min(10.0, max(0.0, self._parameters.get("PD_GRIPPER_TO")))
-        self._moving = [entry for entry in self._moving if entry[1] != source]  # the newest counts
-        self._moving.append((self._commander.time_us + round(seconds * 1e6), source))
-        self._moving.sort(key=lambda entry: entry[0])
-        return Result.IN_PROGRESS
+        if all(asker != source for _, asker in self._moving):  # else: asked again, it is on its way
+            seconds = min(10.0, max(0.0, self._parameters.get("PD_GRIPPER_TO")))
+            self._moving.append((self._commander.time_us + round(seconds * 1e6), source))
+            self._moving.sort(key=lambda entry: entry[0])
+        return None
 
     def _test(self, command: Command, source: Source) -> Result:
         """ACTUATOR_TEST: p5 ACTUATOR_OUTPUT_FUNCTION; disarmed only."""

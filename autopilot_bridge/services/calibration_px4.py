@@ -43,6 +43,7 @@ class Px4Calibration(Microservice):
         self._running: CalibrationScript | None = None
         self._next = 0
         self._due_us = 0
+        self._cancelled = False
 
     @property
     def commands(self) -> Mapping[int, Handler]:
@@ -55,8 +56,11 @@ class Px4Calibration(Microservice):
     def tick(self, time_us: int) -> None:
         """Say what is due."""
         script = self._running
-        if script is None or time_us < self._due_us:
+        if script is None or (time_us < self._due_us and not self._cancelled):
             return
+        if self._cancelled:
+            self._announce(_CRITICAL, "[cal] calibration cancelled")
+            return self._end()
         if script.sensor and not getattr(self._commander.situation.health, script.sensor):
             self._announce(_CRITICAL, "[cal] calibration failed: reading sensor")
             return self._end()
@@ -74,8 +78,7 @@ class Px4Calibration(Microservice):
         if self._running is not None:
             if any(values):
                 return Result.TEMPORARILY_REJECTED
-            self._announce(_CRITICAL, "[cal] calibration cancelled")
-            self._end()
+            self._cancelled = True  # told after the acknowledgement
             return Result.ACCEPTED
         if self._commander.armed:
             return Result.TEMPORARILY_REJECTED
@@ -104,7 +107,7 @@ class Px4Calibration(Microservice):
         return Result.ACCEPTED
 
     def _end(self) -> None:
-        self._running = None
+        self._running, self._cancelled = None, False
         self._commander.situation.calibrating = False
 
     def _mute(self, muted: bool) -> Result:

@@ -14,6 +14,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.telemetry.streams import Builder
 
 _ADSB_VEHICLE: Final = mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE
 _AUTOPILOT: Final = 1
@@ -69,6 +70,11 @@ class TrafficService(Microservice):
     def aircraft(self) -> tuple[int, ...]:
         """ICAO addresses of those heard lately."""
         return tuple(self._heard)
+
+    @property
+    def builders(self) -> Mapping[int, Builder]:
+        """ADSB_VEHICLE can be asked for; it goes out when it comes in, whatever the interval."""
+        return {_ADSB_VEHICLE: lambda: None}
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take ADSB_VEHICLE; what another autopilot passes on is not passed on again."""

@@ -14,6 +14,7 @@ from autopilot_bridge.telemetry.streams import Builder, Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, pressure_altitude_m
 
 _M = mavlink
+_ACTUATOR_OUTPUTS: Final = 32  # fields of ACTUATOR_OUTPUT_STATUS
 
 ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
     {
@@ -122,6 +123,7 @@ class Px4Messages(CommonMessages):
             **super().builders(),
             _M.MAVLINK_MSG_ID_PING: self.ping,
             _M.MAVLINK_MSG_ID_TIMESYNC: self.timesync,
+            _M.MAVLINK_MSG_ID_ACTUATOR_OUTPUT_STATUS: self.actuator_output_status,
             _M.MAVLINK_MSG_ID_ALTITUDE: self.altitude,
             _M.MAVLINK_MSG_ID_ESTIMATOR_STATUS: self.estimator_status,
             _M.MAVLINK_MSG_ID_ORBIT_EXECUTION_STATUS: self.orbit_execution_status,
@@ -134,6 +136,11 @@ class Px4Messages(CommonMessages):
         """PING (4), to everybody."""
         self._ping_sequence += 1
         return (self.view.time_us, self._ping_sequence, 0, 0)
+
+    def actuator_output_status(self) -> Values:
+        """ACTUATOR_OUTPUT_STATUS (375): the pulses of SERVO_OUTPUT_RAW."""
+        _, _, *pulses = self.servo_output_raw()
+        return (self.view.time_us, len(pulses), (*pulses, *(0.0,) * (_ACTUATOR_OUTPUTS - len(pulses))))
 
     def timesync(self) -> Values:
         """TIMESYNC (111) request, nanoseconds since boot."""

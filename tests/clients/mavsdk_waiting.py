@@ -7,11 +7,13 @@ from typing import Any, Final
 WALL_DEADLINE_S: Final = 25.0
 
 
-async def first(stream: AsyncIterator[Any], found: Callable[[Any], bool], what: str) -> Any:
+async def first(
+    stream: AsyncIterator[Any], found: Callable[[Any], bool], what: str, wait_s: float = WALL_DEADLINE_S
+) -> Any:
     """First element of a telemetry stream that satisfies `found`."""
     last: Any = None
     try:
-        async with asyncio.timeout(WALL_DEADLINE_S):
+        async with asyncio.timeout(wait_s):
             async for last in stream:
                 if found(last):
                     return last
