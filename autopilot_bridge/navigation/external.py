@@ -31,7 +31,7 @@ class ExternalSample:
     """One measurement.
 
     Attributes:
-        time_us: vehicle time at which it was taken; -1: not known, its arrival counts.
+        time_us: vehicle time at which it was taken; of its arrival where that is not known.
         values: float64[SAMPLE_SIZE]: position m, attitude (Hamilton, w x y z), velocity m/s; NaN: not there.
         frame: of position and attitude.
         velocity_frame: of the velocity.

@@ -172,7 +172,7 @@ class ExternalAiding:
         if self._repeats_itself(values) and not at_rest:
             counts.frozen += 1
             return True
-        measured_us = (time_us if sample.time_us < 0 else sample.time_us) - round(p.delay_s * 1e6)
+        measured_us = sample.time_us - round(p.delay_s * 1e6)
         row = solution.row_at(measured_us, time_us)
         if row < 0:
             counts.late += 1

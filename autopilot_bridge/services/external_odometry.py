@@ -286,8 +286,8 @@ _READERS: Final[Mapping[int, _Reader]] = {
 
 
 def _measured(stamp_us: int, time_us: int) -> int:
-    """A time stamp, when it is of the vehicle's clock; else -1."""
-    return int(stamp_us) if -_NEWEST_US <= time_us - int(stamp_us) <= _OLDEST_US else -1
+    """A time stamp, when it is of the vehicle's clock; else the time of arrival."""
+    return int(stamp_us) if -_NEWEST_US <= time_us - int(stamp_us) <= _OLDEST_US else time_us
 
 
 def _entry(covariance: list[float], index: int) -> float:

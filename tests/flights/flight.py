@@ -15,7 +15,7 @@ from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.payload import PayloadParameters
+from flightsim.payload import GroundTargetParameters, PayloadParameters
 from missions.telemetry import StatusTextAssembler
 
 FLAVOURS: Final = ("px4", "ardupilot")
@@ -37,6 +37,8 @@ _PX4_MODES: Final[Mapping[str, tuple[float, float]]] = {
     "land": (4, 6),
     "offboard": (6, 0),
     "stabilized": (7, 0),
+    "follow": (4, 8),
+    "precision land": (4, 9),
 }
 _ARDUPILOT_MODES: Final[Mapping[str, tuple[float, float]]] = {
     "stabilize": (0, 0),
@@ -49,6 +51,7 @@ _ARDUPILOT_MODES: Final[Mapping[str, tuple[float, float]]] = {
     "land": (9, 0),
     "poshold": (16, 0),
     "brake": (17, 0),
+    "follow": (23, 0),
 }
 
 
@@ -61,6 +64,7 @@ class Flight:
         environment: the air.
         model, launch: the vehicle, and how it gets into the air.
         payload: what it carries; None: nothing.
+        targets: what there is to see.
 
     Attributes:
         heartbeats: (time s, custom_mode, base_mode, system_status).
@@ -80,6 +84,7 @@ class Flight:
         model: str = "iris",
         launch: str | None = None,
         payload: PayloadParameters | None = None,
+        targets: tuple[GroundTargetParameters, ...] = (),
     ) -> None:
         specification = VehicleSpecification(
             flavour=flavour,
@@ -89,7 +94,12 @@ class Flight:
             payload=payload or PayloadParameters(),
         )
         self.sitl = Sitl(
-            SitlConfiguration(vehicles=(specification,), seed=seed, environment=environment or Environment())
+            SitlConfiguration(
+                vehicles=(specification,),
+                seed=seed,
+                environment=environment or Environment(),
+                targets=targets,
+            )
         )
         self.flavour = flavour
         self.vehicle = self.sitl.vehicles[0]
@@ -117,7 +127,7 @@ class Flight:
             message = decode(frame)
             name = message.get_type()
             self.newest[name] = message
-            if name == "HEARTBEAT":
+            if name == "HEARTBEAT" and frame.component_id == 1:
                 self.heartbeats.append(
                     (self.time_s, message.custom_mode, message.base_mode, message.system_status)
                 )

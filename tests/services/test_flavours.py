@@ -102,7 +102,7 @@ def test_ardupilot_base_mode_in_flight() -> None:
     assert base(display(M.STABILIZED, booted=False)) == 89
 
 
-@pytest.mark.parametrize("number", [8, 10, 12, 13, 14, 15, 22, 23, 25, 26, 27, 28, 29, 99])
+@pytest.mark.parametrize("number", [8, 10, 12, 13, 14, 15, 22, 25, 26, 27, 28, 29, 99])
 def test_ardupilot_numbers_that_are_refused(number: int) -> None:
     assert ardupilot_modes.commanded_mode(number) is None
 
