@@ -10,6 +10,7 @@ from typing import Any, Final, Protocol
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_commands import CameraCommands
+from autopilot_bridge.payload.camera_definition import CameraDefinition
 from autopilot_bridge.payload.camera_lens import CameraLens
 from autopilot_bridge.payload.camera_messages import (
     SENSOR_WIDTH_MM,
@@ -21,7 +22,7 @@ from autopilot_bridge.payload.camera_messages import (
     photo_notes,
     tracking_geo_status,
 )
-from autopilot_bridge.payload.camera_storage import VIDEO_MIB_S, CameraStorage
+from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, VIDEO_MIB_S, CameraStorage
 from autopilot_bridge.payload.camera_tracking import CameraTracker
 from autopilot_bridge.payload.camera_trigger import PhotoTrigger
 from autopilot_bridge.payload.camera_video import VideoStream
@@ -62,6 +63,8 @@ class CameraComponent(Component):
         keeper: makes files of photos and videos; None: they are counted only.
         mode: CAMERA_MODE.
         lens, storage, tracker, trigger, heard: the parts.
+        photo_quality: of JPEG files, to 100.
+        definition: the file that describes it, and its settings.
         recording_since_us: None: no video is being taken.
     """
 
@@ -109,6 +112,8 @@ class CameraComponent(Component):
                 mavlink.MAVLINK_MSG_ID_CAMERA_TRACKING_GEO_STATUS: lambda t: tracking_geo_status(self, t),
             }
         )
+        self.photo_quality = PHOTO_QUALITY
+        self.definition = CameraDefinition(self)
         self._commands = CameraCommands(self)
         self._handlers.update(self._commands.handlers)
         self._answers.update(self._commands.answers)
@@ -121,6 +126,7 @@ class CameraComponent(Component):
     def step(self, time_us: int) -> None:
         """Streams, photos of a running series, a moving lens, the status while something runs."""
         super().step(time_us)
+        self.definition.step(time_us)
         if self.trigger.running and self.trigger.due(time_us):
             self.take_photo()
         if self.lens.moving and time_us - self._lens_us >= _LENS_INTERVAL_US:
@@ -206,6 +212,8 @@ class CameraComponent(Component):
             and self.trigger.travelled(self.heard.velocity_ned_m_s, self._time_us)
         ):
             self.take_photo()
+        if not told:
+            self.definition.handle(message, sender, self._time_us)
 
     def _record(self, time_us: int) -> None:
         if self.recorded_mib >= self.storage.available_mib:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.payload.camera_storage import STORAGE_ID
+from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, STORAGE_ID
 from autopilot_bridge.payload.camera_video import STREAM_ID
 from autopilot_bridge.payload.component import Answer, CommandHandler, parameters, whole
 
@@ -172,6 +172,7 @@ class CameraCommands:
             return _DENIED
         self._camera.mode = mode
         self._camera.tell_settings()
+        self._camera.definition.tell("CAM_MODE")
         return _ACCEPTED
 
     def _zoom(self, message: Any, sender: Sender) -> int | None:
@@ -195,6 +196,7 @@ class CameraCommands:
             return _DENIED
         self._camera.mode = int(mavlink.CAMERA_MODE_IMAGE)
         self._camera.lens.reset()
+        self._camera.photo_quality = PHOTO_QUALITY
         self._camera.tell_settings()
         return _ACCEPTED
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.camera_definition import URI, VERSION
 from autopilot_bridge.payload.component import fixed_text
 from autopilot_bridge.payload.vehicle_heard import Quaternion, forward_axis
 from flightsim.payload import Detection
@@ -48,8 +49,8 @@ def information(camera: "CameraComponent") -> Any:
         model.height_px,
         0,
         flags,
-        0,
-        b"",
+        VERSION,
+        fixed_text(URI, 140),
         gimbal_device_id=camera.gimbal_device_id,
     )
 
@@ -92,6 +93,7 @@ def photo_notes(camera: "CameraComponent") -> dict[str, float]:
     """What goes into a photo's file."""
     notes = {
         "focal_mm": camera.lens.focal_mm,
+        "quality": camera.photo_quality,
         "focal_35_mm": camera.lens.focal_mm * _FILM_WIDTH_MM / SENSOR_WIDTH_MM,
     }
     here, q = camera.heard.located(camera.time_us), camera.orientation

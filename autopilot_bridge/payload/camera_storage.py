@@ -10,6 +10,8 @@ CAPACITY_MIB: Final = 32_768.0
 IMAGE_MIB: Final = 4.0
 VIDEO_MIB_S: Final = 1.0
 STORAGE_ID: Final = 1
+PHOTO_QUALITY: Final = 92
+"""Of JPEG files, unless it is set."""
 _REMEMBERED: Final = 20_000  # photos that can be asked for again
 
 

@@ -3,14 +3,12 @@
 import math
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 from PIL.ExifTags import GPS, IFD, Base
-
-_QUALITY: Final = 92
 
 
 def save_photo(path: Path, picture: NDArray[np.uint8], notes: dict[str, Any]) -> None:
@@ -20,14 +18,17 @@ def save_photo(path: Path, picture: NDArray[np.uint8], notes: dict[str, Any]) ->
         path: a new file.
         picture: the picture.
         notes: what is known of: "lat_deg", "lon_deg", "alt_m" (above mean sea level), "yaw_deg" (of the
-            optical axis from true north), "unix_us", "focal_mm", "focal_35_mm".
+            optical axis from true north), "unix_us", "focal_mm", "focal_35_mm"; and the "quality" to
+            save it with, 1 to 100.
 
     Raises:
         OSError: the file can't be made, or exists.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("xb") as file:
-        Image.fromarray(picture[:, :, ::-1]).save(file, "JPEG", quality=_QUALITY, exif=_exif(notes))
+        Image.fromarray(picture[:, :, ::-1]).save(
+            file, "JPEG", quality=int(notes["quality"]), exif=_exif(notes)
+        )
 
 
 def _exif(notes: dict[str, Any]) -> Image.Exif:

@@ -104,7 +104,7 @@ async def use_camera(system: Any) -> None:
 async def use_lens_and_video(system: Any) -> None:
     from mavsdk.asyncio.plugins.camera import CameraAsync
     from mavsdk.asyncio.plugins.gimbal import GimbalAsync
-    from mavsdk.plugins.camera import CameraError, Mode
+    from mavsdk.plugins.camera import CameraError, Mode, Option, Setting
     from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode
 
     from tests.clients.mavsdk_waiting import first
@@ -128,6 +128,11 @@ async def use_lens_and_video(system: Any) -> None:
         camera.subscribe_video_stream_info(), lambda u: u.video_stream_info.settings.uri, "video stream"
     )
     assert shown.video_stream_info.settings.uri.startswith("rtsp://127.0.0.1:")
+    known = await camera.get_possible_setting_options(CAMERA)
+    assert {item.setting_id for item in known} >= {"CAM_PHOTOQUAL", "CAM_AUTOFOCUS"}
+    await camera.set_setting(CAMERA, Setting("CAM_PHOTOQUAL", "", Option("75", ""), False))
+    chosen = await camera.get_setting(CAMERA, Setting("CAM_PHOTOQUAL", "", Option("", ""), False))
+    assert chosen.option.option_id == "75"
     await camera.stop_video_streaming(CAMERA, 1)
     await camera.start_video_streaming(CAMERA, 1)
 
@@ -151,6 +156,7 @@ async def use_lens_and_video(system: Any) -> None:
     await camera.reset_settings(CAMERA)
 
 
+@pytest.mark.compatibility(client="MAVSDK asyncio", feature="camera, gimbal", plane=True)
 def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
     from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
@@ -169,6 +175,7 @@ def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
     asyncio.run(use(f"udpin://127.0.0.1:{port}"))
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="LANDING_TARGET of the camera", plane=True)
 def test_mavutil_sees_a_target(vehicle: tuple[str, int, int]) -> None:
     flavour, _, port = vehicle
     client = Client(flavour, f"udpin:127.0.0.1:{port}", speedup=SPEEDUP)

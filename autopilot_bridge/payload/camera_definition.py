@@ -1,0 +1,198 @@
+"""The camera's own settings: a camera definition file, by MAVLink FTP, and its parameters (PARAM_EXT).
+
+Source: MAVLink camera definition files (mavlink.io/en/services/camera_def.html), extended parameter protocol
+(mavlink.io/en/services/parameter_ext.html), MAVLink FTP with the component as its server.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+from xml.etree import ElementTree
+
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY
+from autopilot_bridge.services.channel import Source
+from autopilot_bridge.services.file_transfer import FileTransferService
+from autopilot_bridge.storage.generated import GeneratedStore
+
+if TYPE_CHECKING:
+    from autopilot_bridge.payload.camera import CameraComponent
+
+VERSION: Final = 1
+"""Clients keep the file by it: raise it with every change of what is in there."""
+FILE: Final = "camera.xml"
+URI: Final = f"mftp:///{FILE}"
+_TICK_US: Final = 20_000
+_UINT8: Final = int(mavlink.MAV_PARAM_EXT_TYPE_UINT8)
+_ACCEPTED: Final = int(mavlink.PARAM_ACK_ACCEPTED)
+_UNKNOWN: Final = int(mavlink.PARAM_ACK_VALUE_UNSUPPORTED)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraSetting:
+    """One setting: a small number that has a name for each of its values.
+
+    Attributes:
+        name: of the parameter.
+        description: for people.
+        default: value.
+        options: (name, value) of all values there are.
+        get, set: of the component.
+    """
+
+    name: str
+    description: str
+    default: int
+    options: tuple[tuple[str, int], ...]
+    get: Callable[[], int]
+    set: Callable[[int], None]
+
+
+class CameraDefinition:
+    """Serves the definition and the settings of one camera component."""
+
+    def __init__(self, camera: "CameraComponent") -> None:
+        self._camera = camera
+        self.name = "bus"
+        self.settings = _settings(camera)
+        self._files = FileTransferService(GeneratedStore({FILE: lambda _: definition(self.settings)}))
+        self._next_tick_us: int | None = None  # nobody has asked for a file yet
+        self._list: list[int] = []
+
+    def send(self, message: Any) -> None:
+        """What the file service says (it takes this for its channel)."""
+        self._camera.send(message)
+
+    def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> None:
+        """Take FTP and PARAM_EXT messages."""
+        match message.get_msgId():
+            case mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
+                self._files.handle(message, Source(self, *sender), time_us)
+                self._next_tick_us = time_us
+            case mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST:
+                self._list = list(range(len(self.settings)))
+            case mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_READ:
+                index = message.param_index
+                if index == -1:
+                    index = self._index(message.param_id)
+                if 0 <= index < len(self.settings):
+                    self._tell(index)
+            case mavlink.MAVLINK_MSG_ID_PARAM_EXT_SET:
+                self._set(message)
+
+    def step(self, time_us: int) -> None:
+        """Go on with files and lists."""
+        if self._list:
+            self._tell(self._list.pop(0))
+        if self._next_tick_us is not None and time_us >= self._next_tick_us:
+            self._next_tick_us = time_us + _TICK_US
+            self._files.tick(time_us)
+
+    def tell(self, name: str) -> None:
+        """A setting was changed by a command: say so."""
+        self._tell(self._index(name))
+
+    def _index(self, name: str) -> int:
+        return next((i for i, setting in enumerate(self.settings) if setting.name == name), -1)
+
+    def _set(self, message: Any) -> None:
+        index = self._index(message.param_id)
+        value, result = -1, _UNKNOWN
+        if index >= 0:
+            setting = self.settings[index]
+            wanted = _number(message.param_value)
+            if message.param_type == _UINT8 and any(wanted == value for _, value in setting.options):
+                setting.set(wanted)
+                result = _ACCEPTED
+            value = setting.get()
+        self._camera.send(
+            mavlink.MAVLink_param_ext_ack_message(
+                _text(message.param_id), _bytes(max(0, value)), _UINT8, result
+            )
+        )
+
+    def _tell(self, index: int) -> None:
+        setting = self.settings[index]
+        self._camera.send(
+            mavlink.MAVLink_param_ext_value_message(
+                setting.name.encode(), _bytes(setting.get()), _UINT8, len(self.settings), index
+            )
+        )
+
+
+def definition(settings: tuple[CameraSetting, ...]) -> bytes:
+    """The camera definition file."""
+    root = ElementTree.Element("mavlinkcamera")
+    head = ElementTree.SubElement(root, "definition", version=str(VERSION))
+    ElementTree.SubElement(head, "model").text = "simulated camera"
+    ElementTree.SubElement(head, "vendor").text = "flightstack"
+    parameters = ElementTree.SubElement(root, "parameters")
+    for setting in settings:
+        item = ElementTree.SubElement(
+            parameters, "parameter", name=setting.name, type="uint8", default=str(setting.default)
+        )
+        if setting.name == "CAM_MODE":  # clients have a control of their own for it
+            item.set("control", "0")
+        ElementTree.SubElement(item, "description").text = setting.description
+        options = ElementTree.SubElement(item, "options")
+        for name, value in setting.options:
+            ElementTree.SubElement(options, "option", name=name, value=str(value))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+
+
+def _settings(camera: "CameraComponent") -> tuple[CameraSetting, ...]:
+    def set_mode(mode: int) -> None:
+        camera.mode = mode
+        camera.tell_settings()
+
+    def set_quality(quality: int) -> None:
+        camera.photo_quality = quality
+
+    def set_autofocus(on: int) -> None:
+        kind = mavlink.FOCUS_TYPE_AUTO_CONTINUOUS if on else mavlink.FOCUS_TYPE_AUTO_SINGLE
+        if camera.lens.focus(kind, math.nan):
+            camera.tell_settings()
+
+    return (
+        CameraSetting(
+            name="CAM_MODE",
+            description="Camera mode",
+            default=int(mavlink.CAMERA_MODE_IMAGE),
+            options=(("Photo", 0), ("Video", 1), ("Survey", 2)),
+            get=lambda: camera.mode,
+            set=set_mode,
+        ),
+        CameraSetting(
+            name="CAM_PHOTOQUAL",
+            description="JPEG quality",
+            default=PHOTO_QUALITY,
+            options=(("Fine", 98), ("Normal", PHOTO_QUALITY), ("Small", 75)),
+            get=lambda: camera.photo_quality,
+            set=set_quality,
+        ),
+        CameraSetting(
+            name="CAM_AUTOFOCUS",
+            description="Autofocus",
+            default=1,
+            options=(("Once", 0), ("Always", 1)),
+            get=lambda: int(camera.device.focus_distance_m is None),
+            set=set_autofocus,
+        ),
+    )
+
+
+def _number(value: Any) -> int:
+    """The first byte of a value, which decoders take for text."""
+    if isinstance(value, str):
+        value = value.encode("latin-1", "replace")
+    return value[0] if len(value) else 0
+
+
+def _bytes(value: int) -> bytes:
+    return bytes((value,)).ljust(128, b"\0")
+
+
+def _text(name: Any) -> bytes:
+    return (name if isinstance(name, bytes) else str(name).encode("ascii", "replace"))[:16]
