@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, Place
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
@@ -16,6 +17,7 @@ from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask
 if TYPE_CHECKING:
     from autopilot_bridge.commander.commander import Commander
 
+_DO_REPOSITION: Final = 192
 _MAX_DISTANCE_M: Final = 1e6
 _MAX_SPEED_M_S: Final = 100.0
 _MAX_RADIUS_M: Final = 1e4
@@ -123,6 +125,10 @@ class Guidance:
         if commander.policy.fence_bounds_targets and not commander.fence.allows(
             (north_m, east_m, down_m), here
         ):
+            told = CommandDenied(
+                time_us=commander.time_us, command=_DO_REPOSITION, reason=Reason.OUTSIDE_FENCE
+            )
+            commander.emit(told)
             return Verdict(result=commander.policy.mode_denied, reasons=(Reason.OUTSIDE_FENCE,))
         verdict = commander.set_mode(commander.policy.reposition_mode)
         if not verdict.accepted or not commander.armed or commander.mode is not commander.commanded_mode:

@@ -1,8 +1,9 @@
 """What PX4 says about events (v1.16.1, reference sections 7 to 9).
 
-PX4 gives the reasons of a refused arming in EVENT messages, which need its metadata server to be read.
-Here they follow as plain texts, worded as PX4 words the events. The tab that marks a text as a copy of an
-EVENT is left out, so that ground stations show it.
+PX4 gives the reasons of a refused arming in EVENT messages (`px4_events`), which need its metadata to be
+read. Here they follow as texts too, worded as PX4 words the events, for clients that know texts only. The
+status text service ends texts that events repeat with a tab, so that those who read events don't show them
+twice.
 """
 
 from collections.abc import Mapping
@@ -53,16 +54,44 @@ _DISARMED: Final[Mapping[DisarmReason, str]] = {
 _COMMANDS: Final[Mapping[tuple[int, Reason], Notice]] = {
     (300, Reason.MISSION_MISSING): Notice(Severity.CRITICAL, "Mission start denied! No valid mission"),
     (300, Reason.MISSION_INVALID): Notice(Severity.CRITICAL, "Mission start denied! No valid mission"),
+    (192, Reason.OUTSIDE_FENCE): Notice(Severity.CRITICAL, "Reposition is outside geofence"),
     (400, Reason.BAD_PARAMETER): Notice(Severity.CRITICAL, "Unsupported ARM_DISARM param"),
     (176, Reason.MODE_UNKNOWN): Notice(Severity.CRITICAL, "Unsupported auto mode"),
 }
+
+_SWITCHING: Final = "Switching to {} is currently not available"
+_BATTERY: Final[Mapping[BatteryLevel, str]] = {
+    BatteryLevel.LOW: "Low battery level, return advised",
+    BatteryLevel.CRITICAL: "Critical battery level, land now",
+    BatteryLevel.EMERGENCY: "Dangerous battery level, land immediately",
+}
+_ARMED: Final = Notice(Severity.INFO, "Armed by external command")
+_ARMING_DENIED: Final = Notice(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
+_DISARMING_DENIED: Final = Notice(Severity.CRITICAL, "Disarming denied: not landed")
+_TAKEOFF: Final = Notice(Severity.INFO, "Takeoff detected")
+_LANDING: Final = Notice(Severity.INFO, "Landing detected")
+_MISSION_FINISHED: Final = Notice(Severity.INFO, "Mission finished, loitering")
+
+FIXED: Final = (
+    _ARMED,
+    _ARMING_DENIED,
+    _DISARMING_DENIED,
+    _TAKEOFF,
+    _LANDING,
+    _MISSION_FINISHED,
+    *(Notice(Severity.INFO, text) for text in dict.fromkeys(_DISARMED.values())),
+    *(Notice(Severity.CRITICAL, _SWITCHING.format(name)) for name in dict.fromkeys(MODE_NAMES.values())),
+    *(Notice(Severity.CRITICAL, text) for text in _BATTERY.values()),
+    *dict.fromkeys(_COMMANDS.values()),
+)
+"""Texts without numbers in them that have an event of their own."""
 
 
 def notices(event: events.Event) -> tuple[Notice, ...]:
     """The STATUSTEXTs of an event, in order."""
     match event:
         case events.Armed():
-            return (Notice(Severity.INFO, "Armed by external command"),)
+            return (_ARMED,)
         case events.Disarmed(reason=reason):
             return (Notice(Severity.INFO, _DISARMED[reason]),)
         case events.ArmingDenied(reasons=reasons, check_only=check_only):
@@ -71,14 +100,11 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
             )
             if check_only:
                 return why
-            return (
-                Notice(Severity.CRITICAL, "Arming denied: Resolve system health failures first"),
-                *why,
-            )
+            return (_ARMING_DENIED, *why)
         case events.DisarmingDenied():
-            return (Notice(Severity.CRITICAL, "Disarming denied: not landed"),)
+            return (_DISARMING_DENIED,)
         case events.ModeDenied(mode=mode) if mode is not None:
-            return (Notice(Severity.CRITICAL, f"Switching to {MODE_NAMES[mode]} is currently not available"),)
+            return (Notice(Severity.CRITICAL, _SWITCHING.format(MODE_NAMES[mode])),)
         case events.CommandDenied(command=command, reason=reason):
             known = _COMMANDS.get((command, reason))
             return () if known is None else (known,)
@@ -87,18 +113,14 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
         case events.FailsafeActivated(action=FailsafeAction.WARN):
             return (Notice(Severity.CRITICAL, "Failsafe warning triggered"),)
         case events.BatteryWarning(level=level):
-            text = {
-                BatteryLevel.LOW: "Low battery level, return advised",
-                BatteryLevel.CRITICAL: "Critical battery level, land now",
-                BatteryLevel.EMERGENCY: "Dangerous battery level, land immediately",
-            }.get(level)
+            text = _BATTERY.get(level)
             return () if text is None else (Notice(Severity.CRITICAL, text),)
         case events.TakeoffDetected():
-            return (Notice(Severity.INFO, "Takeoff detected"),)
+            return (_TAKEOFF,)
         case events.LandingDetected():
-            return (Notice(Severity.INFO, "Landing detected"),)
+            return (_LANDING,)
         case events.MissionFinished():
-            return (Notice(Severity.INFO, "Mission finished, loitering"),)
+            return (_MISSION_FINISHED,)
     return ()
 
 

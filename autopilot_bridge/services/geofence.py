@@ -15,7 +15,7 @@ from autopilot_bridge.commander.events import Event, FenceBreached
 from autopilot_bridge.commander.geofence_parameters import ALL_FENCES, FenceType
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flight.plan_reading import target_of
-from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
+from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Broadcast, Source, send_to_all
 from autopilot_bridge.services.command_common import Command, Handler, whole
@@ -25,8 +25,6 @@ from autopilot_bridge.telemetry.streams import Builder, Values
 
 _STATUS: Final = mavlink.MAVLINK_MSG_ID_FENCE_STATUS
 _OFF, _ON, _FLOOR_OFF = 0, 1, 2  # of DO_FENCE_ENABLE
-_TOTALS: Final = {MissionType.FENCE: "FENCE_TOTAL", MissionType.RALLY: "RALLY_TOTAL"}
-_MOST: Final = 127  # the parameters are of eight bits
 
 
 class ArdupilotGeofence(Microservice):
@@ -34,8 +32,7 @@ class ArdupilotGeofence(Microservice):
 
     Args:
         commander: has the fence.
-        parameters: FENCE_ENABLE and the totals.
-        stores: the uploaded plans, by type.
+        parameters: FENCE_ENABLE.
         broadcast: all channels.
     """
 
@@ -43,19 +40,16 @@ class ArdupilotGeofence(Microservice):
         self,
         commander: Commander,
         parameters: ParameterStore,
-        stores: Mapping[MissionType, MissionStore],
         broadcast: Broadcast,
     ) -> None:
         self._commander = commander
         self._parameters = parameters
-        self._stores = stores
         self._broadcast = broadcast
-        self._versions = dict.fromkeys(_TOTALS, 0)
 
     @classmethod
     def of(cls, parts: AutopilotParts) -> "ArdupilotGeofence":
         """The one of an autopilot."""
-        return cls(parts.commander, parts.parameters, parts.stores, parts.broadcast)
+        return cls(parts.commander, parts.parameters, parts.broadcast)
 
     @property
     def commands(self) -> Mapping[int, Handler]:
@@ -66,16 +60,6 @@ class ArdupilotGeofence(Microservice):
     def builders(self) -> Mapping[int, Builder]:
         """FENCE_STATUS."""
         return {_STATUS: self._status}
-
-    def tick(self, time_us: int) -> None:
-        """FENCE_TOTAL and RALLY_TOTAL follow what was uploaded."""
-        for kind, name in _TOTALS.items():
-            store = self._stores[kind]
-            if store.version != self._versions[kind]:
-                self._versions[kind] = store.version
-                if name in self._parameters:
-                    count = min(len(store.items), _MOST)
-                    self._parameters.set(name, count, check_range=False)
 
     def follow(self, event: Event) -> None:
         """A breach is told at once."""

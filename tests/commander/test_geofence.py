@@ -296,6 +296,8 @@ def test_places_outside_are_not_flown_to(flavour: str) -> None:
     rig.put_in_air(10.0)
     guidance = rig.commander.guidance
     assert not guidance.reposition(north_m=70.0, east_m=0.0, down_m=-10.0).accepted
+    rig.run(0.1)
+    assert ("Reposition is outside geofence" in rig.texts()) is (flavour == "px4")
     assert guidance.reposition(north_m=30.0, east_m=0.0, down_m=-10.0).accepted
 
 

@@ -5,7 +5,6 @@ from typing import Any
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
@@ -79,12 +78,7 @@ class ServiceRig(Rig):
             mission_item_count=lambda: len(self.missions.items),
             inject_failure=self._inject,
         )
-        stores = {MissionType.MISSION: self.missions, MissionType.FENCE: self.fence}
-        more = (
-            ArdupilotGeofence(self.commander, self.store, stores, self).commands
-            if flavour == "ardupilot"
-            else {}
-        )
+        more = ArdupilotGeofence(self.commander, self.store, self).commands if flavour == "ardupilot" else {}
         self.commands = CommandService.for_flavour(
             flavour, self.commander, hooks, self.flavour.command_address(1), more
         )
