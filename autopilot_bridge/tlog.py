@@ -25,6 +25,7 @@ from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
 
 _TIME: Final = struct.Struct(">Q")
 _pack_time: Final = _TIME.pack
+_OVERHEAD_V1: Final = HEADER_SIZE_V1 + CHECKSUM_SIZE
 _OVERHEAD_V2: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
 FLUSH_BYTES: Final = 64 * 1024
 FLUSH_INTERVAL_US: Final = 1_000_000
@@ -34,12 +35,13 @@ _CHUNK_BYTES: Final = 1 << 20
 def append_records(buffer: bytearray, time_us: int, packet: bytes) -> int:
     """Append the frames of a packet that a channel of ours has sent, as records, to the bytes of a log.
 
-    They are told apart by their lengths only; what comes from elsewhere goes through a parser first.
+    They are told apart by their lengths only; what comes from elsewhere goes through a parser first. Among
+    them may be somebody else's that were forwarded as they came: MAVLink 1, or signed.
 
     Args:
         buffer: where to.
         time_us: microseconds of the Unix epoch.
-        packet: one or more whole MAVLink 2 frames, one behind the other, unsigned.
+        packet: one or more whole frames, one behind the other.
 
     Returns:
         How many records.
@@ -50,11 +52,19 @@ def append_records(buffer: bytearray, time_us: int, packet: bytes) -> int:
     frames = [b""]
     start, size = 0, len(packet)
     try:
-        while start < size and packet[start] == MAGIC_V2:
-            end = start + _OVERHEAD_V2 + packet[start + 1]
+        while start < size:
+            magic = packet[start]
+            if magic == MAGIC_V2:
+                end = start + _OVERHEAD_V2 + packet[start + 1]
+                if packet[start + 2] & INCOMPAT_SIGNED:
+                    end += SIGNATURE_SIZE
+            elif magic == MAGIC_V1:
+                end = start + _OVERHEAD_V1 + packet[start + 1]
+            else:
+                break
             frames.append(packet[start:end])
             start = end
-    except IndexError:  # it ends with the first byte of a frame
+    except IndexError:  # it ends with the first bytes of a frame
         pass
     if start != size:
         torn = size - len(frames[-1]) if start > size else start
@@ -110,7 +120,7 @@ class TlogWriter:
         self._flush_if_due(time_us)
 
     def write_packet(self, time_us: int, packet: bytes) -> None:
-        """Append the frames of a packet that a channel of ours has sent: whole unsigned MAVLink 2 frames.
+        """Append the frames of a packet that a channel of ours has sent.
 
         They are told apart by their lengths only; what comes from elsewhere goes through a parser first.
 

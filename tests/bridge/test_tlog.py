@@ -54,6 +54,23 @@ def test_round_trip(tmp_path):
     assert (counters.records, counters.bytes_skipped, counters.frames.frames_lost) == (3000, 0, 0)
 
 
+def test_forwarded_frames_of_others_are_records_too(tmp_path):
+    """MAVLink 1 and signed frames go through links as they came, and so into the log."""
+    mav = dialect.MAVLink(None, srcSystem=200, srcComponent=191)
+    heartbeat = dialect.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+    first = heartbeat.pack(mav, force_mavlink1=True)
+    mav.signing.secret_key, mav.signing.sign_outgoing, mav.signing.link_id = b"k" * 32, True, 1
+    signed = heartbeat.pack(mav)
+    ours = records(1)[0][1]
+    assert first[0] == 0xFE
+    assert signed[2] & 1
+    path = tmp_path / "a.tlog"
+    with TlogWriter(path) as log:
+        log.write_packet(EPOCH_US, first)
+        log.write_packet(EPOCH_US, ours + signed + first)
+    assert [raw for _, raw in read(path)[0]] == [first, ours, signed, first]
+
+
 def test_packets_are_split_into_records(tmp_path):
     frames = [frame for _, frame in records(5)]
     with TlogWriter(tmp_path / "a.tlog") as log:

@@ -7,6 +7,7 @@ memory is kept.
 """
 
 import gc
+import tempfile
 import time
 import traceback
 from collections.abc import Callable
@@ -17,7 +18,10 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameParser
+from autopilot_bridge.sitl import VehicleSpecification
 from autopilot_bridge.sitl.server import objects_kept
+from autopilot_bridge.sitl.warm_up import compile_flight_code
+from autopilot_bridge.tlog import TlogWriter
 from flightsim import truth as t
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
 from tests.fuzz.generator import Generator
@@ -65,6 +69,7 @@ class Campaign:
         self._flavour, self._model, self._seed = flavour, model, seed
         self._wings = model != "iris"
         self._round = 0
+        compile_flight_code((VehicleSpecification(model=model),))
 
     def run(self, count: int, *, told: Callable[[str], None] = lambda text: None) -> Figures:
         """Fire so many messages: five of six in rounds that are harmless."""
@@ -93,6 +98,7 @@ class Campaign:
 
     def _fresh(self) -> Flying:
         flying = Flying(self._flavour, model=self._model, payload=_CARRIED, seed=self._seed + self._round)
+        flying.sitl.record(_Log())  # on a link of its own, to which what is for others is forwarded
         flying.take_off(60.0 if self._wings else 10.0)
         flying.step(5.0)
         return flying
@@ -148,6 +154,17 @@ class Campaign:
         self.figures.complaints.append(
             f"{self.name}, seed {self._seed}, round {self._round} ({kind}), message {sent}: {what} at {names}"
         )
+
+
+class _Log(TlogWriter):
+    """A log that looks at what it is given, and keeps nothing."""
+
+    def __init__(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            super().__init__(Path(folder) / "nobody.tlog")
+
+    def flush(self) -> None:
+        self._buffer.clear()
 
 
 class _Held:

@@ -10,6 +10,8 @@ import struct
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
+from pymavlink.generator.mavcrc import x25crc
+
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, MAVLinkMessage, MessageDefinition, dialect
 
 VEHICLE: Final = 1
@@ -133,7 +135,21 @@ class Generator:
                 sequence = self._rng.choice(self._services)()
                 encoder = self._rng.choice(self._encoders)
                 frames += [encoder.encode(message) for message in sequence]
-        return frames
+        return [self._dressed(frame) for frame in frames]
+
+    def _dressed(self, frame: bytes) -> bytes:
+        """The frame, sometimes as MAVLink 1, sometimes with a signature of nobody."""
+        kind = self._rng.random()
+        if kind > 0.1:
+            return frame
+        message_id = int.from_bytes(frame[7:10], "little")
+        item = DEFINITIONS[message_id]
+        if kind < 0.05 and message_id < 256:
+            payload = frame[10:-2]
+            head = bytes((0xFE, len(payload), frame[4], frame[5], frame[6], message_id)) + payload
+            return head + _checksum(head[1:], item)
+        head = frame[:2] + b"\1" + frame[3:-2]
+        return head + _checksum(head[1:], item) + self._rng.randbytes(13)
 
     # any message
 
@@ -387,3 +403,7 @@ class Generator:
             *(self._float() for _ in range(4)), rng.randint(-(2**31), 2**31 - 1),
             rng.randint(-(2**31), 2**31 - 1), self._float(),
         )  # fmt: skip
+
+
+def _checksum(covered: bytes, item: MessageDefinition) -> bytes:
+    return x25crc(covered + bytes([item.crc_extra])).crc.to_bytes(2, "little")
