@@ -151,5 +151,6 @@ ARDUPILOT: Final = Flavour(
     navigation_parameters=ardupilot_mapping.navigation_parameters,
     text_needs_heartbeat=True,
     heartbeat_on_mode_change=True,
+    sends_events=False,
     bytewise_parameters=False,
 )

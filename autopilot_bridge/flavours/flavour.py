@@ -162,6 +162,7 @@ class Flavour:
             take its `envelope` too.
         text_needs_heartbeat: no STATUSTEXT on a channel before a heartbeat was received there.
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
+        sends_events: what happens is told in EVENT messages, texts repeat them.
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
     """
 
@@ -192,4 +193,5 @@ class Flavour:
     navigation_parameters: Callable[[ParameterStore], NavigationParameters]
     text_needs_heartbeat: bool
     heartbeat_on_mode_change: bool
+    sends_events: bool
     bytewise_parameters: bool

@@ -136,5 +136,6 @@ PX4: Final = Flavour(
     navigation_parameters=px4_mapping.navigation_parameters,
     text_needs_heartbeat=False,
     heartbeat_on_mode_change=False,
+    sends_events=True,
     bytewise_parameters=True,
 )

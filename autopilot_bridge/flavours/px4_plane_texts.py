@@ -1,6 +1,6 @@
 """What PX4 says about events on a fixed wing (v1.16.1): as on a multicopter, and what only aircraft do.
 
-As in `px4_texts`, what PX4 tells in EVENT messages follows as plain texts.
+As in `px4_texts`, what PX4 tells in EVENT messages follows as texts.
 """
 
 from typing import Final
@@ -12,25 +12,37 @@ from autopilot_bridge.flavours.texts import Notice, Severity
 
 _LAUNCH_M_S2: Final = 6.0  # no propeller accelerates an aircraft so from rest, any launcher does
 
+_EXECUTING: Final = Notice(Severity.INFO, "Executing Mission")
+_LANDED: Final = Notice(Severity.INFO, "Mission finished, landed")
+_AIRSPEED_FAILED: Final = Notice(
+    Severity.CRITICAL, "Airspeed sensor failure detected. Return to launch (RTL) is advised"
+)
+_AIRSPEED_HEALTHY: Final = Notice(Severity.INFO, "Airspeed sensor healthy, start using again")
+_RUNWAY: Final = Notice(Severity.INFO, "Takeoff on runway")
+_FLARING: Final = Notice(Severity.INFO, "Landing, flaring")
+_ABORTED: Final = Notice(Severity.CRITICAL, "Landing aborted")
+
+FIXED: Final = (_EXECUTING, _LANDED, _AIRSPEED_FAILED, _AIRSPEED_HEALTHY, _RUNWAY, _FLARING, _ABORTED)
+"""Texts without numbers in them that have an event of their own."""
+
 
 def notices(event: events.Event) -> tuple[Notice, ...]:
     """The STATUSTEXTs of an event, in order."""
     match event:
         case events.ModeChanged(mode=FlightMode.MISSION):
-            return (Notice(Severity.INFO, "Executing Mission"),)
+            return (_EXECUTING,)
         case events.MissionFinished(landed=True):
-            return (Notice(Severity.INFO, "Mission finished, landed"),)
+            return (_LANDED,)
         case events.AirspeedChanged(valid=False):
-            text = "Airspeed sensor failure detected. Return to launch (RTL) is advised"
-            return (Notice(Severity.CRITICAL, text),)
+            return (_AIRSPEED_FAILED,)
         case events.AirspeedChanged(valid=True):
-            return (Notice(Severity.INFO, "Airspeed sensor healthy, start using again"),)
+            return (_AIRSPEED_HEALTHY,)
         case events.LaunchDetected(acceleration_m_s2=acceleration) if acceleration < _LAUNCH_M_S2:
-            return (Notice(Severity.INFO, "Takeoff on runway"),)
+            return (_RUNWAY,)
         case events.LaunchDetected(delay_s=delay_s):
             return (Notice(Severity.INFO, f"Launch detected. Enabling motors in {delay_s:.1f}s"),)
         case events.FlareStarted():
-            return (Notice(Severity.INFO, "Landing, flaring"),)
+            return (_FLARING,)
         case events.LandingAborted():
-            return (Notice(Severity.CRITICAL, "Landing aborted"),)
+            return (_ABORTED,)
     return px4_texts.notices(event)

@@ -14,6 +14,7 @@ from typing import Any, Final
 from pymavlink.dialects.v20 import all as dialect
 
 from autopilot_bridge.errors import MessageError
+from autopilot_bridge.mavlink.event_messages import MESSAGES
 
 MAVLinkMessage = Any
 """A message object of the dialect (`pymavlink.dialects.v20.all.MAVLink_message`); pymavlink carries no
@@ -143,9 +144,9 @@ def _field_format(field: WireField) -> str:
 
 
 DEFINITIONS: Final = MappingProxyType(
-    {key: define_class(value) for key, value in dialect.mavlink_map.items()}
+    {key: define_class(value) for key, value in {**dialect.mavlink_map, **MESSAGES}.items()}
 )
-"""Every message of the dialect by id."""
+"""Every message of the dialect by id, and those that `event_messages` adds."""
 
 _BY_NAME: Final = MappingProxyType({item.name: item for item in DEFINITIONS.values()})
 

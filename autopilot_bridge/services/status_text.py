@@ -39,8 +39,9 @@ class StatusTextService:
 
     def tell(self, event: Event) -> None:
         """Announce an event in the flavour's words."""
+        end = "\t" if self._flavour.sends_events else ""  # marks what an EVENT says too
         for notice in self._flavour.notices(event):
-            self.announce(notice.severity, notice.text)
+            self.announce(notice.severity, notice.text + end)
 
     def banner(self, channel: Channel) -> None:
         """Who this is, as after a parameter list request on a channel."""

@@ -1,8 +1,10 @@
 """The microservices of a vehicle that have to do with files, put together for one autopilot."""
 
-
-from autopilot_bridge.flavours.card_layout import CARD_LAYOUTS, CardLayout
+from autopilot_bridge.flavours.card_layout import CARD_LAYOUTS
+from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services import packed_parameters
+from autopilot_bridge.services.component_metadata import MOUNT, ComponentMetadataService
+from autopilot_bridge.services.events import EventService
 from autopilot_bridge.services.file_transfer import FileTransferService
 from autopilot_bridge.services.log_book import LogBook
 from autopilot_bridge.services.log_transfer import LogTransferService
@@ -33,22 +35,26 @@ def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
         if memory.card.logs
         else None
     )
-    files = FileTransferService(_tree(parts, layout))
+    places: dict[VehiclePath, FileStore] = {layout.mount: card}
+    told: tuple[Microservice, ...] = ()
+    if name == "px4":
+        metadata = ComponentMetadataService(parts.parameters.definitions, memory.time_us)
+        places[MOUNT] = metadata.store()
+        told = (metadata, EventService(parts.commander, parts.broadcast, parts.flavour.notices))
+    else:
+        places["@PARAM",] = _packed_parameters(parts.parameters)
+    files = FileTransferService(MountTable(places))
     logs = LogTransferService(book, lambda: None if recorder is None else recorder.path)
     storage = ParameterStorageService(
         memory.stored, parts.parameters, parts.commander, STORAGE_POLICIES[name], layout, parts.announce
     )
     power = PowerService(POWER_POLICIES[name], parts.commander, memory.power)
-    return (files, logs, storage, power, *(() if recorder is None else (recorder,)))
+    return (files, logs, storage, power, *told, *(() if recorder is None else (recorder,)))
 
 
-def _tree(parts: AutopilotParts, layout: CardLayout) -> FileStore:
-    """What clients see."""
-    places: dict[VehiclePath, FileStore] = {layout.mount: parts.memory.card.files}
-    if parts.flavour.name == "ardupilot":
-        store = parts.parameters
-        places["@PARAM",] = GeneratedStore(
-            {"param.pck": lambda query: packed_parameters.pack(store, query)},
-            {"param.pck": lambda data: packed_parameters.apply(store, data)},
-        )
-    return MountTable(places)
+def _packed_parameters(store: ParameterStore) -> FileStore:
+    """ArduPilot's `@PARAM`."""
+    return GeneratedStore(
+        {"param.pck": lambda query: packed_parameters.pack(store, query)},
+        {"param.pck": lambda data: packed_parameters.apply(store, data)},
+    )

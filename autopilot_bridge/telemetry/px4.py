@@ -7,6 +7,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.telemetry.common import NAN, CommonMessages, TelemetrySources
@@ -48,6 +49,7 @@ ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
         _M.MAVLINK_MSG_ID_CURRENT_MODE: 0.5,
         _M.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
         _M.MAVLINK_MSG_ID_VIBRATION: 0.5,
+        CURRENT_EVENT_SEQUENCE: 1 / 3,
     }
 )
 """PX4's ONBOARD mode (UDP 14540), reference section 6."""

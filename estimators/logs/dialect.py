@@ -14,6 +14,7 @@ import pymavlink.dialects.v20
 
 from autopilot_bridge.mavlink import DEFINITIONS, MessageDefinition
 from autopilot_bridge.mavlink.definitions import define, define_class
+from autopilot_bridge.mavlink.event_messages import MESSAGES
 from estimators.logs.errors import LogError
 from estimators.logs.xml_definitions import FieldText, MessageText, read_definitions
 from estimators.messages import message_class
@@ -109,7 +110,8 @@ def _of_file(path: Path) -> Mapping[int, Description]:
 @cache
 def _pymavlink_dialect(name: str) -> Dialect:
     module = importlib.import_module(f"pymavlink.dialects.v20.{name}")
-    return Dialect(name, _described(name, (_from_class(item) for item in module.mavlink_map.values())))
+    classes = {**(MESSAGES if name == DEFAULT_DIALECT else {}), **module.mavlink_map}
+    return Dialect(name, _described(name, (_from_class(item) for item in classes.values())))
 
 
 def _described(

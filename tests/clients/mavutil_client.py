@@ -65,7 +65,7 @@ class Client:
                 continue
             last[message.get_type()] = message
             if message.get_type() == "STATUSTEXT":
-                self.texts.append(message.text)
+                self.texts.append(message.text.rstrip("\t"))  # a tab marks what an EVENT says too
             if found(message):
                 return message
         seen = {

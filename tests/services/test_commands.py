@@ -243,7 +243,7 @@ def test_px4_takeoff_without_altitude_uses_the_parameter() -> None:
 def test_px4_mission_start_changes_the_mode_and_arms() -> None:
     rig = rig_of("px4", "ready")
     assert rig.long(300, 0, 0) == [2]
-    assert "Mission start denied! No valid mission" in rig.channel.texts()
+    assert "Mission start denied! No valid mission\t" in rig.channel.texts()
     rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0))
     rig.tick()
     assert rig.long(300, NAN) == [2]
@@ -306,13 +306,13 @@ def test_ardupilot_set_mode_message_is_not_acknowledged() -> None:
 def test_px4_texts_of_refused_commands() -> None:
     rig = rig_of("px4", "flying")
     rig.long(ARM, 0)
-    assert rig.channel.texts() == ["Disarming denied: not landed"]
+    assert rig.channel.texts() == ["Disarming denied: not landed\t"]
     rig.long(ARM, 2)
-    assert rig.channel.texts() == ["Unsupported ARM_DISARM param"]
+    assert rig.channel.texts() == ["Unsupported ARM_DISARM param\t"]
     rig.long(MODE, 1, 4, 77)
-    assert rig.channel.texts() == ["Unsupported auto mode"]
+    assert rig.channel.texts() == ["Unsupported auto mode\t"]
     rig.long(MODE, 1, 4, 4)
-    assert rig.channel.texts() == ["Switching to Mission is currently not available"]
+    assert rig.channel.texts() == ["Switching to Mission is currently not available\t"]
 
 
 def test_ardupilot_pause_outside_guided_and_auto() -> None:

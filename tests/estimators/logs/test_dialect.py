@@ -9,6 +9,7 @@ import pymavlink.dialects.v20
 import pytest
 from pymavlink.generator import mavparse
 
+from autopilot_bridge.mavlink.event_messages import MESSAGES
 from estimators.logs import LogError, open_log
 from estimators.logs.dialect import dialect_names, load_dialect
 from estimators.logs.units import SI, to_si
@@ -65,8 +66,10 @@ def test_definition_files_as_pymavlink_parses_them(path):
 @pytest.mark.parametrize("name", ["all", "ardupilotmega", "common", "minimal"])
 def test_a_file_and_its_generated_dialect_are_the_same(name):
     by_name, by_file = load_dialect(name), load_dialect(FOLDER / f"{name}.xml")
-    assert by_name.messages.keys() == by_file.messages.keys()
-    for key, found in by_name.messages.items():
+    added = MESSAGES.keys() if name == "all" else set()  # pymavlink's own files have them not
+    assert by_name.messages.keys() - added == by_file.messages.keys()
+    for key in by_file.messages:
+        found = by_name.messages[key]
         other = by_file.messages[key]
         assert found.instance_field == other.instance_field
         assert dict(found.units) == dict(other.units)
