@@ -1,0 +1,131 @@
+"""MAVLink's events interface, sender's side: EVENT, CURRENT_EVENT_SEQUENCE, REQUEST_EVENT and its answers.
+
+Events are numbered, and the newest are kept, so that who has missed one can ask for it. The report of health
+and arming checks goes out when it has changed, and when somebody was refused.
+
+Source: mavlink.io/en/services/events.html.
+"""
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.arming import arming_reasons, shortfalls
+from autopilot_bridge.commander.events import ArmingDenied, Event
+from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.flavours import px4_events
+from autopilot_bridge.flavours.event_kinds import Occurrence
+from autopilot_bridge.flavours.texts import Notice
+from autopilot_bridge.mavlink.event_messages import (
+    CURRENT_EVENT_SEQUENCE,
+    REQUEST_EVENT,
+    EventMessage,
+    ResponseEventError,
+)
+from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.telemetry.streams import Builder
+
+KEPT: Final = 64
+"""Events that can be asked for again."""
+_FIRST_SEQUENCE: Final = 65535 - 10  # near the wrap, as PX4 begins, so that clients meet it early
+_REPORT_US: Final = 2_000_000
+_MODULO: Final = 0x10000
+_UNAVAILABLE: Final = 0  # MAV_EVENT_ERROR_REASON
+
+
+class EventService(Microservice):
+    """Sends the events of a PX4.
+
+    Args:
+        commander: what the checks look at.
+        broadcast: all channels.
+        notices: the texts of an event.
+    """
+
+    def __init__(
+        self, commander: Commander, broadcast: Broadcast, notices: Callable[[Event], tuple[Notice, ...]]
+    ) -> None:
+        self._commander = commander
+        self._broadcast = broadcast
+        self._notices = notices
+        self._sequence = _FIRST_SEQUENCE
+        self._kept: deque[MavlinkMessage] = deque(maxlen=KEPT)
+        self._time_us = 0
+        self._next_report_us = 0
+        self._reported: tuple[Occurrence, ...] = ()
+
+    @property
+    def builders(self) -> Mapping[int, Builder]:
+        return {CURRENT_EVENT_SEQUENCE: lambda: (self._sequence, 0)}
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Answer REQUEST_EVENT; ranges may wrap, and what is too old is said so once for each event."""
+        if message.get_msgId() != REQUEST_EVENT:
+            return False
+        count = (message.last_sequence - message.first_sequence) % _MODULO + 1
+        kept = {event.sequence: event for event in self._kept}
+        oldest = self._kept[0].sequence if self._kept else self._sequence
+        for step in range(min(count, KEPT)):
+            sequence = (message.first_sequence + step) % _MODULO
+            event = kept.get(sequence)
+            if event is None:
+                event = ResponseEventError(
+                    source.system_id, source.component_id, sequence, oldest, _UNAVAILABLE
+                )
+            source.channel.send(event)
+        return True
+
+    def tick(self, time_us: int) -> None:
+        """Report the checks when they have changed."""
+        self._time_us = time_us
+        if time_us >= self._next_report_us:
+            self._next_report_us = time_us + _REPORT_US
+            report = self._report()
+            if report != self._reported:
+                self._send_report(report)
+
+    def follow(self, event: Event) -> None:
+        """Send the events of what happened."""
+        for occurrence in px4_events.occurrences(event, self._notices(event)):
+            self._send(occurrence)
+        if isinstance(event, ArmingDenied):
+            self._send_report(self._report())
+
+    def _send_report(self, report: tuple[Occurrence, ...]) -> None:
+        self._reported = report
+        for occurrence in report:
+            self._send(occurrence)
+
+    def _send(self, occurrence: Occurrence) -> None:
+        kind, values, level = occurrence
+        level = kind.level if level is None else level
+        self._sequence = (self._sequence + 1) % _MODULO
+        message = EventMessage(
+            0,  # to everybody
+            0,
+            kind.event_id,
+            self._time_us // 1000 & 0xFFFFFFFF,
+            self._sequence,
+            level << 4 | level,
+            kind.pack(values),
+        )
+        self._kept.append(message)
+        send_to_all(self._broadcast, message)
+
+    def _report(self) -> tuple[Occurrence, ...]:
+        """Which modes can be armed and flown, and what is against it."""
+        commander = self._commander
+        situation, policy, parameters = commander.situation, commander.policy, commander.parameters
+        can_arm = can_run = 0
+        against: dict[Reason, int] = {}
+        for mode, bit in px4_events.MODE_BITS.items():
+            reasons = arming_reasons(mode, situation, policy, parameters)
+            for reason in reasons:
+                against[reason] = against.get(reason, 0) | bit
+            can_arm |= 0 if reasons else bit
+            if mode in policy.flown_modes and not shortfalls(mode, situation, policy, parameters):
+                can_run |= bit
+        ordered = {reason: against[reason] for reason in Reason if reason in against}
+        return px4_events.report(can_arm, can_run, ordered)
