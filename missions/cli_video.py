@@ -50,6 +50,8 @@ def start_video(world: "Sitl", video: str | None, pictures: Path | None) -> "Vid
     else:
         host, port = _place(video)
         parameters = VideoParameters(host=host, port=port, any_port=False, folder=pictures)
+    if parameters.port is not None and not parameters.host.startswith(("127.", "localhost")):
+        click.echo(f"warning: video on {parameters.host} is open to whoever reaches it", err=True)
     return show_cameras(world, parameters)
 
 

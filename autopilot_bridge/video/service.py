@@ -56,6 +56,8 @@ class VideoParameters:
     rate_hz: float = 20.0
 
     def __post_init__(self) -> None:
+        if self.host in ("", "0.0.0.0"):
+            raise VideoError(f"video host {self.host!r} is no address that players connect to; name one")
         if self.port is not None and not 0 <= self.port <= 65535:
             raise VideoError(f"video port {self.port} is not in 0..65535")
         if not 16 <= self.width_px <= 4096:
