@@ -112,8 +112,7 @@ class SigningState:
 
     def sign(self, frame: bytes, link_id: int) -> bytes:
         """A MAVLink 2 frame that has no signature, with one."""
-        newest = self.timestamp + (self._newest >= self._clock())
-        self._newest = newest = min(newest, MAX_TIMESTAMP)
+        self._newest = newest = min(max(self._newest + 1, self._clock()), MAX_TIMESTAMP)
         if newest >= self._save_at:
             self._save()
         head = b"%c%b\x01%b" % (frame[0], frame[1:2], frame[3:-CHECKSUM_SIZE])

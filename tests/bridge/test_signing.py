@@ -1,6 +1,7 @@
 """Message signing against pymavlink's implementation, and against those who have no key."""
 
 import hashlib
+import random
 
 import pytest
 from hypothesis import given
@@ -110,6 +111,22 @@ def test_timestamps_rise_though_the_clock_stands():
     ours, encoder = link(), FrameEncoder(1, 1)
     stamps = [int.from_bytes(ours.sign(encoder.encode(heartbeat()))[-12:-6], "little") for _ in range(5)]
     assert stamps == list(range(NOW, NOW + 5))
+
+
+def test_timestamps_rise_whenever_the_clock_ticks():
+    rng = random.Random(3)
+    clock = [NOW]
+
+    def now():  # may tick between any two looks at it
+        clock[0] += rng.randrange(3)
+        return clock[0]
+
+    ours, encoder = SigningState(KEY, clock=now), FrameEncoder(1, 1)
+    stamps = []
+    for _ in range(500):
+        stamps.append(int.from_bytes(ours.sign(encoder.encode(heartbeat()), 0)[-12:-6], "little"))
+        clock[0] -= rng.randrange(2)
+    assert stamps == sorted(set(stamps))
 
 
 def test_time_never_goes_back():
