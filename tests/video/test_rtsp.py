@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.video.messages import CameraSetup, StudioSetup
 from autopilot_bridge.video.rtsp import RequestReader, RtspError, Transport, parse_transport, response
-from autopilot_bridge.video.rtsp_server import MAX_PLAYERS, RtspServer
+from autopilot_bridge.video.rtsp_server import MAX_PLAYERS, RtspPlayer, RtspServer
 from autopilot_bridge.video.studio import CameraStream
 from flightsim.payload import CameraView, PinholeModel
 
@@ -203,3 +203,36 @@ def test_too_many_players_are_turned_away():
                     await asyncio.sleep(0.01)
 
     asyncio.run(crowd())
+
+
+class SlowWriter:
+    """A connection whose queue the test fills."""
+
+    def __init__(self) -> None:
+        self.written: list[bytes] = []
+        self.queued = 0
+        self.transport = self
+
+    def get_write_buffer_size(self) -> int:
+        return self.queued
+
+    def write(self, data: bytes) -> None:
+        self.written.append(data)
+
+
+def test_a_slow_player_misses_packets_until_the_next_key_picture():
+    writer = SlowWriter()
+    player = RtspPlayer({}, writer)
+    player._transport, player.playing = Transport(True, 0, 1), True
+    player.send(b"before the first key", control=False, key=False)
+    assert writer.written == [] and player.lost
+    player.send(b"key", control=False, key=True)
+    assert writer.written == [b"$\x00\x00\x03key"] and not player.lost
+    writer.queued = 1 << 20
+    player.send(b"too much", control=False, key=False)
+    writer.queued = 0
+    player.send(b"rest of it", control=False, key=False)
+    assert player.lost and len(writer.written) == 1
+    player.send(b"report", control=True, key=False)
+    player.send(b"again", control=False, key=True)
+    assert writer.written[1:] == [b"$\x01\x00\x06report", b"$\x00\x00\x05again"]
