@@ -72,8 +72,8 @@ def test_a_ready_vehicle_is_ok() -> None:
         ({"SYS_STATUS": {"battery_remaining": 10}}, "battery", Level.PROBLEM, "16.2 V, 10 %"),
         ({"SYS_STATUS": {"battery_remaining": 40}}, "battery", Level.WARNING, "40 %"),
         ({"SYS_STATUS": {"battery_remaining": -1}}, "battery", Level.WARNING, "charge not known"),
-        ({"SYS_STATUS": {"battery_remaining": -1, "voltage_battery": 0}}, "battery", Level.WARNING, "not mea"),
-        ({"SYS_STATUS": {PRESENT: 0x0300402F}}, "remote control", Level.WARNING, "none"),
+        ({"SYS_STATUS": {"battery_remaining": -1, "voltage_battery": 0}}, "battery", Level.WARNING, "not"),
+        ({"SYS_STATUS": {PRESENT: 0x0300402F}}, "remote control", Level.WARNING, "no"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_found(changes: dict, subject: str, level: Level, words: str) -> None:

@@ -1,0 +1,153 @@
+"""`flightstack vehicle` as a user calls it, against a SITL of each flavour."""
+
+import io
+import json
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
+
+from autopilot_bridge.parameter_files import read_untyped_parameter_file
+from missions.cli import run_command_line
+from tests.clients.sitl_process import free_port, running_sitl
+
+FLOAT = {"px4": "MPC_XY_CRUISE", "ardupilot": "WPNAV_SPEED"}
+INTEGER = {"px4": "NAV_DLL_ACT", "ardupilot": "FS_GCS_ENABLE"}
+
+
+@dataclass
+class Said:
+    """What a command left behind."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+class User:
+    """Somebody at a terminal, with a SITL beside them. The commands run in this process, to be quick."""
+
+    def __init__(self, flavour: str, port: int) -> None:
+        self.flavour = flavour
+        self.url = f"udpin:127.0.0.1:{port}"
+
+    def run(self, *words: str) -> Said:
+        out, err = io.StringIO(), io.StringIO()
+        with redirect_stdout(out), redirect_stderr(err):
+            code = run_command_line(["vehicle", *words, "--connect", self.url])
+        return Said(code, out.getvalue(), err.getvalue())
+
+    def json(self, *words: str) -> Any:
+        done = self.run(*words, "--json")
+        assert done.stderr == ""
+        return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+def user(request: pytest.FixtureRequest) -> Iterator[User]:
+    port = free_port()
+    with running_sitl(request.param, [f"udpout:127.0.0.1:{port}"], speedup=5.0):
+        yield User(request.param, port)
+
+
+def test_info(user: User) -> None:
+    found = user.json("info")
+    assert (found["autopilot"], found["type"], found["system_id"]) == (user.flavour, "quadrotor", 1)
+    assert found["firmware"] == {"px4": "1.16.1 release", "ardupilot": "4.6.3 release"}[user.flavour]
+    assert {"id": 1, "name": "autopilot1"} in found["components"]
+    assert "mission_int" in found["capabilities"]
+    assert found["armed"] is False
+    assert found["position"]["lat_deg"] == pytest.approx(
+        {"px4": 47.4, "ardupilot": -35.4}[user.flavour], abs=0.1
+    )
+    assert found["battery"]["voltage_v"] > 10.0
+    assert found["gps"]["satellites"] >= 6
+    text = user.run("info")
+    assert (text.returncode, text.stderr) == (0, "")
+    assert f"autopilot      {user.flavour}" in text.stdout
+
+
+def test_parameters_are_read_set_saved_compared_and_loaded(user: User, tmp_path: Path) -> None:
+    name, whole = FLOAT[user.flavour], INTEGER[user.flavour]
+    values = user.json("params", "list")
+    assert len(values) > 300
+    assert values[name]["type"] == 9
+    assert values[whole]["type"] == {"px4": 6, "ardupilot": 2}[user.flavour]  # INT32, INT8
+    assert isinstance(values[whole]["value"], int)
+
+    before = values[name]["value"]
+    for suffix in (".params", ".parm"):
+        saved = user.run("params", "save", str(tmp_path / f"a{suffix}"))
+        assert (saved.returncode, saved.stderr) == (0, "")
+        read = read_untyped_parameter_file(tmp_path / f"a{suffix}")
+        assert read.keys() == values.keys()
+        assert user.run("params", "compare", str(tmp_path / f"a{suffix}")).returncode == 0
+    again = user.run("params", "save", str(tmp_path / "a.params"))
+    assert again.returncode == 2
+    assert "nothing is overwritten" in again.stderr
+
+    value = before + 0.1
+    changed = user.run("params", "set", name, f"{value:.3f}")
+    assert (changed.returncode, changed.stderr) == (0, "")
+    assert user.json("params", "get", name, whole)[name]["value"] == pytest.approx(value, rel=1e-6)
+    differ = user.run("params", "compare", str(tmp_path / "a.params"))
+    assert differ.returncode == 1
+    assert "1 differ" in differ.stdout
+    assert name in differ.stdout
+
+    unasked = user.run("params", "load", str(tmp_path / "a.params"))
+    assert unasked.returncode == 2
+    assert "give --yes" in unasked.stderr
+    loaded = user.run("params", "load", str(tmp_path / "a.params"), "--yes")
+    assert (loaded.returncode, loaded.stderr) == (0, "")
+    assert "1 parameters set" in loaded.stdout
+    assert user.run("params", "compare", str(tmp_path / "a.params")).returncode == 0
+
+
+def test_parameters_that_are_not_there(user: User, tmp_path: Path) -> None:
+    typo = user.run("params", "get", FLOAT[user.flavour] + "X")
+    assert typo.returncode == 2
+    assert f"did you mean {FLOAT[user.flavour]}" in typo.stderr
+    assert len(typo.stderr.splitlines()) == 1
+    fraction = user.run("params", "set", INTEGER[user.flavour], "0.5")
+    assert fraction.returncode == 2
+    assert "accepted: a whole number" in fraction.stderr
+    suffix = user.run("params", "save", str(tmp_path / "a.txt"))
+    assert suffix.returncode == 2
+    assert "accepted: .params, .parm, .param" in suffix.stderr
+    assert not any(tmp_path.iterdir())
+
+
+def test_doctor(user: User) -> None:
+    found = user.json("doctor")
+    assert found["would_arm"] is True
+    subjects = {finding["subject"] for finding in found["findings"]}
+    assert subjects >= {
+        *("vehicle", "sensors", "arming", "GPS", "navigation", "home", "battery", "remote control"),
+        *("geofence", "clock", "lost link", "link"),
+    }
+    assert all(f["advice"] for f in found["findings"] if f["level"] != "ok")
+    link = next(f for f in found["findings"] if f["subject"] == "link")
+    assert "0.0 % lost" in link["text"]
+
+
+def test_nobody_there_is_one_line() -> None:
+    user = User("px4", free_port())
+    done = user.run("info", "--timeout", "1")
+    assert done.returncode == 1
+    assert done.stdout == ""
+    (line,) = done.stderr.splitlines()
+    assert "no autopilot was heard on udpin:127.0.0.1" in line
+    assert "nothing was received in 2 s" in line
+    wrong = {"serial:/dev/none:57600": "can't be opened", "nonsense": "accepted:", "a.tlog": "accepted:"}
+    for url, words in wrong.items():
+        user.url = url
+        done = user.run("info", "--timeout", "1")
+        assert done.returncode in (1, 2)
+        assert words in done.stderr
+        assert len(done.stderr.splitlines()) == 1
