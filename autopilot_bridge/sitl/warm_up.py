@@ -9,8 +9,16 @@ import math
 from collections.abc import Iterable
 from typing import Final
 
+import numpy as np
+
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.mavlink import FrameEncoder, dialect
+from autopilot_bridge.navigation.external import (
+    SAMPLE_SIZE,
+    VELOCITY_M_S,
+    ExternalFrame,
+    ExternalSample,
+)
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.sitl import Sitl
 from flightsim.airframe import AirframeKind, load_airframe
@@ -56,9 +64,31 @@ def _fly_multicopter(sitl: Sitl) -> None:
     _advance(sitl, 3.0 * _PHASE_S)
     guidance.reposition(north_m=5.0, east_m=5.0, down_m=-5.0)
     _advance(sitl, _PHASE_S)
+    _tell_odometry(sitl)
+    _advance(sitl, _PHASE_S)
     for mode in (FlightMode.ORBIT, FlightMode.RETURN, FlightMode.LAND):
         commander.set_mode(mode)
         _advance(sitl, _PHASE_S)
+
+
+def _tell_odometry(sitl: Sitl) -> None:
+    """A velocity as visual odometry gives it."""
+    autopilot = sitl.vehicles[0].autopilot
+    autopilot.parameters.set("EKF2_EV_CTRL", 4)
+    values = np.full(SAMPLE_SIZE, math.nan)
+    values[VELOCITY_M_S] = 0.0
+    unknown = (math.nan, math.nan, math.nan)
+    autopilot.navigation.take_external(
+        ExternalSample(
+            time_us=sitl.time_us,
+            values=values,
+            frame=ExternalFrame.NED,
+            velocity_frame=ExternalFrame.NED,
+            position_variance_m2=unknown,
+            velocity_variance_m2_s2=unknown,
+            yaw_variance_rad2=math.nan,
+        )
+    )
 
 
 def _fly_aircraft(sitl: Sitl) -> None:
