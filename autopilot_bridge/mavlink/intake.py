@@ -20,11 +20,12 @@ SHARE: Final = 400
 TOTAL: Final = 1000
 """Work for all peers in one `take`."""
 _FRAME_WORK: Final = 20  # to decode and handle a frame
+_HEAVY: Final = {23: 400}  # PARAM_SET: everything that depends on a parameter is worked out anew
 _SIGNATURE_WORK: Final = 6  # to check whether a frame may be believed
 _PIECE_WORK: Final = 2
 _FAILURE_WORK: Final = 1  # to find that something is no frame
 _BYTES_OF_WORK: Final = 64
-_SLICE_BYTES: Final = 512
+_SLICE_BYTES: Final = 256
 _SILENT_TAKES: Final = 5000  # 20 s of polls
 
 PeerT = TypeVar("PeerT", bound=Hashable)
@@ -162,7 +163,7 @@ class Intake(Generic[PeerT]):
                 if self._admit is not None:
                     work += len(found) * _SIGNATURE_WORK
                     found = self._admit(found)
-                work += len(found) * _FRAME_WORK
+                work += sum(_HEAVY.get(frame.message_id, _FRAME_WORK) for frame in found)
                 frames += found
         if frames:
             inbox.understood = True

@@ -71,7 +71,7 @@ class MessageIntervalService:
         self._cache = cache
         self._announce = announce
         self._on_demand = on_demand
-        self._pending: list[tuple[Channel, int, float]] = []
+        self._pending: dict[tuple[Channel, int, float], None] = {}  # the same asked for twice is one answer
         self._time_us = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
@@ -93,8 +93,8 @@ class MessageIntervalService:
     def tick(self, time_us: int) -> None:
         """Send what was requested since the last tick: always after the acknowledgement of the request."""
         self._time_us = time_us
-        while self._pending:
-            channel, message_id, parameter = self._pending.pop(0)
+        pending, self._pending = self._pending, {}
+        for channel, message_id, parameter in pending:
             if message_id in self._on_demand:
                 self._on_demand[message_id](channel, parameter)
                 continue
@@ -141,7 +141,7 @@ class MessageIntervalService:
     def request(self, source: Source, message_id: int, parameter: float = 0.0) -> Result:
         """MAV_CMD_REQUEST_MESSAGE: the message follows the acknowledgement."""
         if message_id in self._on_demand:
-            self._pending.append((source.channel, message_id, parameter))
+            self._pending[source.channel, message_id, parameter] = None
             return Result.ACCEPTED
         policy = self._policy
         if message_id not in DEFINITIONS or not self._known(message_id):
@@ -151,7 +151,7 @@ class MessageIntervalService:
             interval_us = table.intervals_us.get(message_id)
             if interval_us is not None and interval_us < _FASTEST_REQUESTABLE_US:
                 return Result.DENIED
-        self._pending.append((source.channel, message_id, parameter))
+        self._pending[source.channel, message_id, parameter] = None
         return Result.ACCEPTED
 
     def _known(self, message_id: int) -> bool:
