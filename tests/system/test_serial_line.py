@@ -58,7 +58,7 @@ def test_a_mission_at_57600_baud(flavour: str, via: str, tmp_path: Path) -> None
     with (
         serial_line(tmp_path / "line", round(BAUD * QUICK)) as line,
         running_sitl(flavour, [line.vehicle], speedup=QUICK),
-        started(tmp_path / "run", *SHORT, "--via", via, "--connect", line.ground) as run,
+        started(tmp_path / "run", *SHORT, "--via", via, "--connect", line.ground, "--yes") as run,
     ):
         run.finish()
         vehicle_s = run.summary["sim_time_s"]
@@ -77,7 +77,7 @@ def test_pulled_out_and_put_in_again_in_a_mission(flavour: str, tmp_path: Path) 
     with (
         serial_line(tmp_path / "line", round(BAUD * SPEEDUP)) as line,
         running_sitl(flavour, [line.vehicle], speedup=SPEEDUP),
-        started(tmp_path / "run", *SHORT, "--periods", "2", "--connect", line.ground) as run,
+        started(tmp_path / "run", *SHORT, "--periods", "2", "--connect", line.ground, "--yes") as run,
     ):
         in_flight(run, "mission")
         pull(line)
@@ -95,7 +95,15 @@ def test_pulled_out_while_setpoints_are_streamed(flavour: str, flying: str, tmp_
         serial_line(tmp_path / "line", round(BAUD * SPEEDUP)) as line,
         running_sitl(flavour, [line.vehicle], speedup=SPEEDUP),
         started(
-            tmp_path / "run", *SHORT, "--periods", "4", "--via", "setpoints", "--connect", line.ground
+            tmp_path / "run",
+            *SHORT,
+            "--periods",
+            "4",
+            "--via",
+            "setpoints",
+            "--connect",
+            line.ground,
+            "--yes",
         ) as run,
     ):
         in_flight(run, flying)
