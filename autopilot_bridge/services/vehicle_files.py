@@ -11,6 +11,7 @@ from autopilot_bridge.services.log_transfer import LogTransferService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.onboard_log import OnboardLog
 from autopilot_bridge.services.parameter_storage import STORAGE_POLICIES, ParameterStorageService
+from autopilot_bridge.services.plan_memory import PlanMemory, plan_files
 from autopilot_bridge.services.power import POWER_POLICIES, PowerService
 from autopilot_bridge.storage import FileStore, MountTable, VehiclePath
 from autopilot_bridge.storage.generated import GeneratedStore
@@ -43,13 +44,15 @@ def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
         told = (metadata, EventService(parts.commander, parts.broadcast, parts.flavour.notices))
     else:
         places["@PARAM",] = _packed_parameters(parts.parameters)
+        places["@MISSION",] = plan_files(parts.stores)
     files = FileTransferService(MountTable(places))
     logs = LogTransferService(book, lambda: None if recorder is None else recorder.path)
     storage = ParameterStorageService(
         memory.stored, parts.parameters, parts.commander, STORAGE_POLICIES[name], layout, parts.announce
     )
     power = PowerService(POWER_POLICIES[name], parts.commander, memory.power)
-    return (files, logs, storage, power, *told, *(() if recorder is None else (recorder,)))
+    plans = PlanMemory(parts.stores, memory.card)
+    return (files, logs, storage, power, plans, *told, *(() if recorder is None else (recorder,)))
 
 
 def _packed_parameters(store: ParameterStore) -> FileStore:

@@ -246,7 +246,9 @@ def test_whatever_comes_is_answered_and_harms_nothing(payloads: list[bytes]) -> 
     assert 0 <= usage.files <= 20
 
 
-PATHS = st.sampled_from([b"a", b"d", b"d/a", b"d/e", b"..", b"/", b"", b"d/../a", b"a\0b", b"d\0d/e", b"\xff"])
+PATHS = st.sampled_from(
+    [b"a", b"d", b"d/a", b"d/e", b"..", b"/", b"", b"d/../a", b"a\0b", b"d\0d/e", b"\xff"]
+)
 OPCODES = st.sampled_from([*range(17)])
 REQUESTS = st.tuples(
     OPCODES, PATHS, st.integers(0, 3), st.sampled_from([0, 1, 500, 2**32 - 1]), st.integers(0, 255)

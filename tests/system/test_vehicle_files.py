@@ -8,7 +8,8 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.services import packed_parameters
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.services import packed_parameters, plan_memory
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from autopilot_bridge.storage import MemoryStore, Quota
 from autopilot_bridge.storage.card import MemoryCard
@@ -210,6 +211,9 @@ def test_reboot_starts_again_from_zero(flavour: str) -> None:
     name, value = CHANGED[flavour]
     client = Client(flavour, card())
     client.fly()
+    plans = client.vehicle.autopilot.missions._stores
+    plan = (MissionItem(command=22, z=5.0), MissionItem(command=16, x=47.0, y=8.0, z=5.0))
+    plans[MissionType.MISSION].replace(plan, 77)
     client.set(name, value)
     before = client.vehicle.autopilot
     assert client.command(REBOOT, 1) == 0
@@ -222,6 +226,8 @@ def test_reboot_starts_again_from_zero(flavour: str) -> None:
     assert after is not before and not after.commander.armed
     assert client.all("HEARTBEAT")
     assert client.get(name) == value
+    kept = after.missions._stores[MissionType.MISSION]
+    assert (kept.items, kept.plan_id) == (plan, 77)
     client.command(512, 2)
     times = [message.time_boot_ms for message in client.all("SYSTEM_TIME")]
     assert times and max(times) < 5000
@@ -283,3 +289,13 @@ def test_packed_parameters_as_pymavlink_reads_them() -> None:
     assert values == pytest.approx(store.as_dict())
     defaults = {name.decode(): value for name, value, _ in decoded.defaults}
     assert defaults["WPNAV_SPEED"] == 1000.0
+
+
+def test_mission_file_is_made_of_items_as_on_the_wire() -> None:
+    items = (MissionItem(command=16, x=-35.0, y=149.0, z=5.0), MissionItem(command=20, param1=float("nan")))
+    data = plan_memory.packed(items, MissionType.MISSION)
+    size = mavlink.MAVLink_mission_item_int_message.unpacker.size
+    assert struct.unpack("<HHHHH", data[:10]) == (0x763D, 0, 0, 0, 2)
+    assert len(data) == 10 + 2 * size
+    first = mavlink.MAVLink_mission_item_int_message.unpacker.unpack(data[10 : 10 + size])
+    assert {-350_000_000, 1_490_000_000, 16} <= set(first)

@@ -1,0 +1,68 @@
+"""Plans that outlive a reboot, and ArduPilot's files of them (`@MISSION/mission.dat`, `fence.dat`, ...).
+
+A file is a header (magic number, MAV_MISSION_TYPE, options, first item, number of items) and the items as
+MISSION_ITEM_INT has them on the wire.
+
+Source: ArduPilot 4.6, AP_Filesystem/README.md ("@MISSION").
+"""
+
+import struct
+from collections.abc import Mapping
+from typing import Final
+
+from autopilot_bridge.mavlink.encoder import payload_packer
+from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
+from autopilot_bridge.services.channel import NOBODY, MavlinkMessage
+from autopilot_bridge.services.microservice import Microservice
+from autopilot_bridge.services.mission_messages import item_message
+from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.generated import Content, GeneratedStore
+
+_HEADER: Final = struct.Struct("<HHHHH")
+_MAGIC: Final = 0x763D
+_FILES: Final = {
+    "mission.dat": MissionType.MISSION,
+    "fence.dat": MissionType.FENCE,
+    "rally.dat": MissionType.RALLY,
+}
+
+
+class PlanMemory(Microservice):
+    """Keeps the plans beside the memory card while the vehicle reboots.
+
+    Args:
+        stores: the plans; those that are kept are put into them.
+        card: keeps them.
+    """
+
+    def __init__(self, stores: Mapping[MissionType, MissionStore], card: MemoryCard) -> None:
+        self._stores = stores
+        self._plans = card.plans
+        for kind, (items, plan_id) in card.plans.items():
+            stores[kind].replace(items, plan_id)
+        self._versions = {kind: store.version for kind, store in stores.items()}
+
+    def tick(self, time_us: int) -> None:
+        """Keep a plan that was changed."""
+        for kind, store in self._stores.items():
+            if store.version != self._versions[kind]:
+                self._versions[kind] = store.version
+                self._plans[kind] = (store.items, store.plan_id)
+
+
+def plan_files(stores: Mapping[MissionType, MissionStore]) -> GeneratedStore:
+    """The plans as files, for reading."""
+    return GeneratedStore({name: _content(stores[kind], kind) for name, kind in _FILES.items()})
+
+
+def _content(store: MissionStore, kind: MissionType) -> Content:
+    return lambda query: packed(store.items, kind)
+
+
+def packed(items: tuple[MissionItem, ...], kind: MissionType) -> bytes:
+    """The file of a plan."""
+    data = bytearray(_HEADER.pack(_MAGIC, kind, 0, 0, len(items)))
+    for seq, item in enumerate(items):
+        message: MavlinkMessage = item_message(NOBODY, item, seq, kind, current=False, as_int=True)
+        data += payload_packer(message.id)(message)
+    return bytes(data)
