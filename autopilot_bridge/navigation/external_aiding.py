@@ -177,17 +177,19 @@ class ExternalAiding:
         if row < 0:
             counts.late += 1
             return True
-        jumped = self._reset_counter >= 0 and sample.reset_counter != self._reset_counter
-        self._reset_counter = sample.reset_counter
+        jumped = has_position and self._reset_counter not in (-1, sample.reset_counter)
+        if has_position:  # a sender of speeds alone has a counter of its own
+            self._reset_counter = sample.reset_counter
         has, turned = 0, False
         if p.use_yaw and math.isfinite(yaw_rad):
-            has, turned = self.heading.take(p, sample, yaw_rad, row, time_us, jumped=jumped)
+            placed = has_position and self._coherent >= _COHERENT_SAMPLES
+            has, turned = self.heading.take(p, sample, yaw_rad, row, time_us, jumped=jumped, placed=placed)
         turn = self.heading.turn_to_ned(sample, yaw_rad, row)
         if has_position and math.isfinite(turn):
             self._map_position(values, turn, row)
             self._judge_coherence(measured_us, row, restart=jumped or turned)
             has |= self._prepare_position(sample, row, time_us, jumped=jumped or turned)
-        if p.use_velocity and has_velocity and (self._begun or not (p.use_position and has_position)):
+        if p.use_velocity and has_velocity and (self._begun or not p.use_position):
             has |= self._prepare_velocity(sample, turn, row, time_us)
         if not has:
             counts.incoherent += 1

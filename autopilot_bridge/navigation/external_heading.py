@@ -70,8 +70,14 @@ class ExternalHeading:
         time_us: int,
         *,
         jumped: bool,
+        placed: bool,
     ) -> tuple[int, bool]:
-        """Prepare the heading: (parts to fuse, the estimate was turned to it)."""
+        """Prepare the heading: (parts to fuse, the estimate was turned to it).
+
+        Args:
+            jumped: the sender's estimate has.
+            placed: its positions move as the vehicle does; else its heading isn't begun with.
+        """
         p, obs = parameters, self._obs
         angle = math.remainder(yaw_rad - self._ours(row), math.tau)
         moved = math.remainder(angle - self._difference_rad, math.tau)
@@ -81,7 +87,7 @@ class ExternalHeading:
         obs[e.EXT_YAW] = yaw_rad
         obs[e.EXT_YAW_VAR] = variance
         own = sample.frame is ExternalFrame.LOCAL_FRD
-        coherent = self._coherent >= _COHERENT_SAMPLES
+        coherent = placed and self._coherent >= _COHERENT_SAMPLES
         lost = self._refused_since_us >= 0 and time_us - self._refused_since_us > p.reset_after_s * 1e6
         if self.in_use and own is self.own and not jumped and not (lost and coherent):
             return e.EXT_HAS_YAW, False

@@ -309,6 +309,30 @@ def test_nonsense_is_counted_and_moves_nothing(flight: Array, name: str) -> None
     assert health.external_in_use and position_error_m(odometry) < 0.5
 
 
+def test_speeds_of_a_message_of_their_own(flight: Array) -> None:
+    """VISION_SPEED_ESTIMATE beside VISION_POSITION_ESTIMATE: another counter of resets is no reset."""
+    bench = Bench(flight, parameters=NO_GPS)
+    odometry = Odometry(bench)
+    odometry.velocity_frame = ExternalFrame.NED
+    halves = [0]
+
+    def one_half(values: Array) -> None:
+        halves[0] += 1
+        if halves[0] % 2:
+            values[VELOCITY_M_S] = math.nan
+            odometry.reset_counter = 3
+        else:
+            values[POSITION_M] = math.nan
+            values[Q_LOCAL_FROM_FRD] = math.nan
+            odometry.reset_counter = 0
+
+    odometry.change = one_half
+    bench.run(35.0, odometry)
+    counts = bench.filter.external_counts
+    assert counts is not None and counts.resets == 1
+    assert position_error_m(odometry) < 0.3
+
+
 def test_poor_and_late_samples_are_refused(flight: Array) -> None:
     bench = Bench(flight, parameters=replace(NO_GPS, external=replace(ALL, least_quality=40)))
     odometry = Odometry(bench)
