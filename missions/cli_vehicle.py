@@ -292,7 +292,8 @@ def compare(other: str, **given: Any) -> int:
             [{"name": d.name, "vehicle": d.vehicle and d.vehicle.number, "other": d.other} for d in found]
         )
     else:
-        _tell_differences(found)
+        if found:
+            _tell_differences(found)
         click.echo(f"{len(found)} differ" if found else "no difference")
     return _FAILED if found else 0
 
@@ -331,9 +332,9 @@ def logs() -> None:
 @_connected
 def list_logs(**given: Any) -> int:
     """The logs that are there."""
-    from missions.vehicle_client.logs import entries
+    from missions.vehicle_client.logs import VehicleLogs
 
-    found = _with_client(given, entries)
+    found = _with_client(given, lambda client: VehicleLogs(client).entries())
     if given["as_json"]:
         _print_json([{"id": e.id, "date": e.date, "size_bytes": e.size_bytes} for e in found])
         return 0
@@ -365,9 +366,10 @@ def download(which: str, folder: Path, **given: Any) -> int:
 
     async def work(client: "VehicleClient") -> list[dict[str, Any]]:
         got = []
-        for entry in client_logs.chosen(await client_logs.entries(client), which):
+        shelf = client_logs.VehicleLogs(client)
+        for entry in client_logs.chosen(await shelf.entries(), which):
             there = client_logs.fetched(folder, entry)
-            path = there or await client_logs.download(client, entry, folder, progress_of(entry.id))
+            path = there or await shelf.download(entry, folder, progress_of(entry.id))
             if terminal and there is None:
                 click.echo("", err=True)
             got.append(
@@ -392,14 +394,14 @@ def download(which: str, folder: Path, **given: Any) -> int:
 @_connected
 def erase(yes: bool, **given: Any) -> int:
     """Delete all logs of the vehicle, after asking."""
-    from missions.vehicle_client.logs import entries
-    from missions.vehicle_client.logs import erase as erase_all
+    from missions.vehicle_client.logs import VehicleLogs
 
     async def work(client: "VehicleClient") -> int:
-        count = len(await entries(client))
+        shelf = VehicleLogs(client)
+        count = len(await shelf.entries())
         if count:
             _confirm(f"delete all {count} logs of vehicle {client.system_id}", yes)
-            await erase_all(client)
+            await shelf.erase()
         return count
 
     count = _with_client(given, work)
@@ -416,7 +418,7 @@ def erase(yes: bool, **given: Any) -> int:
 @vehicle.command()
 @_connected
 def doctor(**given: Any) -> int:
-    """How it is, and what keeps it from arming. Exit code 1 when it would not arm."""
+    """How it is, and what keeps it from arming. Exit code 1 when something stands against a flight."""
     from autopilot_bridge.clock import unix_time_us
     from missions.preflight.finding import Level
     from missions.vehicle_client.doctor import examine
@@ -430,10 +432,12 @@ def doctor(**given: Any) -> int:
         )
     )
     problems = [finding for finding in findings if finding.level is Level.PROBLEM]
+    would_arm = not any(finding.subject == "arming" for finding in problems)
     if given["as_json"]:
         _print_json(
             {
-                "would_arm": not problems,
+                "would_arm": would_arm,
+                "problems": len(problems),
                 "findings": [
                     {"level": str(f.level), "subject": f.subject, "text": f.text, "advice": f.advice}
                     for f in findings
@@ -443,5 +447,6 @@ def doctor(**given: Any) -> int:
     else:
         for finding in findings:
             click.echo(str(finding))
-        click.echo("it would arm" if not problems else f"it would not arm: {len(problems)} problems")
+        against = f"; problems: {len(problems)}" if problems else ""
+        click.echo(f"it would {'' if would_arm else 'not '}arm{against}")
     return _FAILED if problems else 0

@@ -26,6 +26,7 @@ _TEXTS_S: Final = 1.5
 _REPORT_S: Final = 1.0
 _LOSS_WARN, _LOSS_BAD = 0.02, 0.2
 _CLOCK_S: Final = 5.0
+_DAY_S: Final = 86_400.0
 _SLOW_HEARTBEAT_HZ: Final = 0.7
 _RUN_PREARM_CHECKS: Final = 401
 
@@ -111,9 +112,8 @@ def _clock(snapshot: Snapshot, unix_time_us: int, begun_s: float) -> Finding:
     now_us = unix_time_us + (asyncio.get_running_loop().time() - begun_s) * 1e6
     off_s = (told_us - now_us) * 1e-6
     if abs(off_s) > _CLOCK_S:
-        return warning(
-            "clock", f"{off_s:+.0f} s off this machine's", "set this machine's, or wait for GPS time"
-        )
+        off = f"{off_s:+.0f} s" if abs(off_s) < _DAY_S else f"{off_s / _DAY_S:+.0f} days"
+        return warning("clock", f"{off} off this machine's", "set this machine's, or wait for GPS time")
     return ok("clock", f"{off_s:+.1f} s off this machine's")
 
 

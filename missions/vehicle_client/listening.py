@@ -50,6 +50,8 @@ class LinkQuality:
                 f"{self.bytes_total} bytes were received in {self.seconds:.0f} s, and none of it is MAVLink: "
                 "is the baud rate right?"
             )
+        if "HEARTBEAT" in self.rates_hz:
+            return "an autopilot is heard there now: try again"
         names = ", ".join(f"{system}/{component}" for system, component in self.components)
         return f"heard were components {names} (system/component), none of them an autopilot's heartbeat"
 

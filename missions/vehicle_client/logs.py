@@ -12,24 +12,90 @@ from missions.vehicle_client.client import VehicleClient
 
 _TRIES: Final = 3
 _HEADS: Final = ((b"ULog\x01\x12\x35", ".ulg"), (b"\xa3\x95", ".bin"))
+_HEAD_BYTES: Final = 16
 _TLOG_MAGICS: Final = (0xFE, 0xFD)
 
 
-async def entries(client: VehicleClient) -> list[Entry]:
-    """The logs the vehicle has, oldest first.
+class VehicleLogs:
+    """The logs of one vehicle.
 
-    Raises:
-        MissionError: it doesn't tell.
+    One plugin for all: MAVSDK fetches only logs that the same plugin has listed.
     """
-    try:
-        found = await LogFilesAsync(client.system).get_entries()
-    except LogFilesError as error:
-        if error.result is LogFilesResult.NO_LOGFILES:
-            return []
-        raise MissionError(
-            f"vehicle {client.system_id} does not list its logs: {error.result.name.lower()}"
-        ) from error
-    return sorted(found, key=lambda entry: entry.id)
+
+    def __init__(self, client: VehicleClient) -> None:
+        self._system_id = client.system_id
+        self._plugin = LogFilesAsync(client.system)
+
+    async def entries(self) -> list[Entry]:
+        """The logs the vehicle has, oldest first.
+
+        Raises:
+            MissionError: it doesn't tell.
+        """
+        try:
+            found = await self._plugin.get_entries()
+        except LogFilesError as error:
+            if error.result is LogFilesResult.NO_LOGFILES:
+                return []
+            raise MissionError(
+                f"vehicle {self._system_id} does not list its logs: {error.result.name.lower()}"
+            ) from error
+        return sorted(found, key=lambda entry: entry.id)
+
+    async def download(self, entry: Entry, folder: Path, progress: Callable[[float], None]) -> Path:
+        """Fetch one log into a folder; it was listed by `entries` of this object.
+
+        MAVSDK fetches what is missing of a log again by itself and drops a log that it can't complete, so
+        that a download goes on at the level of whole logs: those that are there are not fetched again.
+
+        Raises:
+            MissionError: it does not come.
+            PlanError: there is another file of its name.
+        """
+        part = folder / f"log_{entry.id}.part"
+        failure = ""
+        for _ in range(_TRIES):
+            part.unlink(missing_ok=True)  # MAVSDK writes no file that is there
+            try:
+                async for _result, data in self._plugin.download_log_file(entry, str(part)):
+                    if data is not None:
+                        progress(float(data.progress))
+                failure = ""
+                break
+            except LogFilesError as error:
+                failure = error.result.name.lower()
+        if failure or not part.exists():
+            part.unlink(missing_ok=True)
+            raise MissionError(
+                f"log {entry.id} was not fetched in {_TRIES} attempts: {failure or 'no file came'}"
+            )
+        return _named(part, entry)
+
+    async def erase(self) -> None:
+        """Delete all logs of the vehicle.
+
+        Raises:
+            MissionError: it doesn't.
+        """
+        try:
+            await self._plugin.erase_all_log_files()
+        except LogFilesError as error:
+            raise MissionError(f"the logs were not erased: {error.result.name.lower()}") from error
+
+
+def _named(part: Path, entry: Entry) -> Path:
+    """A fetched file under its own name."""
+    size = part.stat().st_size
+    if size != entry.size_bytes:
+        part.unlink()
+        raise MissionError(f"log {entry.id} came with {size} bytes of {entry.size_bytes}; try again")
+    with part.open("rb") as file:
+        target = part.with_name(log_name(entry, file.read(_HEAD_BYTES)))
+    if target.exists():
+        part.unlink()
+        raise PlanError(f"{target} is there already with other content, and nothing is overwritten")
+    part.rename(target)
+    return target
 
 
 def chosen(found: list[Entry], which: str) -> list[Entry]:
@@ -64,61 +130,6 @@ def fetched(folder: Path, entry: Entry) -> Path | None:
     for path in sorted(folder.glob(f"log_{entry.id}_*")):
         if path.suffix != ".part" and path.stat().st_size == entry.size_bytes:
             with path.open("rb") as file:
-                if path.name == log_name(entry, file.read(16)):
+                if path.name == log_name(entry, file.read(_HEAD_BYTES)):
                     return path
     return None
-
-
-async def download(
-    client: VehicleClient, entry: Entry, folder: Path, progress: Callable[[float], None]
-) -> Path:
-    """Fetch one log into a folder.
-
-    MAVSDK fetches what is missing of a log again by itself and drops a log that it can't complete, so that a
-    download goes on at the level of whole logs: those that are there already are not fetched again.
-
-    Raises:
-        MissionError: it does not come.
-    """
-    part = folder / f"log_{entry.id}.part"
-    plugin = LogFilesAsync(client.system)
-    failure = ""
-    for _ in range(_TRIES):
-        part.unlink(missing_ok=True)  # MAVSDK writes no file that is there
-        try:
-            async for _result, data in plugin.download_log_file(entry, str(part)):
-                if data is not None:
-                    progress(float(data.progress))
-            failure = ""
-            break
-        except LogFilesError as error:
-            failure = error.result.name.lower()
-    if failure or not part.exists():
-        part.unlink(missing_ok=True)
-        raise MissionError(
-            f"log {entry.id} was not fetched in {_TRIES} attempts: {failure or 'no file came'}"
-        )
-    size = part.stat().st_size
-    if size != entry.size_bytes:
-        part.unlink()
-        raise MissionError(f"log {entry.id} came with {size} bytes of {entry.size_bytes}; try again")
-    with part.open("rb") as file:
-        name = log_name(entry, file.read(16))
-    target = folder / name
-    if target.exists():
-        part.unlink()
-        raise PlanError(f"{target} is there already with other content, and nothing is overwritten")
-    part.rename(target)
-    return target
-
-
-async def erase(client: VehicleClient) -> None:
-    """Delete all logs of the vehicle.
-
-    Raises:
-        MissionError: it doesn't.
-    """
-    try:
-        await LogFilesAsync(client.system).erase_all_log_files()
-    except LogFilesError as error:
-        raise MissionError(f"the logs were not erased: {error.result.name.lower()}") from error

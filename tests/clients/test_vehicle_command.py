@@ -125,7 +125,7 @@ def test_parameters_that_are_not_there(user: User, tmp_path: Path) -> None:
 
 def test_doctor(user: User) -> None:
     found = user.json("doctor")
-    assert found["would_arm"] is True
+    assert (found["would_arm"], found["problems"]) == (True, 0)
     subjects = {finding["subject"] for finding in found["findings"]}
     assert subjects >= {
         *("vehicle", "sensors", "arming", "GPS", "navigation", "home", "battery", "remote control"),
@@ -151,3 +151,21 @@ def test_nobody_there_is_one_line() -> None:
         assert done.returncode in (1, 2)
         assert words in done.stderr
         assert len(done.stderr.splitlines()) == 1
+
+
+def test_logs_are_fetched_once_and_erased_when_asked_for(user: User, tmp_path: Path) -> None:
+    if not user.json("logs", "list"):  # ArduPilot begins its log when it is armed
+        assert user.run("logs", "download", "--to", str(tmp_path)).returncode == 2
+        return
+    fetched = user.run("logs", "download", "newest", "--to", str(tmp_path))
+    assert (fetched.returncode, fetched.stderr) == (0, "")
+    (path,) = tmp_path.iterdir()
+    assert path.suffix in (".tlog", ".ulg", ".bin")
+    assert f"{path.stat().st_size} bytes" in fetched.stdout
+    wrong = user.run("logs", "download", "99", "--to", str(tmp_path))
+    assert wrong.returncode == 2
+    assert "accepted: all, newest, or one of" in wrong.stderr
+    unasked = user.run("logs", "erase")
+    assert unasked.returncode == 2
+    assert "give --yes" in unasked.stderr
+    assert user.run("logs", "erase", "--yes").returncode == 0
