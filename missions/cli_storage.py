@@ -34,6 +34,7 @@ class VehicleCards:
     """
 
     def __init__(self, storage: str | None, count: int) -> None:
+        from autopilot_bridge.storage import FOLDER_QUOTA, TEMPORARY_QUOTA
         from autopilot_bridge.storage.card import MemoryCard
         from autopilot_bridge.storage.folder import FolderStore
 
@@ -47,7 +48,8 @@ class VehicleCards:
         folder = Path(self._temporary.name if self._temporary is not None else str(storage))
         try:
             for number in range(1, count + 1):
-                self._stores.append(FolderStore(folder / f"vehicle{number}"))
+                quota = FOLDER_QUOTA if self._temporary is None else TEMPORARY_QUOTA
+                self._stores.append(FolderStore(folder / f"vehicle{number}", quota))
         except OSError as error:
             self.close()
             raise ValueError(

@@ -26,6 +26,7 @@ class Quota:
 
 
 MEMORY_QUOTA: Final = Quota(size_bytes=4 * 1024**2, files=256)
+TEMPORARY_QUOTA: Final = Quota(size_bytes=1024**3, files=20_000)
 FOLDER_QUOTA: Final = Quota(size_bytes=8 * 1024**3, files=20_000)
 
 
