@@ -405,7 +405,7 @@ class Commander:
 
     def _within_fence(self, place_ned_m: flight.Array) -> bool:
         north, east, down = place_ned_m.tolist()
-        return self.fence.allows((north, east, down), self.context.frame)
+        return self.fence.allows((north, east, down), self.context.frame, self.parameters.fence)
 
     @property
     def mission_problem(self) -> Reason | None:

@@ -38,7 +38,6 @@ class FenceWatch:
         "_backup_m",
         "_home",
         "_off",
-        "_parameters",
         "breach_time_us",
         "breaches",
         "broken",
@@ -57,7 +56,6 @@ class FenceWatch:
         self._above_floor = False
         self._armed = False
         self._backup_m: dict[FenceType, float] = {}
-        self._parameters = FenceParameters()
         self._home: Place | None = None
 
     def present(self, parameters: FenceParameters) -> bool:
@@ -84,9 +82,8 @@ class FenceWatch:
         self._off = _NOTHING
         self._auto_on = False
 
-    def allows(self, place_ned_m: Place, frame: LocalFrame | None) -> bool:
+    def allows(self, place_ned_m: Place, frame: LocalFrame | None, parameters: FenceParameters) -> bool:
         """A place is inside of what is on."""
-        parameters = self._parameters
         walls = self.active(parameters)
         return not self.geofence.broken(place_ned_m, self._home, frame, parameters, walls)
 
@@ -104,7 +101,7 @@ class FenceWatch:
     ) -> list[Event]:
         """Look where the vehicle is (None: not known, nothing changes); what there is to tell."""
         events: list[Event] = []
-        self._parameters, self._home = parameters, home_ned_m
+        self._home = home_ned_m
         height_m = -math.inf
         if place_ned_m is not None and home_ned_m is not None:
             height_m = home_ned_m[2] - place_ned_m[2]

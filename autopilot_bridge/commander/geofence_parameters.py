@@ -81,6 +81,11 @@ class FenceParameters:
                 raise ValueError(f"{each.name} = {value} is not a finite number")
 
     @property
+    def bounds_targets(self) -> bool:
+        """Places to fly to must lie inside: always (ArduPilot), or where a breach does something (PX4)."""
+        return self.counts_breaches or self.action > FailsafeAction.WARN
+
+    @property
     def walls(self) -> FenceType:
         """The walls that are set up, whether or not the fence is on."""
         walls = FenceType(0)

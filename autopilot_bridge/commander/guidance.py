@@ -121,10 +121,9 @@ class Guidance:
             radius_m: of an aircraft's circle there, positive clockwise; 0 or NaN: the parameter's.
         """
         commander = self._commander
-        here = commander.context.frame
-        if commander.policy.fence_bounds_targets and not commander.fence.allows(
-            (north_m, east_m, down_m), here
-        ):
+        fence, frame = commander.parameters.fence, commander.context.frame
+        bounded = commander.policy.fence_bounds_targets and fence.bounds_targets
+        if bounded and not commander.fence.allows((north_m, east_m, down_m), frame, fence):
             told = CommandDenied(
                 time_us=commander.time_us, command=_DO_REPOSITION, reason=Reason.OUTSIDE_FENCE
             )

@@ -289,7 +289,11 @@ def test_arming_with_a_fence(parameters: dict, place: float, reason: Reason, tex
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_places_outside_are_not_flown_to(flavour: str) -> None:
-    limits = {"GF_MAX_HOR_DIST": 50.0} if flavour == "px4" else {"FENCE_ENABLE": 1, "FENCE_RADIUS": 50.0}
+    limits = (
+        {"GF_MAX_HOR_DIST": 50.0, "GF_ACTION": 2}
+        if flavour == "px4"
+        else {"FENCE_ENABLE": 1, "FENCE_RADIUS": 50.0}
+    )
     rig = Rig(flavour, **limits)
     if flavour == "ardupilot":
         rig.commander.set_mode(FlightMode.GUIDED)
@@ -299,6 +303,10 @@ def test_places_outside_are_not_flown_to(flavour: str) -> None:
     rig.run(0.1)
     assert ("Reposition is outside geofence" in rig.texts()) is (flavour == "px4")
     assert guidance.reposition(north_m=30.0, east_m=0.0, down_m=-10.0).accepted
+    if flavour == "px4":  # which only looks where a breach does something
+        rig.set_parameter("GF_ACTION", 1)
+        rig.run(0.2)
+        assert guidance.reposition(north_m=70.0, east_m=0.0, down_m=-10.0).accepted
 
 
 # PX4

@@ -160,12 +160,15 @@ def test_motor_fails(flavour: str) -> None:
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_geofence(flavour: str) -> None:
     fence = (
-        {"GF_ACTION": 3, "GF_MAX_HOR_DIST": 400.0}
+        {"GF_ACTION": 3}
         if flavour == "px4"
         else {"FENCE_ENABLE": 1, "FENCE_TYPE": 2, "FENCE_RADIUS": 400.0, "FENCE_ACTION": 1}
     )
     flight = circling(flavour, 60.0, **fence)
     assert flight.reposition(900.0, 0.0, 60.0) == 0
+    if flavour == "px4":  # which refuses a place that is outside already
+        set_real(flight, "GF_MAX_HOR_DIST", 400.0)
+        assert flight.reposition(1200.0, 0.0, 60.0) == 1
     flight.fly_until(lambda: flight.mode == "return", 45.0, "return")
     flight.fly(1.2)
     assert status(flight) == CRITICAL
