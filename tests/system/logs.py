@@ -19,6 +19,7 @@ PX4_MODES = {
 ARDUPILOT_MODES = {3: "mission", 6: "return", 17: "hold", 5: "hold", 9: "land", 4: "guided"}
 ARDUPLANE_MODES = {10: "mission", 11: "return", 12: "hold", 13: "takeoff", 15: "guided"}
 FIXED_WING = 1
+UNKNOWN = "UNKNOWN_"
 
 
 def records(path: Path) -> list[tuple[int, Frame]]:
@@ -40,7 +41,10 @@ def mavutil_counts(path: Path) -> Counter[str]:
     log = mavutil.mavlink_connection(str(path), dialect="all")
     found: Counter[str] = Counter()
     while (message := log.recv_msg()) is not None:
-        found[message.get_type()] += 1
+        name = message.get_type()
+        if name.startswith(UNKNOWN):  # newer than pymavlink's dialect
+            name = DEFINITIONS[int(name.removeprefix(UNKNOWN))].name
+        found[name] += 1
     log.close()
     return found
 

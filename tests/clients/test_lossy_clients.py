@@ -1,0 +1,125 @@
+"""Other people's clients, which retry by themselves, over a poor radio on UDP: 5 % loss, 200 ms of jitter,
+repetitions and swaps. Over a bad one (30 %) they may fail, but nothing is done by half.
+"""
+
+import asyncio
+import random
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from pymavlink import mavftp, mavparm
+
+from autopilot_bridge.links import Impairment
+from tests.clients.mavutil_client import Client
+from tests.clients.sitl_process import free_port, running_sitl
+from tests.lossy_proxy import LossyProxy, lossy_proxy
+
+POOR = Impairment(loss=0.05, duplicate=0.02, reorder=0.02, jitter_s=0.2)
+BAD = Impairment(loss=0.3, duplicate=0.02, reorder=0.02, jitter_s=0.2)
+FOLDER = {"px4": "/fs/microsd", "ardupilot": "/APM"}
+SPEED = {"px4": "MPC_XY_VEL_MAX", "ardupilot": "WPNAV_SPEED"}
+FLAVOURS = ("px4", "ardupilot")
+
+pytestmark = pytest.mark.slow
+
+
+@contextmanager
+def radio(flavour: str, impairment: Impairment, seed: int) -> Iterator[tuple[str, LossyProxy]]:
+    """A vehicle in real time behind a radio; where its client finds it."""
+    near, far = free_port(), free_port()
+    with (
+        running_sitl(flavour, [f"udpout:127.0.0.1:{near}"], speedup=1.0),
+        lossy_proxy(f"udpin:127.0.0.1:{near}", f"udpout:127.0.0.1:{far}", impairment, seed) as proxy,
+    ):
+        yield f"udpin:127.0.0.1:{far}", proxy
+
+
+def put_and_get(client: Client, flavour: str, folder: Path) -> tuple[bytes, bytes | None]:
+    """A file to the vehicle and back; None: refused or not answered."""
+    ftp = mavftp.MAVFTP(client.link, 1, 1)
+    data = random.Random(3).randbytes(4000)
+    file, back = folder / "there.bin", folder / "back.bin"
+    file.write_bytes(data)
+    there = f"{FOLDER[flavour]}/radio.bin"
+    ftp.cmd_put([str(file), there])
+    if ftp.process_ftp_reply("CreateFile", timeout=60).error_code != mavftp.FtpError.Success:
+        return data, None
+    ftp.cmd_get([there, str(back)])
+    if ftp.process_ftp_reply("OpenFileRO", timeout=60).error_code != mavftp.FtpError.Success:
+        return data, None
+    return data, back.read_bytes()
+
+
+def parameter(client: Client, name: str) -> float:
+    """Ask until it is answered, as `mavset` does."""
+    for _ in range(10):
+        client.link.mav.param_request_read_send(1, 1, name.encode(), -1)
+        value = client.link.recv_match(
+            type="PARAM_VALUE", condition=f"PARAM_VALUE.param_id == '{name}'", blocking=True, timeout=2.0
+        )
+        if value is not None:
+            return float(value.param_value)
+    raise AssertionError(f"{name} was not answered")
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_pymavlinks_tools_over_a_poor_radio(flavour: str, tmp_path: Path) -> None:
+    with radio(flavour, POOR, 1) as (url, proxy):
+        client = Client(flavour, url, speedup=1.0, stream_hz=4)
+        sent, back = put_and_get(client, flavour, tmp_path)
+        assert back == sent
+        table = mavparm.MAVParmDict()
+        name = SPEED[flavour]
+        before = parameter(client, name)
+        table[name] = before
+        assert table.mavset(client.link, name, before - 1.0, retries=10)
+        assert parameter(client, name) == pytest.approx(before - 1.0)
+        assert proxy.lost > 10
+        client.link.close()
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_a_file_is_never_there_by_half(flavour: str, seed: int, tmp_path: Path) -> None:
+    with radio(flavour, BAD, seed) as (url, _):
+        client = Client(flavour, url, speedup=1.0, stream_hz=4)
+        sent, back = put_and_get(client, flavour, tmp_path)
+        assert back in (None, sent)
+        client.link.close()
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_mavsdk_over_a_poor_radio(flavour: str) -> None:
+    """All parameters, and a mission there and back."""
+    pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
+    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+    from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+    from mavsdk.asyncio.plugins.param import ParamAsync
+    from mavsdk.plugins.mission_raw import MissionItem
+
+    places = [473977418 + 10 * seq for seq in range(15)]
+    items = [
+        MissionItem(seq, 6, 16, int(seq == 0), 1, 0.0, 0.0, 0.0, 0.0, x, 85455939, 20.0, 0)
+        for seq, x in enumerate(places)
+    ]
+
+    async def script(url: str) -> None:
+        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+        async with Mavsdk(configuration) as sdk:
+            await sdk.add_any_connection(url.replace("udpin:", "udpin://"))
+            system = await sdk.first_autopilot(timeout_s=60.0)
+            assert system is not None
+            async with asyncio.timeout(120.0):
+                everything = await ParamAsync(system).get_all_params()
+            assert len(everything.float_params) + len(everything.int_params) > 300
+            missions = MissionRawAsync(system)
+            async with asyncio.timeout(120.0):
+                await missions.upload_mission(items)
+                back = await missions.download_mission()
+        assert [item.x for item in back][1:] == places[1:]
+
+    with radio(flavour, POOR, 2) as (url, proxy):
+        asyncio.run(script(url))
+        assert proxy.lost > 10

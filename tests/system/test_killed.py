@@ -1,0 +1,166 @@
+"""kill -9 in flight, of the vehicle, of the mission, of an estimator: every log is readable to its last
+complete record, and the vehicle does what its failsafe parameters say.
+"""
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink import mavutil
+
+from autopilot_bridge.tlog import TlogReader
+from tests.clients.sitl_process import SitlProcess, free_port, running_sitl
+from tests.system.logs import counts, mavutil_counts, modes
+from tests.system.runs import SHORT, Run, started, wait_until
+from tests.system.test_serial_line import in_flight
+
+LONG = (*SHORT, "--periods", "20")
+SPEEDUP = 20.0
+MISSION_FAILED = 1
+NUMBERS = {
+    ("px4", "return"): 0x05040000,
+    ("px4", "hold"): 0x03040000,
+    ("px4", "land"): 0x06040000,
+    ("ardupilot", "return"): 6,
+    ("ardupilot", "guided"): 4,
+    ("ardupilot", "land"): 9,
+}
+
+
+@contextlib.contextmanager
+def sitl_and_watcher(
+    flavour: str, folder: Path, parameters: str
+) -> Iterator[tuple[SitlProcess, str, "Watcher", Path]]:
+    """A SITL with parameters and a log, the link for a mission, and somebody who only looks."""
+    port, watched = free_port(), free_port()
+    given, log = folder / "given.parm", folder / "sitl.tlog"
+    given.write_text(parameters)
+    options = ["--params", str(given), "--log", str(log)]
+    links = [f"udpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{watched}"]
+    with running_sitl(flavour, links, speedup=SPEEDUP, options=options) as sitl:
+        watcher = Watcher(flavour, watched)
+        yield sitl, f"udpout:127.0.0.1:{port}", watcher, log
+        watcher.link.close()
+
+
+class Watcher:
+    """Hears the heartbeats; no ground station, whose own heartbeat would count."""
+
+    def __init__(self, flavour: str, port: int) -> None:
+        self.flavour = flavour
+        self.link: Any = mavutil.mavlink_connection(
+            f"udpout:127.0.0.1:{port}", dialect="all", source_system=200, source_component=191
+        )
+
+    def heartbeat(self) -> Any:
+        self.link.mav.heartbeat_send(18, 8, 0, 0, 4)
+        message = self.link.recv_match(type="HEARTBEAT", blocking=True, timeout=0.2)
+        return None if message is None or message.get_srcSystem() != 1 else message
+
+    def sees(self, mode: str) -> None:
+        """Wait for a mode."""
+        number = NUMBERS[self.flavour, mode]
+
+        def told() -> bool:
+            heartbeat = self.heartbeat()
+            return heartbeat is not None and heartbeat.custom_mode == number
+
+        wait_until(told, 30.0)
+
+    def sees_it_disarmed(self) -> None:
+        def told() -> bool:
+            heartbeat = self.heartbeat()
+            return heartbeat is not None and not heartbeat.base_mode & 128
+
+        wait_until(told, 60.0)
+
+
+def check_readable(log: Path) -> None:
+    """Nothing but one torn record at the end may be lost, and pymavlink reads the same."""
+    reader = TlogReader(log)
+    frames = list(reader)
+    assert len(frames) > 500
+    assert reader.counters.bytes_skipped == 0
+    assert log.stat().st_size - sum(8 + len(frame.raw) for _, frame in frames) < 300
+    assert mavutil_counts(log) == counts(log)
+
+
+def kill(run: Run) -> None:
+    run.process.kill()
+    run.process.communicate()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("flavour", "via", "flying", "parameters", "failsafe"),
+    [
+        ("px4", "setpoints", "offboard", "COM_OBL_RC_ACT 3\n", "return"),
+        ("px4", "setpoints", "offboard", "COM_OBL_RC_ACT 4\n", "land"),
+        ("px4", "waypoints", "mission", "NAV_DLL_ACT 2\n", "return"),
+        ("ardupilot", "setpoints", "guided", "FS_GCS_ENABLE 1\n", "return"),
+        ("ardupilot", "waypoints", "mission", "FS_GCS_ENABLE 5\n", "land"),
+    ],
+)
+def test_the_mission_is_killed(
+    flavour: str, via: str, flying: str, parameters: str, failsafe: str, tmp_path: Path
+) -> None:
+    with sitl_and_watcher(flavour, tmp_path, parameters) as (_, link, watcher, log):
+        with started(tmp_path / "run", *LONG, "--via", via, "--connect", link) as run:
+            in_flight(run, flying)
+            kill(run)
+        watcher.sees(failsafe)
+        watcher.sees_it_disarmed()
+    check_readable(run.log)
+    check_readable(log)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_the_vehicle_is_killed(flavour: str, tmp_path: Path) -> None:
+    """The mission ends with a reason, and both logs are readable."""
+    with sitl_and_watcher(flavour, tmp_path, "") as (sitl, link, _, log):
+        with started(tmp_path / "run", *LONG, "--connect", link) as run:
+            in_flight(run, "mission")
+            sitl.process.kill()
+            out = run.finish(MISSION_FAILED)
+        assert "no heartbeat" in out
+        assert "Traceback" not in out
+    assert run.summary["outcome"] == "failed"
+    assert "no heartbeat" in run.summary["reason"]
+    check_readable(run.log)
+    check_readable(log)
+
+
+@pytest.mark.slow
+def test_an_estimator_is_killed(tmp_path: Path) -> None:
+    """Its log is readable, the mission on another link flies on to its end, and the vehicle heeds nothing."""
+    port, onboard = free_port(), free_port()
+    links = [f"udpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{onboard}"]
+    folder = tmp_path / "estimate"
+    command = [sys.executable, "-m", "missions", "estimate", "attitude"]
+    command += ["--connect", f"udpout:127.0.0.1:{onboard}", "--out", str(folder)]
+    with (
+        running_sitl("px4", links, speedup=SPEEDUP),
+        started(tmp_path / "run", *SHORT, "--connect", f"udpout:127.0.0.1:{port}") as run,
+    ):
+        estimator = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, env=os.environ.copy()
+        )
+        try:
+            in_flight(run, "mission")
+            wait_until(lambda: any(log.stat().st_size > 300_000 for log in folder.glob("*.tlog")))
+        finally:
+            estimator.kill()
+            told, _ = estimator.communicate()
+        assert b"Traceback" not in told
+        run.finish()
+    assert run.summary["outcome"] == "completed"
+    assert "offboard" not in modes(run.log)
+    (log,) = folder.glob("*.tlog")
+    check_readable(log)
+    check_readable(run.log)
