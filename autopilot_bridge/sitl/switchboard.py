@@ -80,7 +80,8 @@ class Switchboard:
     def close(self, channel: LinkChannel) -> None:
         """Take a link away; the link itself is closed too."""
         self.channels.remove(channel)
-        self._autopilot.remove_channel(channel)
+        if self._autopilot is not None:
+            self._autopilot.remove_channel(channel)
         self._router.remove(channel)
         del self._reach[channel], self._roles[channel]
         channel.link.close()
@@ -119,7 +120,9 @@ class Switchboard:
                 self._take_key(frame, channel)
                 continue
             others = self._router.route(frame, channel) if several else ()
-            if not others or frame.target_system != own or frame.target_component in (0, AUTOPILOT_COMPONENT):
+            if self._autopilot is not None and (
+                not others or frame.target_system != own or frame.target_component in (0, AUTOPILOT_COMPONENT)
+            ):
                 self._autopilot.receive(frame, channel)
             if frame.target_system == own and frame.target_component == AUTOPILOT_COMPONENT:
                 continue
