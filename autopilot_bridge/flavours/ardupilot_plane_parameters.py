@@ -9,6 +9,9 @@ from autopilot_bridge.parameter_tables import load_table
 from autopilot_bridge.parameters import ParameterDefinition
 
 _COPTER_ONLY: Final = (
+    "PLND_",
+    "PRX1_",
+    "VISO_",
     "ACRO_BAL_ROLL",
     "ACRO_BAL_PITCH",
     "ACRO_TRAINER",
@@ -18,9 +21,11 @@ _COPTER_ONLY: Final = (
     "ANGLE_MAX",
     "ARMING_NEED_LOC",
     "ATC_",
+    "AVOID_",
     "CIRCLE_",
     "DISARM_DELAY",
     "ESC_CALIBRATION",
+    "FOLL_",
     "FRAME_",
     "FS_CRASH_CHECK",
     "FS_DR_",

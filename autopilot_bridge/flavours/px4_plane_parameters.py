@@ -11,6 +11,8 @@ from autopilot_bridge.parameters import ParameterDefinition
 _MULTICOPTER_ONLY: Final = (
     *(f"CA_ROTOR{rotor}_" for rotor in (1, 2, 3)),
     *(f"CA_ROTOR0_A{axis}" for axis in "XYZ"),
+    "CP_",
+    "FLW_",
     "HTE_",
     "LNDMC_",
     "MC_",
