@@ -60,8 +60,7 @@ class FenceWatch:
 
     def present(self, parameters: FenceParameters) -> bool:
         """There is something to keep to, on or off."""
-        walls = parameters.walls
-        return bool(walls & ~FenceType.SHAPES) or (bool(walls & FenceType.SHAPES) and self.geofence.uploaded)
+        return parameters.has_cylinder or (parameters.shapes and self.geofence.uploaded)
 
     def enabled(self, parameters: FenceParameters) -> bool:
         """It is on."""
@@ -102,6 +101,9 @@ class FenceWatch:
         """Look where the vehicle is (None: not known, nothing changes); what there is to tell."""
         events: list[Event] = []
         self._home = home_ned_m
+        if not (self.broken or self._auto_on or self.present(parameters)):
+            self._armed = armed
+            return events
         height_m = -math.inf
         if place_ned_m is not None and home_ned_m is not None:
             height_m = home_ned_m[2] - place_ned_m[2]

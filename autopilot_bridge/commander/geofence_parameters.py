@@ -1,7 +1,7 @@
 """What a pilot may tune about the geofence, in neutral names."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import IntEnum, IntFlag
 from typing import Final
 
@@ -52,6 +52,8 @@ class FenceParameters:
         return_to_rally: the action FENCE_POINT goes to a rally point (FENCE_RET_RALLY).
         return_height_m: at this height over home; 0: between the height limits (FENCE_RET_ALT).
         counts_breaches: breaches are told wall by wall (ArduPilot).
+        walls: those that are set up, whether or not the fence is on.
+        has_cylinder: there are some besides the uploaded shapes.
     """
 
     enabled: bool = False
@@ -73,21 +75,14 @@ class FenceParameters:
     return_to_rally: bool = False
     return_height_m: float = 0.0
     counts_breaches: bool = False
+    walls: FenceType = field(init=False)
+    has_cylinder: bool = field(init=False)
 
     def __post_init__(self) -> None:
         for each in fields(self):
-            value = getattr(self, each.name)
+            value = getattr(self, each.name, None)
             if isinstance(value, float) and not math.isfinite(value):
                 raise ValueError(f"{each.name} = {value} is not a finite number")
-
-    @property
-    def bounds_targets(self) -> bool:
-        """Places to fly to must lie inside: always (ArduPilot), or where a breach does something (PX4)."""
-        return self.counts_breaches or self.action > FailsafeAction.WARN
-
-    @property
-    def walls(self) -> FenceType:
-        """The walls that are set up, whether or not the fence is on."""
         walls = FenceType(0)
         for there, wall in (
             (self.height_max_m > 0.0, FenceType.HEIGHT_MAX),
@@ -97,4 +92,11 @@ class FenceParameters:
         ):
             if there:
                 walls |= wall
-        return walls
+        # asked for ten times a second
+        object.__setattr__(self, "walls", walls)
+        object.__setattr__(self, "has_cylinder", bool(walls & ~FenceType.SHAPES))
+
+    @property
+    def bounds_targets(self) -> bool:
+        """Places to fly to must lie inside: always (ArduPilot), or where a breach does something (PX4)."""
+        return self.counts_breaches or self.action > FailsafeAction.WARN
