@@ -1,0 +1,125 @@
+"""Mission files flown on embedded SITLs, and patterns that went through a file."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from missions.errors import MissionError, PlanError
+from missions.library import find_mission
+from missions.options import FlightOptions
+from missions.plan_files.export import export_plan
+from missions.plan_files.files import read_mission_file
+from missions.plan_files.options import FileOptions, Then
+from missions.session import RunRequest, fly
+from tests.missions.plan_files.plans import LANDING, LAT, LON, changed, simple, waypoint, write
+
+both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+
+
+def request(path: Path, flavour: str = "px4", **more) -> RunRequest:
+    world = find_mission(str(path)).world_defaults
+    asked = RunRequest(
+        options=FileOptions(), autopilot=flavour, model=world.model, home=world.home, picture=False,
+        out=path.parent / "run",
+    )  # fmt: skip
+    return replace(asked, **more)
+
+
+@both
+def test_a_plan_is_flown_with_its_fence_rally_points_and_jumps(flavour: str, tmp_path: Path) -> None:
+    path = write(tmp_path)
+    result = fly(find_mission(str(path)), request(path, flavour, picture=True))
+    assert (result.outcome, result.reason) == ("completed", "")
+    block = result.summary["mission_file"]
+    assert (block["fence_items"], block["rally_points"]) == (4, 1)
+    flown = [entry["item"] for entry in block["reached"] if entry["command"] == 16]
+    assert flown == [2, 3, 4, 6, 3, 4, 6]
+    assert len(block["legs"]) == 7
+    assert block["cross_track_rms_m"] < 0.5
+    assert result.summary["path_max_error_m"] < 2.0
+    assert result.summary["vehicles"][0]["waypoints"]["passed"] == 8
+    assert result.summary["vehicles"][0]["home"]["lat_deg"] == pytest.approx(LAT, abs=1e-4)
+    assert {p.name for p in result.folder.iterdir()} == {"flight.tlog", "summary.json", "track.png"}
+
+
+@both
+def test_what_the_autopilot_does_not_take_is_named(flavour: str, tmp_path: Path) -> None:
+    strange = 82 if flavour == "px4" else 5001  # a spline; a fence's corner
+    items = [simple(1, 22, [0, 0, 0, None, LAT, LON, 15]), simple(2, strange, [0, 0, 0, 0, LAT, LON, 15])]
+    path = write(tmp_path, changed("mission", "items", to=items))
+    result = fly(find_mission(str(path)), request(path, flavour))
+    assert result.outcome == "failed"
+    assert "the vehicle refused the mission at item 2" in result.reason
+    assert result.summary["distance_m"] < 1.0
+
+
+@pytest.mark.slow
+def test_a_mission_that_does_not_land_returns(tmp_path: Path) -> None:
+    items = [simple(1, 22, [0, 0, 0, None, LAT, LON, 15]), waypoint(2, 3e-4, 0.0, 15)]
+    path = write(tmp_path, changed("mission", "items", to=items))
+    result = fly(find_mission(str(path)), request(path))
+    assert (result.outcome, result.reason) == ("completed", "")
+    landed = fly(
+        find_mission(str(path)), request(path, out=tmp_path / "there", options=FileOptions(then=Then.LAND))
+    )
+    assert landed.outcome == "completed"
+    assert landed.summary["distance_m"] < result.summary["distance_m"] - 20.0  # it lands where it is
+
+
+def test_what_can_not_be_flown_is_refused_before_anything_starts(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    with pytest.raises(PlanError, match="is for a multicopter, and the vehicle is a fixed_wing"):
+        fly(find_mission(str(path)), request(path, model="aerosonde"))
+    with pytest.raises(PlanError, match=r"is flown \d+ km from where the vehicle stands"):
+        fly(find_mission(str(path)), request(path, home="47.0,8.0,400"))
+    forever = changed("mission", "items", 4, "params", 1, to=-1)
+    endless = write(tmp_path, forever, "b.plan")
+    result = fly(find_mission(str(endless)), request(endless, out=tmp_path / "endless"))
+    assert "jumps back for ever; say when it ends with --time-limit" in result.reason
+    aircraft = changed("mission", "vehicleType", to=1)
+    aircraft["mission"]["items"] = aircraft["mission"]["items"][:3]
+    wings = write(tmp_path, aircraft, "c.plan")
+    with pytest.raises(PlanError, match="does not land; add a landing, or say what comes after it: --then"):
+        fly(find_mission(str(wings)), request(wings, out=tmp_path / "wings"))
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.slow
+@both
+def test_an_aircraft_flies_its_plan_and_lands(flavour: str, tmp_path: Path) -> None:
+    plan = changed("mission", "vehicleType", to=1)
+    plan["geoFence"] = {"version": 2, "circles": [], "polygons": []}
+    plan["mission"]["items"] = [
+        simple(1, 22, [12, 0, 0, None, LAT + 0.003, LON, 60]),
+        waypoint(2, 0.006, 0.0, 80),
+        waypoint(3, 0.006, 0.008, 80),
+        waypoint(4, 0.0, 0.008, 80),
+        LANDING,
+    ]
+    path = write(tmp_path, plan)
+    parameters = {"RTL_AUTOLAND": 2.0} if flavour == "ardupilot" else {}
+    result = fly(find_mission(str(path)), request(path, flavour, parameters=parameters))
+    assert (result.outcome, result.reason) == ("completed", "")
+    assert {e["item"] for e in result.summary["mission_file"]["reached"]} >= {2, 3, 4}
+
+
+@pytest.mark.parametrize(("flavour", "suffix"), [("px4", ".plan"), ("ardupilot", ".waypoints")])
+def test_a_pattern_is_written_and_flown_from_its_file(flavour: str, suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"l2{suffix}"
+    asked = RunRequest(options=FlightOptions(pattern="L2", width_m=40.0, height_m=40.0), autopilot=flavour)
+    count = export_plan(find_mission("lissajous"), asked, path)
+    document = read_mission_file(path)
+    assert len(document.items) == count > 10
+    assert document.lands
+    result = fly(find_mission(str(path)), request(path, flavour))
+    assert (result.outcome, result.reason) == ("completed", "")
+    assert result.summary["path_max_error_m"] < 2.0
+
+
+def test_a_mission_without_waypoints_has_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "own.py"
+    path.write_text("async def fly(vehicle, options):\n    pass\n")
+    with pytest.raises(MissionError, match="own is not flown by uploaded waypoints"):
+        export_plan(find_mission(str(path)), RunRequest(), tmp_path / "a.plan")
+    assert not (tmp_path / "a.plan").exists()

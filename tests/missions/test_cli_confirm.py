@@ -1,0 +1,85 @@
+"""The question before a flight with a real vehicle: when it is asked, and what the answers do."""
+
+import sys
+from collections.abc import Iterator
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from missions.cli_confirm import confirmation, is_hardware
+from missions.cli_fly import fly
+from missions.preflight.before_flight import Confirm, Look
+from missions.preflight.finding import ok, problem
+
+SERIAL = ["serial:/dev/ttyACM0:57600"]
+FINE = Look(system_id=1, findings=(ok("GPS", "3D fix"),))
+SICK = Look(system_id=1, findings=(ok("GPS", "3D fix"), problem("home", "not set", "wait")))
+
+
+@pytest.mark.parametrize(
+    ("connections", "hardware"),
+    [
+        (SERIAL, True),
+        (["/dev/ttyUSB0,57600"], True),
+        (["udpin:0.0.0.0:14550"], True),
+        (["udpout:192.168.1.2:14550"], True),
+        (["udpin:127.0.0.1:14550"], False),
+        (["tcp:localhost:5760"], False),
+        (["tcp:127.0.0.1:5760", *SERIAL], True),
+    ],
+)
+def test_what_may_be_a_real_vehicle(connections: list[str], hardware: bool) -> None:
+    assert is_hardware(connections) is hardware
+
+
+def test_nothing_is_asked_on_links_of_this_machine() -> None:
+    assert confirmation(["udpin:127.0.0.1:14550"], yes=False, check=False) is None
+
+
+@pytest.mark.parametrize("connection", [*SERIAL, "udpin:0.0.0.0:14550"])
+def test_where_nobody_can_be_asked_nothing_flies(connection: str) -> None:
+    result = CliRunner().invoke(fly, ["lissajous", "--connect", connection])
+    assert result.exit_code == 2
+    assert "nobody can be asked; give --yes" in " ".join(result.output.split())
+
+
+@pytest.mark.parametrize("option", [["--yes"], ["--check"], ["--regain", "5"]])
+def test_options_for_real_vehicles_are_refused_without_one(option: list[str]) -> None:
+    result = CliRunner().invoke(fly, ["lissajous", *option])
+    assert result.exit_code == 2
+    assert f"{option[0]}: for vehicles elsewhere" in " ".join(result.output.split())
+
+
+def test_yes_flies_only_when_nothing_is_found(capsys: pytest.CaptureFixture[str]) -> None:
+    confirm = confirmation(SERIAL, yes=True, check=False)
+    assert confirm is not None
+    assert confirm([FINE])
+    assert not confirm([FINE, SICK])
+    assert "problem  home: not set; wait" in capsys.readouterr().err
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: True, raising=False)
+    confirm = confirmation(SERIAL, yes=False, check=False)
+    assert confirm is not None
+    yield confirm
+
+
+@pytest.mark.parametrize(
+    ("look", "answer", "flies"),
+    [
+        (FINE, "yes", True),
+        (FINE, "YES ", True),
+        (FINE, "y", False),
+        (FINE, "", False),
+        (SICK, "yes", False),
+        (SICK, "fly anyway", True),
+    ],
+)
+def test_the_answer_must_be_typed_out(
+    asked: Confirm, look: Look, answer: str, flies: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(click, "prompt", lambda *_, **__: answer)
+    assert asked([look]) is flies
