@@ -1,8 +1,9 @@
 """The page docs/compatibility.md, made from the outcomes of the tests with real clients.
 
 A test says what it is about by `@pytest.mark.compatibility(client=..., feature=...)` and on which vehicle by
-its parameter `vehicle` (or the marker's). What the firmware does not offer is a test, too: it passes when the
-client is told so, and gives the reason with `not_offered(request, "...")`.
+its parameter `vehicle` (or another one: `parameter=`; or the marker's `vehicle=`; `plane=True`: aircraft).
+What the firmware does not offer is a test, too: it passes when the client is told so, and gives the reason by
+`not_offered(request, "...")`.
 
 `python -m pytest tests/clients -m '' --write-compatibility` writes the page; it refuses when a test of the
 page was not run. Every other run compares the outcomes it has with the page, and fails when they differ.
@@ -91,7 +92,9 @@ def cell_of(item: pytest.Item) -> Cell | None:
     given: dict[str, Any] = dict(marker.kwargs)
     callspec = getattr(item, "callspec", None)
     parameters = {} if callspec is None else callspec.params
-    vehicle = given.get("vehicle") or parameters["vehicle"]
+    vehicle = given.get("vehicle") or parameters[given.get("parameter", "vehicle")]
+    if given.get("plane"):
+        vehicle = f"{vehicle}-plane"
     client = given.get("client") or parameters["client"]
     if vehicle not in VEHICLES:
         raise pytest.UsageError(f"{item.nodeid}: vehicle {vehicle!r} is none of {', '.join(VEHICLES)}")

@@ -30,10 +30,15 @@ def _class_name(plugin: str) -> str:
 
 
 class Session(ABC):
-    """A ground station by MAVSDK, connected to one vehicle."""
+    """A ground station by MAVSDK, connected to one vehicle.
+
+    Attributes:
+        before_arming: what must be done otherwise before the vehicle can be armed.
+    """
 
     def __init__(self) -> None:
         self._plugins: dict[str, Any] = {}
+        self.before_arming: Callable[[], None] = lambda: None
 
     def plugin(self, name: str) -> Any:
         """A plugin by the name of its module."""

@@ -60,7 +60,7 @@ def running_sitl(
     reader.start()
     try:
         assert sitl.started.wait(START_DEADLINE_S), f"no {READY_LINE!r} line: {sitl.lines}"
-        assert process.poll() is None, f"the SITL ended at once: {sitl.lines}"
+        assert any(READY_LINE in line for line in sitl.lines), f"the SITL ended at once: {sitl.lines}"
         yield sitl
     finally:
         process.send_signal(signal.SIGINT)

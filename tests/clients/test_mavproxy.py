@@ -22,6 +22,9 @@ def waypoints(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.compatibility(
+    client="MAVProxy", feature="arm, takeoff, guided, auto, rtl; param, wp", vehicle="ardupilot"
+)
 def test_everyday_commands(tmp_path: Path) -> None:
     port = free_port(socket.SOCK_STREAM)
     with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"]):

@@ -30,6 +30,9 @@ def plan(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.compatibility(
+    client="MAVProxy", feature="arm, takeoff, guided, auto, rtl; param, wp", vehicle="ardupilot-plane"
+)
 def test_everyday_commands(tmp_path: Path) -> None:
     port = free_port(socket.SOCK_STREAM)
     with running_sitl(

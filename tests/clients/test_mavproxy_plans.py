@@ -26,6 +26,7 @@ def waypoint_file(path: Path, rows: Sequence[tuple[int, int, float, float, float
     return path
 
 
+@pytest.mark.compatibility(client="MAVProxy", feature="fence, rally", vehicle="ardupilot")
 def test_fence_and_rally_modules(tmp_path: Path) -> None:
     fence = [(3, 5001, 4.0, LAT + north, LON + east, 0.0) for north, east in CORNERS]
     fence_file = waypoint_file(tmp_path / "fence.txt", [*fence, (3, 5004, 8.0, LAT + 3e-4, LON, 0.0)])

@@ -121,6 +121,9 @@ async def fly_px4(url: str) -> None:
         await first(telemetry.subscribe_armed(), lambda armed: not armed, "disarm")
 
 
+@pytest.mark.compatibility(
+    client="MAVSDK asyncio", feature="action, offboard, mission: one flight", vehicle="px4"
+)
 def test_asyncio_interface_flies_px4() -> None:
     port = free_port()
     with running_sitl("px4", [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP):
@@ -145,6 +148,9 @@ def accepted(action: Callable[[], None]) -> bool:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.compatibility(
+    client="MAVSDK synchronous", feature="action, offboard, mission: one flight", parameter="flavour"
+)
 def test_synchronous_interface_flies(flavour: str) -> None:
     port = free_port()
     with running_sitl(flavour, [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP):

@@ -236,6 +236,9 @@ async def fly_px4(url: str) -> None:
         await pilot.lands()
 
 
+@pytest.mark.compatibility(
+    client="MAVSDK asyncio", feature="action, offboard, mission: one flight", vehicle="px4-plane"
+)
 def test_px4_aircraft() -> None:
     port = free_port()
     with running_sitl("px4", [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP, options=AIRCRAFT):
@@ -277,6 +280,9 @@ async def fly_arduplane(url: str) -> None:
         await pilot.lands()
 
 
+@pytest.mark.compatibility(
+    client="MAVSDK asyncio", feature="action, offboard, mission: one flight", vehicle="ardupilot-plane"
+)
 def test_ardupilot_aircraft() -> None:
     port = free_port()
     with running_sitl("ardupilot", [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP, options=AIRCRAFT):

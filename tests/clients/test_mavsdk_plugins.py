@@ -74,6 +74,8 @@ def mavsdk(sitl: Sitl, client: str) -> Iterator[Session]:
     if sitl.flavour == "ardupilot":
         for stream in ("position", "position_velocity_ned", "attitude_euler", "in_air", "health"):
             session.call("telemetry", f"set_rate_{stream}", 10.0)
+        # after a landing it stays in RTL or LAND, and MAVSDK has no word for GUIDED but a take-off
+        session.before_arming = lambda: sitl.script.set_mode("GUIDED")
     session.first("telemetry", "health", lambda health: health.is_armable and health.is_global_position_ok)
     yield session
     session.close()
@@ -114,10 +116,8 @@ def fly(session: Session) -> Any:
     if not session.first("telemetry", "in_air"):
         land(session)
         session.call("action", "set_takeoff_altitude", HEIGHT_M)
-        # ArduPilot is armable before it has a position, and stays in RTL after an RTL
-        session.until(
-            "arming", lambda: accepted(session, "action", "hold") and accepted(session, "action", "arm")
-        )
+        session.before_arming()
+        session.until("arming", lambda: accepted(session, "action", "arm"))
         session.call("action", "takeoff")
         session.first("telemetry", "position", lambda p: p.relative_altitude_m > HEIGHT_M - 1.0)
         session.first("telemetry", "landed_state", lambda state: state.name == "IN_AIR")
@@ -362,7 +362,7 @@ def test_ftp(mavsdk: Session, vehicle: str, client: str, tmp_path: Path) -> None
     mavsdk.call("ftp", "create_directory", folder)
     mavsdk.collect("ftp", "upload", str(file), folder)
     listed = mavsdk.call("ftp", "list_directory", folder)
-    assert "notes.txt" in listed.files
+    assert "notes.txt" in {entry.name for entry in listed.entries}
     assert mavsdk.call("ftp", "are_files_identical", str(file), f"{folder}/notes.txt")
     for burst in (False, True):
         back = tmp_path / f"back{burst}"
@@ -372,6 +372,32 @@ def test_ftp(mavsdk: Session, vehicle: str, client: str, tmp_path: Path) -> None
     mavsdk.call("ftp", "rename", f"{folder}/notes.txt", f"{folder}/more.txt")
     mavsdk.call("ftp", "remove_file", f"{folder}/more.txt")
     mavsdk.call("ftp", "remove_directory", folder)
+
+
+@compatibility(feature="component_metadata")
+def test_component_metadata(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest) -> None:
+    from mavsdk.plugins.component_metadata import MetadataType
+
+    mavsdk.call("component_metadata", "request_autopilot_component")
+    if vehicle == "ardupilot":
+        with pytest.raises(AssertionError, match="not seen"):
+            mavsdk.first("component_metadata", "metadata_available", wait_s=2.0)
+        not_offered(request, "no component metadata in 4.6")
+        return
+    found = mavsdk.first(
+        "component_metadata", "metadata_available", lambda update: update.type == MetadataType.PARAMETER
+    )
+    assert "MPC_XY_VEL_MAX" in found.json_metadata
+
+
+@compatibility(feature="events")
+def test_events(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest) -> None:
+    if vehicle == "ardupilot":
+        assert "NOT_AVAILABLE" in rejected(mavsdk, "events", "get_health_and_arming_checks_report")
+        not_offered(request, "no events in 4.6")
+        return
+    report = mavsdk.first("events", "health_and_arming_checks")
+    assert report.health_components
 
 
 # in the air
@@ -483,7 +509,11 @@ def test_offboard(mavsdk: Session, vehicle: str, kind: str, request: pytest.Fixt
     mavsdk.call("offboard", method, *arguments)
     mavsdk.call("offboard", "start")
     assert mavsdk.call("offboard", "is_active")
-    if kind == "position_global":
+    if vehicle == "ardupilot" and kind == "attitude_rate":
+        with pytest.raises(AssertionError, match="not seen"):
+            mavsdk.first("telemetry", "position_velocity_ned", lambda at: found(start, at), wait_s=1.0)
+        not_offered(request, "without attitude_rate: body rates alone are not flown in GUIDED here")
+    elif kind == "position_global":
         mavsdk.first("telemetry", "position", lambda p: abs(p.longitude_deg - east_deg) < 1.5 * DEG_PER_M)
     else:
         moved(mavsdk, lambda at: found(start, at))
@@ -556,7 +586,7 @@ def test_raw_mission(mavsdk: Session, vehicle: str) -> None:
 
 
 @compatibility(feature="manual_control")
-def test_manual_control(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest) -> None:
+def test_manual_control(mavsdk: Session, sitl: Sitl, vehicle: str) -> None:
     fly(mavsdk)
 
     def sticks(forward: float) -> Callable[[], None]:
@@ -565,17 +595,39 @@ def test_manual_control(mavsdk: Session, vehicle: str, request: pytest.FixtureRe
 
     hold, push = sticks(0.0), sticks(0.6)
     mavsdk.first("telemetry", "position", each=hold)
-    if vehicle == "ardupilot":
-        assert not accepted(mavsdk, "manual_control", "start_position_control")
-        sitl_mode = mavsdk.first("telemetry", "flight_mode", each=hold)
-        assert sitl_mode.name != "POSCTL"
-        not_offered(request, "MAVSDK knows no manual modes of ArduPilot; sticks steer LOITER all the same")
-    else:
-        mavsdk.call("manual_control", "start_position_control")
+    mavsdk.call("manual_control", "start_position_control")
+    if vehicle == "px4":
         mavsdk.first("telemetry", "flight_mode", lambda mode: mode.name == "POSCTL", hold)
-    if vehicle == "ardupilot":
-        mavsdk.until("hold", lambda: accepted(mavsdk, "action", "hold"))
+    else:  # which is LOITER there; MAVSDK has no name for it
+        sitl.script.sees_mode("LOITER", hold)
     moved(mavsdk, lambda at: math.hypot(at.velocity.north_m_s, at.velocity.east_m_s) > 2.0, push)
+    fly(mavsdk)
+
+
+@compatibility(feature="follow_me")
+def test_follow_me(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest) -> None:
+    from mavsdk.plugins.follow_me import Config, TargetLocation
+
+    here = fly(mavsdk)
+    target = TargetLocation(
+        here.latitude_deg + 30.0 * DEG_PER_M, here.longitude_deg, here.absolute_altitude_m, 0.0, 0.0, 0.0
+    )
+    altitude = Config.FollowAltitudeMode.CONSTANT
+    accepted(mavsdk, "follow_me", "set_config", Config(10.0, 8.0, 0.1, altitude, 8.0, 180.0))
+    mavsdk.call("follow_me", "set_target_location", target)
+    if vehicle == "ardupilot":
+        assert not accepted(mavsdk, "follow_me", "start")
+        not_offered(request, "MAVSDK follows with PX4 only")
+        return
+    mavsdk.call("follow_me", "start")
+    plugin = getattr(mavsdk.plugin("follow_me"), "_plugin", mavsdk.plugin("follow_me"))
+    mavsdk.first(
+        "telemetry",
+        "position",
+        lambda p: abs((target.latitude_deg - p.latitude_deg) / DEG_PER_M) < 12.0,
+        lambda: plugin.set_target_location(target),
+    )
+    mavsdk.call("follow_me", "stop")
     fly(mavsdk)
 
 

@@ -62,6 +62,7 @@ def take_off(client: Client, height_m: float) -> None:
     )
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", parameter="client")
 def test_offboard_positions_and_return(client: Client) -> None:
     take_off(client, 10.0)
     if client.flavour == "px4":
@@ -74,6 +75,7 @@ def test_offboard_positions_and_return(client: Client) -> None:
     client.landed_and_disarmed()
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="mission", parameter="client")
 def test_uploaded_mission_and_landing(client: Client) -> None:
     client.ready()
     here = client.until("position", lambda m: m.get_type() == "GLOBAL_POSITION_INT")

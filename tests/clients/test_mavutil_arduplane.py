@@ -40,6 +40,7 @@ def sent(client: AircraftClient, roll_deg: float, thrust: float, type_mask: int)
     return lambda: client.send_attitude(roll_deg, 5.0, thrust, type_mask)
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="mission", vehicle="ardupilot-plane")
 def test_auto_from_take_off_to_auto_disarm() -> None:
     with aircraft("ardupilot") as client:
         client.ready()
@@ -59,6 +60,9 @@ def test_auto_from_take_off_to_auto_disarm() -> None:
         assert "Auto disarmed" in client.texts
 
 
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
+)
 def test_reposition_with_radius_and_direction(flying: AircraftClient) -> None:
     for place, clockwise in (
         (flying.runway.along(300.0, 200.0), 1.0),
@@ -74,6 +78,9 @@ def test_reposition_with_radius_and_direction(flying: AircraftClient) -> None:
 
 
 @pytest.mark.parametrize("heading_deg", [90.0, 350.0])
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
+)
 def test_heading(guided: AircraftClient, heading_deg: float) -> None:
     guided.command(mavlink.MAV_CMD_GUIDED_CHANGE_HEADING, 1, heading_deg, 5.0)
     guided.holds(
@@ -84,6 +91,9 @@ def test_heading(guided: AircraftClient, heading_deg: float) -> None:
     )
 
 
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
+)
 def test_altitude_and_airspeed(guided: AircraftClient) -> None:
     guided.command(mavlink.MAV_CMD_GUIDED_CHANGE_ALTITUDE, 0, 0, 0, 0, 0, 0, 110.0)
     guided.command(mavlink.MAV_CMD_GUIDED_CHANGE_SPEED, 0, 21.0, 0.0)
@@ -91,6 +101,9 @@ def test_altitude_and_airspeed(guided: AircraftClient) -> None:
     guided.flies_at(21.0)
 
 
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
+)
 def test_attitude_with_throttle(guided: AircraftClient) -> None:
     for roll_deg, throttle in ((25.0, 0.9), (-25.0, 0.7)):
         each = sent(guided, roll_deg, throttle, NO_RATES)
@@ -129,6 +142,11 @@ def test_attitudes_that_stop_leave_the_circle_commanded_before(flying: AircraftC
 
 
 @pytest.mark.parametrize("by", ["override", "manual control"])
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)",
+    feature="sticks: RC_CHANNELS_OVERRIDE, MANUAL_CONTROL",
+    vehicle="ardupilot-plane",
+)
 def test_sticks_in_fbwa(flying: AircraftClient, by: str) -> None:
     flying.set_mode("FBWA")
     limit_deg = flying.parameter("ROLL_LIMIT_DEG")
@@ -144,6 +162,9 @@ def test_sticks_in_fbwa(flying: AircraftClient, by: str) -> None:
     flying.link.mav.rc_channels_override_send(1, 1, *(0,) * 8)
 
 
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
+)
 def test_loiter(flying: AircraftClient) -> None:
     flying.set_mode("LOITER")
     before = flying.next("GLOBAL_POSITION_INT")
@@ -152,6 +173,9 @@ def test_loiter(flying: AircraftClient) -> None:
     assert abs(after.relative_alt - before.relative_alt) < 15_000
 
 
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
+)
 def test_return(flying: AircraftClient) -> None:
     flying.set_mode("RTL")
     radius_m = flying.parameter("WP_LOITER_RAD")

@@ -46,6 +46,7 @@ def flying(parked: AircraftClient) -> AircraftClient:
     return parked
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="mission", vehicle="px4-plane")
 def test_mission_from_take_off_to_auto_disarm() -> None:
     with aircraft("px4") as client:
         client.ready()
@@ -65,6 +66,7 @@ def test_mission_from_take_off_to_auto_disarm() -> None:
         assert [text for text in client.texts if text in said] == list(said)
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_reposition_with_a_radius(flying: AircraftClient) -> None:
     place = flying.runway.along(300.0, -200.0)
     lat, lon, height_m = flying.geodetic(place, flying.runway.alt_m + 80.0)
@@ -73,6 +75,7 @@ def test_reposition_with_a_radius(flying: AircraftClient) -> None:
     flying.sees_mode("LOITER")
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_orbit(flying: AircraftClient) -> None:
     place = flying.runway.along(500.0, 0.0)
     lat, lon, height_m = flying.geodetic(place, flying.runway.alt_m + 70.0)
@@ -84,6 +87,7 @@ def test_orbit(flying: AircraftClient) -> None:
     assert (status.x * 1e-7, status.y * 1e-7) == pytest.approx((lat, lon), abs=1e-6)
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_airspeed(flying: AircraftClient) -> None:
     flying.set_mode("LOITER")
     for airspeed_m_s in (21.0, 26.0):
@@ -91,6 +95,7 @@ def test_airspeed(flying: AircraftClient) -> None:
         flying.flies_at(airspeed_m_s)
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_offboard_attitudes(flying: AircraftClient) -> None:
     for roll_deg in (20.0, -25.0):
 
@@ -103,6 +108,7 @@ def test_offboard_attitudes(flying: AircraftClient) -> None:
     flying.set_mode("LOITER")
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_offboard_position_is_circled(flying: AircraftClient) -> None:
     place = flying.runway.along(200.0, 300.0)
 
@@ -114,6 +120,7 @@ def test_offboard_position_is_circled(flying: AircraftClient) -> None:
     flying.circles(place, flying.parameter("NAV_LOITER_RAD"), 90.0, each=each)
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_offboard_velocity_is_a_course(flying: AircraftClient) -> None:
     def each() -> None:
         frame = mavlink.MAV_FRAME_LOCAL_NED
@@ -133,6 +140,7 @@ def test_offboard_velocity_is_a_course(flying: AircraftClient) -> None:
     )
 
 
+@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_return(flying: AircraftClient) -> None:
     flying.set_mode("RTL")
     flying.circles((0.0, 0.0), flying.parameter("NAV_LOITER_RAD"), flying.parameter("RTL_RETURN_ALT"))
