@@ -51,8 +51,8 @@ class RtspServer:
                     writer.write(response(503, request) if full else await player.answer(request))
                 if full:
                     break
-        except (RtspError, OSError, TimeoutError):
-            pass
+        except (RtspError, OSError, TimeoutError, asyncio.CancelledError):
+            pass  # cancelled: the process ends, and the connection with it
         finally:
             self._players -= not full
             player.close()
