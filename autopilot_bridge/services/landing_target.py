@@ -17,6 +17,7 @@ from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.services.channel import MavlinkMessage, Source
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from flightsim.airframe import AirframeKind
 from flightsim.rotations import multiply, quaternion_from_euler
 
 Array = NDArray[np.float64]
@@ -47,12 +48,15 @@ class LandingTargetService(Microservice):
         self._context = parts.commander.context
         self._navigation = parts.navigation
         self._system_id = parts.system_id
+        self._lands_there = parts.flavour.kind is AirframeKind.MULTICOPTER
         self._gimbal: deque[tuple[int, Array, bool]] = deque(maxlen=32)
         self.refused = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take one message of the vehicle's own payload, or of anybody who helps it to land."""
         message_id = message.get_msgId()
+        if not self._lands_there:
+            return False
         if message_id == _GIMBAL:
             if source.system_id == self._system_id and source.component_id == _GIMBAL_COMPONENT:
                 self._note_gimbal(message, time_us)

@@ -43,7 +43,7 @@ def by_odometry(flavour: str, message: str = "odometry") -> tuple[Flight, Tracke
     return flight, tracker
 
 
-@pytest.mark.parametrize("message", ["odometry", "vision"])
+@pytest.mark.parametrize("message", ["odometry", pytest.param("vision", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_quadrotor_without_gps_flies_by_odometry(flavour: str, message: str) -> None:
     flight, _ = by_odometry(flavour, message)
@@ -208,6 +208,7 @@ def test_lands_at_the_target_its_camera_sees(flavour: str) -> None:
     assert math.dist(flight.position_ned_m[:2], PAD) < 0.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_a_target_lost_in_the_descent_is_searched_and_then_done_without(flavour: str) -> None:
     flight = Flight(flavour, parameters={"PLND_ENABLED": 1, "PLND_TYPE": 1} if flavour == "ardupilot" else {})
@@ -250,7 +251,7 @@ def test_a_target_lost_in_the_descent_is_searched_and_then_done_without(flavour:
 # obstacles
 
 
-@pytest.mark.parametrize("slide", [True, False])
+@pytest.mark.parametrize("slide", [True, pytest.param(False, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_stops_before_a_wall(flavour: str, slide: bool) -> None:
     parameters = (
