@@ -13,6 +13,7 @@ from autopilot_bridge.errors import BridgeError
 from missions.cli_signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli_storage import VehicleCards, storage_option
 from missions.cli_types import SLOWEST, FiniteRange
+from missions.cli_video import start_video, video_options
 from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
 
 if TYPE_CHECKING:
@@ -170,6 +171,7 @@ def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
     metavar="FILE",
     help="Keep keys that clients set, and times, over restarts.",
 )
+@video_options
 @storage_option
 @click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
 @click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
@@ -193,6 +195,8 @@ def sitl(
     targets: tuple[str, ...],
     map_file: str | None,
     map_target: str | None,
+    video: str | None,
+    pictures: Path | None,
     signing_key: Path | None,
     unsigned: str,
     signing_store: Path | None,
@@ -265,6 +269,7 @@ def sitl(
         )
         compile_flight_code(world.configuration.vehicles)
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
+        pictured = start_video(world, video, pictures)
         recorder = None if log is None else TlogWriter(log)
         if count > 1 and ports:
             opened = server.open([()] * count, shared=ports)
@@ -283,6 +288,8 @@ def sitl(
         click.echo(f"vehicle {system_id} ({kind}): {address} {port.role}{signed_how(signing, port.address)}")
     for named in dict.fromkeys(port.address for _, port, _ in opened):
         warn_if_unsigned(named, signing)
+    for uri in () if pictured is None else pictured.uris:
+        click.echo(f"video: {uri}")
     click.echo("ready, Ctrl-C ends it")
     sys.stdout.flush()
     waits = autopilot == "ardupilot" and not ports and not no_wait
@@ -301,6 +308,8 @@ def sitl(
         )
     finally:
         world.close()
+        if pictured is not None:
+            pictured.close()
         if recorder is not None:
             recorder.close()
         for number, handler in before.items():
