@@ -84,6 +84,7 @@ class Connection:
         self.parsers: Intake[object] = Intake(None if signing is None else signing.admit)
         self.system_id, self.component_id = identity
         self._link = link
+        self._forget = getattr(link, "forget", None)
         self._recorder = recorder
         self._encoder = FrameEncoder(*identity)
         self._newest = NewestFrames()
@@ -138,6 +139,8 @@ class Connection:
     def _drain(self) -> None:
         for peer, data in self._link.receive():
             self._on_bytes(peer, data)
+            if self._forget is not None and not self.parsers.understood(peer):
+                self._forget(peer)  # a stranger on a server's port gets no commands to overhear
 
     def _on_bytes(self, peer: object, data: bytes) -> None:
         frames = self.parsers.parse(peer, data)

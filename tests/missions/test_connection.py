@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
+from autopilot_bridge.clock import LoopClock, TelemetryClock, VirtualTimeLoop, run
 from autopilot_bridge.links import memory_pair, open_link
 from autopilot_bridge.mavlink import FrameEncoder, Intake, dialect
 from autopilot_bridge.mavlink.intake import MAX_PEERS
@@ -211,3 +211,20 @@ def test_the_same_mission_flies_a_vehicle_elsewhere(make_sitl, tmp_path, kind, f
     assert result.summary["vehicles"][0]["error_reference"] == "estimate"
     assert result.summary["path_rms_error_m"] < 1.0
     assert autopilot.parameters["MPC_ACC_HOR"][0] == 2.5
+
+
+def test_a_stranger_on_the_port_is_not_spoken_to():
+    async def script():
+        link = open_link("udpin:127.0.0.1:0")
+        vehicle, stranger = (open_link(f"udpout:127.0.0.1:{link.port}") for _ in range(2))
+        stranger.send(b"\xfd\x09 who is there? " * 4)
+        vehicle.send(FrameEncoder(1, 1).encode(attitude(1)))
+        async with Connection(link, TelemetryClock()) as connection:
+            while connection.latest("ATTITUDE", 1) is None or not vehicle.receive():
+                await asyncio.sleep(0.01)
+            assert len(link.peers) == 1
+            assert stranger.receive() == []
+        vehicle.close()
+        stranger.close()
+
+    asyncio.run(asyncio.wait_for(script(), 20.0))
