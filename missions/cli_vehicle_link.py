@@ -1,0 +1,103 @@
+"""What all of `flightstack vehicle` shares: the link, errors in one line, JSON, the question."""
+
+import asyncio
+import json
+import sys
+from collections.abc import Callable, Coroutine, Mapping
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from autopilot_bridge.links import Address
+    from missions.vehicle_client.client import VehicleClient
+
+T = TypeVar("T")
+FAILED: Final = 1
+
+_OPTIONS = (
+    click.option(
+        "--connect",
+        required=True,
+        metavar="URL",
+        help="udpin:0.0.0.0:14550, tcp:HOST:5760, serial:DEVICE:BAUD",
+    ),
+    click.option("--system-id", type=click.IntRange(1, 255), help="Where several are on the link."),
+    click.option(
+        "--timeout", type=click.FloatRange(0.5, 600.0), default=10.0, show_default=True, help="To hear it, s."
+    ),
+    click.option("--json", "as_json", is_flag=True, help="Print JSON, for scripts."),
+)
+
+
+def connected(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of every command that talks to a vehicle."""
+    for add in reversed(_OPTIONS):
+        command = add(command)
+    return command
+
+
+def address(text: str) -> "Address":
+    """A connection string of the command line."""
+    from autopilot_bridge.errors import AddressError
+    from autopilot_bridge.links import parse_address
+
+    try:
+        return parse_address(text)
+    except AddressError as error:
+        raise click.UsageError(str(error)) from error
+
+
+def run(work: Coroutine[Any, Any, T]) -> T:
+    """Run to the end; what goes wrong is one line, and the exit code tells whose fault it was."""
+    from autopilot_bridge.errors import BridgeError
+    from autopilot_bridge.parameters import ParameterError
+    from missions.errors import MissionError, PlanError
+
+    try:
+        return asyncio.run(work)
+    except (PlanError, ParameterError) as error:
+        raise click.UsageError(str(error)) from error
+    except (MissionError, BridgeError) as error:
+        raise click.ClickException(str(error)) from error
+
+
+def with_client(given: Mapping[str, Any], work: "Callable[[VehicleClient], Coroutine[Any, Any, T]]") -> T:
+    """Do something with the vehicle that the options name."""
+    link = address(given["connect"])
+    from missions.vehicle_client.client import open_client
+
+    async def whole() -> T:
+        async with open_client(link, timeout_s=given["timeout"], system_id=given["system_id"]) as client:
+            return await work(client)
+        raise AssertionError("not reached")
+
+    return run(whole())
+
+
+def print_json(value: Any) -> None:
+    """Plain values as JSON; numbers that are none as null."""
+    click.echo(json.dumps(_finite(value), indent=2, allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if value == value and abs(value) != float("inf") else None
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    return value
+
+
+def confirm(question: str, yes: bool) -> None:
+    """Ask for a typed yes; without a terminal, --yes must be given."""
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise click.UsageError(f"{question}: not confirmed; give --yes where nobody can be asked")
+    if (
+        click.prompt(f"{question}: type yes", default="", show_default=False, err=True).strip().lower()
+        != "yes"
+    ):
+        raise click.ClickException("not confirmed, nothing was done")
