@@ -64,9 +64,10 @@ class NavigationFilter:
         "_limits",
         "_mechanise",
         "_parameters",
-        "_pending",
         "_readings",
+        "_slow_readings",
         "_solution",
+        "_taken_us",
         "health",
         "state",
         "vehicle_at_rest",
@@ -116,6 +117,13 @@ class NavigationFilter:
             self._dt_s,
             *map(float, self._limits),
         )
+        self._slow_readings = (
+            (readings.magnetometer, HAS_MAG),
+            (readings.barometer, HAS_BARO),
+            (readings.rangefinder, HAS_RANGE),
+            (readings.gps, HAS_GPS),
+        )
+        self._taken_us = [-1] * len(self._slow_readings)
         self._aiding = Aiding(parameters, readings=readings, solution=self._solution, health=self.health)
         self.reset()
 
@@ -199,7 +207,7 @@ class NavigationFilter:
     def reset(self) -> None:
         """Forget the estimate and align anew. The origin and the reset counters stay."""
         self._aligned = False
-        self._pending = 0
+        self._take_pending()  # and forget them
         self._countdown = self._divisor
         self._alignment.restart()
         self._solution.clear()
@@ -221,8 +229,7 @@ class NavigationFilter:
         if row == solution.rows:
             row = 0
         solution.row = row
-        readings = self._readings
-        imu = readings.imu
+        imu = self._readings.imu
         gyro_range, accel_range, timeout_s = self._limits
         self._mechanise(
             solution.core,
@@ -236,18 +243,10 @@ class NavigationFilter:
             accel_range,
             timeout_s,
         )
-        if readings.magnetometer.fresh:
-            self._pending |= HAS_MAG
-        if readings.barometer.fresh:
-            self._pending |= HAS_BARO
-        if readings.rangefinder.fresh:
-            self._pending |= HAS_RANGE
-        if readings.gps.fresh:
-            self._pending |= HAS_GPS
         self._countdown -= 1
         if self._countdown == 0:
             self._countdown = self._divisor
-            pending, self._pending = self._pending, 0
+            pending = self._take_pending()
             solution.steps += self._divisor
             self._aiding.at_rest = self.vehicle_at_rest
             if self._aiding.update(time_us, pending) & UNSOUND:
@@ -255,6 +254,15 @@ class NavigationFilter:
                 self.reset()
             elif self._aiding.air is not None:
                 self._aiding.air.write(self.state, self._divisor * self._dt_s)
+
+    def _take_pending(self) -> int:
+        """Bits of the readings that have been delivered since the last call."""
+        pending = 0
+        for index, (reading, bit) in enumerate(self._slow_readings):
+            if reading.time_us != self._taken_us[index]:
+                self._taken_us[index] = reading.time_us
+                pending |= bit
+        return pending
 
     def _align(self, time_us: int) -> None:
         alignment = self._alignment
@@ -266,5 +274,6 @@ class NavigationFilter:
         core[GYRO_LAST : GYRO_LAST + 3] = core[GYRO : GYRO + 3]
         self._aiding.align(time_us, alignment.accel_frd_m_s2, alignment.mag_frd_gauss)
         mechanisation.write_navigation(core, self.state)
+        self._take_pending()  # what came before is no news
         self._aligned = True
         self.health.uninitialised = False

@@ -23,9 +23,12 @@ class FaultPoint:
     """One unit of one sensor, with the failure in force (None: healthy).
 
     Failures draw from `rng`, a stream of the unit's own, so they shift no noise.
+
+    Attributes:
+        failing: the points of the sensor that have a failure in force; shared with the sensor.
     """
 
-    __slots__ = ("_interval_s", "_reading", "_rng", "failure", "fault", "target")
+    __slots__ = ("_interval_s", "_reading", "_rng", "failing", "failure", "fault", "target")
 
     def __init__(
         self, target: FaultTarget, reading: Reading, interval_s: float, rng: np.random.Generator
@@ -33,6 +36,7 @@ class FaultPoint:
         self.target = target
         self.fault: Fault | None = None
         self.failure = FaultType.OK
+        self.failing: set[FaultPoint] = set()
         self._reading = reading
         self._interval_s = interval_s
         self._rng = rng
@@ -105,6 +109,10 @@ class FaultPoint:
                 fault = kinds.Drift(per_s * self._interval_s, target.add_bias)
         self.fault = fault
         self.failure = failure
+        if fault is None:
+            self.failing.discard(self)
+        else:
+            self.failing.add(self)
 
     def deliver(self, values: Array) -> bool:
         """Spoil a sample that comes from elsewhere, in place; False when it isn't delivered."""

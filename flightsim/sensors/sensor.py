@@ -76,6 +76,7 @@ class Sensor:
         "_block",
         "_constants",
         "_deliveries_to_skip",
+        "_failing",
         "_head",
         "_kernel",
         "_measured_us",
@@ -110,6 +111,9 @@ class Sensor:
         self.interval_steps = interval_steps
         self.latency_steps = latency_steps
         self.fault_points = fault_points
+        self._failing: set[FaultPoint] = set()  # those of them with a failure in force
+        for point in fault_points:
+            point.failing = self._failing
         self._constants = model.constants
         self._state = model.state
         self._truth = truth
@@ -137,13 +141,10 @@ class Sensor:
             self._rng.standard_normal(out=self._block)
             row = 0
         self._row = row + 1
-        for point in self.fault_points:
-            if point.fault is not None:
-                taken = self._kernel(
-                    self._truth, self._constants, self._state, self._block, row, self._scratch
-                )
-                self._deliver_faulty(taken, self._scratch, time_us)
-                return
+        if self._failing:
+            taken = self._kernel(self._truth, self._constants, self._state, self._block, row, self._scratch)
+            self._deliver_faulty(taken, self._scratch, time_us)
+            return
         reading = self.reading
         if self._kernel(self._truth, self._constants, self._state, self._block, row, reading.values):
             reading.time_us = time_us
@@ -173,10 +174,9 @@ class Sensor:
         tail = self._tail
         self._tail = tail + 1 if tail + 1 < len(self._ring) else 0
         values, taken, measured_us = self._ring[tail], self._taken[tail], self._measured_us[tail]
-        for point in self.fault_points:
-            if point.fault is not None:
-                self._deliver_faulty(taken, values, measured_us)
-                return
+        if self._failing:
+            self._deliver_faulty(taken, values, measured_us)
+            return
         reading = self.reading
         if taken:
             reading.values[:] = values
