@@ -53,8 +53,6 @@ class ArduPilotCommands(CommandHandlers):
             mavlink.MAV_CMD_DO_SET_HOME: self.set_home,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.terminate,
             mavlink.MAV_CMD_DO_SET_SERVO: self.set_servo,
-            mavlink.MAV_CMD_DO_GRIPPER: self.fail,
-            mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self.calibrate,
         }
 
     @abstractmethod
@@ -184,11 +182,3 @@ class ArduPilotCommands(CommandHandlers):
     def fail(self, command: Command, source: Source) -> Result:
         """FAILED: there is no such device."""
         return Result.FAILED
-
-    def calibrate(self, command: Command, source: Source) -> Result:
-        """PREFLIGHT_CALIBRATION: gyro and pressure are in order; nothing or more is unsupported."""
-        asked = [command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z]
-        wanted = {index for index, value in enumerate(asked) if whole(value, 0)}
-        if not wanted or not wanted <= {0, 2}:
-            return Result.UNSUPPORTED
-        return Result.FAILED if self.commander.armed else Result.ACCEPTED

@@ -42,7 +42,6 @@ class Px4Commands(CommandHandlers):
             mavlink.MAV_CMD_MISSION_START: self.start_mission,
             mavlink.MAV_CMD_DO_LAND_START: self.land_start,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.refuse,
-            mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self.calibrate,
             mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self.request_protocol_version,
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self.silence,
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self.silence,
@@ -164,13 +163,3 @@ class Px4Commands(CommandHandlers):
     def refuse(self, command: Command, source: Source) -> Result:
         """DENIED, as the release does (flight termination is off by a circuit breaker)."""
         return Result.DENIED
-
-    def calibrate(self, command: Command, source: Source) -> Result:
-        """PREFLIGHT_CALIBRATION: gyro, pressure and level need no help; the guided ones are not emulated."""
-        if self.commander.armed:
-            return Result.TEMPORARILY_REJECTED
-        interactive = (command.p2, command.p4)
-        guided_accelerometer = whole(command.x, 0) in (1, 4)
-        if any(whole(value, 0) for value in interactive) or guided_accelerometer:
-            return Result.UNSUPPORTED
-        return Result.ACCEPTED
