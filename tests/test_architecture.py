@@ -11,7 +11,7 @@ GROUND_FLOOR = tuple(
     f"autopilot_bridge.{name}"
     for name in (
         *("mavlink", "links", "routing", "clock", "tlog", "errors"),
-        *("geodesy", "mission_plan", "parameters", "parameter_files"),
+        *("geodesy", "mission_plan", "parameters", "parameter_files", "rotation"),
     )
 )
 COMPILER = ("flightsim.kernels",)  # compiles and knows nothing of the world: for everybody above `flightsim`
@@ -19,7 +19,7 @@ COMPILER = ("flightsim.kernels",)  # compiles and knows nothing of the world: fo
 CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")
 SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "threading", "subprocess", "time")
 SANS_IO = (
-    *(f"autopilot_bridge.{name}" for name in ("mavlink", "routing", "geodesy", "mission_plan")),
+    *(f"autopilot_bridge.{name}" for name in ("mavlink", "routing", "geodesy", "mission_plan", "rotation")),
     *(
         f"autopilot_bridge.{name}"
         for name in (

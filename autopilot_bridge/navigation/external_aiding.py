@@ -23,13 +23,14 @@ from autopilot_bridge.navigation.external import (
     ExternalSample,
     variance_of,
 )
-from autopilot_bridge.navigation.external_heading import ExternalHeading, heading_of
+from autopilot_bridge.navigation.external_heading import ExternalHeading
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.report import Clocks
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
 from autopilot_bridge.navigation.standby import Standby
 from autopilot_bridge.navigation.states import GYRO, HISTORY_Q, X_GYRO_BIAS
+from autopilot_bridge.rotation import yaw_of
 
 Array = NDArray[np.float64]
 
@@ -366,4 +367,4 @@ def _usable(values: Array) -> tuple[bool, bool, float]:
     has_position = bool(np.abs(position).max() <= _MAX_POSITION_M)  # False for NaN
     has_velocity = bool(np.abs(velocity).max() <= _MAX_SPEED_M_S)
     norm = math.sqrt(float(q @ q)) if float(np.abs(q).max()) < 10.0 else math.nan
-    return has_position, has_velocity, heading_of(q / norm) if 0.5 < norm < 2.0 else math.nan
+    return has_position, has_velocity, yaw_of((q / norm).tolist()) if 0.5 < norm < 2.0 else math.nan

@@ -16,6 +16,7 @@ from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
 from autopilot_bridge.navigation.states import HISTORY_Q, X_VEL
+from autopilot_bridge.rotation import yaw_of
 
 Array = NDArray[np.float64]
 
@@ -149,10 +150,4 @@ class ExternalHeading:
         return self._turn_rad
 
     def _ours(self, row: int) -> float:
-        return heading_of(self._solution.history[row, HISTORY_Q : HISTORY_Q + 4])
-
-
-def heading_of(q: Array) -> float:
-    """Heading of a unit quaternion local-from-body."""
-    w, x, y, z = q.tolist()
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return yaw_of(self._solution.history[row, HISTORY_Q : HISTORY_Q + 4].tolist())

@@ -27,7 +27,8 @@ from autopilot_bridge.payload.camera_tracking import CameraTracker
 from autopilot_bridge.payload.camera_trigger import PhotoTrigger
 from autopilot_bridge.payload.camera_video import VideoStream
 from autopilot_bridge.payload.component import Component
-from autopilot_bridge.payload.vehicle_heard import Quaternion, VehicleHeard, product, quaternion
+from autopilot_bridge.payload.vehicle_heard import VehicleHeard
+from autopilot_bridge.rotation import Quaternion, from_euler, product
 from flightsim.payload import Camera, CameraFrame, Gimbal
 
 CAMERA_COMPONENT: Final = int(mavlink.MAV_COMP_ID_CAMERA)
@@ -98,7 +99,7 @@ class CameraComponent(Component):
         self.status_interval_us = 0
         self._gimbal = gimbal
         p = camera.parameters
-        self._q_frd_from_mount = quaternion(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad)
+        self._q_frd_from_mount = from_euler(p.mount_roll_rad, p.mount_pitch_rad, p.mount_yaw_rad)
         self._next_status_us = 0
         self._lens_us = 0
         self._builders.update(

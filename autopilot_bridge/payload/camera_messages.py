@@ -7,7 +7,7 @@ from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_definition import URI, VERSION
 from autopilot_bridge.payload.component import fixed_text
-from autopilot_bridge.payload.vehicle_heard import Quaternion, forward_axis
+from autopilot_bridge.rotation import rotate
 from flightsim.payload import Detection
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 SENSOR_WIDTH_MM: Final = 6.0  # a 1/2.3-inch sensor; with the field of view it gives the focal length
 _FILM_WIDTH_MM: Final = 36.0
+_FORWARD: Final = (1.0, 0.0, 0.0)
 _NO_NUMBER: Final = 255
 _UNKNOWN_DEGE7: Final = 2**31 - 1
 _FARTHEST_M: Final = 20_000.0  # beyond, the ground is no plane
@@ -100,7 +101,7 @@ def photo_notes(camera: "CameraComponent") -> dict[str, float]:
     if here is not None:
         notes |= {"lat_deg": here.lat_deg, "lon_deg": here.lon_deg, "alt_m": here.alt_m}
     if q is not None:
-        north, east, _ = forward_axis(q)
+        north, east, _ = rotate(q, _FORWARD)
         notes["yaw_deg"] = math.degrees(math.atan2(east, north))
     unix_us = camera.heard.unix_us(camera.time_us)
     if unix_us:
@@ -111,7 +112,7 @@ def photo_notes(camera: "CameraComponent") -> dict[str, float]:
 def fov_status(camera: "CameraComponent", time_us: int) -> Any:
     """CAMERA_FOV_STATUS: where the camera is, and the ground in the middle of its picture."""
     here, q = camera.heard.located(time_us), camera.orientation
-    ground = None if here is None or q is None else ground_point(camera, here, forward_axis(q))
+    ground = None if here is None or q is None else ground_point(camera, here, rotate(q, _FORWARD))
     width_rad, height_rad = camera.lens.fov_rad
     return mavlink.MAVLink_camera_fov_status_message(
         camera.time_ms,
@@ -129,7 +130,7 @@ def tracking_geo_status(camera: "CameraComponent", time_us: int) -> Any:
     place, distance_m, heading_rad = None, math.nan, math.nan
     if tracker.thing is not None and here is not None and q is not None:
         right, down = tracker.thing.detection.normalised
-        place = ground_point(camera, here, _turned(q, (1.0, right, down)))
+        place = ground_point(camera, here, rotate(q, (1.0, right, down)))
         if place is not None:
             north_m, east_m, down_m = LocalFrame(here).ned_from_geodetic(
                 place.lat_deg, place.lon_deg, place.alt_m
@@ -190,14 +191,3 @@ def _dege7(place: GeodeticPosition | None) -> tuple[int, int, int]:
     if place is None:
         return (_UNKNOWN_DEGE7,) * 3
     return round(place.lat_deg * 1e7), round(place.lon_deg * 1e7), round(place.alt_m * 1e3)
-
-
-def _turned(q: Quaternion, v: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A vector of the mount's frame in NED."""
-    w, x, y, z = q
-    tx, ty, tz = 2.0 * (y * v[2] - z * v[1]), 2.0 * (z * v[0] - x * v[2]), 2.0 * (x * v[1] - y * v[0])
-    return (
-        v[0] + w * tx + y * tz - z * ty,
-        v[1] + w * ty + z * tx - x * tz,
-        v[2] + w * tz + x * ty - y * tx,
-    )

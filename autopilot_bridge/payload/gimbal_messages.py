@@ -5,6 +5,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.component import fixed_text
+from autopilot_bridge.rotation import yaw_of
 from flightsim.payload import Gimbal, GimbalFlags
 
 GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
@@ -42,7 +43,7 @@ def attitude_status(gimbal: Gimbal) -> Any:
     flags = status_flags(gimbal)
     in_earth = bool(flags & GimbalFlags.YAW_IN_EARTH_FRAME)
     earth, vehicle = gimbal.measured_q_ned_from_gimbal, gimbal.measured_q_heading_from_gimbal
-    delta_yaw = math.remainder(_yaw(earth.tolist()) - _yaw(vehicle.tolist()), math.tau)
+    delta_yaw = math.remainder(yaw_of(earth.tolist()) - yaw_of(vehicle.tolist()), math.tau)
     rates = gimbal.measured_rates_rad_s.tolist()
     failure = mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_PITCH_LIMIT if gimbal.limits_reached[1] else 0
     failure |= mavlink.GIMBAL_DEVICE_ERROR_FLAGS_AT_YAW_LIMIT if gimbal.limits_reached[2] else 0
@@ -70,8 +71,8 @@ def mount_orientation(gimbal: Gimbal, time_ms: int) -> Any:
         time_ms,
         math.degrees(math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))),
         math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))),
-        math.degrees(_yaw([w, x, y, z])),
-        math.degrees(_yaw(gimbal.measured_q_ned_from_gimbal.tolist())) % 360.0,
+        math.degrees(yaw_of((w, x, y, z))),
+        math.degrees(yaw_of(gimbal.measured_q_ned_from_gimbal.tolist())) % 360.0,
     )
 
 
@@ -109,8 +110,3 @@ def _device_capabilities(gimbal: Gimbal) -> int:
     p = gimbal.parameters
     capabilities = _CAPABILITIES | (_ROLL_CAPABILITIES if p.axes == 3 else 0)
     return capabilities | (_ENDLESS if p.yaw_limit_rad >= math.pi else 0)
-
-
-def _yaw(q: list[float]) -> float:
-    w, x, y, z = q
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

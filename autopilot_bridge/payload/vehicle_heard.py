@@ -5,13 +5,12 @@ from typing import Any, Final
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.rotation import Quaternion, from_euler
 
 AUTOPILOT: Final = int(mavlink.MAV_COMP_ID_AUTOPILOT1)
 STALE_US: Final = 3_000_000
 _LAT_MAX: Final = 900_000_000
 _LON_MAX: Final = 1_800_000_000
-
-Quaternion = tuple[float, float, float, float]
 
 
 class VehicleHeard:
@@ -47,7 +46,7 @@ class VehicleHeard:
             case mavlink.MAVLINK_MSG_ID_ATTITUDE:
                 if not all(map(math.isfinite, (message.roll, message.pitch, message.yaw))):
                     return False
-                self.q_ned_from_frd = quaternion(message.roll, message.pitch, message.yaw)
+                self.q_ned_from_frd = from_euler(message.roll, message.pitch, message.yaw)
             case mavlink.MAVLINK_MSG_ID_SYSTEM_TIME:
                 if message.time_unix_usec == 0:
                     return False
@@ -82,32 +81,3 @@ class VehicleHeard:
         self.heading_rad = math.radians(1e-2 * message.hdg) if message.hdg < 36000 else math.nan
         self._position_us = time_us
         return True
-
-
-def quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Hamilton quaternion (w, x, y, z) of Euler angles, radians, in the order yaw, pitch, roll."""
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-
-
-def product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """a (x) b, Hamilton."""
-    return (
-        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
-        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
-        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
-        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
-    )
-
-
-def forward_axis(q: Quaternion) -> tuple[float, float, float]:
-    """Where the x axis of a frame points (north, east, down)."""
-    w, x, y, z = q
-    return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)

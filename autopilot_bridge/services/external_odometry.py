@@ -28,16 +28,15 @@ from autopilot_bridge.navigation.external import (
     ExternalSample,
 )
 from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.rotation import Quaternion, conjugate, from_euler, product
 from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
-from flightsim.rotations import multiply, quaternion_from_euler
+from autopilot_bridge.services.time_stamps import in_vehicle_time
 
 Array = NDArray[np.float64]
 
 _VIO: Final = 6  # FAILURE_UNIT_SENSOR_VIO
 _AUTOPILOT: Final = 1
-_OLDEST_US: Final = 500_000
-_NEWEST_US: Final = 20_000
 _HALF: Final = math.sqrt(0.5)
 _UNKNOWN3: Final = (math.nan, math.nan, math.nan)
 _POSE_DIAGONAL: Final = (0, 6, 11)  # of an upper triangle of 6 x 6, by rows
@@ -47,7 +46,6 @@ _VELOCITY_DIAGONAL: Final = (0, 4, 8)
 _NED_FROM_ENU: Final = (0.0, _HALF, _HALF, 0.0)
 _FRD_FROM_FLU: Final = (0.0, 1.0, 0.0, 0.0)
 _SAME: Final = (1.0, 0.0, 0.0, 0.0)
-Quaternion = tuple[float, float, float, float]
 
 _POSE_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion, Quaternion]]] = {
     mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME, _SAME),
@@ -195,10 +193,10 @@ class ExternalOdometryService(Microservice):
         velocity_frame, velocity_local = _VELOCITY_FRAMES[twist]
         values = np.full(SAMPLE_SIZE, math.nan)
         values[POSITION_M] = _rotated(local, (message.x, message.y, message.z))
-        values[Q_LOCAL_FROM_FRD] = _changed(local, tuple(message.q), body)
+        values[Q_LOCAL_FROM_FRD] = _changed(local, message.q, body)
         values[VELOCITY_M_S] = _rotated(velocity_local, (message.vx, message.vy, message.vz))
         return ExternalSample(
-            time_us=_measured(message.time_usec, time_us),
+            time_us=in_vehicle_time(int(message.time_usec), time_us),
             values=values,
             frame=policy.local_frame(self._parameters) if policy.one_frame else frame,
             velocity_frame=velocity_frame,
@@ -215,10 +213,10 @@ class ExternalOdometryService(Microservice):
         values[POSITION_M] = (message.x, message.y, message.z)
         angles = (message.roll, message.pitch, message.yaw)
         if all(abs(angle) < 100.0 for angle in angles):
-            quaternion_from_euler(*angles, values[Q_LOCAL_FROM_FRD])
+            values[Q_LOCAL_FROM_FRD] = from_euler(*angles)
         return self._local(
             values,
-            _measured(message.usec, time_us),
+            in_vehicle_time(int(message.usec), time_us),
             _diagonal(message.covariance, _POSE_DIAGONAL),
             _entry(message.covariance, _POSE_YAW),
             int(getattr(message, "reset_counter", 0)),
@@ -231,7 +229,7 @@ class ExternalOdometryService(Microservice):
         values[Q_LOCAL_FROM_FRD] = message.q
         return self._local(
             values,
-            _measured(message.time_usec, time_us),
+            in_vehicle_time(int(message.time_usec), time_us),
             _diagonal(message.covariance, _POSE_DIAGONAL),
             _entry(message.covariance, _POSE_YAW),
             0,
@@ -243,7 +241,7 @@ class ExternalOdometryService(Microservice):
         values = np.full(SAMPLE_SIZE, math.nan)
         values[VELOCITY_M_S] = (message.x, message.y, message.z)
         return ExternalSample(
-            time_us=_measured(message.usec, time_us),
+            time_us=in_vehicle_time(int(message.usec), time_us),
             values=values,
             frame=frame,
             velocity_frame=frame,
@@ -285,11 +283,6 @@ _READERS: Final[Mapping[int, _Reader]] = {
 }
 
 
-def _measured(stamp_us: int, time_us: int) -> int:
-    """A time stamp, when it is of the vehicle's clock; else the time of arrival."""
-    return int(stamp_us) if -_NEWEST_US <= time_us - int(stamp_us) <= _OLDEST_US else time_us
-
-
 def _entry(covariance: list[float], index: int) -> float:
     """One of the covariance; NaN in the first one says that there is none."""
     return float(covariance[index]) if math.isfinite(covariance[0]) else math.nan
@@ -308,9 +301,7 @@ def _rotated(q: Quaternion, vector: tuple[float, float, float]) -> tuple[float, 
     return (x, -y, -z) if q is _FRD_FROM_FLU else (x, y, z)
 
 
-def _changed(local: Quaternion, q: tuple[float, ...], body: Quaternion) -> Array:
+def _changed(local: Quaternion, q: list[float], body: Quaternion) -> Quaternion:
     """An attitude between other axes: local q body^-1."""
-    first, out = np.zeros(4), np.zeros(4)
-    multiply(np.array(local), np.array(q, dtype=np.float64), first)
-    multiply(first, np.array(body) * (1.0, -1.0, -1.0, -1.0), out)
-    return out
+    w, x, y, z = q
+    return product(product(local, (w, x, y, z)), conjugate(body))

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.rotation import from_euler, rotate, yaw_of
 from autopilot_bridge.services.channel import MavlinkMessage, Source
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.time_stamps import in_vehicle_time
 from flightsim.airframe import AirframeKind
-from flightsim.rotations import multiply, quaternion_from_euler
 
 Array = NDArray[np.float64]
 
@@ -27,8 +28,6 @@ _GIMBAL: Final = mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
 _CAMERA_COMPONENT: Final = int(mavlink.MAV_COMP_ID_CAMERA)
 _GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
 _YAW_IN_EARTH: Final = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
-_OLDEST_US: Final = 500_000
-_NEWEST_US: Final = 20_000
 _GIMBAL_US: Final = 500_000
 _MAX_ANGLE_RAD: Final = 1.3
 _STEEPEST: Final = 0.2  # least part of a line of sight that points down
@@ -73,13 +72,13 @@ class LandingTargetService(Microservice):
         q = np.array(message.q, dtype=np.float64)
         if 0.9 < float(q @ q) < 1.1:  # False for NaN
             in_earth = bool(message.flags & _YAW_IN_EARTH)
-            self._gimbal.append((_in_vehicle_time(message.time_boot_ms * 1000, time_us), q, in_earth))
+            self._gimbal.append((in_vehicle_time(message.time_boot_ms * 1000, time_us), q, in_earth))
 
     def _place(
         self, message: MavlinkMessage, source: Source, time_us: int
     ) -> tuple[int, Array, float] | None:
         """(time, local NED, 1-sigma) of what the message says; None for nothing usable."""
-        measured_us = _in_vehicle_time(int(message.time_usec), time_us)
+        measured_us = in_vehicle_time(int(message.time_usec), time_us)
         pose = self._navigation.past_pose(measured_us, time_us)
         if pose is None or not self._context.position_valid:
             return None
@@ -131,20 +130,11 @@ class LandingTargetService(Microservice):
 
 def rotated(q: Array, vector: Array) -> Array:
     """A vector turned by a unit quaternion."""
-    first, out = np.zeros(4), np.zeros(4)
-    multiply(q, np.array((0.0, *vector)), first)
-    multiply(first, q * (1.0, -1.0, -1.0, -1.0), out)
-    return out[1:4]
+    w, x, y, z = q.tolist()
+    north, east, down = vector.tolist()
+    return np.array(rotate((w, x, y, z), (north, east, down)))
 
 
 def _heading(q: Array) -> Array:
     """The part of an attitude that turns about the vertical."""
-    w, x, y, z = q.tolist()
-    out: Array = np.zeros(4)
-    quaternion_from_euler(0.0, 0.0, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)), out)
-    return out
-
-
-def _in_vehicle_time(stamp_us: int, time_us: int) -> int:
-    """A time stamp, when it is of the vehicle's clock; else the time of arrival."""
-    return stamp_us if -_NEWEST_US <= time_us - stamp_us <= _OLDEST_US else time_us
+    return np.array(from_euler(0.0, 0.0, yaw_of(q.tolist())))

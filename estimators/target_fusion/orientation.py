@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 
-from estimators.rotation import Quaternion, between
+from autopilot_bridge.rotation import Quaternion, between
 
 __all__ = ["Orientations"]
 

@@ -7,7 +7,7 @@ import math
 from collections import deque
 from typing import Final, Protocol
 
-from estimators.rotation import Quaternion, between, from_euler
+from autopilot_bridge.rotation import Quaternion, between, from_euler
 from missions.telemetry import Attitude
 
 _KEPT: Final = 256

@@ -12,7 +12,7 @@ from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudePar
 from estimators.interface import Outcome
 from estimators.messages import read_message
 from estimators.needs import message_names
-from estimators.rotation import Quaternion, from_euler, yaw_of
+from autopilot_bridge.rotation import Quaternion, from_euler, yaw_of
 from estimators.runner import ESTIMATOR_COMPONENTS, TRUTH_COMPONENT
 from estimators.vehicle_time import VehicleTime
 from missions import telemetry

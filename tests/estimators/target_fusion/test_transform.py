@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from estimators.rotation import from_euler, product, rotate, yaw_of
+from autopilot_bridge.rotation import from_euler, product, rotate, yaw_of
 from estimators.target_fusion import Range, TargetFusionParameters
 from estimators.target_fusion.sight import Detection, place_in_level_frame
 from estimators.target_fusion.transform import INFORMATION, add_information, belief_of, ground_target

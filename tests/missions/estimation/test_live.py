@@ -16,7 +16,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from estimators.logs import open_log
-from estimators.rotation import from_euler
+from autopilot_bridge.rotation import from_euler
 from missions.cli import run_command_line
 
 ROOT = Path(__file__).parents[3]

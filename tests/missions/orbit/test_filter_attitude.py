@@ -6,7 +6,7 @@ import math
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
-from estimators.rotation import yaw_of
+from autopilot_bridge.rotation import yaw_of
 from missions.library import find_mission
 from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.options import AttitudeFrom, OrbitOptions

@@ -1,9 +1,10 @@
-"""Rotations of single vectors, in plain numbers: an estimator or a mission turns a few vectors per image.
+"""Rotations of single vectors, in plain numbers: for who turns a few vectors per image or message.
 
 Quaternions are Hamilton, (w, x, y, z), and named `q_a_from_b`.
 """
 
 import math
+from collections.abc import Sequence
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -51,8 +52,8 @@ def from_euler(roll_rad: float, pitch_rad: float, yaw_rad: float) -> Quaternion:
     )
 
 
-def yaw_of(q: Quaternion) -> float:
-    """Heading of `q_ned_from_frd`."""
+def yaw_of(q: Sequence[float]) -> float:
+    """Heading of `q_ned_from_frd`, (4,)."""
     w, x, y, z = q
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
