@@ -44,7 +44,7 @@ def vehicle_signing(key: Path | None, unsigned: str, store: Path | None) -> "Sig
 
     Args:
         key: file with the key of all vehicles.
-        unsigned: from whom unsigned frames are taken: "none", "local" or "all".
+        unsigned: from whom unsigned frames are taken: "none", "serial", "local" or "all".
         store: file in which keys and times are kept.
 
     Raises:

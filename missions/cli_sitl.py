@@ -160,10 +160,11 @@ def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
 @key_option
 @click.option(
     "--unsigned",
-    type=click.Choice(["none", "local", "all"]),
-    default="local",
+    type=click.Choice(["none", "serial", "local", "all"]),
+    default="serial",
     show_default=True,
-    help="Who takes unsigned frames while there is a key: no link, those of this machine and serial ones, all.",
+    help="Which links take unsigned frames while there is a key: none, serial ones, those of this machine too, "
+    "all.",
 )
 @click.option(
     "--signing-store",

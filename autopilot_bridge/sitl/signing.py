@@ -30,6 +30,7 @@ class UnsignedFrom(StrEnum):
     """From whom unsigned frames are taken while there is a key."""
 
     NONE = "none"
+    SERIAL = "serial"
     LOCAL = "local"
     ALL = "all"
 
@@ -37,6 +38,7 @@ class UnsignedFrom(StrEnum):
 POLICIES: Final[Mapping[UnsignedFrom, Mapping[Reach, LinkSigningPolicy]]] = MappingProxyType(
     {
         UnsignedFrom.NONE: {Reach.CABLE: RADIO, Reach.MACHINE: REQUIRED, Reach.NETWORK: REQUIRED},
+        UnsignedFrom.SERIAL: {Reach.CABLE: TRUSTED, Reach.MACHINE: REQUIRED, Reach.NETWORK: REQUIRED},
         UnsignedFrom.LOCAL: {Reach.CABLE: TRUSTED, Reach.MACHINE: TRUSTED, Reach.NETWORK: REQUIRED},
         UnsignedFrom.ALL: {Reach.CABLE: TRUSTED, Reach.MACHINE: TRUSTED, Reach.NETWORK: UNSIGNED_TOO},
     }
@@ -106,7 +108,7 @@ class SigningParameters:
     """
 
     key: SigningKey | None = None
-    unsigned_from: UnsignedFrom = UnsignedFrom.LOCAL
+    unsigned_from: UnsignedFrom = UnsignedFrom.SERIAL
     removable: bool = True
     clock: Callable[[], int] | None = None
     store: SigningStore | None = field(default=None, compare=False)

@@ -140,7 +140,7 @@ def attacks(port: int, recorded: list[bytes]) -> Iterator[None]:
 @pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
 def test_pymavlink_flies_signed_while_attacked(flavour: str, key_file: Path) -> None:
     port = free_port()
-    options = ("--signing-key", str(key_file), "--unsigned", "none")
+    options = ("--signing-key", str(key_file))
     with running_sitl(flavour, [f"udpin:127.0.0.1:{port}"], speedup=5.0, options=options) as sitl:
         assert any("signatures required" in line for line in sitl.lines)
         station = Station(f"udpout:127.0.0.1:{port}", SECRET)
@@ -160,7 +160,7 @@ def test_pymavlink_flies_signed_while_attacked(flavour: str, key_file: Path) -> 
 def test_mavproxy_flies_signed(tmp_path: Path, key_file: Path) -> None:
     pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
     port = free_port(socket.SOCK_STREAM)
-    options = ("--signing-key", str(key_file), "--unsigned", "none")
+    options = ("--signing-key", str(key_file))
     with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=8.0, options=options):
         station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
         try:
@@ -178,10 +178,10 @@ def test_mavproxy_flies_signed(tmp_path: Path, key_file: Path) -> None:
 
 @pytest.mark.slow
 def test_mavproxy_brings_the_key(tmp_path: Path) -> None:
-    """`signing setup` on loopback; then whoever has another key is refused where signatures are required."""
+    """`signing setup` on loopback; then whoever has another key is refused."""
     pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
     port, store = free_port(socket.SOCK_STREAM), tmp_path / "store"
-    options = ("--unsigned", "none", "--signing-store", str(store))
+    options = ("--signing-store", str(store))
     with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=8.0, options=options):
         station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
         try:
@@ -213,7 +213,7 @@ def test_mavproxy_brings_the_key(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_our_mission_flies_signed(tmp_path: Path, key_file: Path) -> None:
     port = free_port()
-    options = ("--signing-key", str(key_file), "--unsigned", "none")
+    options = ("--signing-key", str(key_file))
     with running_sitl("px4", [f"udpout:127.0.0.1:{port}"], speedup=8.0, options=options):
         for key, code, told in (("another one", 1, "bad signature"), (PASSPHRASE, 0, "completed")):
             arguments = ["fly", "square.py", "--connect", f"udpin:127.0.0.1:{port}"]

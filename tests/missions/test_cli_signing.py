@@ -58,8 +58,14 @@ def test_a_link_open_to_the_network_is_warned_of_in_one_line() -> None:
 @pytest.mark.parametrize(
     ("options", "warned", "how"),
     [
-        (("--link", "udpin:127.0.0.1:0"), False, ", signed; takes unsigned frames too"),
+        (("--link", "udpin:127.0.0.1:0"), False, ", signatures required"),
+        (("--link", "tcpin:127.0.0.1:0"), False, ", signatures required"),
         (("--link", "udpin:127.0.0.1:0", "--unsigned", "none"), False, ", signatures required"),
+        (
+            ("--link", "udpin:127.0.0.1:0", "--unsigned", "local"),
+            False,
+            ", signed; takes unsigned frames too",
+        ),
         (("--link", NETWORK), False, ", signatures required"),
         (("--link", NETWORK, "--unsigned", "all"), True, ", signed; takes unsigned frames too"),
     ],

@@ -174,6 +174,18 @@ def test_an_attacker_changes_nothing_at_all(
     )  # no answer, no text, no faster stream
 
 
+@pytest.mark.parametrize(
+    ("reach", "believed"), [(Reach.CABLE, True), (Reach.MACHINE, False), (Reach.NETWORK, False)]
+)
+def test_whoever_gives_a_key_has_it_required_everywhere_but_on_a_cable(reach: Reach, believed: bool) -> None:
+    sitl = Sitl(SitlConfiguration(), signing=SigningParameters(key=KEY))
+    link = sitl.connect(0, reach=reach)
+    setting = dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 7.0, 9)
+    link.send(FrameEncoder(255, 190).encode(setting))
+    taken = sitl.vehicles[0].autopilot.parameters.as_dict()["MIS_TAKEOFF_ALT"]
+    assert taken == (7.0 if believed else 2.5)
+
+
 def test_a_radio_on_the_line_passes_unsigned() -> None:
     sitl = Sitl(SitlConfiguration(), signing=SigningParameters(key=KEY, unsigned_from=UnsignedFrom.NONE))
     for reach, tolerated in ((Reach.CABLE, 1), (Reach.MACHINE, 0), (Reach.NETWORK, 0)):
@@ -248,12 +260,15 @@ def test_the_first_key_comes_by_a_trusted_link(reach: Reach, taken: bool) -> Non
 
 
 @pytest.mark.parametrize("unsigned_from", UnsignedFrom)
-@pytest.mark.parametrize("reach", [Reach.MACHINE, Reach.NETWORK])
+@pytest.mark.parametrize("reach", [Reach.CABLE, Reach.MACHINE, Reach.NETWORK])
 def test_the_next_key_comes_from_the_holder_of_the_old_one(reach: Reach, unsigned_from: UnsignedFrom) -> None:
     for sign, holder in ((bytes, False), (signer(OTHER_KEY, 1 << 46), False), (signer(KEY, 1 << 46), True)):
         keys = Keys(reach, key=KEY, unsigned_from=unsigned_from)
         keys.bring(OTHER_KEY.secret, sign)
-        trusted = reach is Reach.MACHINE and unsigned_from is not UnsignedFrom.NONE
+        trusted = reach is Reach.CABLE or (
+            reach is Reach.MACHINE and unsigned_from in (UnsignedFrom.LOCAL, UnsignedFrom.ALL)
+        )
+        trusted = trusted and unsigned_from is not UnsignedFrom.NONE
         assert keys.key == (OTHER_KEY if holder or trusted else KEY)
 
 
