@@ -11,7 +11,8 @@ GROUND_FLOOR = tuple(
     f"autopilot_bridge.{name}"
     for name in (
         *("mavlink", "links", "routing", "clock", "tlog", "errors"),
-        *("geodesy", "mission_plan", "parameters", "parameter_files", "rotation"),
+        *("geodesy", "mission_plan", "mission_wire", "fence_shapes", "rotation"),
+        *("parameters", "parameter_files"),
     )
 )
 COMPILER = ("flightsim.kernels",)  # compiles and knows nothing of the world: for everybody above `flightsim`
@@ -19,7 +20,13 @@ COMPILER = ("flightsim.kernels",)  # compiles and knows nothing of the world: fo
 CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")
 SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "threading", "subprocess", "time")
 SANS_IO = (
-    *(f"autopilot_bridge.{name}" for name in ("mavlink", "routing", "geodesy", "mission_plan", "rotation")),
+    *(
+        f"autopilot_bridge.{name}"
+        for name in (
+            *("mavlink", "routing", "geodesy", "rotation"),
+            *("mission_plan", "mission_wire", "fence_shapes"),
+        )
+    ),
     *(
         f"autopilot_bridge.{name}"
         for name in (

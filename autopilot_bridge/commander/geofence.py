@@ -1,44 +1,21 @@
-"""The geofence: a cylinder around home, and the polygons and circles of the uploaded fence plan.
-
-Plan items as in the MAVLink mission protocol (MAV_MISSION_TYPE_FENCE): vertices of one polygon follow each
-other and carry their number in param1; circles carry the radius in param1.
-"""
+"""The geofence: a cylinder around home, and the polygons and circles of the uploaded fence plan."""
 
 import math
-from dataclasses import dataclass
-from typing import Final
 
 from autopilot_bridge.commander.geofence_parameters import FenceParameters, FenceType
+from autopilot_bridge.fence_shapes import (
+    RETURN_POINT,
+    FenceCircle,
+    FenceShape,
+    Point,
+    fence_point,
+    fence_shapes,
+    outside_shapes,
+)
 from autopilot_bridge.geodesy import LocalFrame
-from autopilot_bridge.mission_plan import MissionItem, MissionStore
+from autopilot_bridge.mission_plan import MissionStore
 
-RETURN_POINT: Final = 5000
-POLYGON_INCLUSION: Final = 5001
-POLYGON_EXCLUSION: Final = 5002
-CIRCLE_INCLUSION: Final = 5003
-CIRCLE_EXCLUSION: Final = 5004
-
-Point = tuple[float, float]
 Place = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class _Polygon:
-    vertices: tuple[Point, ...]
-    inclusion: bool
-
-    def allows(self, point: Point) -> bool:
-        return inside_polygon(point, self.vertices) == self.inclusion
-
-
-@dataclass(frozen=True, slots=True)
-class _Circle:
-    centre: Point
-    radius_m: float
-    inclusion: bool
-
-    def allows(self, point: Point) -> bool:
-        return (math.dist(point, self.centre) <= self.radius_m) == self.inclusion
 
 
 class Geofence:
@@ -54,7 +31,7 @@ class Geofence:
         self._plan = plan
         self._version = -1
         self._frame: LocalFrame | None = None
-        self._shapes: tuple[_Polygon | _Circle, ...] = ()
+        self._shapes: tuple[FenceShape, ...] = ()
         self._return_point: Point | None = None
 
     @property
@@ -75,7 +52,7 @@ class Geofence:
         for shape in self._shapes:
             if not shape.inclusion:
                 continue
-            if isinstance(shape, _Circle):
+            if isinstance(shape, FenceCircle):
                 return shape.centre
             count = len(shape.vertices)
             return (
@@ -112,56 +89,14 @@ class Geofence:
                 broken |= FenceType.HEIGHT_MIN
         if FenceType.SHAPES in walls and parameters.shapes and frame is not None:
             self._compile(frame)
-            if self._outside_shapes((north_m, east_m), join=parameters.inclusions_join):
+            if outside_shapes(self._shapes, (north_m, east_m), join=parameters.inclusions_join):
                 broken |= FenceType.SHAPES
         return broken
-
-    def _outside_shapes(self, point: Point, *, join: bool) -> bool:
-        if not self._shapes:
-            return False
-        kept = [shape.allows(point) for shape in self._shapes if shape.inclusion]
-        if kept and not (any(kept) if join else all(kept)):
-            return True
-        return any(not shape.allows(point) for shape in self._shapes if not shape.inclusion)
 
     def _compile(self, frame: LocalFrame) -> None:
         if self._version == self._plan.version and self._frame is frame:
             return
         self._version, self._frame = self._plan.version, frame
-        self._return_point = None
-        shapes: list[_Polygon | _Circle] = []
-        pending: list[MissionItem] = []
-        for item in self._plan.items:
-            if item.command == RETURN_POINT:
-                self._return_point = _local(item, frame)
-            elif item.command in (CIRCLE_INCLUSION, CIRCLE_EXCLUSION):
-                if math.isfinite(item.param1) and item.param1 > 0.0:
-                    shapes.append(_Circle(_local(item, frame), item.param1, item.command == CIRCLE_INCLUSION))
-            elif item.command in (POLYGON_INCLUSION, POLYGON_EXCLUSION):
-                if pending and (item.command, item.param1) != (pending[0].command, pending[0].param1):
-                    pending = []
-                pending.append(item)
-                if len(pending) >= 3 and len(pending) == item.param1:
-                    vertices = tuple(_local(vertex, frame) for vertex in pending)
-                    shapes.append(_Polygon(vertices, item.command == POLYGON_INCLUSION))
-                    pending = []
-        self._shapes = tuple(shapes)
-
-
-def inside_polygon(point: Point, vertices: tuple[Point, ...]) -> bool:
-    """Even-odd rule: does a ray from the point cross an odd number of edges?"""
-    north, east = point
-    inside = False
-    previous = vertices[-1]
-    for vertex in vertices:
-        if (vertex[0] > north) != (previous[0] > north):
-            crossing = vertex[1] + (north - vertex[0]) * (previous[1] - vertex[1]) / (previous[0] - vertex[0])
-            if east < crossing:
-                inside = not inside
-        previous = vertex
-    return inside
-
-
-def _local(item: MissionItem, frame: LocalFrame) -> Point:
-    north_m, east_m, _ = frame.ned_from_geodetic(item.x, item.y, frame.origin.alt_m)
-    return north_m, east_m
+        self._shapes = fence_shapes(self._plan.items, frame)
+        returns = [item for item in self._plan.items if item.command == RETURN_POINT]
+        self._return_point = fence_point(returns[-1], frame) if returns else None

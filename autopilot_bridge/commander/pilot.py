@@ -66,8 +66,10 @@ class PilotInput:
     def sticks_age_s(self, time_us: int, timeout_s: float) -> float:
         """Since there were sticks; infinite when there never were."""
         age_s = (time_us - self._time_us) * 1e-6 if self._time_us >= 0 else math.inf
-        if not self._built_in_radio or age_s <= timeout_s:
+        if not self._built_in_radio:
             return age_s
+        if age_s <= timeout_s:
+            return 0.0  # an override holds until it is forgotten
         failed_us = self.radio_failed_since_us
         return 0.0 if failed_us is None else min(age_s, (time_us - failed_us) * 1e-6)
 

@@ -24,12 +24,12 @@ from autopilot_bridge.flight.plan_reading import (
     target_of,
 )
 from autopilot_bridge.flight.plan_task import PlanTask
+from autopilot_bridge.flight.precision_land import landing_task
+from autopilot_bridge.flight.precision_parameters import Precision
 from autopilot_bridge.flight.region_of_interest import heading_to
 from autopilot_bridge.flight.return_home import ReturnTask
 from autopilot_bridge.flight.spline import SplineCurve, SplineFlight
 from autopilot_bridge.flight.takeoff import TakeoffTask
-from autopilot_bridge.flight.precision_land import landing_task
-from autopilot_bridge.flight.precision_parameters import Precision
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.flight.trajectory import SPEED
 from autopilot_bridge.flight.yaw import wrap_pi

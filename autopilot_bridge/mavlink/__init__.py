@@ -16,6 +16,7 @@ from autopilot_bridge.mavlink.definitions import (
 from autopilot_bridge.mavlink.encoder import FrameEncoder
 from autopilot_bridge.mavlink.frame import Frame
 from autopilot_bridge.mavlink.intake import Intake
+from autopilot_bridge.mavlink.names import command_name, enum_name
 from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters, SourceCounters
 from autopilot_bridge.mavlink.signing import LinkSigning, LinkSigningPolicy, SigningState
 from autopilot_bridge.mavlink.signing_key import SigningKey
@@ -35,7 +36,9 @@ __all__ = [
     "SigningState",
     "SourceCounters",
     "WireField",
+    "command_name",
     "decode",
     "definition",
     "dialect",
+    "enum_name",
 ]

@@ -5,16 +5,10 @@ from typing import Any, Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mission_wire import RELATIVE_FRAMES, TERRAIN_FRAMES
 from autopilot_bridge.payload.vehicle_heard import STALE_US, VehicleHeard
 
-_RELATIVE_FRAMES: Final = frozenset(
-    (
-        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
-        mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
-        mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT,  # the ground is taken as level with home
-        mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT,
-    )
-)
+_RELATIVE_FRAMES: Final = RELATIVE_FRAMES | TERRAIN_FRAMES  # the ground is taken as level with home
 _HAS_POSITION: Final = 1  # of FOLLOW_TARGET.est_capabilities
 _HAS_VELOCITY: Final = 2
 _FASTEST_M_S: Final = 1000.0

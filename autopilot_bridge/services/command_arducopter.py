@@ -8,9 +8,10 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.flavours import ardupilot_modes
+from autopilot_bridge.mission_wire import RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_ardupilot import ArduPilotCommands
-from autopilot_bridge.services.command_common import RELATIVE_FRAMES, Command, CommandHooks, whole
+from autopilot_bridge.services.command_common import Command, CommandHooks, whole
 
 
 class ArduCopterCommands(ArduPilotCommands):

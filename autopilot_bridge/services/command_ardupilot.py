@@ -10,11 +10,10 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import ModeDenied
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_common import (
-    AMSL_FRAMES,
     FORCE_NUMBER,
-    RELATIVE_FRAMES,
     Command,
     CommandHandlers,
     CommandHooks,
@@ -109,7 +108,7 @@ class ArduPilotCommands(CommandHandlers):
         """DO_REPOSITION, COMMAND_INT only: p2 bit 0 changes to GUIDED."""
         if not command.is_int:
             return Result.UNSUPPORTED
-        if command.frame not in AMSL_FRAMES | RELATIVE_FRAMES:
+        if command.frame not in GLOBAL_FRAMES | RELATIVE_FRAMES:
             self.hooks.announce(_WARNING, f"Unknown mavlink coordinate frame {command.frame}")
             return Result.DENIED
         unset = not (math.isfinite(command.x) and math.isfinite(command.y) and math.isfinite(command.z))

@@ -9,11 +9,10 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flavours import ardupilot_plane_modes
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_ardupilot import ArduPilotCommands
 from autopilot_bridge.services.command_common import (
-    AMSL_FRAMES,
-    RELATIVE_FRAMES,
     Command,
     CommandHooks,
     whole,
@@ -178,7 +177,7 @@ class ArduPlaneCommands(ArduPilotCommands):
         if self.commander.mode is not FlightMode.GUIDED:
             return Result.FAILED
         relative = command.frame is None or command.frame in RELATIVE_FRAMES
-        if not relative and command.frame not in AMSL_FRAMES:
+        if not relative and command.frame not in GLOBAL_FRAMES:
             return Result.DENIED
         if not math.isfinite(command.z) or command.z in (0.0, -1.0):
             return Result.DENIED

@@ -13,14 +13,14 @@ from typing import Final, NamedTuple, Protocol
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander import Commander
-from autopilot_bridge.commander.events import CommandDenied, RebootRequested
+from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.verdict import Reason, Result
+from autopilot_bridge.mission_wire import UNSET_INT
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
 
 FORCE_NUMBER: Final = 21196
-_INT_UNSET: Final = 0x7FFFFFFF
 _LOCAL_FRAMES: Final = frozenset(
     {
         mavlink.MAV_FRAME_LOCAL_NED,
@@ -32,10 +32,6 @@ _LOCAL_FRAMES: Final = frozenset(
         mavlink.MAV_FRAME_LOCAL_FRD,
         mavlink.MAV_FRAME_LOCAL_FLU,
     }
-)
-AMSL_FRAMES: Final = frozenset({mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT})
-RELATIVE_FRAMES: Final = frozenset(
-    {mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
 )
 _HOME_POSITION: Final = mavlink.MAVLINK_MSG_ID_HOME_POSITION
 _AUTOPILOT_VERSION: Final = mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION
@@ -89,8 +85,8 @@ def command_from_message(message: MavlinkMessage) -> Command:
         x, y, z, frame = message.param5, message.param6, message.param7, None
     else:
         scale = 1e-4 if message.frame in _LOCAL_FRAMES else 1e-7
-        x = math.nan if message.x == _INT_UNSET else message.x * scale
-        y = math.nan if message.y == _INT_UNSET else message.y * scale
+        x = math.nan if message.x == UNSET_INT else message.x * scale
+        y = math.nan if message.y == UNSET_INT else message.y * scale
         z, frame = message.z, int(message.frame)
     return Command(
         int(message.command),
@@ -249,7 +245,8 @@ class CommandHandlers(ABC):
         unit, kind, instance = whole(command.p1), whole(command.p2), whole(command.p3, 0)
         if self.hooks.inject_failure is None:
             return Result.UNSUPPORTED
-        disabled = "SYS_FAILURE_EN" in self.hooks.parameters and not self.hooks.parameters.get("SYS_FAILURE_EN")
+        parameters = self.hooks.parameters
+        disabled = "SYS_FAILURE_EN" in parameters and not parameters.get("SYS_FAILURE_EN")
         if disabled or unit is None or kind is None or instance is None:
             return Result.DENIED
         return self.hooks.inject_failure(unit, kind, instance)

@@ -12,6 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
+from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Source
 from autopilot_bridge.services.mission_download import MissionDownloads
@@ -19,7 +20,6 @@ from autopilot_bridge.services.mission_feasibility import mission_problems
 from autopilot_bridge.services.mission_feasibility_aircraft import AircraftRules
 from autopilot_bridge.services.mission_messages import (
     ack_message,
-    item_from_message,
     plan_checksum,
     send_extended,
 )

@@ -8,8 +8,9 @@ from collections.abc import Callable
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
+from autopilot_bridge.mission_wire import item_message
 from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
-from autopilot_bridge.services.mission_messages import ack_message, count_message, item_message, send_extended
+from autopilot_bridge.services.mission_messages import ack_message, count_message, send_extended
 from autopilot_bridge.services.mission_policy import MissionPolicy, Text
 from autopilot_bridge.services.mission_sessions import Download, Sessions, mission_type_of, same_partner
 
@@ -159,7 +160,16 @@ class MissionDownloads:
             self._policy.ordered_download and mission_type is MissionType.MISSION and store.current == seq
         )
         sent = self._policy.rules.read_back(item, as_int=as_int)
-        to.channel.send(item_message(to, sent, seq, mission_type, current=current, as_int=as_int))
+        to.channel.send(
+            item_message(
+                sent,
+                seq,
+                mission_type,
+                target=(to.system_id, to.component_id),
+                current=current,
+                as_int=as_int,
+            )
+        )
 
     def _count(self, to: Source, count: int, mission_type: MissionType) -> None:
         plan_id = self._stores[mission_type].plan_id if self._policy.plan_ids else 0

@@ -17,10 +17,10 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flight.plan_reading import is_waypoint
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
 from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.mission_wire import TERRAIN_FRAMES, UNSET_INT, is_geodetic
 from autopilot_bridge.services.channel import MavlinkMessage, send_to_all
 from autopilot_bridge.services.command_common import Command
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
-from autopilot_bridge.services.mission_messages import TERRAIN_FRAMES, UNSET_INT, is_geodetic
 
 Execute = Callable[[Command], Result | None]
 

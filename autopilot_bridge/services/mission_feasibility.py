@@ -11,8 +11,8 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES, is_geodetic
 from autopilot_bridge.services.mission_feasibility_aircraft import AircraftRules, aircraft_problems
-from autopilot_bridge.services.mission_messages import GLOBAL_FRAMES, is_geodetic
 
 VTOL_COMMANDS: Final = frozenset(
     (

@@ -13,8 +13,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.flavours.mapping import clamp, integer, number
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES, is_geodetic
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.mission_messages import GLOBAL_FRAMES, is_geodetic
 
 _PLACES: Final = frozenset(
     (

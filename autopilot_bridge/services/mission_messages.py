@@ -1,4 +1,4 @@
-"""MISSION_* messages: building them, and turning items into messages and back.
+"""MISSION_* messages: building them, and the identifiers of plans.
 
 pymavlink's dialect leaves out the plan identifiers that the MAVLink definition gives as extension fields:
 MISSION_COUNT.opaque_id, MISSION_ACK.opaque_id and MISSION_CURRENT.mission_id, fence_id, rally_points_id (all
@@ -6,7 +6,6 @@ uint32, 0 = unknown). They are added here; a pymavlink that has them is used as 
 no part in CRC_EXTRA, so every MAVLink 2 receiver understands both.
 """
 
-import math
 import struct
 import zlib
 from typing import Any, ClassVar, Final
@@ -14,19 +13,9 @@ from typing import Any, ClassVar, Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services.channel import NOBODY, Channel, MavlinkMessage, Source
+from autopilot_bridge.mission_wire import item_message
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
 
-GLOBAL_FRAMES: Final = frozenset((mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT))
-RELATIVE_FRAMES: Final = frozenset(
-    (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
-)
-TERRAIN_FRAMES: Final = frozenset(
-    (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
-)
-GEODETIC_FRAMES: Final = GLOBAL_FRAMES | RELATIVE_FRAMES | TERRAIN_FRAMES
-UNSET_INT: Final = 2**31 - 1  # x or y of MISSION_ITEM_INT that is not set
-_DEG_E7: Final = 1e7
-_LOCAL_E4: Final = 1e4
 _CRC_HEAD: Final = struct.Struct("<BHB4f")
 
 
@@ -128,70 +117,6 @@ def request_message(to: Source, seq: int, mission_type: int, *, as_int: bool) ->
     return message(to.system_id, to.component_id, seq, mission_type)
 
 
-def is_geodetic(item: MissionItem) -> bool:
-    """True when x and y of an item are latitude and longitude."""
-    return item.frame in GEODETIC_FRAMES
-
-
-def item_from_message(message: MavlinkMessage) -> MissionItem:
-    """The item in a MISSION_ITEM or MISSION_ITEM_INT, unchecked; unset coordinates become NaN."""
-    x, y = message.x, message.y
-    if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT:
-        if message.frame in GEODETIC_FRAMES:
-            x, y = (math.nan if value == UNSET_INT else value / _DEG_E7 for value in (x, y))
-        elif message.frame != mavlink.MAV_FRAME_MISSION:
-            x, y = x / _LOCAL_E4, y / _LOCAL_E4
-    return MissionItem(
-        command=message.command,
-        frame=message.frame,
-        param1=message.param1,
-        param2=message.param2,
-        param3=message.param3,
-        param4=message.param4,
-        x=x,
-        y=y,
-        z=message.z,
-        autocontinue=bool(message.autocontinue),
-    )
-
-
-def item_message(
-    to: Source, item: MissionItem, seq: int, mission_type: int, *, current: bool, as_int: bool
-) -> MavlinkMessage:
-    """MISSION_ITEM_INT, or MISSION_ITEM, for one item."""
-    x: float = item.x
-    y: float = item.y
-    if as_int:
-        scale = (
-            _DEG_E7 if is_geodetic(item) else 1.0 if item.frame == mavlink.MAV_FRAME_MISSION else _LOCAL_E4
-        )
-        x, y = _scaled(x, scale), _scaled(y, scale)
-    message = mavlink.MAVLink_mission_item_int_message if as_int else mavlink.MAVLink_mission_item_message
-    return message(
-        to.system_id,
-        to.component_id,
-        seq,
-        item.frame,
-        item.command,
-        int(current),
-        int(item.autocontinue),
-        item.param1,
-        item.param2,
-        item.param3,
-        item.param4,
-        x,
-        y,
-        item.z,
-        mission_type,
-    )
-
-
-def _scaled(value: float, scale: float) -> int:
-    if not math.isfinite(value):
-        return UNSET_INT
-    return max(-(2**31), min(UNSET_INT, round(value * scale)))
-
-
 def message_checksum(message: MavlinkMessage, previous: int) -> int:
     """PX4's plan identifier, continued over one more MISSION_ITEM(_INT).
 
@@ -216,6 +141,6 @@ def plan_checksum(items: tuple[MissionItem, ...], mission_type: MissionType = Mi
     """Identifier of a plan as PX4 would compute it from an upload in MISSION_ITEM_INT; 0 when empty."""
     checksum = 0
     for seq, item in enumerate(items):
-        message = item_message(NOBODY, item, seq, mission_type, current=False, as_int=True)
+        message = item_message(item, seq, mission_type, target=(0, 0), current=False)
         checksum = message_checksum(message, checksum)
     return checksum

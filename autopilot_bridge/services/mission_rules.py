@@ -10,7 +10,7 @@ from typing import Final, Protocol
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services.mission_messages import GEODETIC_FRAMES
+from autopilot_bridge.mission_wire import GEODETIC_FRAMES
 
 ACCEPTED: Final = mavlink.MAV_MISSION_ACCEPTED
 INVALID_PARAM: Final = (

@@ -6,7 +6,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services.mission_messages import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
+from autopilot_bridge.mission_wire import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.mission_rules import (
     check_fence,
     check_finite,

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
+from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
 from autopilot_bridge.services.mission_messages import (
     ack_message,
-    item_from_message,
     message_checksum,
     request_message,
     send_extended,

@@ -7,13 +7,13 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.rotation import Quaternion, from_euler, product, yaw_of
 from estimators.input_guard import InputGuard
 from estimators.interface import Outcome
 from estimators.lissajous.model import VX, VY, Array, course, course_variance
 from estimators.lissajous.pattern_frame import Track
 from estimators.lissajous.positions import PositionReader, values_of
 from estimators.messages import Message
-from autopilot_bridge.rotation import Quaternion, from_euler, product, yaw_of
 from estimators.target_fusion.orientation import Orientations
 from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
 from estimators.target_fusion.sight import Detection, place_in_level_frame

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimators.lissajous.model import Array
 from autopilot_bridge.rotation import Quaternion, rotate
+from estimators.lissajous.model import Array
 from estimators.target_fusion.parameters import Range, TargetFusionParameters
 
 __all__ = ["Detection", "Seen", "place_in_level_frame"]

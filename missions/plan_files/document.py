@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import command_name
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError
 from missions.kind import VehicleKind
@@ -37,6 +37,10 @@ FLOWN_TO: Final = frozenset(
     }
 )
 """Commands that name a place to fly to."""
+
+INT_FRAMES: Final = {0: 5, 3: 6, 10: 11}
+"""Global frames as files have them -> the same, counted in whole numbers, as items have them."""
+PLAIN_FRAMES: Final = {whole: plain for plain, whole in INT_FRAMES.items()}
 
 LOITERS: Final = frozenset({NAV_LOITER_UNLIM, NAV_LOITER_TURNS, NAV_LOITER_TIME, NAV_LOITER_TO_ALT})
 
@@ -82,6 +86,4 @@ class MissionDocument:
 
 def item_name(index: int, command: int) -> str:
     """An item by its place in the mission (from 0), numbered from 1 as ground stations do."""
-    entry = dialect.enums["MAV_CMD"].get(command)
-    name = entry.name.removeprefix("MAV_CMD_") if entry else f"command {command}"
-    return f"item {index + 1} ({name})"
+    return f"item {index + 1} ({command_name(command)})"

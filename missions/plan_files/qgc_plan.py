@@ -7,20 +7,25 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from autopilot_bridge.fence_shapes import (
+    CIRCLE_EXCLUSION,
+    CIRCLE_INCLUSION,
+    POLYGON_EXCLUSION,
+    POLYGON_INCLUSION,
+    RETURN_POINT,
+)
 from autopilot_bridge.geodesy import GeodeticPosition
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import dialect, enum_name
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.plan_files.complex_items import landing_items, simple_items
-from missions.plan_files.document import DO_JUMP, MissionDocument
+from missions.plan_files.document import DO_JUMP, INT_FRAMES, PLAIN_FRAMES, MissionDocument
 from missions.plan_files.json_values import Refuse, entries, flag, is_number, mapping, number, numbers, whole
 
 _MAX_BYTES: Final = 32 * 1024 * 1024
 _FIRMWARE: Final = {12: "px4", 3: "ardupilot"}
-_RETURN_POINT, _VERTEX_IN, _VERTEX_OUT, _CIRCLE_IN, _CIRCLE_OUT, _RALLY = 5000, 5001, 5002, 5003, 5004, 5100
-_INT_FRAMES: Final = {0: 5, 3: 6, 10: 11}
-_PLAIN_FRAMES: Final = {5: 0, 6: 3, 11: 10}
+_RALLY: Final = 5100  # NAV_RALLY_POINT
 
 
 def read_plan(path: Path) -> MissionDocument:
@@ -81,9 +86,9 @@ def _kind(mission: Mapping[str, Any], path: Path) -> VehicleKind | None:
         return None
     kind = KIND_OF_TYPE.get(type_) if isinstance(type_, int) else None
     if kind is None:
-        entry = dialect.enums["MAV_TYPE"].get(type_) if isinstance(type_, int) else None
+        name = enum_name("MAV_TYPE", type_) if isinstance(type_, int) else None
         raise PlanError(
-            f"{path}: vehicleType {type_!r}{f' ({entry.name})' if entry else ''} can't be flown; accepted: "
+            f"{path}: vehicleType {type_!r}{f' (MAV_TYPE_{name})' if name else ''} can't be flown; accepted: "
             "multicopters and fixed wings"
         )
     return kind
@@ -149,7 +154,7 @@ def _simple(entry: Mapping[str, Any], where: str, refuse: Refuse) -> MissionItem
         raise refuse(where, f"frame {frame}, command {command}; accepted: a MAV_FRAME and a MAV_CMD")
     return MissionItem(
         command=command,
-        frame=_INT_FRAMES.get(frame, frame),
+        frame=INT_FRAMES.get(frame, frame),
         param1=values[0],
         param2=values[1],
         param3=values[2],
@@ -167,7 +172,7 @@ def _fence_items(fence: Mapping[str, Any], refuse: Refuse) -> tuple[MissionItem,
         where = f"geoFence, polygon {number_}"
         polygon = mapping(raw, where, refuse)
         points = [numbers(p, 2, where, refuse) for p in entries(polygon.get("polygon"), where, refuse)]
-        command = _VERTEX_IN if flag(polygon, "inclusion", True, where, refuse) else _VERTEX_OUT
+        command = POLYGON_INCLUSION if flag(polygon, "inclusion", True, where, refuse) else POLYGON_EXCLUSION
         items += [
             MissionItem(command=command, frame=0, param1=float(len(points)), x=lat, y=lon)
             for lat, lon in points
@@ -177,12 +182,12 @@ def _fence_items(fence: Mapping[str, Any], refuse: Refuse) -> tuple[MissionItem,
         entry = mapping(raw, where, refuse)
         circle = mapping(entry.get("circle"), where, refuse)
         lat, lon = numbers(circle.get("center"), 2, f"{where}, center", refuse)
-        command = _CIRCLE_IN if flag(entry, "inclusion", True, where, refuse) else _CIRCLE_OUT
+        command = CIRCLE_INCLUSION if flag(entry, "inclusion", True, where, refuse) else CIRCLE_EXCLUSION
         radius_m = number(circle, "radius", where, refuse)
         items.append(MissionItem(command=command, frame=0, param1=radius_m, x=lat, y=lon))
     if fence.get("breachReturn"):
         lat, lon, alt = numbers(fence["breachReturn"], 3, "geoFence.breachReturn", refuse)
-        items.append(MissionItem(command=_RETURN_POINT, frame=3, x=lat, y=lon, z=alt))
+        items.append(MissionItem(command=RETURN_POINT, frame=3, x=lat, y=lon, z=alt))
     return tuple(items)
 
 
@@ -233,7 +238,7 @@ def _simple_entry(index: int, item: MissionItem) -> dict[str, Any]:
         "autoContinue": item.autocontinue,
         "command": item.command,
         "doJumpId": index + 1,
-        "frame": _PLAIN_FRAMES.get(item.frame, item.frame),
+        "frame": PLAIN_FRAMES.get(item.frame, item.frame),
         "params": [None if math.isnan(n) else n for n in numbers_],
         "type": "SimpleItem",
     }

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES
 from missions.plan_files.document import (
     DO_CHANGE_SPEED,
     DO_JUMP,
@@ -27,7 +28,6 @@ from missions.plan_files.document import (
 )
 from missions.plan_files.validation import has_place
 
-_ABSOLUTE: Final = frozenset({0, 5})
 _MOST_STEPS: Final = 20_000
 _PATH_STEP_M: Final = 1.0
 _LOITER_RADIUS_M: Final = 60.0
@@ -127,7 +127,7 @@ def route_of(document: MissionDocument, home: GeodeticPosition) -> Route:
             stops[-1] = replace(stops[-1], stay_s=stops[-1].stay_s + max(0.0, item.param1))
         elif item.command in FLOWN_TO:
             north, east, _ = frame.ned_from_geodetic(item.x, item.y, home.alt_m)
-            height_m = item.z - home.alt_m if item.frame in _ABSOLUTE else item.z
+            height_m = item.z - home.alt_m if item.frame in GLOBAL_FRAMES else item.z
             stops.append(
                 Stop(
                     index=index,

@@ -3,21 +3,24 @@
 import math
 from typing import Final
 
+from autopilot_bridge.fence_shapes import (
+    CIRCLE_EXCLUSION,
+    CIRCLE_INCLUSION,
+    POLYGON_EXCLUSION,
+    POLYGON_INCLUSION,
+)
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_wire import GEODETIC_FRAMES
 from missions.errors import PlanError
 from missions.plan_files.document import DO_JUMP, FLOWN_TO, NAV_LAND, NAV_TAKEOFF, MissionDocument
 
 MAX_ITEMS: Final = 5000
 """More than any flight controller stores."""
 
-GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
-_PLAIN_FRAME: Final = 2
 _HIGHEST_M: Final = 50_000.0
 _HERE_IF_UNSET: Final = frozenset({NAV_TAKEOFF, NAV_LAND})
 _VTOL: Final = frozenset({84, 85, 3000})
-_FENCE_VERTEX: Final = frozenset({5001, 5002})
-_FENCE_CIRCLE: Final = frozenset({5003, 5004})
 
 
 def validated(document: MissionDocument) -> MissionDocument:
@@ -43,11 +46,11 @@ def validated(document: MissionDocument) -> MissionDocument:
                     f"{document.path}: {what}, point {number}: {item.x!r}, {item.y!r} is no place; accepted: "
                     "latitude -90..90 and longitude -180..180 degrees"
                 )
-            if item.command in _FENCE_CIRCLE and not 0.0 < item.param1 < math.inf:
+            if item.command in (CIRCLE_INCLUSION, CIRCLE_EXCLUSION) and not 0.0 < item.param1 < math.inf:
                 raise PlanError(
                     f"{document.path}: {what}, circle {number}: radius {item.param1:g} m; accepted: above 0"
                 )
-            if item.command in _FENCE_VERTEX and item.param1 < 3:
+            if item.command in (POLYGON_INCLUSION, POLYGON_EXCLUSION) and item.param1 < 3:
                 raise PlanError(
                     f"{document.path}: {what}: a polygon of {item.param1:g} points; accepted: 3 or more"
                 )
@@ -73,9 +76,10 @@ def _check_item(document: MissionDocument, index: int) -> None:
         return
     if item.command not in FLOWN_TO:
         return
-    if item.frame not in GLOBAL_FRAMES:
+    if item.frame not in GEODETIC_FRAMES:
         raise document.refuse(
-            index, f"frame {item.frame}; accepted: global ones ({', '.join(map(str, sorted(GLOBAL_FRAMES)))})"
+            index,
+            f"frame {item.frame}; accepted: global ones ({', '.join(map(str, sorted(GEODETIC_FRAMES)))})",
         )
     if item.command in _HERE_IF_UNSET and not has_place(item):
         pass

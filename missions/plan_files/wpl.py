@@ -8,12 +8,17 @@ from typing import Any, Final
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES
 from missions.errors import PlanError
-from missions.plan_files.document import DO_JUMP, NAV_WAYPOINT, MissionDocument
+from missions.plan_files.document import (
+    DO_JUMP,
+    INT_FRAMES,
+    NAV_WAYPOINT,
+    PLAIN_FRAMES,
+    MissionDocument,
+)
 
 HEADER: Final = "QGC WPL 110"
-_ABSOLUTE: Final = frozenset({0, 5})
-_TERRAIN_OR_RELATIVE: Final = {3: 6, 10: 11, 0: 5}  # the same frames, counted in whole numbers
 
 
 def read_wpl(path: Path) -> MissionDocument:
@@ -50,7 +55,7 @@ def read_wpl(path: Path) -> MissionDocument:
 
 
 def _home(row: Any) -> GeodeticPosition | None:
-    if row.command != NAV_WAYPOINT or row.frame not in _ABSOLUTE:
+    if row.command != NAV_WAYPOINT or row.frame not in GLOBAL_FRAMES:
         return None
     if not (abs(row.x) <= 90.0 and abs(row.y) <= 180.0 and math.isfinite(row.z)) or row.x == row.y == 0.0:
         return None
@@ -60,7 +65,7 @@ def _home(row: Any) -> GeodeticPosition | None:
 def _item(row: Any, first: int) -> MissionItem:
     item = MissionItem(
         command=row.command,
-        frame=_TERRAIN_OR_RELATIVE.get(row.frame, row.frame),
+        frame=INT_FRAMES.get(row.frame, row.frame),
         param1=row.param1,
         param2=row.param2,
         param3=row.param3,
@@ -80,7 +85,7 @@ def format_wpl(items: Iterable[MissionItem], home: GeodeticPosition) -> str:
     for index, item in enumerate((marker, *items)):
         if item.command == DO_JUMP:
             item = replace(item, param1=item.param1 + 1)
-        frame = {6: 3, 5: 0, 11: 10}.get(item.frame, item.frame)
+        frame = PLAIN_FRAMES.get(item.frame, item.frame)
         numbers = (item.param1, item.param2, item.param3, item.param4, item.x, item.y, item.z)
         texts = [f"{0.0 if math.isnan(number) else number:.8f}" for number in numbers]
         lines.append("\t".join([str(index), str(int(index == 0)), str(frame), str(item.command), *texts,

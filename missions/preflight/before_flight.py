@@ -6,17 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from autopilot_bridge.fence_shapes import fence_shapes
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from missions.errors import MissionError
 from missions.mission import Mission
 from missions.options import MissionOptions
 from missions.outline import Outline
-from missions.preflight.fence_geometry import areas, first_outside
+from missions.preflight.fence_geometry import first_outside
 from missions.preflight.finding import Finding, Level, ok, problem, warning
 from missions.preflight.health import health_findings
 from missions.preflight.lost_link import PARAMETERS, lost_link_words
-from missions.preflight.settings import FENCE_PARAMETERS, RULES, fence, settings_findings
+from missions.preflight.settings import FENCE_PARAMETERS, RULES, fence, settings_findings, shapes_join
 from missions.preflight.snapshot import Snapshot
 from missions.vehicle.vehicle import Vehicle
 
@@ -167,7 +168,9 @@ def _way(
                     "way", f"the plan's home is {away_m:.0f} m from the vehicle's", "see that it fits here"
                 )
             )
-    outside = first_outside(areas(items, vehicle.home), [(n, e) for n, e, _ in points])
+    shapes = fence_shapes(items, LocalFrame(vehicle.home))
+    join = shapes_join(vehicle.autopilot, parameters)
+    outside = first_outside(shapes, [(n, e) for n, e, _ in points], join=join)
     if outside is not None:
         findings.append(
             problem(

@@ -78,12 +78,13 @@ RULES: Final[Mapping[str, tuple[Rule, ...]]] = MappingProxyType(
 FENCE_PARAMETERS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
         "px4": ("GF_ACTION", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"),
-        "ardupilot": ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_RADIUS", "FENCE_ALT_MAX"),
+        "ardupilot": ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_RADIUS", "FENCE_ALT_MAX", "FENCE_OPTIONS"),
     }
 )
-"""Those that `fence` looks at."""
+"""Those that say what it is."""
 
 _FENCE_ALTITUDE, _FENCE_CIRCLE, _FENCE_POLYGONS = 1, 2, 4
+_FENCE_UNION: Final = 2  # of FENCE_OPTIONS
 
 
 def settings_findings(snapshot: Snapshot) -> list[Finding]:
@@ -139,6 +140,11 @@ def fence(snapshot: Snapshot) -> Finding:
     if not parts:
         return _no_fence("there is none", "draw one in the ground station, or fly without on purpose")
     return ok("geofence", ", ".join(parts))
+
+
+def shapes_join(flavour: str, parameters: Mapping[str, float]) -> bool:
+    """Whether of several areas to stay in one is enough: PX4 always, ArduPilot when it is told so."""
+    return flavour == "px4" or bool(int(parameters.get("FENCE_OPTIONS", 0.0)) & _FENCE_UNION)
 
 
 def _no_fence(text: str, advice: str) -> Finding:

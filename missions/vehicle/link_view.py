@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock
 from autopilot_bridge.geodesy import GeodeticPosition
-from autopilot_bridge.mavlink import MAVLinkMessage, decode, dialect
+from autopilot_bridge.mavlink import MAVLinkMessage, command_name, decode, dialect, enum_name
 from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.errors import VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
@@ -336,14 +336,6 @@ class VehicleView:
                 stop()
 
 
-def command_name(command: int) -> str:
-    """A MAV_CMD in words: "NAV_TAKEOFF"."""
-    entry = dialect.enums["MAV_CMD"].get(command)
-    return entry.name.removeprefix("MAV_CMD_") if entry else f"command {command}"
-
-
 def describe_ack(ack: Any) -> str:
     """A COMMAND_ACK in words: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
-    result = dialect.enums["MAV_RESULT"].get(ack.result)
-    result_name = result.name.removeprefix("MAV_RESULT_") if result else f"result {ack.result}"
-    return f"{command_name(ack.command)}: {result_name}"
+    return f"{command_name(ack.command)}: {enum_name('MAV_RESULT', ack.result) or f'result {ack.result}'}"

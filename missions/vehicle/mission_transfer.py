@@ -1,18 +1,18 @@
 """The MAVLink mission protocol, from the ground station's side: missions, geofences and rally points."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import command_name, dialect, enum_name
 from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.mission_wire import item_from_message, item_message
+from missions.connection import AUTOPILOT_COMPONENT
 from missions.errors import CommandRejected, VehicleTimeout
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
-_GLOBAL_FRAMES: Final = frozenset({0, 3, 5, 6, 10, 11})
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
 _SENDINGS: Final = 3
@@ -26,49 +26,11 @@ _NAMES: Final = {
 }
 
 
-def item_message(
-    item: MissionItem, sequence: int, system_id: int, mission_type: MissionType = MissionType.MISSION
-) -> Any:
-    """MISSION_ITEM_INT of an item: degrees in 1e-7, local metres in 1e-4; NaN x or y ("not set") as 0."""
-    scale = 1e7 if item.frame in _GLOBAL_FRAMES else (1.0 if item.frame == 2 else 1e4)
-
-    def whole(value: float) -> int:
-        return round(value * scale) if math.isfinite(value) else 0
-
-    return dialect.MAVLink_mission_item_int_message(
-        system_id,
-        1,
-        sequence,
-        item.frame,
-        item.command,
-        1 if sequence == 0 and mission_type is MissionType.MISSION else 0,
-        int(item.autocontinue),
-        item.param1,
-        item.param2,
-        item.param3,
-        item.param4,
-        whole(item.x),
-        whole(item.y),
-        item.z,
-        int(mission_type),
-    )
-
-
-def item_from_message(message: Any) -> MissionItem:
-    """The item a MISSION_ITEM_INT carries."""
-    scale = 1e-7 if message.frame in _GLOBAL_FRAMES else (1.0 if message.frame == 2 else 1e-4)
-    return MissionItem(
-        command=message.command,
-        frame=message.frame,
-        param1=message.param1,
-        param2=message.param2,
-        param3=message.param3,
-        param4=message.param4,
-        x=message.x * scale,
-        y=message.y * scale,
-        z=message.z,
-        autocontinue=bool(message.autocontinue),
-    )
+def _item_message(item: MissionItem, sequence: int, system_id: int, mission_type: MissionType) -> Any:
+    """MISSION_ITEM_INT for an autopilot; x and y that are not set are 0, as ground stations send them."""
+    first = sequence == 0 and mission_type is MissionType.MISSION
+    target = (system_id, AUTOPILOT_COMPONENT)
+    return item_message(item, sequence, mission_type, target=target, current=first, unset=0)
 
 
 def renumbered(items: Sequence[MissionItem], by: int) -> list[MissionItem]:
@@ -77,13 +39,7 @@ def renumbered(items: Sequence[MissionItem], by: int) -> list[MissionItem]:
 
 
 def _result_name(result: int) -> str:
-    entry = dialect.enums["MAV_MISSION_RESULT"].get(result)
-    return entry.name.removeprefix("MAV_MISSION_") if entry else f"result {result}"
-
-
-def _command_name(command: int) -> str:
-    entry = dialect.enums["MAV_CMD"].get(command)
-    return entry.name.removeprefix("MAV_CMD_") if entry else f"command {command}"
+    return enum_name("MAV_MISSION_RESULT", result, prefix="MAV_MISSION_") or f"result {result}"
 
 
 async def upload(
@@ -141,7 +97,7 @@ async def _send_plan(
                 if asked < 0:
                     vehicle.send(count)
                 else:  # its acknowledgement was lost: PX4 repeats it
-                    vehicle.send(item_message(items[-1], len(items) - 1, vehicle.system_id, mission_type))
+                    vehicle.send(_item_message(items[-1], len(items) - 1, vehicle.system_id, mission_type))
                 continue
             if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
                 continue
@@ -160,14 +116,14 @@ async def _send_plan(
                     continue  # perhaps to an item of an earlier transfer that came twice
                 where = ""
                 if asked >= 0:
-                    where = f" at item {asked - before + 1} ({_command_name(items[asked].command)})"
+                    where = f" at item {asked - before + 1} ({command_name(items[asked].command)})"
                 raise CommandRejected(
                     f"the vehicle refused the {what}{where}: {_result_name(reply.type)}; {vehicle.heard()}",
                     reply.type,
                 )
             if reply.seq < len(items):
                 asked = max(asked, reply.seq)
-                vehicle.send(item_message(items[reply.seq], reply.seq, vehicle.system_id, mission_type))
+                vehicle.send(_item_message(items[reply.seq], reply.seq, vehicle.system_id, mission_type))
 
 
 async def _ask(

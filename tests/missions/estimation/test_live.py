@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
-from estimators.logs import open_log
 from autopilot_bridge.rotation import from_euler
+from estimators.logs import open_log
 from missions.cli import run_command_line
 
 ROOT = Path(__file__).parents[3]

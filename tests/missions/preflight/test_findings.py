@@ -6,14 +6,15 @@ from typing import Any
 
 import pytest
 
+from autopilot_bridge.fence_shapes import fence_shapes
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
 from missions.kind import VehicleKind
-from missions.preflight.fence_geometry import areas, first_outside
+from missions.preflight.fence_geometry import first_outside
 from missions.preflight.finding import Finding, Level
 from missions.preflight.health import health_findings, reasons_against_arming
 from missions.preflight.lost_link import lost_link_words
-from missions.preflight.settings import fence, settings_findings
+from missions.preflight.settings import fence, settings_findings, shapes_join
 from missions.preflight.snapshot import Snapshot
 
 HEALTH, PRESENT = "onboard_control_sensors_health", "onboard_control_sensors_present"
@@ -191,9 +192,26 @@ SQUARE = ((-100.0, -100.0), (-100.0, 100.0), (100.0, 100.0), (100.0, -100.0))
     ],
 )
 def test_ways_and_fences(fences: list, way: list, outside: tuple[float, float] | None) -> None:
-    place = first_outside(areas(fences, HOME), way)
+    place = first_outside(fence_shapes(fences, LocalFrame(HOME)), way, join=False)
     if outside is None:
         assert place is None
     else:
         assert place is not None
         assert math.dist(place, outside) < 6.0  # found in steps of 5 m
+
+
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "inside"),
+    [
+        ("px4", {}, True),
+        ("ardupilot", {}, False),
+        ("ardupilot", {"FENCE_OPTIONS": 1.0}, False),
+        ("ardupilot", {"FENCE_OPTIONS": 2.0}, True),
+    ],
+)
+def test_two_areas_to_stay_in(flavour: str, parameters: dict[str, float], inside: bool) -> None:
+    """PX4 asks for one of them, ArduPilot for all unless it is told otherwise."""
+    plan = [*items(5001, 4, *SQUARE), *items(5003, 50.0, (130.0, 0.0))]
+    shapes = fence_shapes(plan, LocalFrame(HOME))
+    place = first_outside(shapes, [(0.0, 0.0), (160.0, 0.0)], join=shapes_join(flavour, parameters))
+    assert (place is None) is inside

@@ -1,0 +1,108 @@
+"""The polygons and circles of a geofence plan, and whether places lie inside.
+
+Plan items as in the MAVLink mission protocol (MAV_MISSION_TYPE_FENCE): vertices of one polygon follow each
+other and carry their number in param1; circles carry the radius in param1.
+"""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.mission_plan import MissionItem
+
+RETURN_POINT: Final = 5000
+POLYGON_INCLUSION: Final = 5001
+POLYGON_EXCLUSION: Final = 5002
+CIRCLE_INCLUSION: Final = 5003
+CIRCLE_EXCLUSION: Final = 5004
+"""MAV_CMD_NAV_FENCE_*."""
+
+Point = tuple[float, float]
+"""North and east, m, in a local frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class FencePolygon:
+    """A polygon to stay in (`inclusion`), or out of."""
+
+    vertices: tuple[Point, ...]
+    inclusion: bool
+
+    def allows(self, point: Point) -> bool:
+        """A point is where this shape wants it."""
+        return inside_polygon(point, self.vertices) == self.inclusion
+
+
+@dataclass(frozen=True, slots=True)
+class FenceCircle:
+    """A circle to stay in (`inclusion`), or out of."""
+
+    centre: Point
+    radius_m: float
+    inclusion: bool
+
+    def allows(self, point: Point) -> bool:
+        """A point is where this shape wants it."""
+        return (math.dist(point, self.centre) <= self.radius_m) == self.inclusion
+
+
+FenceShape = FencePolygon | FenceCircle
+
+
+def fence_shapes(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[FenceShape, ...]:
+    """The shapes that fence items describe; what makes no sense is left out, shape by shape."""
+    shapes: list[FenceShape] = []
+    pending: list[MissionItem] = []
+    for item in items:
+        if item.command in (CIRCLE_INCLUSION, CIRCLE_EXCLUSION):
+            if math.isfinite(item.param1) and item.param1 > 0.0:
+                shapes.append(
+                    FenceCircle(fence_point(item, frame), item.param1, item.command == CIRCLE_INCLUSION)
+                )
+        elif item.command in (POLYGON_INCLUSION, POLYGON_EXCLUSION):
+            if pending and (item.command, item.param1) != (pending[0].command, pending[0].param1):
+                pending = []
+            pending.append(item)
+            if len(pending) >= 3 and len(pending) == item.param1:
+                vertices = tuple(fence_point(vertex, frame) for vertex in pending)
+                shapes.append(FencePolygon(vertices, item.command == POLYGON_INCLUSION))
+                pending = []
+    return tuple(shapes)
+
+
+def fence_point(item: MissionItem, frame: LocalFrame) -> Point:
+    """Where a fence item is."""
+    north_m, east_m, _ = frame.ned_from_geodetic(item.x, item.y, frame.origin.alt_m)
+    return north_m, east_m
+
+
+def outside_shapes(shapes: tuple[FenceShape, ...], point: Point, *, join: bool) -> bool:
+    """Whether a point is where the shapes don't want it.
+
+    Every exclusion shape must be kept out of.
+
+    Args:
+        join: of several inclusion shapes one is enough (PX4); else all must be kept (ArduPilot).
+    """
+    if not shapes:
+        return False
+    kept = [shape.allows(point) for shape in shapes if shape.inclusion]
+    if kept and not (any(kept) if join else all(kept)):
+        return True
+    return any(not shape.allows(point) for shape in shapes if not shape.inclusion)
+
+
+def inside_polygon(point: Point, vertices: tuple[Point, ...]) -> bool:
+    """Even-odd rule: does a ray from the point cross an odd number of edges?"""
+    north, east = point
+    inside = False
+    previous = vertices[-1]
+    for vertex in vertices:
+        if (vertex[0] > north) != (previous[0] > north):
+            crossing = vertex[1] + (north - vertex[0]) * (previous[1] - vertex[1]) / (previous[0] - vertex[0])
+            if east < crossing:
+                inside = not inside
+        previous = vertex
+    return inside

@@ -1,0 +1,24 @@
+"""Names of MAVLink's enumerations, for people."""
+
+from typing import Final
+
+from pymavlink.dialects.v20 import all as dialect
+
+_ENUMS: Final = dialect.enums
+
+
+def enum_name(enum: str, value: int, *, prefix: str = "") -> str | None:
+    """An entry's name without what all of them begin with; None: there is no such entry.
+
+    Args:
+        enum: as the definitions call it ("MAV_CMD").
+        value: of the entry.
+        prefix: what the names begin with; "": the enumeration's own name and an underscore.
+    """
+    entry = _ENUMS[enum].get(value)
+    return None if entry is None else str(entry.name).removeprefix(prefix or f"{enum}_")
+
+
+def command_name(command: int) -> str:
+    """A MAV_CMD in words: "NAV_TAKEOFF"."""
+    return enum_name("MAV_CMD", command) or f"command {command}"

@@ -1,0 +1,104 @@
+"""Mission items as messages and back: MISSION_ITEM_INT and MISSION_ITEM, and what their frames mean.
+
+Source: MAVLink mission protocol, https://mavlink.io/en/services/mission.html.
+"""
+
+import math
+from typing import Final
+
+from autopilot_bridge.mavlink import MAVLinkMessage
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.mission_plan import MissionItem
+
+GLOBAL_FRAMES: Final = frozenset((mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT))
+"""Altitudes above mean sea level."""
+RELATIVE_FRAMES: Final = frozenset(
+    (mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)
+)
+"""Altitudes above home."""
+TERRAIN_FRAMES: Final = frozenset(
+    (mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT, mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT_INT)
+)
+"""Altitudes above the ground."""
+GEODETIC_FRAMES: Final = GLOBAL_FRAMES | RELATIVE_FRAMES | TERRAIN_FRAMES
+UNSET_INT: Final = 2**31 - 1
+"""x or y of MISSION_ITEM_INT that is not set."""
+_DEG_E7: Final = 1e7
+_LOCAL_E4: Final = 1e4
+
+
+def is_geodetic(item: MissionItem) -> bool:
+    """True when x and y of an item are latitude and longitude."""
+    return item.frame in GEODETIC_FRAMES
+
+
+def item_from_message(message: MAVLinkMessage) -> MissionItem:
+    """The item in a MISSION_ITEM or MISSION_ITEM_INT, unchecked; unset coordinates become NaN."""
+    x, y = message.x, message.y
+    if message.get_msgId() == mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT:
+        if message.frame in GEODETIC_FRAMES:
+            x, y = (math.nan if value == UNSET_INT else value / _DEG_E7 for value in (x, y))
+        elif message.frame != mavlink.MAV_FRAME_MISSION:
+            x, y = x / _LOCAL_E4, y / _LOCAL_E4
+    return MissionItem(
+        command=message.command,
+        frame=message.frame,
+        param1=message.param1,
+        param2=message.param2,
+        param3=message.param3,
+        param4=message.param4,
+        x=x,
+        y=y,
+        z=message.z,
+        autocontinue=bool(message.autocontinue),
+    )
+
+
+def item_message(
+    item: MissionItem,
+    seq: int,
+    mission_type: int,
+    *,
+    target: tuple[int, int],
+    current: bool,
+    as_int: bool = True,
+    unset: int = UNSET_INT,
+) -> MAVLinkMessage:
+    """MISSION_ITEM_INT (degrees in 1e-7, local metres in 1e-4), or MISSION_ITEM, for one item.
+
+    Args:
+        target: system and component it is for.
+        current: it is the one to be flown.
+        as_int: MISSION_ITEM_INT.
+        unset: x and y that are not set (NaN), of MISSION_ITEM_INT.
+    """
+    x: float = item.x
+    y: float = item.y
+    if as_int:
+        scale = (
+            _DEG_E7 if is_geodetic(item) else 1.0 if item.frame == mavlink.MAV_FRAME_MISSION else _LOCAL_E4
+        )
+        x, y = _scaled(x, scale, unset), _scaled(y, scale, unset)
+    message = mavlink.MAVLink_mission_item_int_message if as_int else mavlink.MAVLink_mission_item_message
+    return message(
+        *target,
+        seq,
+        item.frame,
+        item.command,
+        int(current),
+        int(item.autocontinue),
+        item.param1,
+        item.param2,
+        item.param3,
+        item.param4,
+        x,
+        y,
+        item.z,
+        int(mission_type),
+    )
+
+
+def _scaled(value: float, scale: float, unset: int) -> int:
+    if not math.isfinite(value):
+        return unset
+    return max(-(2**31), min(UNSET_INT, round(value * scale)))
