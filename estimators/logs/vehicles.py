@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import dialect, enum_name
 from estimators.logs.table import Table
 from estimators.vehicle_time import AUTOPILOT
 
@@ -159,5 +159,4 @@ def _spans(
 
 @cache
 def _enum_name(enum: str, value: int) -> str:
-    entry = dialect.enums[enum].get(value)
-    return f"{enum} {value}" if entry is None else str(entry.name).removeprefix(f"{enum}_")
+    return enum_name(enum, value) or f"{enum} {value}"

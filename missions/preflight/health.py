@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import dialect, enum_name
 from missions.preflight.finding import Finding, ok, problem, warning
 from missions.preflight.snapshot import Snapshot
 
@@ -77,10 +77,8 @@ def _bit_names(bits: int) -> str:
     names = []
     for bit in range(32):
         if bits & 1 << bit:
-            entry = dialect.enums["MAV_SYS_STATUS_SENSOR"].get(1 << bit)
-            name = entry.name if entry else f"bit {bit}"
-            for prefix in ("MAV_SYS_STATUS_SENSOR_", "MAV_SYS_STATUS_"):
-                name = name.removeprefix(prefix)
+            name = enum_name("MAV_SYS_STATUS_SENSOR", 1 << bit) or f"bit {bit}"
+            name = name.removeprefix("MAV_SYS_STATUS_")  # as some of them begin
             names.append(name.lower().replace("_", " "))
     return ", ".join(names)
 
@@ -115,8 +113,7 @@ def gps(snapshot: Snapshot) -> Finding:
     hdop = None if eph is None or eph == _UNKNOWN_EPH else eph / 100.0
     shown = f"{satellites} satellites" + ("" if hdop is None else f", HDOP {hdop:.1f}")
     if fix < dialect.GPS_FIX_TYPE_3D_FIX:
-        entry = dialect.enums["GPS_FIX_TYPE"].get(fix)
-        name = entry.name.removeprefix("GPS_FIX_TYPE_") if entry else f"fix type {fix}"
+        name = enum_name("GPS_FIX_TYPE", fix) or f"fix type {fix}"
         return problem("GPS", f"{name}, {shown}", "wait for a 3D fix, under open sky")
     if satellites < _SATELLITES or (hdop is not None and hdop > _HDOP_WARN):
         return warning(

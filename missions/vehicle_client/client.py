@@ -2,9 +2,7 @@
 
 import asyncio
 import json
-import math
-from collections import Counter
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Collection, Container, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from typing import Any, Final
 
@@ -47,8 +45,8 @@ class VehicleClient:
         system_id: MAVLink system id.
         direct: MAVSDK's plugin for messages as they are.
         messages: the newest of each name from the autopilot.
-        counts: how many of each name came.
         texts: what the vehicle said, oldest first.
+        parameter_types: MAV_PARAM_TYPE of the parameters that were told.
     """
 
     def __init__(self, system: System, system_id: int) -> None:
@@ -56,7 +54,6 @@ class VehicleClient:
         self.system_id = system_id
         self.direct = MavlinkDirectAsync(system)
         self.messages: dict[str, Mapping[str, Any]] = {}
-        self.counts: Counter[str] = Counter()
         self.texts: list[str] = []
         self.parameter_types: dict[str, int] = {}
         self._tasks: list[asyncio.Task[None]] = []
@@ -79,7 +76,6 @@ class VehicleClient:
             with suppress(ValueError):  # NaN in a field is no JSON
                 fields = json.loads(message.fields_json)
                 self.messages[message.message_name] = fields
-                self.counts[message.message_name] += 1
                 if message.message_name == "PARAM_VALUE":
                     self.parameter_types[str(fields.get("param_id", ""))] = int(fields.get("param_type", 0))
 
@@ -124,12 +120,11 @@ class VehicleClient:
 
     async def wait_for(self, *names: str, timeout_s: float) -> list[str]:
         """Wait until messages of these names have come; gives those that have not."""
-        end_s = asyncio.get_running_loop().time() + timeout_s
-        while missing := [name for name in names if name not in self.messages]:
-            if asyncio.get_running_loop().time() >= end_s:
-                return missing
-            await asyncio.sleep(_LOOK_S)
-        return []
+        return await _missing(names, self.messages, timeout_s)
+
+    async def wait_for_types(self, names: Collection[str], *, timeout_s: float) -> list[str]:
+        """Wait until the types of these parameters are known; gives those that are not."""
+        return await _missing(names, self.parameter_types, timeout_s)
 
     async def command(self, command: int, *parameters: float) -> int | None:
         """COMMAND_LONG; its MAV_RESULT, or None without an answer."""
@@ -158,6 +153,17 @@ class VehicleClient:
                 )
             if name == "HOME_POSITION" and name not in self.messages:
                 await self.command(dialect.MAV_CMD_REQUEST_MESSAGE, float(definition(name).message_id))
+
+
+async def _missing(names: Collection[str], known: Container[str], timeout_s: float) -> list[str]:
+    """Wait until all names are known; gives those that are not in the end."""
+    loop = asyncio.get_running_loop()
+    end_s = loop.time() + timeout_s
+    while missing := [name for name in names if name not in known]:
+        if loop.time() >= end_s:
+            return missing
+        await asyncio.sleep(_LOOK_S)
+    return []
 
 
 @asynccontextmanager
@@ -228,8 +234,3 @@ async def _heard(address: Address) -> str:
     except BridgeError as error:
         return str(error)
     return quality.heard()
-
-
-def finite(value: float | None) -> float | None:
-    """A number for JSON: None for NaN and infinity."""
-    return value if value is not None and math.isfinite(value) else None

@@ -9,7 +9,7 @@ from mavsdk.plugins.events import EventsError
 from mavsdk.plugins.mission_raw import MissionRawError
 
 from autopilot_bridge.links import Address
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import dialect, enum_name
 from missions.errors import MissionError
 from missions.preflight.finding import Finding, ok, problem, warning
 from missions.preflight.health import PREARM_BIT, health_findings
@@ -28,7 +28,6 @@ _LOSS_WARN, _LOSS_BAD = 0.02, 0.2
 _CLOCK_S: Final = 5.0
 _DAY_S: Final = 86_400.0
 _SLOW_HEARTBEAT_HZ: Final = 0.7
-_RUN_PREARM_CHECKS: Final = 401
 
 
 async def examine(
@@ -49,7 +48,7 @@ async def examine(
         findings = [_who(client)]
         wanted = WANTED.get(client.flavour, WANTED["px4"])
         await client.ask_for(wanted)
-        await client.command(_RUN_PREARM_CHECKS)  # the reasons are told again
+        await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the reasons are told again
         missing = await client.wait_for(*wanted, timeout_s=_WAIT_S)
         await asyncio.sleep(_TEXTS_S)
         try:
@@ -67,8 +66,7 @@ async def examine(
 
 
 def _who(client: VehicleClient) -> Finding:
-    type_ = dialect.enums["MAV_TYPE"].get(int(client.messages["HEARTBEAT"]["type"]))
-    name = type_.name.removeprefix("MAV_TYPE_").lower() if type_ else "unknown type"
+    name = (enum_name("MAV_TYPE", int(client.messages["HEARTBEAT"]["type"])) or "unknown type").lower()
     text = (
         f"{client.flavour or 'another autopilot'}, {name}, system id {client.system_id}, mode {client.mode}"
     )

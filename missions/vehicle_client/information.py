@@ -5,7 +5,7 @@ from typing import Any, Final
 from mavsdk.asyncio.plugins.info import InfoAsync
 from mavsdk.plugins.info import InfoError
 
-from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mavlink import dialect, enum_name
 from missions.vehicle_client.client import WANTED, VehicleClient
 
 _WAIT_S: Final = 4.0
@@ -20,10 +20,9 @@ async def information(client: VehicleClient) -> dict[str, Any]:
     await client.wait_for("AUTOPILOT_VERSION", *wanted, timeout_s=_WAIT_S)
     heartbeat = client.messages["HEARTBEAT"]
     snapshot = client.snapshot()
-    type_ = dialect.enums["MAV_TYPE"].get(int(heartbeat["type"]))
     return {
         "autopilot": client.flavour or _name("MAV_AUTOPILOT", int(heartbeat["autopilot"])),
-        "type": type_.name.removeprefix("MAV_TYPE_").lower() if type_ else int(heartbeat["type"]),
+        "type": _name("MAV_TYPE", int(heartbeat["type"])),
         "kind": None if client.kind is None else str(client.kind),
         "system_id": client.system_id,
         "components": [
@@ -44,13 +43,11 @@ async def information(client: VehicleClient) -> dict[str, Any]:
 
 
 def _name(enum: str, value: int) -> str:
-    entry = dialect.enums[enum].get(value)
-    return entry.name.removeprefix(f"{enum}_").lower() if entry else str(value)
+    return (enum_name(enum, value) or str(value)).lower()
 
 
 def _component(component: int) -> str:
-    entry = dialect.enums["MAV_COMPONENT"].get(component)
-    return entry.name.removeprefix("MAV_COMP_ID_").lower() if entry else f"component {component}"
+    return (enum_name("MAV_COMPONENT", component, prefix="MAV_COMP_ID_") or f"component {component}").lower()
 
 
 def _landed(state: int | None) -> str | None:
@@ -96,11 +93,8 @@ def _git_hash(client: VehicleClient) -> str:
 def _capabilities(bits: int | None) -> list[str] | None:
     if bits is None:
         return None
-    entries = dialect.enums["MAV_PROTOCOL_CAPABILITY"]
     return [
-        entries[1 << k].name.removeprefix("MAV_PROTOCOL_CAPABILITY_").lower()
-        if 1 << k in entries
-        else f"bit {k}"
+        (enum_name("MAV_PROTOCOL_CAPABILITY", 1 << k) or f"bit {k}").lower()
         for k in range(32)
         if bits & 1 << k
     ]
@@ -130,7 +124,7 @@ def _gps(client: VehicleClient) -> dict[str, Any] | None:
     if m is None:
         return None
     return {
-        "fix": _name("GPS_FIX_TYPE", int(m["fix_type"])).removeprefix("gps_fix_type_"),
+        "fix": _name("GPS_FIX_TYPE", int(m["fix_type"])),
         "satellites": m["satellites_visible"],
         "hdop": None if m["eph"] == 65535 else m["eph"] / 100.0,
     }

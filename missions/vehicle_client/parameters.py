@@ -1,6 +1,5 @@
 """A vehicle's parameters through MAVSDK: read, set, saved, loaded, compared."""
 
-import asyncio
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from missions.errors import CommandRejected, MissionError, PlanError, VehicleTim
 from missions.vehicle_client.client import VehicleClient
 
 _LIST_TRIES: Final = 3
+_TYPES_S: Final = 1.0
 _INTEGERS: Final = frozenset((1, 2, 3, 4, 5, 6))
 
 
@@ -67,7 +67,7 @@ async def read_all(client: VehicleClient) -> dict[str, Value]:
         raise VehicleTimeout(
             f"vehicle {client.system_id} did not list its parameters ({_LIST_TRIES} attempts)"
         )
-    await asyncio.sleep(0.1)  # the last messages are on their way to us
+    await client.wait_for_types([p.name for p in listed.int_params], timeout_s=_TYPES_S)
     values = {
         p.name: Value(number=int(p.value), type=client.parameter_types.get(p.name, int(ParameterType.INT32)))
         for p in listed.int_params
