@@ -69,5 +69,9 @@ def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
 
 
 @pytest.mark.parametrize("link", re.findall(r"\]\(([^)h][^)]*)\)", README))
-def test_linked_files_exist(link: str) -> None:
-    assert (ROOT / link).exists(), link
+def test_linked_files_and_sections_exist(link: str) -> None:
+    file, _, section = link.partition("#")
+    assert (ROOT / file).exists(), link
+    if section:
+        headings = re.findall(r"^#+ (.+)$", (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)
+        assert section in {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}

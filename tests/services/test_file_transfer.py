@@ -1,4 +1,4 @@
-"""MAVLink FTP by its page (mavlink.io/en/services/ftp.html): every request, its errors, repeats and bursts."""
+"""MAVLink FTP by its page (mavlink.io/en/services/ftp.html): requests, errors, repeats and bursts."""
 
 import errno
 import zlib
@@ -63,7 +63,8 @@ def burst(rig: FtpRig, session: int, size: int = MAX_DATA) -> bytes:
     assert rig.send(Opcode.BURST_READ_FILE, session=session, size=size, sequence=sequence) == []
     for _ in range(10_000):
         for reply in rig.run():
-            assert reply.sequence == (sequence := sequence + 1) & 0xFFFF
+            sequence += 1
+            assert reply.sequence == sequence & 0xFFFF
             if reply.error is not None:
                 assert reply.error == (FtpError.END_OF_FILE,)
                 return bytes(read)

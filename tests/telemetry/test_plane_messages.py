@@ -248,11 +248,10 @@ def test_every_message_has_the_fields_of_its_definition() -> None:
         ):
             values = messages.builders()[definition(name).message_id]()
             assert values is not None and len(values) == len(definition(name).field_names), name
-    arduplane = Aircraft().ardupilot.builders()
+    of_services = {definition(name).message_id for name in ("CURRENT_EVENT_SEQUENCE", "FENCE_STATUS")}
+    arduplane = set(Aircraft().ardupilot.builders()) | of_services
     for group in ardupilot_plane.STREAM_GROUPS.values():
-        for message_id in group:
-            assert message_id in arduplane
-    of_services = {definition("CURRENT_EVENT_SEQUENCE").message_id}
+        assert set(group) <= arduplane
     assert set(px4_plane.ONBOARD_RATES_HZ) <= set(Aircraft().px4.builders()) | of_services
 
 
