@@ -163,8 +163,7 @@ def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
     type=click.Choice(["none", "serial", "local", "all"]),
     default="serial",
     show_default=True,
-    help="Which links take unsigned frames while there is a key: none, serial ones, those of this machine too, "
-    "all.",
+    help="Which links take unsigned frames while there is a key: none, serial ones, this machine's too, all.",
 )
 @click.option(
     "--signing-store",

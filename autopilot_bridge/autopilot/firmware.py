@@ -69,9 +69,7 @@ def _log_rates_hz(groups: Mapping[int, tuple[int, ...]]) -> Mapping[int, float]:
     """What an ArduPilot, which streams nothing unasked, writes into its log."""
     rates_hz = {message_id: 10.0 for group in groups.values() for message_id in group}
     fast = (mavlink.MAVLINK_MSG_ID_ATTITUDE, mavlink.MAVLINK_MSG_ID_RAW_IMU)
-    return MappingProxyType(
-        {mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **rates_hz, **dict.fromkeys(fast, 25.0)}
-    )
+    return MappingProxyType({mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **rates_hz, **dict.fromkeys(fast, 25.0)})
 
 
 _PX4: Final = Firmware(
