@@ -44,11 +44,11 @@ from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.telemetry.ardupilot import STREAM_RATE_PARAMETERS, ArdupilotMessages
 from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
-from autopilot_bridge.telemetry.line import LineBudget
+from autopilot_bridge.telemetry.line import MICROSECONDS, LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.px4 import Px4Messages
 from autopilot_bridge.telemetry.px4_plane import Px4PlaneMessages
-from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
+from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 from autopilot_bridge.telemetry.throttle import StreamThrottle
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.airframe import AirframeKind
@@ -227,6 +227,7 @@ class Autopilot:
                 parameters=self.parameters,
                 readings=readings,
                 stores=stores,
+                missions=firmware.missions,
                 broadcast=self,
                 announce=self._texts.announce,
                 memory=memory,

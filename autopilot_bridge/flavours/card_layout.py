@@ -36,6 +36,7 @@ class CardLayout:
             numbers (ArduPilot).
         first_log_id: of LOG_ENTRY.
         parameters: file of the stored parameters, on the card.
+        plans: folder of the stored plans, on the card.
         save_after_s: so long after a change the parameters are stored.
         log_times: when to log, by the parameters; None: not at all.
     """
@@ -45,6 +46,7 @@ class CardLayout:
     log_folder_by_day: bool
     first_log_id: int
     parameters: VehiclePath
+    plans: VehiclePath
     save_after_s: float
     log_times: Callable[[ParameterStore], LogTimes | None]
 
@@ -79,6 +81,7 @@ CARD_LAYOUTS: Final[Mapping[str, CardLayout]] = MappingProxyType(
             log_folder_by_day=True,
             first_log_id=0,
             parameters=(f"parameters{QGC_SUFFIX}",),
+            plans=("plans",),
             save_after_s=0.3,
             log_times=_px4_log_times,
         ),
@@ -88,6 +91,7 @@ CARD_LAYOUTS: Final[Mapping[str, CardLayout]] = MappingProxyType(
             log_folder_by_day=False,
             first_log_id=1,
             parameters=(f"parameters{MAVPROXY_SUFFIXES[0]}",),
+            plans=("PLANS",),
             save_after_s=0.0,
             log_times=_ardupilot_log_times,
         ),

@@ -19,6 +19,7 @@ from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, Channel, MavlinkMessage, Source
 from autopilot_bridge.services.command_common import Command, Handler
+from autopilot_bridge.services.mission_policy import MissionPolicy
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.telemetry.streams import Builder
 from flightsim.interface import SensorReadings
@@ -52,6 +53,7 @@ class AutopilotParts:
         parameters: the parameter store.
         readings: the sensors.
         stores: the uploaded plans, by type.
+        missions: which plans the firmware takes.
         broadcast: all channels.
         announce: sends a STATUSTEXT.
         memory: card, clock and power of the computer it runs on.
@@ -66,6 +68,7 @@ class AutopilotParts:
     parameters: ParameterStore
     readings: SensorReadings
     stores: Mapping[MissionType, MissionStore]
+    missions: MissionPolicy
     broadcast: Broadcast
     announce: Announce
     memory: VehicleMemory

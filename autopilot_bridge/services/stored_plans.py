@@ -7,6 +7,7 @@ damaged, or that holds what would be refused from a client, is kept aside and to
 """
 
 import contextlib
+import math
 import struct
 import zlib
 from collections.abc import Mapping
@@ -26,6 +27,7 @@ _HEADER: Final = struct.Struct("<8sHHI")
 _FORMAT: Final = b"FSPLAN1\n"
 _ITEM: Final = struct.Struct("<HBB7d")
 _CRC: Final = struct.Struct("<I")
+_LARGEST: Final = 3.4e38  # of the wire's floats
 _NAMES: Final = {
     MissionType.MISSION: "mission",
     MissionType.FENCE: "fence",
@@ -158,6 +160,11 @@ class StoredPlans(Microservice):
         if count > self._policy.capacity[kind]:
             raise ValueError(f"{count} items are more than {self._policy.capacity[kind]}")
         for seq, item in enumerate(items):
+            values = (item.param1, item.param2, item.param3, item.param4, item.x, item.y, item.z)
+            if any(abs(value) > _LARGEST for value in values):
+                raise ValueError(f"item {seq} of the stored plan holds what no message can")
+            if seq == 0 and self._policy.home_is_item_0 and not math.isfinite(item.x + item.y + item.z):
+                raise ValueError("the home of the stored plan is nowhere")
             if self._policy.rules.check(item, kind, seq, count) != mavlink.MAV_MISSION_ACCEPTED:
                 raise ValueError(f"item {seq} of the stored plan, command {item.command}, is not taken")
         if kind is MissionType.FENCE and check_fence_polygons(items) != mavlink.MAV_MISSION_ACCEPTED:

@@ -9,10 +9,11 @@ from autopilot_bridge.services.file_transfer import FileTransferService
 from autopilot_bridge.services.log_book import LogBook
 from autopilot_bridge.services.log_transfer import LogTransferService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.mission_files import plan_files
 from autopilot_bridge.services.onboard_log import OnboardLog
 from autopilot_bridge.services.parameter_storage import STORAGE_POLICIES, ParameterStorageService
-from autopilot_bridge.services.plan_memory import PlanMemory, plan_files
 from autopilot_bridge.services.power import POWER_POLICIES, PowerService
+from autopilot_bridge.services.stored_plans import StoredPlans
 from autopilot_bridge.storage import FileStore, MountTable, VehiclePath
 from autopilot_bridge.storage.generated import GeneratedStore
 
@@ -51,7 +52,7 @@ def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
         memory.stored, parts.parameters, parts.commander, STORAGE_POLICIES[name], layout, parts.announce
     )
     power = PowerService(POWER_POLICIES[name], parts.commander, memory.power)
-    plans = PlanMemory(parts.stores, memory.card)
+    plans = StoredPlans(parts.stores, card, layout.plans, parts.missions, parts.announce)
     return (files, logs, storage, power, plans, *told, *(() if recorder is None else (recorder,)))
 
 

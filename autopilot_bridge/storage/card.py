@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.storage.files import FileStore
 from autopilot_bridge.storage.memory import MemoryStore
 
@@ -14,11 +13,9 @@ class MemoryCard:
     Attributes:
         files: the card's own file system; by default in memory, empty.
         logs: flights are logged on it.
-        plans: missions, fences and rally points: items and identifier, by type.
         boots: how often an autopilot was started with it, in this run.
     """
 
     files: FileStore = field(default_factory=MemoryStore)
     logs: bool = False
-    plans: dict[MissionType, tuple[tuple[MissionItem, ...], int]] = field(default_factory=dict)
     boots: int = 0

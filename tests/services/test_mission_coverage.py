@@ -32,6 +32,25 @@ def accepted(flavour: str, kind: AirframeKind) -> set[int]:
     return found
 
 
+@pytest.mark.parametrize("firmware", list(FIRMWARES))
+def test_what_is_stored_would_be_taken_again(firmware: tuple[str, AirframeKind]) -> None:
+    """A stored plan is judged by the same rules when the vehicle boots."""
+    rules = FIRMWARES[firmware].missions.rules
+    taken = 0
+    for kind in MissionType:
+        for command in range(0, 6000):
+            for frame in (0, 2, 3, 5, 6, 10):
+                for value in (0.0, 3.0, math.nan):
+                    place = {"x": math.nan, "y": math.nan} if math.isnan(value) else {"x": 47.4, "y": 8.5}
+                    item = MissionItem(
+                        command=command, frame=frame, z=10.0, param1=value, param4=value, **place
+                    )
+                    if rules.check(item, kind, 1, 9) == 0:
+                        taken += 1
+                        assert rules.check(rules.stored(item), kind, 1, 9) == 0, item
+    assert taken > 100
+
+
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("model", list(KINDS))
 def test_every_accepted_command_does_something(flavour: str, model: str) -> None:

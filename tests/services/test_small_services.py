@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.services.commands import CommandService
@@ -33,6 +34,7 @@ class Vehicle:
             parameters=rig.store,
             readings=rig.readings,
             stores={},
+            missions=FIRMWARES[flavour, rig.flavour.kind].missions,
             broadcast=rig,
             announce=rig.status.announce,
             memory=None,  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services import packed_parameters, plan_memory
+from autopilot_bridge.services import mission_files, packed_parameters
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from autopilot_bridge.storage import MemoryStore, Quota
 from autopilot_bridge.storage.card import MemoryCard
@@ -53,6 +53,27 @@ class Client:
         self.run(0.1)
         acks = [message.result for message in self.all("COMMAND_ACK") if message.command == number]
         return acks[-1] if acks else None
+
+    def upload(self, kind: MissionType, items: list[MissionItem]) -> None:
+        self.heard.clear()
+        self.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), kind))
+        for _ in range(100):
+            self.run(0.02)
+            asked = self.all("MISSION_REQUEST_INT") + self.all("MISSION_REQUEST")
+            if self.all("MISSION_ACK"):
+                assert self.all("MISSION_ACK")[0].type == 0
+                return
+            self.heard.clear()
+            for request in asked:
+                item = items[request.seq]
+                place = (round(item.x * 1e7), round(item.y * 1e7), item.z)
+                params = (item.param1, item.param2, item.param3, item.param4)
+                self.send(
+                    mavlink.MAVLink_mission_item_int_message(
+                        1, 1, request.seq, item.frame, item.command, 0, 1, *params, *place, kind
+                    )
+                )
+        raise AssertionError("the upload doesn't end")
 
     def set(self, name: str, value: float) -> None:
         self.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
@@ -160,6 +181,29 @@ def test_parameters_outlive_runs_and_reboots(flavour: str, tmp_path: Path) -> No
     assert client.get(name) == value
     client = Client(flavour, MemoryCard(files=store), {name: before + 1.0})  # the command line goes before
     assert client.get(name) == before + 1.0
+    store.close()
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_plans_outlive_runs(flavour: str, tmp_path: Path) -> None:
+    """An uploaded plan is there in the next run, the same to the last bit."""
+    store = FolderStore(tmp_path)
+    client = Client(flavour, MemoryCard(files=store))
+    client.run(3.0)
+    places = ((47.3, 8.4), (47.3, 8.7), (47.5, 8.55))
+    fence = [MissionItem(command=5001, frame=3, param1=3.0, x=x, y=y) for x, y in places]
+    rally = [MissionItem(command=5100, frame=3, x=47.398, y=8.546, z=20.0)]
+    client.upload(MissionType.FENCE, fence)
+    client.upload(MissionType.RALLY, rally)
+    kept = client.vehicle.autopilot.missions._stores
+    client.run(0.1)
+    store.close()  # as kill -9 leaves it: nothing was closed in the vehicle
+    store = FolderStore(tmp_path)
+    client = Client(flavour, MemoryCard(files=store))
+    again = client.vehicle.autopilot.missions._stores
+    for kind, count in ((MissionType.MISSION, 0), (MissionType.FENCE, 3), (MissionType.RALLY, 1)):
+        assert len(again[kind].items) == count
+        assert (repr(again[kind].items), again[kind].plan_id) == (repr(kept[kind].items), kept[kind].plan_id)
     store.close()
 
 
@@ -293,7 +337,7 @@ def test_packed_parameters_as_pymavlink_reads_them() -> None:
 
 def test_mission_file_is_made_of_items_as_on_the_wire() -> None:
     items = (MissionItem(command=16, x=-35.0, y=149.0, z=5.0), MissionItem(command=20, param1=float("nan")))
-    data = plan_memory.packed(items, MissionType.MISSION)
+    data = mission_files.packed(items, MissionType.MISSION)
     size = mavlink.MAVLink_mission_item_int_message.unpacker.size
     assert struct.unpack("<HHHHH", data[:10]) == (0x763D, 0, 0, 0, 2)
     assert len(data) == 10 + 2 * size

@@ -1,4 +1,4 @@
-"""Plans that outlive a reboot, and ArduPilot's files of them (`@MISSION/mission.dat`, `fence.dat`, ...).
+"""ArduPilot's files of its plans (`@MISSION/mission.dat`, `fence.dat`, ...).
 
 A file is a header (magic number, MAV_MISSION_TYPE, options, first item, number of items) and the items as
 MISSION_ITEM_INT has them on the wire.
@@ -14,8 +14,6 @@ from autopilot_bridge.mavlink.encoder import payload_packer
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_message
 from autopilot_bridge.services.channel import MavlinkMessage
-from autopilot_bridge.services.microservice import Microservice
-from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.generated import Content, GeneratedStore
 
 _HEADER: Final = struct.Struct("<HHHHH")
@@ -25,29 +23,6 @@ _FILES: Final = {
     "fence.dat": MissionType.FENCE,
     "rally.dat": MissionType.RALLY,
 }
-
-
-class PlanMemory(Microservice):
-    """Keeps the plans beside the memory card while the vehicle reboots.
-
-    Args:
-        stores: the plans; those that are kept are put into them.
-        card: keeps them.
-    """
-
-    def __init__(self, stores: Mapping[MissionType, MissionStore], card: MemoryCard) -> None:
-        self._stores = stores
-        self._plans = card.plans
-        for kind, (items, plan_id) in card.plans.items():
-            stores[kind].replace(items, plan_id)
-        self._versions = {kind: store.version for kind, store in stores.items()}
-
-    def tick(self, time_us: int) -> None:
-        """Keep a plan that was changed."""
-        for kind, store in self._stores.items():
-            if store.version != self._versions[kind]:
-                self._versions[kind] = store.version
-                self._plans[kind] = (store.items, store.plan_id)
 
 
 def plan_files(stores: Mapping[MissionType, MissionStore]) -> GeneratedStore:
