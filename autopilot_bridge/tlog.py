@@ -12,12 +12,11 @@ from typing import BinaryIO, Final
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink.frame import (
-    CHECKSUM_SIZE,
-    HEADER_SIZE_V1,
-    HEADER_SIZE_V2,
     INCOMPAT_SIGNED,
     MAGIC_V1,
     MAGIC_V2,
+    OVERHEAD_V1,
+    OVERHEAD_V2,
     SIGNATURE_SIZE,
     Frame,
 )
@@ -25,8 +24,6 @@ from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
 
 _TIME: Final = struct.Struct(">Q")
 _pack_time: Final = _TIME.pack
-_OVERHEAD_V1: Final = HEADER_SIZE_V1 + CHECKSUM_SIZE
-_OVERHEAD_V2: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
 FLUSH_BYTES: Final = 64 * 1024
 FLUSH_INTERVAL_US: Final = 1_000_000
 _CHUNK_BYTES: Final = 1 << 20
@@ -55,11 +52,11 @@ def append_records(buffer: bytearray, time_us: int, packet: bytes) -> int:
         while start < size:
             magic = packet[start]
             if magic == MAGIC_V2:
-                end = start + _OVERHEAD_V2 + packet[start + 1]
+                end = start + OVERHEAD_V2 + packet[start + 1]
                 if packet[start + 2] & INCOMPAT_SIGNED:
                     end += SIGNATURE_SIZE
             elif magic == MAGIC_V1:
-                end = start + _OVERHEAD_V1 + packet[start + 1]
+                end = start + OVERHEAD_V1 + packet[start + 1]
             else:
                 break
             frames.append(packet[start:end])
@@ -275,9 +272,9 @@ def _record_size(buffer: bytes, start: int) -> int | None:
     if available < 3:
         return None
     if magic == MAGIC_V1:
-        size = HEADER_SIZE_V1 + buffer[at + 1] + CHECKSUM_SIZE
+        size = OVERHEAD_V1 + buffer[at + 1]
     else:
-        size = HEADER_SIZE_V2 + buffer[at + 1] + CHECKSUM_SIZE
+        size = OVERHEAD_V2 + buffer[at + 1]
         if buffer[at + 2] & INCOMPAT_SIGNED:
             size += SIGNATURE_SIZE
     return _TIME.size + size if size <= available else None

@@ -11,6 +11,7 @@ from typing import Final
 
 import numpy as np
 
+from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.land import LandTask, descent_speed
 from autopilot_bridge.flight.motion import SmoothMotion
@@ -111,8 +112,8 @@ class PrecisionLandTask:
         motion.steer(ctx, motion.heading.yaw_rad if math.isnan(self._yaw_rad) else self._yaw_rad)
         motion.write(ctx)
         if self.phase is PrecisionPhase.DESCEND:
-            ctx.setpoint[2] = math.nan  # by speed alone: the height of the ground isn't known
-            ctx.setpoint[8] = 0.0
+            ctx.setpoint[sp.POS_NED_M][2] = math.nan  # by speed alone: the height of the ground isn't known
+            ctx.setpoint[sp.ACC_NED_M_S2][2] = 0.0
         return TaskStatus.RUNNING
 
     def _go(self, phase: PrecisionPhase) -> None:

@@ -8,12 +8,11 @@ from fastcrc.crc16 import mcrf4xx
 
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
 from autopilot_bridge.mavlink.frame import (
-    CHECKSUM_SIZE,
-    HEADER_SIZE_V1,
-    HEADER_SIZE_V2,
     INCOMPAT_SIGNED,
     MAGIC_V1,
     MAGIC_V2,
+    OVERHEAD_V1,
+    OVERHEAD_V2,
     SIGNATURE_SIZE,
     Frame,
 )
@@ -21,8 +20,6 @@ from autopilot_bridge.mavlink.frame import (
 _CRC_EXTRA: Final = {key: bytes([item.crc_extra]) for key, item in DEFINITIONS.items()}
 _MAGIC_V1_BYTE: Final = bytes([MAGIC_V1])
 _MAGIC_V2_BYTE: Final = bytes([MAGIC_V2])
-_OVERHEAD_V1: Final = HEADER_SIZE_V1 + CHECKSUM_SIZE
-_OVERHEAD_V2: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
 _unpack_head: Final = struct.Struct("<BBBBBBBHB").unpack_from
 _MAX_LATE: Final = 16  # frames; a larger step back is a sender that started anew
 
@@ -131,9 +128,9 @@ class FrameParser:
         start = 0
         source: SourceCounters | None = None
         sender = -1, -1
-        while size - start >= _OVERHEAD_V2:
+        while size - start >= OVERHEAD_V2:
             magic, length, flags, _, sequence, system_id, component_id, low, high = _unpack_head(data, start)
-            end = start + _OVERHEAD_V2 + length
+            end = start + OVERHEAD_V2 + length
             if magic != MAGIC_V2 or flags or end > size:
                 break
             message_id = low | high << 16
@@ -189,7 +186,7 @@ class FrameParser:
                     counters.bytes_unsupported += 1
                     start += 1
                     continue
-                crc_end = start + _OVERHEAD_V2 + buffer[start + 1]
+                crc_end = start + OVERHEAD_V2 + buffer[start + 1]
                 end = crc_end + SIGNATURE_SIZE if flags else crc_end
                 if end > size:
                     break
@@ -198,7 +195,7 @@ class FrameParser:
                 if size - start < 2:
                     break
                 flags = 0
-                crc_end = end = start + _OVERHEAD_V1 + buffer[start + 1]
+                crc_end = end = start + OVERHEAD_V1 + buffer[start + 1]
                 if end > size:
                     break
                 message_id = buffer[start + 5]

@@ -19,9 +19,9 @@ from fastcrc.crc16 import mcrf4xx
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
 from autopilot_bridge.mavlink.frame import (
     CHECKSUM_SIZE,
-    HEADER_SIZE_V2,
     INCOMPAT_SIGNED,
     MAGIC_V2,
+    OVERHEAD_V2,
     SIGNATURE_SIZE,
     Frame,
 )
@@ -39,7 +39,6 @@ SETUP_SIGNING: Final = 256
 _SAVE_EVERY: Final = MINUTE // 2
 _TIMESTAMP_SIZE: Final = 6
 _DIGEST_SIZE: Final = 6
-_FRAME_OVERHEAD: Final = HEADER_SIZE_V2 + CHECKSUM_SIZE
 _RADIO_MESSAGES: Final = frozenset({109, 166})  # RADIO_STATUS, RADIO: a telemetry radio has no key
 
 
@@ -247,13 +246,13 @@ class LinkSigning:
     def sign(self, packet: bytes) -> bytes:
         """The frames of a packet (whole MAVLink 2 frames without signatures) with signatures."""
         state, link_id = self.state, self.link_id
-        first = _FRAME_OVERHEAD + packet[1]
+        first = OVERHEAD_V2 + packet[1]
         if first == len(packet):
             self.counters.sent += 1
             return state.sign(packet, link_id)
         signed, start, size = [], 0, len(packet)
         while start < size:
-            end = start + _FRAME_OVERHEAD + packet[start + 1]
+            end = start + OVERHEAD_V2 + packet[start + 1]
             signed.append(state.sign(packet[start:end], link_id))
             start = end
         self.counters.sent += len(signed)

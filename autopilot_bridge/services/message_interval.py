@@ -14,7 +14,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
 from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
-from autopilot_bridge.telemetry.streams import MICROSECONDS, PayloadCache, StreamTable
+from autopilot_bridge.telemetry.line import MICROSECONDS
+from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 
 ALL_STREAMS: Final = mavlink.MAV_DATA_STREAM_ALL
 _FASTEST_REQUESTABLE_US: Final = 100_000

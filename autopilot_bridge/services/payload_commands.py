@@ -17,6 +17,7 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
 from autopilot_bridge.services.command_common import Command, Handler
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.mission_equipment import GIMBAL_COMMANDS
 
 _CAMERA: Final = int(mavlink.MAV_COMP_ID_CAMERA)
 _GIMBAL: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
@@ -47,14 +48,6 @@ _ARDUPILOT_CAMERA: Final = _TRIGGER | {
     mavlink.MAV_CMD_CAMERA_TRACK_RECTANGLE,
     mavlink.MAV_CMD_CAMERA_STOP_TRACKING,
 }
-_GIMBAL_COMMANDS: Final = frozenset(
-    (
-        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
-        _CONFIGURE,
-        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
-        mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
-    )
-)
 _ROI: Final = frozenset(
     (
         mavlink.MAV_CMD_DO_SET_ROI,
@@ -100,7 +93,7 @@ class PayloadCommands(Microservice):
         """Those that are passed on. Regions of interest are accepted without a gimbal too."""
         return {
             **dict.fromkeys(self._policy.camera, self._to_camera),
-            **dict.fromkeys(_GIMBAL_COMMANDS, self._to_gimbal),
+            **dict.fromkeys(GIMBAL_COMMANDS, self._to_gimbal),
             **dict.fromkeys(_ROI, self._look),
         }
 

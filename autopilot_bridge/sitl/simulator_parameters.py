@@ -9,7 +9,9 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from autopilot_bridge.flavours.mapping import clamp, number
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.parameters import ParameterStore
+from flightsim import truth as t
 from flightsim.sensors import SensorSuite
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.sensors.faults import UnsupportedFaultError
@@ -18,7 +20,6 @@ from flightsim.vehicle import Vehicle
 Fault = tuple[FaultType, dict[str, Any]]
 
 _SOUND: Final[Fault] = (FaultType.OK, {})
-_METRES_PER_DEG: Final = 111_319.5
 _PASCALS_PER_METRE: Final = -12.0
 _FIX_SATELLITES: Final = 4
 _FULL_VOLTAGE: Final = 12.6  # SIM_BATT_VOLTAGE of ArduPilot's own battery
@@ -96,12 +97,19 @@ class SimulatorParameters:
         satellites = number(store, "SIM_GPS_NUMSATS", number(store, "SIM_GPS_USED", 10.0))
         if satellites < _FIX_SATELLITES or number(store, "SIM_GPS_JAM", 0.0):
             return FaultType.WRONG, {"no_fix": True}
-        scale = (_METRES_PER_DEG, _METRES_PER_DEG, 1.0)
         bias = [
-            *(number(store, f"SIM_GPS_GLITCH_{axis}", 0.0) * k for axis, k in zip("XYZ", scale, strict=True)),
+            *self._glitch(*(number(store, f"SIM_GPS_GLITCH_{axis}", 0.0) for axis in "XYZ")),
             *(number(store, f"SIM_GPS_VERR_{axis}", 0.0) for axis in "XYZ"),
         ]
         return (FaultType.WRONG, {"bias": bias}) if any(bias) else _SOUND
+
+    def _glitch(self, lat_deg: float, lon_deg: float, up_m: float) -> tuple[float, float, float]:
+        """Degrees of latitude and longitude as metres to the north and east, where the vehicle is now."""
+        lat_rad, lon_rad, alt_m = self._vehicle.truth[t.LAT_RAD : t.ALT_M + 1].tolist()
+        here = GeodeticPosition(lat_deg=math.degrees(lat_rad), lon_deg=math.degrees(lon_rad), alt_m=alt_m)
+        lat_deg = clamp(here.lat_deg + lat_deg, -90.0, 90.0)
+        north, east, _ = LocalFrame(here).ned_from_geodetic(lat_deg, here.lon_deg + lon_deg, alt_m)
+        return north, east, up_m
 
     def _barometer(self, store: ParameterStore) -> Fault:
         if number(store, "SIM_BARO_DISABLE", 0.0):

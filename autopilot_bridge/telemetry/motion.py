@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
+from autopilot_bridge.mavlink.frame import OVERHEAD_V2
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.records import record_type, whole
 from autopilot_bridge.telemetry.streams import Builder
@@ -37,7 +38,6 @@ _POSE_POSITION: Final = (0, 6, 11)  # diagonal of an upper-triangular 6x6 covari
 _POSE_ATTITUDE: Final = (15, 18, 20)
 _HIGHRES_FIELDS_UPDATED: Final = 63  # accelerometer, gyro: what PX4's driver publishes together
 _PLACE_SIZE: Final = 5
-_FRAME_OVERHEAD: Final = 12  # header and checksum
 _NEED_ATTITUDE: Final = 0b100011  # bits of MESSAGES
 _NEED_FRAME: Final = 0b001000
 _NEED_SENSORS: Final = 0b010000
@@ -210,7 +210,7 @@ class MotionMessages:
             name: slice(first, first + size)
             for name, (first, size, _, _) in zip(MESSAGES, _PARTS.tolist(), strict=True)
         }
-        self._packet = np.zeros(self._record.nbytes + len(MESSAGES) * _FRAME_OVERHEAD, np.uint8)
+        self._packet = np.zeros(self._record.nbytes + len(MESSAGES) * OVERHEAD_V2, np.uint8)
         self._packet_bytes = self._packet.data
         self._record_bytes = self._record.view(np.uint8)
         self._make_frames = compiled_for(_frames, self._record_bytes, 0, 0, 0, self._packet)

@@ -13,19 +13,18 @@ from itertools import count
 from typing import Final, Protocol
 
 from autopilot_bridge.mavlink.definitions import definition
-from autopilot_bridge.telemetry.line import LineBudget, thinned_us
+from autopilot_bridge.mavlink.frame import OVERHEAD_V2
+from autopilot_bridge.telemetry.line import MICROSECONDS, LineBudget, thinned_us
 from autopilot_bridge.telemetry.packing import values_packer
 
 Values = tuple[object, ...]
 Builder = Callable[[], Values | bytes | None]
 """Field values of a message in the order of its definition, or its packed payload; None: nothing to say."""
 
-MICROSECONDS: Final = 1_000_000
 GRID_US: Final = 10_000
 """Streams of 50 Hz and slower are sent on this grid of vehicle time; their rate stays exact on average."""
 HEARTBEAT: Final = 0
 """Never thinned, never waits."""
-FRAME_OVERHEAD: Final = 12  # header and checksum
 
 
 class PayloadSink(Protocol):
@@ -196,7 +195,7 @@ class StreamTable:
         """Interval as asked for (us) and size (bytes of a frame) of the streams that may be thinned."""
         sizes = self._sizes
         return [
-            (interval_us, sizes.get(number, FRAME_OVERHEAD + definition(number).size))
+            (interval_us, sizes.get(number, OVERHEAD_V2 + definition(number).size))
             for number, interval_us in self._intervals_us.items()
             if number != HEARTBEAT
         ]
@@ -260,7 +259,7 @@ class StreamTable:
             else:
                 del waiting[message_id]
                 bits |= self._motion_bits[message_id]
-                size = FRAME_OVERHEAD + definition(message_id).size
+                size = OVERHEAD_V2 + definition(message_id).size
             room -= size
             line.spend_share(size)
         if waiting:
@@ -275,7 +274,7 @@ class StreamTable:
         size = 0
         if payload is not None:
             due.append((message_id, payload))
-            size = FRAME_OVERHEAD + len(payload.rstrip(b"\0"))
+            size = OVERHEAD_V2 + len(payload.rstrip(b"\0"))
         self._sizes[message_id] = size
         return size
 

@@ -8,6 +8,7 @@ import pytest
 
 from autopilot_bridge.flight.precision_land import PrecisionLandTask, PrecisionPhase
 from autopilot_bridge.mavlink import FrameEncoder, dialect
+from flightsim import interface
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.payload import CameraParameters, GroundTargetParameters, PayloadParameters, Static
@@ -381,6 +382,11 @@ def test_sim_parameters_break_the_world() -> None:
     put("SIM_GPS_DISABLE", 1.0)
     flight.fly_until(lambda: flight.mode == "land", 12.0, "EKF failsafe")
     put("SIM_GPS_DISABLE", 0.0)
+    put("SIM_GPS_GLITCH_X", 0.001)
+    put("SIM_GPS_GLITCH_Y", -0.002)  # degrees, whatever a degree measures there
+    truth, told = flight.vehicle.vehicle.truth, flight.vehicle.sensors.readings.gps.values
+    assert told[interface.GPS_LAT_DEG] - math.degrees(truth[t.LAT_RAD]) == pytest.approx(0.001, abs=5e-5)
+    assert told[interface.GPS_LON_DEG] - math.degrees(truth[t.LON_RAD]) == pytest.approx(-0.002, abs=5e-5)
     put("SIM_ENGINE_MUL", 0.0)
     put("SIM_ENGINE_FAIL", 1.0)
     assert flight.vehicle.vehicle.motor_effectiveness(0) == 0.0
