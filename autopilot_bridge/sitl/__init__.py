@@ -10,7 +10,8 @@ from autopilot_bridge.sitl.configuration import (
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
-from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
+from autopilot_bridge.sitl.sitl import Sitl
+from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.sitl.warm_up import compile_flight_code
 
 __all__ = [

@@ -10,7 +10,8 @@ from typing import Final
 from autopilot_bridge.clock import RealTimeClock
 from autopilot_bridge.links import Link, open_link, reach_of
 from autopilot_bridge.sitl.ports import Port, default_ports
-from autopilot_bridge.sitl.sitl import Sitl, SitlVehicle
+from autopilot_bridge.sitl.sitl import Sitl
+from autopilot_bridge.sitl.vehicle import SitlVehicle
 
 _FREE_RUN_POLL_US: Final = 20_000
 _POLL_WALL_S: Final = 0.004

@@ -1,245 +1,27 @@
-"""The one visible wiring: world, sensors, autopilots and links, stepped together.
+"""The one visible wiring: world, vehicles and links, stepped together.
 
-Execution order of a step, for each vehicle in turn: vehicle dynamics, sensors, autopilot (navigation, slow
-loop, control, streams), payload. Then the world's clock moves on and what links have brought is handed to the
-autopilots.
+In a step each vehicle makes its own, in turn (`SitlVehicle.step`). Then the world's clock moves on and what
+links have brought is handed to the autopilots.
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-import numpy as np
-
-from autopilot_bridge.autopilot import Autopilot
-from autopilot_bridge.flavours import get_flavour
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
-from autopilot_bridge.mavlink import Frame
-from autopilot_bridge.mavlink.signing import signing_time
-from autopilot_bridge.payload import PayloadStation
-from autopilot_bridge.services.vehicle_memory import PowerAction
-from autopilot_bridge.sitl.channel import LinkChannel
-from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
-from autopilot_bridge.sitl.failures import FailureInjector
-from autopilot_bridge.sitl.launch_crew import LaunchCrew
+from autopilot_bridge.sitl.configuration import SitlConfiguration
 from autopilot_bridge.sitl.shared_link import SharedLink
-from autopilot_bridge.sitl.signing import SigningParameters, VehicleSigning
-from autopilot_bridge.sitl.switchboard import Switchboard
-from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder, TruthEncoder
+from autopilot_bridge.sitl.signing import SigningParameters
+from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
+from autopilot_bridge.sitl.vehicle import NEVER_US, SitlVehicle
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.tlog import TlogWriter
-from flightsim.airframe import Airframe, AirframeKind, LaunchKind
-from flightsim.initial_state import InitialState
-from flightsim.payload import GroundTargets, Payload, PayloadParameters
-from flightsim.sensors import (
-    FIX_AT_BOOT,
-    RTK_FIX_AFTER_10_S,
-    GpsParameters,
-    SensorSuite,
-    SensorSuiteParameters,
-)
+from flightsim.payload import GroundTargets
 from flightsim.world import World, WorldParameters
-
-if TYPE_CHECKING:
-    from flightsim.flight_envelope import FlightEnvelope
 
 TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a frame of truth."""
 
-_NEVER_US: Final = 1 << 62
-REBOOT_US: Final = 1_000_000
-"""From when a rebooting autopilot goes down until it starts again."""
 _NOT_SIGNED: Final = SigningParameters()
-
-
-class SitlVehicle:
-    """One vehicle with its sensors, autopilot and channels.
-
-    Attributes:
-        vehicle: the JSBSim vehicle.
-        sensors: its sensor suite; `sensors.faults` switches failures.
-        autopilot: the emulated autopilot.
-        payload: what it carries, as MAVLink components on a link of their own; None: nothing.
-        links: its open links, who is heard on them, and the key it signs with.
-        crashed: the vehicle is a wreck; clients were told.
-    """
-
-    def __init__(
-        self,
-        specification: VehicleSpecification,
-        index: int,
-        configuration: SitlConfiguration,
-        world: World,
-        targets: GroundTargets,
-        signing: SigningParameters,
-        card: MemoryCard,
-    ) -> None:
-        streams = world.streams
-        self.specification = specification
-        launch = None if specification.launch is None else LaunchKind(specification.launch)
-        self.vehicle = world.add_vehicle(
-            specification.model, initial=InitialState(offset_ne_m=specification.offset_ne_m, launch=launch)
-        )
-        airframe = self.vehicle.airframe
-        aircraft = airframe.kind is AirframeKind.FIXED_WING
-        flavour = get_flavour(specification.flavour, airframe.kind)
-        fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
-        self.sensors = SensorSuite(
-            fitted(gps=_gps(specification.flavour)),
-            physics_rate_hz=configuration.physics_rate_hz,
-            truth=self.vehicle.truth,
-            seeds=lambda name: streams.child("vehicle", index, "sensor", name),
-        )
-        failures = FailureInjector(self.vehicle, self.sensors)
-        self._new_autopilot = partial(
-            Autopilot,
-            flavour,
-            system_id=specification.system_id,
-            readings=self.sensors.readings,
-            physics_rate_hz=configuration.physics_rate_hz,
-            parameters={
-                **flavour.launch_parameters.get(launch or airframe.launch_kind, {}),
-                **specification.parameters,
-            },
-            envelope=_envelope(airframe, configuration) if aircraft else None,
-            inject_failure=failures.inject,
-            simulation=failures,
-            card=card,
-            power=self._on_power,
-        )
-        self._epoch_us = configuration.unix_epoch_us
-        self._boot_us = 0
-        self._power: PowerAction | None = None
-        self._power_us = _NEVER_US  # when it goes down, or boots
-        self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us)
-        self._actuators = self.autopilot.actuators  # written in place
-        self._crew_of = partial(LaunchCrew, self.vehicle, step_us=world.step_us)
-        self._crew = None if self.vehicle.launcher is None else self._crew_of(self.autopilot.commander)
-        self.links = Switchboard(
-            self.autopilot,
-            system_id=specification.system_id,
-            signing=VehicleSigning(
-                signing,
-                system_id=specification.system_id,
-                clock=lambda: signing_time(configuration.unix_epoch_us + world.time_us),
-                armed=lambda: self.autopilot.commander.armed,
-            ),
-        )
-        self.crashed = False
-        self.truth_encoder = TruthEncoder(specification.system_id, self.vehicle.truth)
-        self.payload: PayloadStation | None = None
-        if specification.payload != PayloadParameters():
-            self._fit(
-                Payload(
-                    specification.payload,
-                    truth=self.vehicle.truth,
-                    home=configuration.place,
-                    physics_rate_hz=configuration.physics_rate_hz,
-                    seeds=lambda name: streams.child("vehicle", index, "sensor", name),
-                    targets=targets,
-                    magnetic_field=configuration.magnetic_field,
-                )
-            )
-
-    def _fit(self, payload: Payload) -> None:
-        """Put the payload's components onto a link of their own."""
-        ours, theirs = memory_pair("vehicle", "payload")
-        station = PayloadStation(payload, system_id=self.specification.system_id, send=theirs.send)
-        channel = self.open(ours, role="payload")
-        ours.on_receive = lambda data: self.take(channel, channel.parse(data))
-        theirs.on_receive = station.receive
-        self.payload = station
-
-    @property
-    def channels(self) -> list[LinkChannel]:
-        """Its open links."""
-        return self.links.channels
-
-    @property
-    def echoes(self) -> int:
-        """Frames of its own that came back on a link; they were dropped."""
-        return self.links.echoes
-
-    def step(self, time_us: int) -> None:
-        """One physics step, ending at `time_us`."""
-        if time_us >= self._power_us:
-            self._power_cycle(time_us)
-        boot_us = self._boot_us
-        self.vehicle.step(self._actuators)
-        self.sensors.step(time_us - boot_us)
-        if time_us > boot_us:
-            self.autopilot.step(time_us - boot_us)
-        if self.payload is not None:
-            self.payload.step(time_us)
-        if self._crew is not None and self._crew.watch(time_us):
-            self._crew = None
-        if self.vehicle.crash is not None and not self.crashed:
-            self.crashed = True
-            text = self.truth_encoder.encode_text(f"Simulator: {self.vehicle.crash}")
-            self.links.send_to_all(text)
-
-    def _on_power(self, action: PowerAction) -> None:
-        self._power, self._power_us = action, 0
-
-    def _power_cycle(self, time_us: int) -> None:
-        """The autopilot goes down, to boot again a moment later unless it was shut down; or it boots."""
-        if self._power is None:
-            self._boot_us, self._power_us = time_us, _NEVER_US
-            self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us + time_us)
-            self._actuators = self.autopilot.actuators
-            self.links.restart(self.autopilot)
-            if self._crew is not None:
-                self._crew = self._crew_of(self.autopilot.commander)
-            return
-        again = self._power is PowerAction.REBOOT
-        self._boot_us = self._power_us = time_us + REBOOT_US if again else _NEVER_US
-        self._power = None
-        self._actuators = np.zeros_like(self._actuators)
-        self.autopilot.close()
-        self.links.restart(None)
-
-    def open(
-        self,
-        link: Link,
-        *,
-        name: str | None = None,
-        role: str = "onboard",
-        bytes_per_s: float | None = None,
-        reach: Reach | None = None,
-    ) -> LinkChannel:
-        """Give the autopilot one more link.
-
-        Args:
-            name: unique per vehicle; None: made from the link.
-            role: which default streams run on it ("onboard", "gcs" or "payload").
-            bytes_per_s: what the link carries in a second of vehicle time; streams are thinned to fit.
-            reach: who can get at it; None: only this process when it is a memory link, else the network.
-        """
-        return self.links.open(link, name=name, role=role, bytes_per_s=bytes_per_s, reach=reach)
-
-    def close(self, channel: LinkChannel) -> None:
-        """Take a link away; the link itself is closed too."""
-        self.links.close(channel)
-
-    def poll(self) -> None:
-        """Hand everything that has arrived to the autopilot, and forward what is for somebody else."""
-        self.links.poll()
-
-    def take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
-        """Hand frames that came in on a channel to the autopilot and to the channels they are meant for."""
-        self.links.take(channel, frames)
-
-
-def _gps(flavour: str) -> GpsParameters:
-    """The receiver, with the start-up that the firmware's own SITL shows."""
-    return GpsParameters(fix_timeline=RTK_FIX_AFTER_10_S if flavour == "ardupilot" else FIX_AT_BOOT)
-
-
-def _envelope(airframe: Airframe, configuration: SitlConfiguration) -> "FlightEnvelope":
-    """What an aircraft can do, found by trimming its model."""
-    from flightsim.flight_envelope import flight_envelope  # brings scipy, which a multicopter needs not
-
-    return flight_envelope(airframe, home=configuration.place, environment=configuration.environment)
 
 
 class Sitl:
@@ -290,11 +72,11 @@ class Sitl:
         self._step_us = 1_000_000 // configuration.physics_rate_hz
         self._time_us = 0
         self._poll_us = self._step_us
-        self._next_poll_us = _NEVER_US
+        self._next_poll_us = NEVER_US
         self._attended: list[Callable[[int], None]] = []
         self._truth_listeners: list[TruthListener] = []
         self._truth_interval_us = 1_000_000 // TRUTH_RATE_HZ
-        self._next_truth_us = _NEVER_US
+        self._next_truth_us = NEVER_US
         self._target_truth = TargetTruthEncoder(self.targets, configuration.place)
 
     @property
@@ -408,7 +190,7 @@ class Sitl:
     def on_truth(self, listener: TruthListener) -> None:
         """Have truth frames delivered at 50 Hz, for the log and the score."""
         self._truth_listeners.append(listener)
-        if self._next_truth_us == _NEVER_US:
+        if self._next_truth_us == NEVER_US:
             self._next_truth_us = self._time_us + self._truth_interval_us
 
     def close(self) -> None:
