@@ -1,9 +1,11 @@
 """MAVLink's events interface, sender's side: EVENT, CURRENT_EVENT_SEQUENCE, REQUEST_EVENT and its answers.
 
 Events are numbered, and the newest are kept, so that who has missed one can ask for it. The report of health
-and arming checks goes out when it has changed, and when somebody was refused.
+and arming checks goes out when it has changed, when somebody was refused, when a ground station is heard
+(again) before a flight, and when somebody asks for the checks.
 
-Source: mavlink.io/en/services/events.html.
+Sources: mavlink.io/en/services/events.html; PX4 1.16, Commander (RUN_PREARM_CHECKS, and a ground station that
+connects, bring the report also when nothing has changed).
 """
 
 from collections import deque
@@ -13,10 +15,11 @@ from typing import Final
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.arming import arming_reasons, shortfalls
 from autopilot_bridge.commander.events import ArmingDenied, Event
-from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.flavours import px4_events
 from autopilot_bridge.flavours.event_kinds import Occurrence
 from autopilot_bridge.flavours.texts import Notice
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.event_messages import (
     CURRENT_EVENT_SEQUENCE,
     REQUEST_EVENT,
@@ -24,6 +27,7 @@ from autopilot_bridge.mavlink.event_messages import (
     ResponseEventError,
 )
 from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.command_common import Command, Handler
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.streams import Builder
 
@@ -55,6 +59,11 @@ class EventService(Microservice):
         self._time_us = 0
         self._next_report_us = 0
         self._reported: tuple[Occurrence, ...] = ()
+        self._station_heard = False
+
+    @property
+    def commands(self) -> Mapping[int, Handler]:
+        return {mavlink.MAV_CMD_RUN_PREARM_CHECKS: self._run_checks}
 
     @property
     def builders(self) -> Mapping[int, Builder]:
@@ -78,13 +87,25 @@ class EventService(Microservice):
         return True
 
     def tick(self, time_us: int) -> None:
-        """Report the checks when they have changed."""
+        """Report the checks when they have changed, and to a ground station that comes."""
         self._time_us = time_us
         if time_us >= self._next_report_us:
             self._next_report_us = time_us + _REPORT_US
             report = self._report()
-            if report != self._reported:
+            if self._station_comes() or report != self._reported:
                 self._send_report(report)
+
+    def _station_comes(self) -> bool:
+        """Before a flight, a ground station is heard that was not before."""
+        situation, before = self._commander.situation, self._station_heard
+        self._station_heard = situation.gcs_age_s < self._commander.parameters.gcs_loss_s
+        return self._station_heard and not before and not self._commander.armed
+
+    def _run_checks(self, command: Command, source: Source) -> Result:
+        """RUN_PREARM_CHECKS; what is in the way comes as texts too, and brings the report by itself."""
+        if not self._commander.check_arming():
+            self._send_report(self._report())
+        return Result.ACCEPTED
 
     def follow(self, event: Event) -> None:
         """Send the events of what happened."""

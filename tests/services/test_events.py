@@ -9,10 +9,13 @@ import pytest
 
 from autopilot_bridge.commander import events
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.commander.verdict import Reason
+from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.flavours import get_flavour, px4_events, px4_plane_texts, px4_texts
 from autopilot_bridge.flavours.event_kinds import EventKind, definitions
+from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.event_messages import CURRENT_EVENT_SEQUENCE, EVENT, RequestEvent
+from autopilot_bridge.services.channel import Source
+from autopilot_bridge.services.command_common import Command
 from autopilot_bridge.services.component_metadata import GENERAL, ComponentMetadataService
 from autopilot_bridge.services.events import KEPT, EventService
 from autopilot_bridge.services.ftp_protocol import crc32
@@ -36,8 +39,6 @@ class Rig(ServiceRig):
         return found
 
     def request(self, first: int, last: int) -> list[Any]:
-        from autopilot_bridge.services.channel import Source
-
         assert self.service.handle(RequestEvent(1, 1, first, last), Source(self.link, 255, 190), 0)
         return self.sent()
 
@@ -80,6 +81,21 @@ def test_refused_arming_brings_the_reasons() -> None:
     assert ids[1] == px4_events.ARMING_SUMMARY.event_id
     assert px4_events.CHECKS[Reason.BOOTING].event_id in ids[2:-1]
     assert ids[-1] == px4_events.HEALTH_SUMMARY.event_id
+
+
+def test_report_comes_to_a_station_that_is_heard_and_to_who_asks() -> None:
+    rig = Rig()
+    rig.service.tick(10_000_000)
+    first = rig.sent()
+    rig.commander.situation.gcs_age_s = 0.5
+    rig.service.tick(20_000_000)
+    assert [message.arguments for message in rig.sent()] == [message.arguments for message in first]
+    rig.service.tick(30_000_000)
+    assert rig.sent() == []
+    asked = Command(mavlink.MAV_CMD_RUN_PREARM_CHECKS, *(0.0,) * 7, None)
+    assert rig.service.commands[asked.id](asked, Source(rig.link, 255, 190)) is Result.ACCEPTED
+    told = [message.id for message in rig.sent()]
+    assert not rig.commander.arming_reasons and px4_events.HEALTH_SUMMARY.event_id in told
 
 
 def test_report_comes_once_until_it_changes() -> None:
