@@ -469,6 +469,7 @@ class Commander:
             return
         previous, self.mode = self.mode, mode
         self.guidance.forget_speed()
+        self.context.look_at(None)
         self.emit(ModeChanged(time_us=self.time_us, mode=mode, previous=previous))
         self.tasks.enter(mode)
 

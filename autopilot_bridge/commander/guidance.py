@@ -272,6 +272,7 @@ class Guidance:
         commander = self._commander
         if not commander.airborne or commander.mode is not commander.policy.reposition_mode:
             return
+        commander.context.look_at(None)
         task = self._vehicle.turn(commander.context, commander.tasks.task, yaw_rad)
         if task is not None:
             commander.tasks.start(task)

@@ -26,6 +26,7 @@ from autopilot_bridge.navigation.health import NavigationHealth
 
 if TYPE_CHECKING:
     from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
+    from autopilot_bridge.flight.region_of_interest import RegionOfInterest
 
 Array = NDArray[np.float64]
 
@@ -160,6 +161,8 @@ class FlightContext:
         sticks: newest pilot input.
         frame: local frame of the filter's origin, None before it is known.
         rally: the uploaded rally points; None: there are none.
+        roi: the region of interest, by the mission or a command, until the mode changes; None: there is none.
+        nose_on_roi: whatever is flown, the nose turns to it (a mission decides for itself).
         surroundings: what others tell of targets and obstacles.
         within_fence: says whether a place, local NED, (3,), is inside the geofence; None: nobody knows.
         events: what happened since the autopilot last emptied the list.
@@ -179,9 +182,11 @@ class FlightContext:
         "landed_state",
         "maybe_landed",
         "nav",
+        "nose_on_roi",
         "parameters",
         "phase",
         "rally",
+        "roi",
         "setpoint",
         "sticks",
         "surroundings",
@@ -218,10 +223,17 @@ class FlightContext:
         self.sticks = ManualInput()
         self.frame: LocalFrame | None = None
         self.rally: MissionStore | None = None
+        self.roi: RegionOfInterest | None = None
+        self.nose_on_roi = False
         self.surroundings = Surroundings()
         self.within_fence: Callable[[Array], bool] | None = None
         self.events: list[FlightEvent] = []
         self.hover_thrust = 0.5
+
+    def look_at(self, roi: RegionOfInterest | None, *, nose: bool = False) -> None:
+        """Have a region of interest from now on; with `nose` whatever is flown turns the nose to it."""
+        self.roi = roi
+        self.nose_on_roi = nose and roi is not None
 
     @property
     def multicopter(self) -> FlightParameters:

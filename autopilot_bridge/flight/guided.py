@@ -93,6 +93,7 @@ class GuidedTask:
         speed_m_s: float | None = None,
     ) -> None:
         """Fly to a place and stay; NaN components: keep the present ones."""
+        _asked_for_yaw(ctx, yaw_rad)
         target = np.array(position_ned_m, dtype=np.float64)
         if self.kind is GuidedKind.POSITION and self._goto is not None and self._goto_started:
             if np.array_equal(target, self._position, equal_nan=True) and speed_m_s is None:
@@ -123,6 +124,7 @@ class GuidedTask:
             self._motion = SmoothMotion(ctx, speed_m_s=ctx.multicopter.max_speed_m_s)
         self._velocity[:] = np.nan_to_num(np.array(velocity_ned_m_s, dtype=np.float64), nan=0.0)
         self._acceleration[:] = acceleration_ned_m_s2
+        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         self._set_streamed(GuidedKind.VELOCITY, yaw_rad, yaw_rate_rad_s)
 
     def set_acceleration(
@@ -137,6 +139,7 @@ class GuidedTask:
         if self.kind is not GuidedKind.ACCELERATION or self._motion is None:
             self._motion = SmoothMotion(ctx)
         self._acceleration[:] = np.nan_to_num(np.array(acceleration_ned_m_s2, dtype=np.float64), nan=0.0)
+        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         self._set_streamed(GuidedKind.ACCELERATION, yaw_rad, yaw_rate_rad_s)
 
     def set_trajectory(
@@ -155,6 +158,7 @@ class GuidedTask:
         self._acceleration[:] = acceleration_ned_m_s2
         if self.kind is not GuidedKind.TRAJECTORY or self._motion is None:
             self._motion = SmoothMotion(ctx)
+        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         self._set_streamed(GuidedKind.TRAJECTORY, yaw_rad, yaw_rate_rad_s)
 
     def set_attitude(
@@ -267,3 +271,9 @@ class GuidedTask:
             velocity[0:2] *= p.max_speed_m_s / size
         down = min(p.descend_speed_m_s, max(-p.climb_speed_m_s, float(velocity[2])))
         motion.trajectory.track_velocity(float(velocity[0]), float(velocity[1]), down, ctx.dt_s)
+
+
+def _asked_for_yaw(ctx: FlightContext, *values: float) -> None:
+    """A target that says where the nose points, or how it turns, ends the region of interest."""
+    if ctx.nose_on_roi and any(math.isfinite(value) for value in values):
+        ctx.look_at(None)

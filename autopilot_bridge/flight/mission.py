@@ -299,7 +299,7 @@ class MissionTask(PlanTask):
 
     def _wanted_yaw(self, ctx: FlightContext, otherwise: float) -> float:
         """Heading of the region of interest, where the nose follows it."""
-        roi = self._roi
+        roi = ctx.roi
         if roi is None or not ctx.multicopter.nose_follows_roi:
             return otherwise
         yaw = heading_to(ctx, self._roi_place(ctx), roi.yaw_offset_rad)

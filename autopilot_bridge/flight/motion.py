@@ -8,6 +8,7 @@ import numpy as np
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.parameters import YawBehaviour
+from autopilot_bridge.flight.region_of_interest import roi_heading
 from autopilot_bridge.flight.task import SpeedKind, clear_setpoint
 from autopilot_bridge.flight.trajectory import (
     SPEED,
@@ -164,12 +165,17 @@ class SmoothMotion:
         target_ned_m: Array | None = None,
         yaw_rate_rad_s: float = 0.0,
     ) -> None:
-        """One tick of the heading: to `yaw_rad`, or by the vehicle's yaw behaviour where that is NaN.
+        """One tick of the heading: to `yaw_rad`, or by the vehicle's yaw behaviour where that is NaN; to the
+        region of interest before either, where the nose is on it.
 
         `yaw_rate_rad_s` is the rate at which the wanted heading turns itself.
         """
         wanted = yaw_rad
-        if math.isnan(wanted):
+        if ctx.nose_on_roi:
+            looked_at = roi_heading(ctx)
+            wanted = self.heading.yaw_rad if math.isnan(looked_at) else looked_at
+            yaw_rate_rad_s = 0.0
+        elif math.isnan(wanted):
             wanted = self.heading.yaw_rad
             behaviour = ctx.multicopter.yaw_behaviour
             if behaviour == YawBehaviour.TOWARDS_TARGET and target_ned_m is not None:

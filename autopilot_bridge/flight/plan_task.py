@@ -29,7 +29,7 @@ from autopilot_bridge.flight.plan_reading import (
     jump_target,
     target_of,
 )
-from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, RegionOfInterest, RoiMode, roi_of
+from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, RoiMode, roi_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
@@ -60,7 +60,6 @@ class PlanTask(ABC):
         "_first_item",
         "_habits",
         "_jumps",
-        "_roi",
         "_seq",
         "_store",
         "_sub",
@@ -79,7 +78,6 @@ class PlanTask(ABC):
         self._wait_left_s = 0.0
         self._beside: deque[int] = deque()
         self._condition_left_s = math.nan
-        self._roi: RegionOfInterest | None = None
         self._finished = False
 
     @abstractmethod
@@ -135,7 +133,7 @@ class PlanTask(ABC):
         self._version = self._store.version
         self._finished = False
         self._jumps.clear()
-        self._roi = None
+        ctx.look_at(None)
         self._begin(ctx, max(self._store.current, self._first_item), None)
 
     def _begin(self, ctx: FlightContext, seq: int, came_from: Array | None) -> None:
@@ -207,7 +205,7 @@ class PlanTask(ABC):
             if place is not None:
                 ctx.events.append(HomeChangeRequested(float(place[0]), float(place[1]), float(place[2])))
         elif item.command in ROI_COMMANDS:
-            self._roi = roi_of(item, ctx)
+            ctx.look_at(roi_of(item, ctx))
             ctx.events.append(ItemCommanded(seq))
         elif item.command not in MARKERS and item.command not in CONDITIONS:
             ctx.events.append(ItemCommanded(seq))
@@ -275,7 +273,7 @@ class PlanTask(ABC):
 
     def _roi_place(self, ctx: FlightContext) -> Array | None:
         """Place of the region of interest, local NED, (3,); None: there is none."""
-        roi = self._roi
+        roi = ctx.roi
         if roi is None or self._finished:
             return None
         if roi.mode is RoiMode.LOCATION:

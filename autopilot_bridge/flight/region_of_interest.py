@@ -72,6 +72,12 @@ def roi_of(item: MissionItem, ctx: FlightContext) -> RegionOfInterest | None:
     return RegionOfInterest(mode=mode, index=index, yaw_offset_rad=math.radians(offset))
 
 
+def roi_heading(ctx: FlightContext) -> float:
+    """Heading to a region of interest that is a place; NaN while there is none."""
+    roi = ctx.roi
+    return math.nan if roi is None else heading_to(ctx, roi.place_ned_m, roi.yaw_offset_rad)
+
+
 def heading_to(ctx: FlightContext, place_ned_m: Array | None, offset_rad: float = 0.0) -> float:
     """Heading from the vehicle to a place; NaN where there is none."""
     if place_ned_m is None or not ctx.position_valid:

@@ -13,7 +13,11 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.flight.region_of_interest import roi_of
+from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
 from autopilot_bridge.services.command_common import Command, Handler
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
@@ -23,6 +27,7 @@ _CAMERA: Final = int(mavlink.MAV_COMP_ID_CAMERA)
 _GIMBAL: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
 _CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 _NONE: Final = mavlink.MAV_CMD_DO_SET_ROI_NONE
+_NEXT_WAYPOINT: Final = mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
 _PRESENT_US: Final = 5_000_000
 _NOBODY: Final = (0, 0)
 _TAKE, _GIVE_UP = -2.0, -3.0
@@ -65,14 +70,34 @@ class PayloadPolicy:
     Attributes:
         camera: commands it passes on to a camera.
         absent: what it answers while the device is not there; None: nothing.
+        nose_modes: modes in which a commanded region of interest turns a multicopter's nose, and whether the
+            nose follows whatever is flown there (else as the mission does).
+        kinds_of_roi: DO_SET_ROI says by param1 what it means, and the next waypoint can be looked at; else it
+            is always a place.
+        bad_place: the answer to a region of interest that is nowhere on Earth.
     """
 
     camera: frozenset[int]
     absent: Result | None
+    nose_modes: Mapping[FlightMode, bool]
+    kinds_of_roi: bool
+    bad_place: Result
 
 
-PX4_PAYLOAD: Final = PayloadPolicy(camera=_PX4_TRIGGER, absent=None)
-ARDUPILOT_PAYLOAD: Final = PayloadPolicy(camera=_ARDUPILOT_CAMERA, absent=Result.UNSUPPORTED)
+PX4_PAYLOAD: Final = PayloadPolicy(
+    camera=_PX4_TRIGGER,
+    absent=None,
+    nose_modes={FlightMode.MISSION: False},  # mission_base.cpp: heading_sp_update
+    kinds_of_roi=True,
+    bad_place=Result.DENIED,
+)
+ARDUPILOT_PAYLOAD: Final = PayloadPolicy(
+    camera=_ARDUPILOT_CAMERA,
+    absent=Result.UNSUPPORTED,
+    nose_modes={FlightMode.MISSION: False, FlightMode.GUIDED: True},  # autoyaw.cpp: set_roi
+    kinds_of_roi=False,
+    bad_place=Result.FAILED,
+)
 
 
 class PayloadCommands(Microservice):
@@ -95,6 +120,7 @@ class PayloadCommands(Microservice):
             **dict.fromkeys(self._policy.camera, self._to_camera),
             **dict.fromkeys(GIMBAL_COMMANDS, self._to_gimbal),
             **dict.fromkeys(_ROI, self._look),
+            **({_NEXT_WAYPOINT: self._look} if self._policy.kinds_of_roi else {}),
         }
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
@@ -133,11 +159,24 @@ class PayloadCommands(Microservice):
         return Result.ACCEPTED
 
     def _look(self, command: Command, source: Source) -> Result | None:
-        if self._is_there(_GIMBAL):
+        item = _roi_item(command, kinds=self._policy.kinds_of_roi)
+        if item is not None and not (abs(item.x) <= 90.0 and abs(item.y) <= 180.0):
+            return self._policy.bad_place
+        if self._is_there(_GIMBAL) and command.id != _NEXT_WAYPOINT:
             if not self._may_point(source):
                 return Result.DENIED
             self._pass_on(_GIMBAL, command)
+        elif item is not None:
+            self._turn_nose(item)
         return Result.ACCEPTED
+
+    def _turn_nose(self, item: MissionItem) -> None:
+        commander = self._parts.commander
+        context, mode = commander.context, commander.mode
+        if not commander.armed or mode not in self._policy.nose_modes:
+            return
+        if isinstance(context.parameters, FlightParameters) and context.multicopter.nose_follows_roi:
+            context.look_at(roi_of(item, context), nose=self._policy.nose_modes[mode])
 
     def _configured(self, command: Command, source: Source) -> Command:
         """The client itself is meant by -2 and -3, not the autopilot that passes its words on."""
@@ -153,6 +192,30 @@ class PayloadCommands(Microservice):
 
     def _pass_on(self, component: int, command: Command) -> None:
         send_to_all(self._parts.broadcast, forwarded(command, self._parts.system_id, component))
+
+
+def _roi_item(command: Command, *, kinds: bool) -> MissionItem | None:
+    """A region of interest as a mission has it; None: one that is no place (another vehicle).
+
+    0/0 ends it, as ArduPilot has it.
+    """
+    if command.id == mavlink.MAV_CMD_DO_SET_ROI_SYSID:
+        return None
+    by_kind = command.id == mavlink.MAV_CMD_DO_SET_ROI and kinds
+    kind = command.p1 if by_kind else 0.0
+    nowhere = command.x == 0.0 and command.y == 0.0
+    placeless = nowhere and command.id == mavlink.MAV_CMD_DO_SET_ROI_LOCATION
+    number = _NONE if placeless else command.id
+    without_place = number in (_NONE, _NEXT_WAYPOINT) or (by_kind and kind != mavlink.MAV_ROI_LOCATION)
+    return MissionItem(
+        command=number,
+        frame=mavlink.MAV_FRAME_GLOBAL if command.frame is None else command.frame,
+        param1=kind,
+        param2=command.p2,
+        x=0.0 if without_place else command.x,
+        y=0.0 if without_place else command.y,
+        z=command.z if math.isfinite(command.z) else 0.0,
+    )
 
 
 def forwarded(command: Command, system_id: int, component: int) -> MavlinkMessage:
