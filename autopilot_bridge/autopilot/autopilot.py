@@ -5,14 +5,16 @@ its flight task, services, events); control laws; streams that are due. Nothing 
 clock.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final, Protocol, TypeVar
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.autopilot.firmware import FIRMWARES, PAYLOAD_ROLE
+from autopilot_bridge.autopilot.channels import AutopilotChannel, ChannelStreams
+from autopilot_bridge.autopilot.firmware import FIRMWARES
+from autopilot_bridge.autopilot.messages import telemetry_messages
 from autopilot_bridge.autopilot.microservices import microservices
 from autopilot_bridge.autopilot.status import NavigationJudgement, StatusReport
 from autopilot_bridge.commander import events
@@ -26,7 +28,7 @@ from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Channel, Service, Source, TimedService
+from autopilot_bridge.services.channel import Service, Source, TimedService
 from autopilot_bridge.services.command_common import CommandHooks
 from autopilot_bridge.services.commands import CommandService
 from autopilot_bridge.services.geofence import MissionFence
@@ -41,17 +43,10 @@ from autopilot_bridge.services.stored_parameters import boot_parameters
 from autopilot_bridge.services.timesync import TimeSyncService
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
 from autopilot_bridge.storage.card import MemoryCard
-from autopilot_bridge.telemetry.ardupilot import STREAM_RATE_PARAMETERS, ArdupilotMessages
-from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
-from autopilot_bridge.telemetry.line import MICROSECONDS, LineBudget
-from autopilot_bridge.telemetry.motion import MotionMessages
-from autopilot_bridge.telemetry.px4 import Px4Messages
-from autopilot_bridge.telemetry.px4_plane import Px4PlaneMessages
-from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
-from autopilot_bridge.telemetry.throttle import StreamThrottle
+from autopilot_bridge.telemetry.line import MICROSECONDS
+from autopilot_bridge.telemetry.streams import PayloadCache
 from autopilot_bridge.telemetry.view import TelemetryView
-from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 
 if TYPE_CHECKING:  # its module brings scipy
@@ -63,26 +58,6 @@ _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MA
 
 FailureHook = Callable[[int, int, int], Result]
 EntryT = TypeVar("EntryT")
-
-
-class AutopilotChannel(Channel, Protocol):
-    """A channel that takes packed payloads too.
-
-    Attributes:
-        motion: makes the frames of the fastest messages; set when the channel is added.
-    """
-
-    motion: MotionMessages | None
-
-    @property
-    def line(self) -> LineBudget | None:
-        """What the channel's line can carry; None: whatever there is."""
-
-    def send_payload(self, message_id: int, payload: bytes) -> None:
-        """Frame the payload and send it."""
-
-    def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Send the due motion messages and frames of the payloads (message id, bytes) together."""
 
 
 class _Progress:
@@ -150,7 +125,6 @@ class Autopilot:
         self._simulation = simulation
         self._readings = readings
         self._address = firmware.address(system_id)
-        self._step_us = MICROSECONDS // physics_rate_hz
         self._divisor = physics_rate_hz // SLOW_RATE_HZ
         self._until_slow = self._divisor
         self._time_us = 0
@@ -236,16 +210,20 @@ class Autopilot:
             )
         )
         self._cache = PayloadCache(merged(self._messages.builders(), *(more.builders for more in self._more)))
-        self._tables: dict[str, StreamTable] = {}
-        self._table_list: list[StreamTable] = []
-        self._ports: list[StreamTable] = []  # those for clients: SR0_* is the first
-        self._throttles: dict[str, StreamThrottle] = {}  # of channels on slow lines
+        self._streams = ChannelStreams(
+            self.channels,
+            firmware=firmware,
+            parameters=self.parameters,
+            cache=self._cache,
+            motion=self._messages.motion,
+            physics_step_us=MICROSECONDS // physics_rate_hz,
+        )
         self.intervals = MessageIntervalService(
             firmware.intervals,
-            self._tables,
+            self._streams.tables,
             self._cache,
             self._texts.announce,
-            merged(self._on_demand(), *(more.on_demand for more in self._more)),
+            merged(*(more.on_demand for more in self._more)),
         )
         hooks = CommandHooks(
             intervals=self.intervals,
@@ -280,7 +258,7 @@ class Autopilot:
             self._parameter_service,
             self.missions,
             TimeSyncService(answers_ping=firmware.answers_ping),
-            RadioService(self._throttle),
+            RadioService(lambda channel: self._streams.throttle(channel, self._time_us)),
             *self._more,
             self.intervals,
             self._texts,
@@ -303,7 +281,7 @@ class Autopilot:
             self._until_slow = self._divisor
             self._slow(time_us)
         self.controller.step()
-        for table in self._table_list:
+        for table in self._streams.running:
             if table.next_due_us <= time_us:
                 self._view.advance(time_us)
                 table.tick(time_us)
@@ -316,33 +294,10 @@ class Autopilot:
         Raises:
             ValueError: unknown role, or a channel of that name is there already.
         """
-        rates_hz = self._firmware.rates_hz.get(role)
-        if rates_hz is None:
-            accepted = ", ".join(self._firmware.rates_hz)
-            raise ValueError(f"channel role {role!r} is unknown; accepted: {accepted}")
-        if channel.name in self._tables:
-            raise ValueError(f"a channel named {channel.name!r} is open already")
-        table = StreamTable(
-            self._cache,
-            channel,
-            rates_hz,
-            physics_step_us=self._step_us,
-            motion_bits=self._messages.motion.bits,
-            line=channel.line,
-        )
-        channel.motion = self._messages.motion
-        first_us = max(self._time_us, round(self.flavour.policy.heartbeat_start_s * 1e6))
-        table.delay(mavlink.MAVLINK_MSG_ID_HEARTBEAT, first_us)
-        self.channels.append(channel)
-        self._tables[channel.name] = table
-        self._table_list = list(self._tables.values())
+        first_us = round(self.flavour.policy.heartbeat_start_s * 1e6)
+        self._streams.add(channel, role=role, time_us=self._time_us, heartbeat_us=first_us)
         if role == LOG_ROLE:
             self._parameter_service.list_on(channel)
-        elif role != PAYLOAD_ROLE:
-            self._ports.append(table)
-            self._apply_stream_rates(len(self._ports) - 1)
-        if channel.line is not None:
-            self._throttle(channel)
 
     def close(self) -> None:
         """Go down: close and store what is open."""
@@ -351,11 +306,7 @@ class Autopilot:
 
     def remove_channel(self, channel: AutopilotChannel) -> None:
         """Stop everything on a channel."""
-        self.channels.remove(channel)
-        table = self._tables.pop(channel.name)
-        self._throttles.pop(channel.name, None)
-        self._table_list = list(self._tables.values())
-        self._ports = [port for port in self._ports if port is not table]
+        self._streams.remove(channel)
 
     def receive(self, frame: Frame, channel: AutopilotChannel) -> None:
         """Take one frame from a channel. Contents are untrusted and never raise."""
@@ -382,8 +333,7 @@ class Autopilot:
         self.controller.set_ground_contact(context.ground_contact)
         navigation.vehicle_at_rest = context.on_ground and not self.commander.tasks.lifting_off
         self._view.advance(time_us)
-        for throttle in self._throttles.values():
-            throttle.advance(time_us)
+        self._streams.advance(time_us)
         for service in self._timed:
             service.tick(time_us)
         for event in self.commander.drain_events():
@@ -403,36 +353,15 @@ class Autopilot:
                 if mode is not FlightMode.MISSION:
                     self._progress.complete = False
                 if self.flavour.heartbeat_on_mode_change:
-                    self._push(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
+                    self._streams.push(mavlink.MAVLINK_MSG_ID_HEARTBEAT, self._time_us)
             case events.HomeSet():
                 self._push_position()
             case events.Armed() if self._firmware.position_pushed_at_arm:
                 self._push_position()
 
-    def _throttle(self, channel: Channel) -> StreamThrottle | None:
-        """What thins the streams of a channel, from now on; None when it has no streams."""
-        table = self._tables.get(channel.name)
-        if table is None:
-            return None
-        throttle = self._throttles.get(channel.name)
-        if throttle is None:
-            line: LineBudget | None = getattr(channel, "line", None)
-            throttle = StreamThrottle(table, line, self._firmware.flow_control)
-            throttle.advance(self._time_us)
-            self._throttles[channel.name] = throttle
-        return throttle
-
-    def _push(self, message_id: int) -> None:
-        """Send a message on every channel at once, streams aside."""
-        self._cache.forget()
-        payload = self._cache.payload(message_id, self._time_us)
-        if payload is not None:
-            for channel in self.channels:
-                channel.send_payload(message_id, payload)
-
     def _push_position(self) -> None:
-        self._push(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
-        self._push(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN)
+        self._streams.push(mavlink.MAVLINK_MSG_ID_HOME_POSITION, self._time_us)
+        self._streams.push(mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, self._time_us)
 
     def _on_parameter(self, name: str, value: float) -> None:
         flavour, store = self.flavour, self.parameters
@@ -440,21 +369,7 @@ class Autopilot:
         self.commander.guidance.set_parameters(flavour.flight_parameters(store, **self._vehicle))
         self.commander.parameters = flavour.commander_parameters(store)
         self.navigation.set_parameters(flavour.navigation_parameters(store))
-        if name.startswith("SR") and name[2:3].isdigit():
-            self._apply_stream_rates(int(name[2]), changed=name)
-
-    def _apply_stream_rates(self, index: int, changed: str | None = None) -> None:
-        """ArduPilot's SRn_* parameters: rates of the stream groups of channel n (one that changed)."""
-        if index >= len(self._ports):
-            return
-        for group, ending in STREAM_RATE_PARAMETERS.items():
-            name = f"SR{index}_{ending}"
-            if name not in self.parameters or changed not in (None, name):
-                continue
-            rate_hz = self.parameters.get(name)
-            interval_us = round(MICROSECONDS / rate_hz) if rate_hz > 0 else -1
-            for message_id in self._firmware.intervals.groups[group]:
-                self._ports[index].set_default(message_id, interval_us, self._time_us)
+        self._streams.change(name, self._time_us)
 
     def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
         sources = TelemetrySources(
@@ -473,13 +388,12 @@ class Autopilot:
             task=lambda: self.commander.tasks.task,
             missions=self.commander.missions,
         )
-        aircraft = self.flavour.kind is AirframeKind.FIXED_WING
-        if self.flavour.name == "px4":
-            messages = Px4PlaneMessages if aircraft else Px4Messages
-            return messages(
-                sources, current_mode=self._status.current_mode, orbit=lambda: self.commander.tasks.orbit
-            )
-        return ArduPlaneMessages(sources) if aircraft else ArdupilotMessages(sources)
+        return telemetry_messages(
+            self.flavour,
+            sources,
+            current_mode=self._status.current_mode,
+            orbit=lambda: self.commander.tasks.orbit,
+        )
 
     def _on_plan_changed(self, mission_type: MissionType) -> None:
         if mission_type is MissionType.MISSION:
@@ -487,23 +401,6 @@ class Autopilot:
 
     def _mission_current(self) -> bytes:
         return self.missions.current_message().wire_payload()
-
-    def _on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
-        if self.flavour.name != "px4":
-            return {}
-        return {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES: self._send_available_modes}
-
-    def _send_available_modes(self, channel: Channel, index: float) -> None:
-        """AVAILABLE_MODES (435): one mode by index from 1, or all of them for 0."""
-        modes: Sequence[tuple[FlightMode, int]] = sorted(
-            self.flavour.custom_modes.items(), key=lambda item: item[1]
-        )
-        for number, (mode, custom_mode) in enumerate(modes, start=1):
-            if index in (0, number):
-                name = self.flavour.mode_names.get(mode, mode.value).encode()
-                channel.send(
-                    mavlink.MAVLink_available_modes_message(len(modes), number, 0, custom_mode, 0, name[:34])
-                )
 
 
 def merged(*tables: Mapping[int, EntryT]) -> dict[int, EntryT]:

@@ -94,6 +94,8 @@ class MessageIntervalService:
     def tick(self, time_us: int) -> None:
         """Send what was requested since the last tick: always after the acknowledgement of the request."""
         self._time_us = time_us
+        if not self._pending:
+            return
         pending, self._pending = self._pending, {}
         for channel, message_id, parameter in pending:
             if message_id in self._on_demand:

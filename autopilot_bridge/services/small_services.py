@@ -1,6 +1,7 @@
-"""Calibration, actuators, traffic and people at the controls: those of a firmware for a class of vehicle."""
+"""Calibration, actuators, traffic, modes, sticks: those of a firmware for a class of vehicle."""
 
 from autopilot_bridge.services.actuators import ArducopterActuators, ArduplaneActuators, Px4Actuators, Tunes
+from autopilot_bridge.services.available_modes import AvailableModes
 from autopilot_bridge.services.calibration_ardupilot import ArdupilotCalibration
 from autopilot_bridge.services.calibration_compass import CompassCalibration
 from autopilot_bridge.services.calibration_px4 import Px4Calibration
@@ -14,7 +15,14 @@ def small_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
     """Those of one autopilot."""
     manual, tunes = ManualService.of(parts), Tunes()
     if parts.flavour.name == "px4":
-        return manual, Px4Calibration(parts), Px4Actuators(parts), TrafficService(parts, PX4_TRAFFIC), tunes
+        return (
+            manual,
+            Px4Calibration(parts),
+            Px4Actuators(parts),
+            TrafficService(parts, PX4_TRAFFIC),
+            tunes,
+            AvailableModes(parts.flavour),
+        )
     aircraft = parts.flavour.kind is AirframeKind.FIXED_WING
     return (
         manual,

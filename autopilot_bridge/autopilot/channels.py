@@ -1,0 +1,173 @@
+"""The channels of an autopilot: which streams run on each, and what a slow line takes of them."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.autopilot.firmware import PAYLOAD_ROLE, Firmware
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.channel import Channel
+from autopilot_bridge.services.vehicle_memory import LOG_ROLE
+from autopilot_bridge.telemetry.ardupilot import STREAM_RATE_PARAMETERS
+from autopilot_bridge.telemetry.line import MICROSECONDS, LineBudget
+from autopilot_bridge.telemetry.motion import MotionMessages
+from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
+from autopilot_bridge.telemetry.throttle import StreamThrottle
+
+
+class AutopilotChannel(Channel, Protocol):
+    """A channel that takes packed payloads too.
+
+    Attributes:
+        motion: makes the frames of the fastest messages; set when the channel is added.
+    """
+
+    motion: MotionMessages | None
+
+    @property
+    def line(self) -> LineBudget | None:
+        """What the channel's line can carry; None: whatever there is."""
+
+    def send_payload(self, message_id: int, payload: bytes) -> None:
+        """Frame the payload and send it."""
+
+    def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
+        """Send the due motion messages and frames of the payloads (message id, bytes) together."""
+
+
+class ChannelStreams:
+    """The streams of all channels.
+
+    Args:
+        channels: those that are open; kept up to date.
+        firmware: default rates by role, and how streams follow a radio's buffer.
+        parameters: ArduPilot's SRn_*, where there are any.
+        cache: makes and packs messages.
+        motion: makes the fastest ones.
+        physics_step_us: no stream runs faster.
+
+    Attributes:
+        tables: streams by the channel's name.
+        running: the same tables, to step through.
+    """
+
+    __slots__ = (
+        "_cache",
+        "_channels",
+        "_firmware",
+        "_motion",
+        "_parameters",
+        "_ports",
+        "_step_us",
+        "_throttles",
+        "running",
+        "tables",
+    )
+
+    def __init__(
+        self,
+        channels: list[AutopilotChannel],
+        *,
+        firmware: Firmware,
+        parameters: ParameterStore,
+        cache: PayloadCache,
+        motion: MotionMessages,
+        physics_step_us: int,
+    ) -> None:
+        self._channels = channels
+        self._firmware = firmware
+        self._parameters = parameters
+        self._cache = cache
+        self._motion = motion
+        self._step_us = physics_step_us
+        self.tables: dict[str, StreamTable] = {}
+        self.running: tuple[StreamTable, ...] = ()
+        self._ports: list[StreamTable] = []  # those for clients: SR0_* is the first
+        self._throttles: dict[str, StreamThrottle] = {}  # of channels on slow lines
+
+    def add(self, channel: AutopilotChannel, *, role: str, time_us: int, heartbeat_us: int) -> None:
+        """Start the default streams of a role on one more channel.
+
+        Args:
+            heartbeat_us: no heartbeat before.
+
+        Raises:
+            ValueError: unknown role, or a channel of that name is there already.
+        """
+        rates_hz = self._firmware.rates_hz.get(role)
+        if rates_hz is None:
+            accepted = ", ".join(self._firmware.rates_hz)
+            raise ValueError(f"channel role {role!r} is unknown; accepted: {accepted}")
+        if channel.name in self.tables:
+            raise ValueError(f"a channel named {channel.name!r} is open already")
+        table = StreamTable(
+            self._cache,
+            channel,
+            rates_hz,
+            physics_step_us=self._step_us,
+            motion_bits=self._motion.bits,
+            line=channel.line,
+        )
+        channel.motion = self._motion
+        table.delay(mavlink.MAVLINK_MSG_ID_HEARTBEAT, max(time_us, heartbeat_us))
+        self._channels.append(channel)
+        self.tables[channel.name] = table
+        self.running = tuple(self.tables.values())
+        if role not in (LOG_ROLE, PAYLOAD_ROLE):
+            self._ports.append(table)
+            self._apply_rates(len(self._ports) - 1, time_us)
+        if channel.line is not None:
+            self.throttle(channel, time_us)
+
+    def remove(self, channel: AutopilotChannel) -> None:
+        """Stop everything on a channel."""
+        self._channels.remove(channel)
+        table = self.tables.pop(channel.name)
+        self._throttles.pop(channel.name, None)
+        self.running = tuple(self.tables.values())
+        self._ports = [port for port in self._ports if port is not table]
+
+    def throttle(self, channel: Channel, time_us: int) -> StreamThrottle | None:
+        """What thins the streams of a channel, from now on; None when it has no streams."""
+        table = self.tables.get(channel.name)
+        if table is None:
+            return None
+        throttle = self._throttles.get(channel.name)
+        if throttle is None:
+            line: LineBudget | None = getattr(channel, "line", None)
+            throttle = StreamThrottle(table, line, self._firmware.flow_control)
+            throttle.advance(time_us)
+            self._throttles[channel.name] = throttle
+        return throttle
+
+    def advance(self, time_us: int) -> None:
+        """Slow lines carry on. Called at 50 Hz."""
+        for throttle in self._throttles.values():
+            throttle.advance(time_us)
+
+    def push(self, message_id: int, time_us: int) -> None:
+        """Send a message on every channel at once, streams aside."""
+        self._cache.forget()
+        payload = self._cache.payload(message_id, time_us)
+        if payload is not None:
+            for channel in self._channels:
+                channel.send_payload(message_id, payload)
+
+    def change(self, name: str, time_us: int) -> None:
+        """A parameter has changed; of those that set the rates of a channel's streams take it over."""
+        if name.startswith("SR") and name[2:3].isdigit():
+            self._apply_rates(int(name[2]), time_us, changed=name)
+
+    def _apply_rates(self, index: int, time_us: int, changed: str | None = None) -> None:
+        """ArduPilot's SRn_* parameters: rates of the stream groups of channel n (one that changed)."""
+        if index >= len(self._ports):
+            return
+        for group, ending in STREAM_RATE_PARAMETERS.items():
+            name = f"SR{index}_{ending}"
+            if name not in self._parameters or changed not in (None, name):
+                continue
+            rate_hz = self._parameters.get(name)
+            interval_us = round(MICROSECONDS / rate_hz) if rate_hz > 0 else -1
+            for message_id in self._firmware.intervals.groups[group]:
+                self._ports[index].set_default(message_id, interval_us, time_us)

@@ -1,0 +1,38 @@
+"""AVAILABLE_MODES: what modes there are and what they are called (standard modes protocol; PX4)."""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.flavours.flavour import Flavour
+from autopilot_bridge.services.channel import Channel
+from autopilot_bridge.services.microservice import Microservice
+
+_NAME_BYTES: Final = 34
+
+
+class AvailableModes(Microservice):
+    """Answers requests for AVAILABLE_MODES.
+
+    Args:
+        flavour: whose modes.
+    """
+
+    def __init__(self, flavour: Flavour) -> None:
+        self._names = [
+            (custom_mode, flavour.mode_names.get(mode, mode.value).encode()[:_NAME_BYTES])
+            for mode, custom_mode in sorted(flavour.custom_modes.items(), key=lambda item: item[1])
+        ]
+
+    @property
+    def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
+        return {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES: self._send}
+
+    def _send(self, channel: Channel, index: float) -> None:
+        """One mode by index from 1, or all of them for 0."""
+        for number, (custom_mode, name) in enumerate(self._names, start=1):
+            if index in (0, number):
+                channel.send(
+                    mavlink.MAVLink_available_modes_message(len(self._names), number, 0, custom_mode, 0, name)
+                )
