@@ -4,6 +4,7 @@ Property tests draw the same examples on every run, so that no run is luckier th
 the tests and the programs they start, even where the suite runs in the background of a shell.
 """
 
+import os
 import signal
 
 import pytest
@@ -23,6 +24,26 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write docs/compatibility.md from the outcomes of the tests with real clients",
     )
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One worker more than there are cores: tests with processes and other people's clients mostly wait."""
+    return (os.cpu_count() or 1) + 1
+
+
+SLOW_TO_FINISH = ("test_static_checks.py", "clients", "system", "flights")
+"""Files and folders whose tests take longest or wait most; begun first, no worker is left alone with them."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    def rank(item: pytest.Item) -> int:
+        return min(
+            (SLOW_TO_FINISH.index(part) for part in item.path.parts if part in SLOW_TO_FINISH),
+            default=len(SLOW_TO_FINISH),
+        )
+
+    items.sort(key=rank)
 
 
 def pytest_configure(config: pytest.Config) -> None:

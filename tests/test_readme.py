@@ -63,7 +63,7 @@ def test_the_mission_flies_and_the_estimator_with_it(tmp_path: Path) -> None:
     assert re.search(r"climb, vehicle 1: \d+ estimates: alt [01]\.\d+ m RMS off autopilot", said)
 
 
-@pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])
+@pytest.mark.parametrize("autopilot", [pytest.param("px4", marks=pytest.mark.slow), "ardupilot"])
 def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
     fly(HEADINGS, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
 

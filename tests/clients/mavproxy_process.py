@@ -8,7 +8,8 @@ import threading
 import time
 from pathlib import Path
 
-WALL_DEADLINE_S = 25.0
+WALL_DEADLINE_S = 100.0
+"""For every single thing that is waited for, also on a machine with a lot else to do."""
 
 
 class Mavproxy:

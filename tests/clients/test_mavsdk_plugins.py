@@ -63,7 +63,10 @@ def sitl(vehicle: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Sit
         yield made
 
 
-@pytest.fixture(scope="module", params=list(SESSIONS))
+@pytest.fixture(
+    scope="module",
+    params=[ASYNCIO, *(pytest.param(name, marks=pytest.mark.slow) for name in SESSIONS if name != ASYNCIO)],
+)
 def client(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 

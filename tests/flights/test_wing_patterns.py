@@ -59,7 +59,7 @@ def well_flown(flight: dict[str, Any], rms_max_m: float) -> None:
     assert seconds(flight, "return") < RETURN_MAX_S
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
 def test_setpoints_follow_the_curve_in_still_air(flown: Any, flavour: str) -> None:
     flight = flown("lissajous", flavour, None, windy=False, pattern="L2")
     well_flown(flight, STILL_RMS_M)

@@ -108,7 +108,7 @@ def test_every_message_at_a_kilohertz(flavour: str) -> None:
 def test_storms_of_requests(flavour: str) -> None:
     with scene(flavour) as there:
         client, other = there.client(), there.client(254)
-        for number in range(3000):
+        for number in range(1000):
             client.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, 30, 4000 + number)
             client.command(dialect.MAV_CMD_REQUEST_MESSAGE, 435, 0)
             client.say(dialect.MAVLink_param_request_list_message(1, 1))

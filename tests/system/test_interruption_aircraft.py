@@ -55,7 +55,7 @@ def last_modes(path: Path, systems: int) -> list[int]:
     return [told[system] for system in range(1, systems + 1)]
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", [pytest.param("px4", marks=pytest.mark.slow), "ardupilot"])
 def test_ctrl_c_without_gps(flavour: str, tmp_path: Path) -> None:
     """When the mission has switched GPS off: it is switched on again, and the aircraft returns."""
     with started(tmp_path / "run", *ORBIT, "--autopilot", flavour) as run:

@@ -66,6 +66,7 @@ def test_the_folder_holds_map_summary_log_and_picture(found):
     assert (found.folder / "track.png").stat().st_size > 20_000
 
 
+@pytest.mark.slow
 def test_a_search_with_the_published_map_is_the_same_search(found, tmp_path):
     options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
     again = fly(OccupancyMission(), request(tmp_path / "again", options, picture=False))

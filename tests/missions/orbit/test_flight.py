@@ -93,6 +93,7 @@ def test_the_circle_is_held_without_gps(tmp_path, autopilot, options):
     assert summary["autopilot"] == autopilot
 
 
+@pytest.mark.slow
 def test_the_same_seed_flies_the_same_orbit(tmp_path):
     for name in ("a", "b"):
         orbit(tmp_path, name=name, duration_s=5.0)
@@ -109,6 +110,7 @@ def test_a_target_that_is_not_there_ends_the_mission_and_brings_the_aircraft_hom
     assert result.summary["gps_back_at_s"] is not None
 
 
+@pytest.mark.slow
 def test_without_the_fault_the_orbit_is_the_same_and_gps_stays(tmp_path):
     result = orbit(tmp_path, gps_fault=False, duration_s=30.0)
     assert result.outcome == "completed", result.reason
