@@ -30,7 +30,18 @@ class LinkChannel:
         motion: set by the autopilot that the channel is added to.
     """
 
-    __slots__ = ("_encoder", "_forward", "_intake", "_peers", "line", "link", "motion", "name", "signing")
+    __slots__ = (
+        "_encoder",
+        "_forward",
+        "_intake",
+        "_peers",
+        "_signs",
+        "line",
+        "link",
+        "motion",
+        "name",
+        "signing",
+    )
 
     def __init__(
         self,
@@ -46,6 +57,7 @@ class LinkChannel:
         self.link = link
         self.line = line
         self.signing = signing
+        self._signs = signing if signing is not None and signing.policy.sign else None  # while there is a key
         self.motion: MotionMessages | None = None
         self._encoder = FrameEncoder(system_id, component_id)
         self._intake: Intake[PeerId] = Intake(None if signing is None else signing.admit)
@@ -85,7 +97,7 @@ class LinkChannel:
         packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
         if payloads:
             most = _MAX_PACKET
-            if self.signing is not None and self.signing.signs:
+            if self._signs is not None and self._signs.signs:
                 most -= SIGNATURE_SIZE * (len(payloads) + motion.bit_count())
             for frame in self._encoder.encode_payloads(payloads):
                 if packet and len(packet) + len(frame) > most:
@@ -110,8 +122,10 @@ class LinkChannel:
             self._put(raw)
 
     def _send(self, data: bytes) -> None:
-        signing = self.signing
-        self._put(signing.sign(data) if signing is not None and signing.signs else data)
+        signs = self._signs
+        if signs is not None and signs.state.active:
+            data = signs.sign(data)
+        self._put(data)
 
     def _put(self, data: bytes) -> None:
         if self.line is not None:

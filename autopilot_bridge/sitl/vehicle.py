@@ -200,14 +200,7 @@ class SitlVehicle:
         bytes_per_s: float | None = None,
         reach: Reach | None = None,
     ) -> LinkChannel:
-        """Give the autopilot one more link.
-
-        Args:
-            name: unique per vehicle; None: made from the link.
-            role: which default streams run on it ("onboard", "gcs" or "payload").
-            bytes_per_s: what the link carries in a second of vehicle time; streams are thinned to fit.
-            reach: who can get at it; None: only this process when it is a memory link, else the network.
-        """
+        """Give the autopilot one more link; see `Switchboard.open`."""
         return self.links.open(link, name=name, role=role, bytes_per_s=bytes_per_s, reach=reach)
 
     def close(self, channel: LinkChannel) -> None:
