@@ -16,7 +16,7 @@ from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
 
 ASYNCIO: Final = "MAVSDK asyncio"
 SYNCHRONOUS: Final = "MAVSDK synchronous"
-DISCOVERY_S: Final = 30.0
+DISCOVERY_S: Final = 100.0
 
 Found = Callable[[Any], bool]
 

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from tests.clients.runway import PlanItem
 
-WALL_DEADLINE_S: Final = 30.0
+WALL_DEADLINE_S: Final = 100.0
 EKF_READY: Final = 831
 """Attitude, velocity and position, as ArduPilot reports a filter that uses GPS."""
 SETPOINTS_HZ: Final = 10.0

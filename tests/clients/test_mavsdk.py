@@ -73,7 +73,7 @@ async def fly_px4(url: str) -> None:
     configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
     async with Mavsdk(configuration) as mavsdk:
         await mavsdk.add_any_connection(url)
-        system = await mavsdk.first_autopilot(timeout_s=20.0)
+        system = await mavsdk.first_autopilot(timeout_s=100.0)
         assert system is not None
         telemetry, action = TelemetryAsync(system), ActionAsync(system)
         await first(telemetry.subscribe_health_all_ok(), bool, "health")
@@ -157,7 +157,7 @@ def test_synchronous_interface_flies(flavour: str) -> None:
         configuration = SyncConfiguration.create_with_component_type(ComponentType.GROUND_STATION)
         with SyncMavsdk(configuration) as mavsdk:
             mavsdk.add_any_connection(f"udpin://127.0.0.1:{port}")
-            system = mavsdk.first_autopilot(timeout_s=20.0)
+            system = mavsdk.first_autopilot(timeout_s=100.0)
             assert system is not None
             telemetry, action = Telemetry(system), Action(system)
             if flavour == "ardupilot":

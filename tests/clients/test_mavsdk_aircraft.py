@@ -209,7 +209,7 @@ async def land_by_mission(pilot: Pilot) -> None:
 
 async def connected(url: str, mavsdk: Mavsdk) -> Pilot:
     await mavsdk.add_any_connection(url)
-    system = await mavsdk.first_autopilot(timeout_s=20.0)
+    system = await mavsdk.first_autopilot(timeout_s=100.0)
     assert system is not None
     return Pilot(system)
 

@@ -165,7 +165,7 @@ def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
         configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
         async with Mavsdk(configuration) as mavsdk:
             await mavsdk.add_any_connection(url)
-            system = await mavsdk.first_autopilot(timeout_s=20.0)
+            system = await mavsdk.first_autopilot(timeout_s=100.0)
             assert system is not None
             await use_gimbal(system)
             await use_camera(system)

@@ -21,7 +21,7 @@ from tests.clients.sitl_process import free_port, running_sitl
 
 PASSPHRASE = "correct-horse"
 SECRET = hashlib.sha256(PASSPHRASE.encode()).digest()
-WALL_DEADLINE_S = 40.0
+WALL_DEADLINE_S = 100.0
 
 
 @pytest.fixture(autouse=True)

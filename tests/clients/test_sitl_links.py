@@ -15,7 +15,7 @@ from pymavlink import mavutil
 from tests.clients.sitl_process import free_port, running_sitl
 
 mavlink = mavutil.mavlink
-WALL_DEADLINE_S = 20.0
+WALL_DEADLINE_S = 100.0
 
 
 def connect(url: str, system_id: int = 255) -> Any:

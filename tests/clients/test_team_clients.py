@@ -18,7 +18,7 @@ from tests.clients.sitl_process import free_port, running_sitl
 
 mavlink = mavutil.mavlink
 COUNT = 5
-WALL_DEADLINE_S = 40.0
+WALL_DEADLINE_S = 100.0
 READY = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
 

@@ -13,7 +13,7 @@ os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")
 
 Picture = NDArray[np.uint8]
 OPEN_DEADLINE_MS: Final = 60_000  # the picture process starts when the first player comes
-WATCH_DEADLINE_S: Final = 40.0
+WATCH_DEADLINE_S: Final = 100.0
 
 
 def watch(uri: str) -> Any:

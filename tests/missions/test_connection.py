@@ -170,17 +170,23 @@ def free_port():
 
 
 class Elsewhere(threading.Thread):
-    """A scripted autopilot on a real link, some tens of times faster than real time."""
+    """A scripted autopilot on a real link, some tens of times faster than real time.
+
+    A mission that has no time to keep up is waited for: it would see only parts of the flight.
+    """
+
+    BEHIND_US = 3_000_000
 
     def __init__(self, autopilot):
         super().__init__(daemon=True)
         self.autopilot, self.end = autopilot, threading.Event()
 
     def run(self):
-        time_us = 0
-        while not self.end.wait(0.0004):
+        time_us = heard_us = 0
+        while not self.end.wait(0.05 if time_us - heard_us > self.BEHIND_US else 0.0004):
             for _peer, data in self.autopilot.link.receive():
                 self.autopilot.receive(data)
+                heard_us = time_us
             time_us += 20_000
             self.autopilot.step(time_us)
         self.autopilot.link.close()
