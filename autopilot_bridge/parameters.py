@@ -134,7 +134,7 @@ class ParameterStore:
         ValueError: the same name twice in the table.
     """
 
-    __slots__ = ("_definitions", "_folded", "_index", "_subscribers", "_values")
+    __slots__ = ("_definitions", "_fixed", "_folded", "_index", "_subscribers", "_values")
 
     def __init__(
         self, definitions: Iterable[ParameterDefinition], overrides: Mapping[str, float] | None = None
@@ -148,6 +148,7 @@ class ParameterStore:
             raise ValueError(f"parameters defined twice: {', '.join(twice)}")
         self._values = [definition.convert(definition.default) for definition in self._definitions]
         self._subscribers: list[ChangeCallback] = []
+        self._fixed: set[str] = set()
         for name, value in (overrides or {}).items():
             self.set(name, value)
 
@@ -196,7 +197,7 @@ class ParameterStore:
         storage type still limits them.
 
         Raises:
-            ParameterError: unknown name or unacceptable value; nothing is changed.
+            ParameterError: unknown name, unacceptable value, or one that is fixed; nothing is changed.
         """
         index = self.index_of(name)
         definition = self._definitions[index]
@@ -205,10 +206,27 @@ class ParameterStore:
             definition.check_range(stored)
         if stored == self._values[index]:
             return False
+        if name in self._fixed:
+            raise ParameterError(
+                f"{name} = {value:g}: it is {self._values[index]:g} and can't be changed here"
+            )
         self._values[index] = stored
         for callback in tuple(self._subscribers):
             callback(name, stored)
         return True
+
+    def fix(self, name: str, value: float) -> None:
+        """Give a parameter a value that nobody can change from now on.
+
+        Raises:
+            ParameterError: unknown name or unacceptable value.
+        """
+        self.set(name, value)
+        self._fixed.add(name)
+
+    def is_fixed(self, name: str) -> bool:
+        """Whether a parameter's value is given by what it describes, and can't be changed."""
+        return name in self._fixed
 
     def subscribe(self, callback: ChangeCallback) -> Callable[[], None]:
         """Call `callback(name, value)` after every change; returns what ends the subscription."""

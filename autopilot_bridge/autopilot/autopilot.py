@@ -35,7 +35,7 @@ from autopilot_bridge.services.geofence import MissionFence
 from autopilot_bridge.services.message_interval import MessageIntervalService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice, Simulation
 from autopilot_bridge.services.mission import MissionService, new_stores
-from autopilot_bridge.services.parameters import ParameterService
+from autopilot_bridge.services.parameters import ParameterService, fix_identity
 from autopilot_bridge.services.radio import RadioService
 from autopilot_bridge.services.setpoints import SetpointService
 from autopilot_bridge.services.status_text import StatusTextService
@@ -134,6 +134,7 @@ class Autopilot:
         if envelope is not None and flavour.airframe_of is not None:
             airframe.update(flavour.airframe_of(envelope))
         self.parameters = ParameterStore(flavour.parameter_definitions(), {**airframe, **(parameters or {})})
+        fix_identity(self.parameters, firmware.parameters, system_id)
         card = card or MemoryCard()
         memory = VehicleMemory(
             card=card,
@@ -239,6 +240,7 @@ class Autopilot:
             self,
             on_list=lambda channel: self._texts.banner(channel),
         )
+            on_fixed=self._tell_fixed,
         self._timed: tuple[TimedService, ...] = (
             self._parameter_service,
             self.missions,
@@ -372,6 +374,10 @@ class Autopilot:
         self._streams.change(name, self._time_us)
 
     def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
+    def _tell_fixed(self, name: str) -> None:
+        value = self.parameters.get(name)
+        self._texts.announce(mavlink.MAV_SEVERITY_WARNING, f"{name} stays {value:g}: given by the simulation")
+
         sources = TelemetrySources(
             view=self._view,
             context=self.context,

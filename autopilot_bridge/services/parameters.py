@@ -32,6 +32,7 @@ from autopilot_bridge.services.channel import (
 
 HASH_NAME: Final = "_HASH_CHECK"
 NO_INDEX: Final = 65535
+_COMPONENT_ID: Final = 1
 _AS_FLOAT: Final = struct.Struct("<f")
 _AS_INT32: Final = struct.Struct("<i")
 _AS_UINT32: Final = struct.Struct("<I")
@@ -50,6 +51,8 @@ class ParameterPolicy:
         set_echo_to_all: every PARAM_SET is answered on all channels (ArduPilot); else on the asking channel,
             and on all channels once more if the value changed (PX4).
         hash_parameter: the list starts with `_HASH_CHECK`, and setting it ends the list (PX4).
+        identity: parameters that are the system id, and the component id 1. They are what they are as long as
+            the vehicle is there, and a change is refused: real ones take it over at the next boot.
         list_per_tick: parameters sent per 50 Hz tick and channel while listing.
     """
 
@@ -59,6 +62,7 @@ class ParameterPolicy:
     index_by_name: bool
     set_echo_to_all: bool
     hash_parameter: bool
+    identity: tuple[str, ...]
     list_per_tick: int
 
     def __post_init__(self) -> None:
@@ -73,6 +77,7 @@ PX4_PARAMETER_POLICY: Final = ParameterPolicy(
     index_by_name=True,
     set_echo_to_all=False,
     hash_parameter=True,
+    identity=("MAV_SYS_ID", "MAV_COMP_ID"),
     list_per_tick=20,  # 904 were seen to take 0.9 s
 )
 ARDUPILOT_PARAMETER_POLICY: Final = ParameterPolicy(
@@ -82,8 +87,16 @@ ARDUPILOT_PARAMETER_POLICY: Final = ParameterPolicy(
     index_by_name=False,
     set_echo_to_all=True,
     hash_parameter=False,
+    identity=("SYSID_THISMAV",),
     list_per_tick=43,  # 1397 were seen to take 0.65 s
 )
+
+
+def fix_identity(store: ParameterStore, policy: ParameterPolicy, system_id: int) -> None:
+    """Have the parameters tell the ids that the vehicle has, whatever a file says."""
+    for name, value in zip(policy.identity, (system_id, _COMPONENT_ID), strict=False):
+        if name in store:
+            store.fix(name, value)
 
 
 class _Listing:
@@ -106,6 +119,7 @@ class ParameterService:
         policy: the firmware's ways.
         broadcast: all channels of the autopilot.
         on_list: called with the asking channel for each PARAM_REQUEST_LIST (ArduPilot sends its banner then).
+        on_fixed: called with the name of a parameter that somebody tried to change and nobody can.
     """
 
     def __init__(
@@ -115,11 +129,13 @@ class ParameterService:
         broadcast: Broadcast,
         *,
         on_list: Callable[[Channel], None] | None = None,
+        on_fixed: Callable[[str], None] | None = None,
     ) -> None:
         self._store = store
         self._policy = policy
         self._broadcast = broadcast
         self._on_list = on_list
+        self._on_fixed = on_fixed
         self._listings: list[_Listing] = []
         self._setting: str | None = None  # being set by PARAM_SET, whose echo stands for the announcement
         store.subscribe(self._announce_change)
@@ -205,6 +221,10 @@ class ParameterService:
         try:
             changed = self._store.set(definition.name, value, check_range=False)
         except ParameterError:
+            if self._store.is_fixed(definition.name):  # the present value tells that it was not taken
+                channel.send(self._value_message(definition, index=self._index_in_reply(definition)))
+                if self._on_fixed is not None:
+                    self._on_fixed(definition.name)
             return  # beyond the storage type: refused in silence, as the firmwares refuse
         finally:
             self._setting = None

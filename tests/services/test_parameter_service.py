@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
 from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
+from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source, ardupilot_address_rule, px4_address_rule
 from autopilot_bridge.services.parameters import (
@@ -18,6 +19,7 @@ from autopilot_bridge.services.parameters import (
     PX4_PARAMETER_POLICY,
     ParameterService,
 )
+from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 
 
 class Recorder:
@@ -290,3 +292,34 @@ def test_whatever_arrives_nothing_raises(flavour: str, messages: list[Any]) -> N
     for message in vehicle.other.take():
         message.pack(packer)
     assert all(math.isfinite(value) for value in vehicle.store.as_dict().values())
+
+
+@pytest.mark.parametrize(
+    ("flavour", "name", "given"),
+    [("px4", "MAV_SYS_ID", 3), ("px4", "MAV_COMP_ID", 1), ("ardupilot", "SYSID_THISMAV", 3)],
+)
+def test_the_ids_of_a_vehicle_are_told_and_stay(flavour: str, name: str, given: int) -> None:
+    """A change is answered with the value that is kept, and a text."""
+    sitl = Sitl(
+        SitlConfiguration(
+            vehicles=(VehicleSpecification(flavour=flavour, system_id=3, parameters={name: 9.0}),)
+        )
+    )
+    link, parser = sitl.connect(0), FrameParser()
+
+    def heard(message: Any, seconds: float) -> list[Any]:
+        link.send(FrameEncoder(255, 190).encode(message))
+        until_us = sitl.time_us + round(seconds * 1e6)
+        while sitl.time_us < until_us:
+            sitl.advance()
+        return [decode(frame) for _, data in link.receive() for frame in parser.feed(data)]
+
+    heard(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3), 3.0)
+    wanted = struct.unpack("<f", struct.pack("<i", 7))[0] if flavour == "px4" else 7.0
+    kind = 6 if flavour == "px4" else 4
+    messages = heard(mavlink.MAVLink_param_set_message(3, 1, name.encode(), wanted, kind), 0.5)
+    (value,) = [m.param_value for m in messages if m.get_type() == "PARAM_VALUE" and m.param_id == name]
+    assert (struct.unpack("<i", struct.pack("<f", value))[0] if flavour == "px4" else value) == given
+    texts = "".join(m.text for m in messages if m.get_type() == "STATUSTEXT")
+    assert f"{name} stays {given}" in texts
+    assert sitl.vehicles[0].autopilot.parameters.get(name) == given
