@@ -1,6 +1,7 @@
 """An estimator as a process on a UDP link: what it hears, tells, logs; silence, garbage, interruptions."""
 
 import contextlib
+import itertools
 import json
 import math
 import random
@@ -35,10 +36,10 @@ def untimed(ms):
     return dialect.MAVLink_vfr_hud_message(0, 0, 0, 0, math.sin(ms / 3000), 0)
 
 
-def team(seconds):
-    """What two drones say that fly to and fro along a meridian and see a target 30 m east of its middle."""
+def team():
+    """What two drones say, for ever, that fly to and fro along a meridian and see a target 30 m east of its middle."""
     home, height_m, east_m, omega = (473977400, 85455900, 500000), 20.0, 30.0, 0.1
-    for ms in range(1000, 1000 + 1000 * seconds, 100):
+    for ms in itertools.count(1000, 100):
         for system, side in ((1, 1.0), (2, -1.0)):
             north_m = side * 50.0 * math.cos(omega * ms / 1000)
             speed_m_s = -side * 50.0 * omega * math.sin(omega * ms / 1000)
@@ -193,7 +194,7 @@ def test_a_base_station_hears_a_team_on_one_link(tmp_path, port):
     def say():
         encoders = {}
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
-            for system, component, message in team(600):
+            for system, component, message in team():
                 encoder = encoders.setdefault((system, component), FrameEncoder(system, component))
                 link.sendto(encoder.encode(message), ("127.0.0.1", port))
                 if done.wait(0.0005):
