@@ -37,7 +37,7 @@ def untimed(ms):
 
 
 def team():
-    """What two drones say, for ever, that fly to and fro along a meridian and see a target 30 m east of its middle."""
+    """What two drones say for ever, that fly along a meridian and see a target 30 m east of its middle."""
     home, height_m, east_m, omega = (473977400, 85455900, 500000), 20.0, 30.0, 0.1
     for ms in itertools.count(1000, 100):
         for system, side in ((1, 1.0), (2, -1.0)):
