@@ -189,6 +189,7 @@ class Autopilot:
             on_plan_changed=self._on_plan_changed,
             parameters=self.parameters,
             fence=MissionFence(self.commander),
+            landed=lambda: self.commander.landed,
         )
         self._status = StatusReport(flavour, self.commander)
         self._view = TelemetryView(self.context, self.navigation.state, readings)
@@ -239,8 +240,8 @@ class Autopilot:
             firmware.parameters,
             self,
             on_list=lambda channel: self._texts.banner(channel),
-        )
             on_fixed=self._tell_fixed,
+        )
         self._timed: tuple[TimedService, ...] = (
             self._parameter_service,
             self.missions,
@@ -373,11 +374,11 @@ class Autopilot:
         self.navigation.set_parameters(flavour.navigation_parameters(store))
         self._streams.change(name, self._time_us)
 
-    def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
     def _tell_fixed(self, name: str) -> None:
         value = self.parameters.get(name)
         self._texts.announce(mavlink.MAV_SEVERITY_WARNING, f"{name} stays {value:g}: given by the simulation")
 
+    def _build_messages(self, unix_epoch_us: int) -> CommonMessages:
         sources = TelemetrySources(
             view=self._view,
             context=self.context,

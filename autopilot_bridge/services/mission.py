@@ -23,7 +23,7 @@ from autopilot_bridge.services.mission_messages import (
     plan_checksum,
     send_extended,
 )
-from autopilot_bridge.services.mission_policy import INFO, MissionPolicy, Text
+from autopilot_bridge.services.mission_policy import CRITICAL, INFO, MissionPolicy, Text
 from autopilot_bridge.services.mission_report import MissionProgress, MissionReport, NoProgress
 from autopilot_bridge.services.mission_rules import fence_excludes
 from autopilot_bridge.services.mission_sessions import Sessions, mission_type_of
@@ -55,6 +55,7 @@ class FenceJudge(Protocol):
 
 HomeOf = Callable[[], GeodeticPosition | None]
 _GUIDED_ITEM = 2  # MISSION_ITEM.current of a guided-mode target
+_PROBLEMS_TOLD = 3  # a mission of the wrong place has one for each item
 
 
 def new_stores() -> dict[MissionType, MissionStore]:
@@ -78,6 +79,7 @@ class MissionService:
         on_guided_item: takes an item as a target for guided mode; False refuses (ArduPilot only).
         parameters: what an aircraft's missions are judged by; None: the firmware's defaults.
         fence: what missions must keep inside (PX4); None: nothing.
+        landed: whether the vehicle stands on the ground.
     """
 
     def __init__(
@@ -94,6 +96,7 @@ class MissionService:
         on_guided_item: Callable[[MissionItem], bool] | None = None,
         parameters: ParameterStore | None = None,
         fence: FenceJudge | None = None,
+        landed: Callable[[], bool] = lambda: True,
     ) -> None:
         self._policy = policy
         self._stores = dict(stores)
@@ -105,6 +108,7 @@ class MissionService:
         self._on_guided_item = on_guided_item
         self._parameters = ParameterStore(()) if parameters is None else parameters
         self._fence = fence
+        self._landed = landed
         self._sessions = Sessions()
         self._uploads = MissionUploads(policy, self._stores, self._sessions, announce, self._store_plan)
         self._downloads = MissionDownloads(policy, self._stores, self._sessions, announce, self._read_plan)
@@ -292,6 +296,10 @@ class MissionService:
         fence = mission_type is MissionType.FENCE
         if fence and home is not None and fence_excludes(items, home.lat_deg, home.lon_deg):
             self._say(self._policy.texts.home_outside_fence)
+        if mission_type is not MissionType.RALLY:
+            # The firmware has events for these only, which few clients show.
+            for problem in self.problems(landed=self._landed())[:_PROBLEMS_TOLD]:
+                self._announce(CRITICAL, problem)
 
     def _store_ardupilot_plan(
         self, mission_type: MissionType, items: tuple[MissionItem, ...], *, flying: bool

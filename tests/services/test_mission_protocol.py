@@ -299,6 +299,7 @@ def test_px4_feasibility(px4: Vehicle, items: list[Any], problem: str | None) ->
     assert upload(px4, items).type == 0
     assert px4.service.problems() == (() if problem is None else (problem,))
     assert px4.service.mission_valid() == (problem is None)
+    assert px4.take_texts() == ([] if problem is None else [(2, problem)])
 
 
 def test_plan_identifiers_are_of_the_plan() -> None:
