@@ -31,6 +31,8 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
     check_suffix(path)
     if request.options.vehicles > 1:
         raise PlanError("a mission file is for one vehicle; leave --vehicles out")
+    if type(mission).plan_items is Mission.plan_items:
+        raise PlanError(f"mission {mission.name} is not flown by uploaded waypoints; there is no file of it")
     exported = _Exported(mission, path)
     with TemporaryDirectory() as folder:
         asked = replace(request, out=Path(folder) / "run", picture=False, confirm=None, estimator=None)

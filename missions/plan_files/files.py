@@ -24,11 +24,13 @@ def read_mission_file(path: Path) -> MissionDocument:
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a name that no mission file has, or that a file has already."""
+    """Refuse a name that no mission file has, that a file has already, or in a folder that is not there."""
     if path.suffix.lower() not in SUFFIXES:
         raise PlanError(f"mission file {path}: suffix {path.suffix!r}; accepted: {', '.join(SUFFIXES)}")
     if path.exists():
         raise PlanError(f"{path} is there already, and nothing is overwritten; choose another name")
+    if not path.parent.is_dir():
+        raise PlanError(f"mission file {path}: there is no folder {path.parent}")
 
 
 def write_mission_file(

@@ -52,8 +52,6 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
     wings = vehicle.kind is VehicleKind.FIXED_WING
     route = route_of(document, home)
     check_distance(route, document.path, home)
-    if route.endless and options.time_limit_s is None:
-        raise PlanError(f"{document.path} jumps back for ever; say when it ends with --time-limit SECONDS")
     if document.firmware not in (None, vehicle.autopilot):
         notes.warn(
             f"{document.path} was planned for {document.firmware}, and is flown by {vehicle.autopilot}"

@@ -13,11 +13,11 @@ from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.mission import Debriefing, Mission, WorldDefaults
-from missions.plan_files.document import FLOWN_TO, LOITERS, NAV_LAND, MissionDocument
+from missions.plan_files.document import FLOWN_TO, NAV_LAND, MissionDocument
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
 from missions.plan_files.options import FileOptions
-from missions.plan_files.route import Stop, route_of, scored_stops
+from missions.plan_files.route import Stop, route_of, scored_stops, straight
 from missions.planning.limits import FixedWingLimits, Limits
 
 if TYPE_CHECKING:
@@ -68,6 +68,10 @@ class FileMission(Mission[FileOptions]):
             raise PlanError(
                 f"{self.document.path} does not land; add a landing, or say what comes after it: --then land "
                 "(along the runway, at home) or --then return"
+            )
+        if options.time_limit_s is None and route_of(self.document, self._plan_home).endless:
+            raise PlanError(
+                f"{self.document.path} jumps back for ever; say when it ends with --time-limit SECONDS"
             )
 
     def check_place(self, options: FileOptions, limits: Limits, home: GeodeticPosition) -> None:
@@ -139,7 +143,7 @@ class FileMission(Mission[FileOptions]):
                 continue
             place = start  # messages of items between the two places (speed, camera) may lie between theirs
             stop = next((k for k in range(start + 1, len(times)) if times[k][0] == b.index), None)
-            if stop is None or {a.command, b.command} & LOITERS:
+            if stop is None or not straight(a, b):
                 continue
             flown = track.between(times[start][1], times[stop][1]).pos_ned_m
             if len(flown) > 1:

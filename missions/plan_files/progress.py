@@ -14,7 +14,7 @@ from missions.plan_files.document import (
     NAV_RETURN_TO_LAUNCH,
     MissionDocument,
 )
-from missions.plan_files.route import Route, Stop, has_circles
+from missions.plan_files.route import Route, Stop, has_curves
 from missions.vehicle.adapter import Mode
 from missions.vehicle.vehicle import Vehicle
 
@@ -42,7 +42,7 @@ class MissionWatch:
         self._endless = route.endless
         self._stops = tuple(stop for stop in route.stops if stop.command != NAV_LAND)
         self._scored_from = scored[0].index if scored else -1
-        self._phase = "mission" if has_circles(scored) else PATTERN
+        self._phase = "mission" if has_curves(scored) else PATTERN
         self._jumps = any(item.command == DO_JUMP for item in items)
         self._final = max(
             (

@@ -22,6 +22,7 @@ from missions.plan_files.document import (
     NAV_LOITER_TIME,
     NAV_LOITER_TURNS,
     NAV_RETURN_TO_LAUNCH,
+    NAV_SPLINE_WAYPOINT,
     NAV_TAKEOFF,
     NAV_WAYPOINT,
     MissionDocument,
@@ -158,9 +159,15 @@ def scored_stops(route: Route, *, with_takeoff: bool) -> tuple[Stop, ...]:
     return tuple(stop for stop in route.stops if stop.command not in left_out)
 
 
-def has_circles(stops: Sequence[Stop]) -> bool:
-    """Whether somewhere between the first and the last place the way is a circle, not a line."""
-    return any(stop.command in LOITERS for stop in stops[:-1])
+def straight(a: Stop, b: Stop) -> bool:
+    """Whether the way from one place to the next is a line, not a circle or a spline."""
+    return not {a.command, b.command} & LOITERS and b.command != NAV_SPLINE_WAYPOINT
+
+
+def has_curves(stops: Sequence[Stop]) -> bool:
+    """Whether somewhere between the first and the last place the way is a circle or a spline, not a line."""
+    splines = any(stop.command == NAV_SPLINE_WAYPOINT for stop in stops[1:])
+    return splines or any(stop.command in LOITERS for stop in stops[:-1])
 
 
 def path_ned_m(stops: Sequence[Stop]) -> NDArray[np.float64]:

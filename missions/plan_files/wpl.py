@@ -37,7 +37,10 @@ def read_wpl(path: Path) -> MissionDocument:
     except UnicodeDecodeError as error:
         raise PlanError(f"{path} is not text (byte {error.start})") from error
     except (mavwp.MAVWPError, ValueError, OverflowError) as error:
-        raise PlanError(f"{path} is not understood after {loader.count()} rows: {error}") from error
+        raise PlanError(
+            f"{path} is not understood after {loader.count()} rows: {error}; accepted: {HEADER!r}, then rows "
+            "of 12 numbers"
+        ) from error
     rows = [loader.wp(index) for index in range(loader.count())]
     for index, row in enumerate(rows):
         if row.frame not in range(256) or row.command not in range(65536):

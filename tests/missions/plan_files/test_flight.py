@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from missions.errors import MissionError, PlanError
+from missions.errors import PlanError
 from missions.library import find_mission
 from missions.options import FlightOptions
 from missions.plan_files.export import export_plan
@@ -75,8 +75,8 @@ def test_what_can_not_be_flown_is_refused_before_anything_starts(tmp_path: Path)
         fly(find_mission(str(path)), request(path, home="47.0,8.0,400"))
     forever = changed("mission", "items", 4, "params", 1, to=-1)
     endless = write(tmp_path, forever, "b.plan")
-    result = fly(find_mission(str(endless)), request(endless, out=tmp_path / "endless"))
-    assert "jumps back for ever; say when it ends with --time-limit" in result.reason
+    with pytest.raises(PlanError, match="jumps back for ever; say when it ends with --time-limit"):
+        fly(find_mission(str(endless)), request(endless, out=tmp_path / "endless"))
     aircraft = changed("mission", "vehicleType", to=1)
     aircraft["mission"]["items"] = aircraft["mission"]["items"][:3]
     wings = write(tmp_path, aircraft, "c.plan")
@@ -120,6 +120,8 @@ def test_a_pattern_is_written_and_flown_from_its_file(flavour: str, suffix: str,
 def test_a_mission_without_waypoints_has_no_file(tmp_path: Path) -> None:
     path = tmp_path / "own.py"
     path.write_text("async def fly(vehicle, options):\n    pass\n")
-    with pytest.raises(MissionError, match="own is not flown by uploaded waypoints"):
+    with pytest.raises(PlanError, match="own is not flown by uploaded waypoints"):
         export_plan(find_mission(str(path)), RunRequest(), tmp_path / "a.plan")
+    with pytest.raises(PlanError, match="there is no folder"):
+        export_plan(find_mission("lissajous"), RunRequest(), tmp_path / "none" / "a.plan")
     assert not (tmp_path / "a.plan").exists()

@@ -9,7 +9,7 @@ import pytest
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
 from missions.plan_files.document import MissionDocument
-from missions.plan_files.route import has_circles, path_ned_m, placed, route_of, scored_stops
+from missions.plan_files.route import has_curves, path_ned_m, placed, route_of, scored_stops, straight
 from tests.missions.plan_files.plans import ALT, LAT, LON
 
 HOME = GeodeticPosition(lat_deg=LAT, lon_deg=LON, alt_m=ALT)
@@ -72,8 +72,16 @@ def test_what_is_scored() -> None:
     assert [s.command for s in scored_stops(route, with_takeoff=True)] == [22, 16, 19]
     wings = scored_stops(route, with_takeoff=False)
     assert [s.command for s in wings] == [16, 19]
-    assert not has_circles(wings)  # the circle is the last of it
-    assert has_circles(route.stops)
+    assert not has_curves(wings)  # the circle is the last of it
+    assert has_curves(route.stops)
+
+
+def test_splines_are_no_lines() -> None:
+    line, spline, after = route_of(document(at(0.0), at(1e-4, command=82), at(2e-4)), HOME).stops
+    assert not straight(line, spline)
+    assert straight(spline, after)
+    assert has_curves((line, spline, after))
+    assert not has_curves((spline, after))  # nothing leads to the first place
 
 
 def test_the_path_is_straight_between_places() -> None:
