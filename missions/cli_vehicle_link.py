@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from missions.cli_types import FiniteRange
+
 if TYPE_CHECKING:
     from autopilot_bridge.links import Address
     from missions.vehicle_client.client import VehicleClient
@@ -24,7 +26,7 @@ _OPTIONS = (
     ),
     click.option("--system-id", type=click.IntRange(1, 255), help="Where several are on the link."),
     click.option(
-        "--timeout", type=click.FloatRange(0.5, 600.0), default=10.0, show_default=True, help="To hear it, s."
+        "--timeout", type=FiniteRange(0.5, 600.0), default=10.0, show_default=True, help="To hear it, s."
     ),
     click.option("--json", "as_json", is_flag=True, help="Print JSON, for scripts."),
 )

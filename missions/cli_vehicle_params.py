@@ -124,7 +124,8 @@ def load(file: Path, yes: bool, **given: Any) -> int:
         if settable:
             if not given["as_json"]:
                 _tell_differences(settable)
-            confirm(f"set {len(settable)} parameters of vehicle {client.system_id}", yes)
+            noun = "parameter" if len(settable) == 1 else "parameters"
+            confirm(f"set {len(settable)} {noun} of vehicle {client.system_id}", yes)
         return changes, await client_parameters.load(client, settable, lambda line: None)
 
     changes, refused = with_client(given, work)
@@ -133,12 +134,12 @@ def load(file: Path, yes: bool, **given: Any) -> int:
     if given["as_json"]:
         print_json({"set": done, "refused": refused, "unknown": unknown})
     else:
-        click.echo(f"{done} parameters set")
+        click.echo(f"{done} {'parameter' if done == 1 else 'parameters'} set")
     for text in refused:
         click.echo(f"flightstack: {text}", err=True)
     if unknown:
         click.echo(f"flightstack: the vehicle has no {', '.join(unknown)}", err=True)
-    return FAILED if refused else 0
+    return FAILED if refused or unknown else 0
 
 
 @params.command()

@@ -51,7 +51,10 @@ class LinkQuality:
                 "is the baud rate right?"
             )
         if "HEARTBEAT" in self.rates_hz:
-            return "an autopilot is heard there now: try again"
+            ids = ", ".join(str(system) for system, component in self.components if component == 1)
+            return (
+                f"heard there now: autopilot with system id {ids}; try again, or choose it with --system-id"
+            )
         names = ", ".join(f"{system}/{component}" for system, component in self.components)
         return f"heard were components {names} (system/component), none of them an autopilot's heartbeat"
 

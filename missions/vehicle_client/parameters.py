@@ -17,13 +17,15 @@ from autopilot_bridge.parameter_files import (
     format_mavproxy,
     format_qgc,
 )
-from autopilot_bridge.parameters import ParameterDefinition, ParameterType
+from autopilot_bridge.parameters import INTEGER_LIMITS, ParameterDefinition, ParameterType
 from missions.errors import CommandRejected, MissionError, PlanError, VehicleTimeout
 from missions.vehicle_client.client import VehicleClient
 
 _LIST_TRIES: Final = 3
 _TYPES_S: Final = 1.0
 _INTEGERS: Final = frozenset((1, 2, 3, 4, 5, 6))
+_INT32: Final = INTEGER_LIMITS[ParameterType.INT32]
+_LARGEST_FLOAT: Final = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,12 +121,13 @@ async def write_one(client: VehicleClient, name: str, number: float, type_: int)
     plugin = ParamAsync(client.system)
     try:
         if type_ in _INTEGERS:
-            if not math.isfinite(number) or number != int(number):
-                raise PlanError(f"parameter {name} = {number:g}: accepted: a whole number")
+            low, high = _whole_range(type_)
+            if not low <= number <= high or number != int(number):
+                raise PlanError(f"parameter {name} = {number:g}: accepted: a whole number, {low} to {high}")
             await plugin.set_param_int(name, int(number))
         else:
-            if not math.isfinite(number):
-                raise PlanError(f"parameter {name} = {number:g}: accepted: a finite number")
+            if not abs(number) <= _LARGEST_FLOAT:
+                raise PlanError(f"parameter {name} = {number:g}: accepted: a number of single precision")
             await plugin.set_param_float(name, float(number))
     except ParamError as error:
         raise CommandRejected(
@@ -134,6 +137,12 @@ async def write_one(client: VehicleClient, name: str, number: float, type_: int)
     if not same(kept.number, number):
         raise CommandRejected(f"the vehicle kept {name} = {kept} instead of {number:g}", 0)
     return kept
+
+
+def _whole_range(type_: int) -> tuple[int, int]:
+    """What fits in a type, as far as MAVSDK, which sets signed numbers of 32 bits, can set it."""
+    low, high = INTEGER_LIMITS.get(_known_type(type_), _INT32)
+    return low, min(high, _INT32[1])
 
 
 def format_values(path: Path, values: Mapping[str, Value], system_id: int) -> str:

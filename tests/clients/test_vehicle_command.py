@@ -105,7 +105,7 @@ def test_parameters_are_read_set_saved_compared_and_loaded(user: User, tmp_path:
     assert "give --yes" in unasked.stderr
     loaded = user.run("params", "load", str(tmp_path / "a.params"), "--yes")
     assert (loaded.returncode, loaded.stderr) == (0, "")
-    assert "1 parameters set" in loaded.stdout
+    assert "1 parameter set" in loaded.stdout
     assert user.run("params", "compare", str(tmp_path / "a.params")).returncode == 0
 
 
@@ -117,6 +117,13 @@ def test_parameters_that_are_not_there(user: User, tmp_path: Path) -> None:
     fraction = user.run("params", "set", INTEGER[user.flavour], "0.5")
     assert fraction.returncode == 2
     assert "accepted: a whole number" in fraction.stderr
+    large = user.run("params", "set", INTEGER[user.flavour], "99999999999")
+    assert large.returncode == 2
+    assert "= 1e+11: accepted: a whole number, -" in large.stderr
+    other = tmp_path.parent / "other.parm"
+    other.write_text("NOT_THERE 1\n")
+    unknown = user.run("params", "load", str(other), "--yes")
+    assert (unknown.returncode, unknown.stderr) == (1, "flightstack: the vehicle has no NOT_THERE\n")
     suffix = user.run("params", "save", str(tmp_path / "a.txt"))
     assert suffix.returncode == 2
     assert "accepted: .params, .parm, .param" in suffix.stderr
