@@ -3,6 +3,7 @@
 import asyncio
 from typing import Final
 
+from mavsdk.asyncio.plugins.component_metadata import ComponentMetadataAsync
 from mavsdk.asyncio.plugins.events import EventsAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
 from mavsdk.plugins.events import EventsError
@@ -24,6 +25,7 @@ _LISTEN_S: Final = 3.0
 _WAIT_S: Final = 5.0
 _TEXTS_S: Final = 1.5
 _REPORT_S: Final = 1.0
+_REPORTS: Final = 5
 _LOSS_WARN, _LOSS_BAD = 0.02, 0.2
 _CLOCK_S: Final = 5.0
 _DAY_S: Final = 86_400.0
@@ -86,15 +88,23 @@ async def _fence_items(client: VehicleClient) -> int | None:
 
 async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
     """What PX4's arming checks report by events; nothing where there are none, or MAVSDK has no names."""
+    if snapshot.flavour != "px4":
+        return []
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
-    try:
-        report = await asyncio.wait_for(
-            EventsAsync(client.system).get_health_and_arming_checks_report(), _REPORT_S
-        )
-    except (EventsError, TimeoutError):
+    events = EventsAsync(client.system)
+    await ComponentMetadataAsync(client.system).request_autopilot_component()  # gives events their names
+    for _ in range(_REPORTS):
+        await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
+        await asyncio.sleep(_REPORT_S)
+        try:
+            report = await asyncio.wait_for(events.get_health_and_arming_checks_report(), _REPORT_S)
+            break
+        except (EventsError, TimeoutError):
+            continue
+    else:
         return []
     found = []
-    for entry in report.all_problems:
+    for entry in report.current_mode_intention.problems:
         text = f"{entry.message} {entry.description}".strip()
         told = problem if entry.log_level <= 3 and not health & PREARM_BIT else warning
         found.append(told("arming check", text, f"look at {entry.health_component or 'it'}"))
