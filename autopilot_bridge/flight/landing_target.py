@@ -15,23 +15,16 @@ ACQUIRED_S: Final = 2.0
 
 
 class LandingTargetTrack:
-    """Its place in local NED.
+    """Its place in local NED; it is taken to stand still.
 
     Attributes:
         motion: the filter behind it.
     """
 
-    __slots__ = ("_still", "motion")
+    __slots__ = ("motion",)
 
     def __init__(self) -> None:
-        self._still = True
         self.motion = TargetMotion(acceleration_m_s2=_SLOWEST_M_S2, still=True)
-
-    def set_moving(self, moving: bool) -> None:
-        """The target may move (LTEST_MODE 0, PLND_OPTIONS bit 0)."""
-        if moving is self._still:
-            self._still = not moving
-            self.motion = TargetMotion(acceleration_m_s2=0.5 if moving else _SLOWEST_M_S2, still=not moving)
 
     def take(self, time_us: int, position_ned_m: Array, *, sigma_m: float) -> bool:
         """A sighting; False when it is refused."""
@@ -47,11 +40,6 @@ class LandingTargetTrack:
             return None
         known = self.motion.at(time_us)
         return None if known is None else (float(known[0][0]), float(known[0][1]))
-
-    def velocity(self, time_us: int) -> tuple[float, float]:
-        """(north, east) of its motion."""
-        known = self.motion.at(time_us)
-        return (0.0, 0.0) if known is None else (float(known[1][0]), float(known[1][1]))
 
     def forget(self) -> None:
         """Nothing is known of it."""

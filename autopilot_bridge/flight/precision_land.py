@@ -157,15 +157,13 @@ class PrecisionLandTask:
         sink = 0.0
         if self.phase is PrecisionPhase.DESCEND:
             sink = max(_SLOWEST_LAND_M_S, descent_speed(height_m, ctx.multicopter))
-        velocity = ctx.surroundings.landing_target.velocity(ctx.time_us)
-        self._approach(ctx, motion, seen, velocity, sink)
+        self._approach(ctx, motion, seen, sink)
 
     def _approach(
         self,
         ctx: FlightContext,
         motion: SmoothMotion,
         place: tuple[float, float],
-        velocity: tuple[float, float],
         sink_m_s: float,
     ) -> None:
         trajectory = motion.trajectory
@@ -179,7 +177,7 @@ class PrecisionLandTask:
         )
         scale = closing / away if away > 1e-6 else 0.0
         trajectory.stretch = 1.0
-        trajectory.track_velocity(velocity[0] + scale * north, velocity[1] + scale * east, sink_m_s, ctx.dt_s)
+        trajectory.track_velocity(scale * north, scale * east, sink_m_s, ctx.dt_s)
 
     def _without_target(
         self, ctx: FlightContext, motion: SmoothMotion, p: PrecisionParameters, height_m: float
@@ -239,7 +237,7 @@ class PrecisionLandTask:
         """Too high to see anything: down first."""
         here = motion.trajectory.position_ned_m if self._place is None else self._place
         place = (float(here[0]), float(here[1]))
-        self._approach(ctx, motion, place, (0.0, 0.0), ctx.multicopter.land_descend_speed_m_s)
+        self._approach(ctx, motion, place, ctx.multicopter.land_descend_speed_m_s)
 
     def _climbs(self, ctx: FlightContext, motion: SmoothMotion, p: PrecisionParameters) -> bool:
         """Up to the height of the search; True when the vehicle is there."""
