@@ -11,8 +11,8 @@ NONE: Final = "none"
 storage_option = click.option(
     "--storage",
     metavar="DIR|none",
-    help="Folder that keeps the vehicles' memory cards: logs, parameters, plans, files. none: in memory, no logs. "
-    "[default: a temporary folder, gone at the end]",
+    help="Folder that keeps the vehicles' memory cards: logs, parameters, plans, files. "
+    "none: in memory, no logs. [default: a temporary folder, gone at the end]",
 )
 
 

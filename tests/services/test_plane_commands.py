@@ -143,6 +143,20 @@ def test_arduplane_says_why_a_mode_is_refused(number: int, text: str) -> None:
     assert rig.channel.texts() == [text]
 
 
+def test_aircraft_follow_nobody() -> None:
+    """PX4's Follow Target (AUTO 8) is refused in the air; ArduCopter's FOLLOW (23) is another mode here."""
+    rig = rig_of("px4", "flying")
+    before = rig.commander.mode
+    assert rig.long(MODE, 1, 4, 8) == [0, 1]
+    assert "".join(rig.channel.texts()) == "Switching to Follow Target is currently not available\t"
+    assert rig.commander.mode is before
+    rig = rig_of("ardupilot", "flying")
+    before = rig.commander.mode
+    assert rig.long(MODE, 1, 23) == [4]
+    assert rig.channel.texts() == ["Q_ENABLE 0"]
+    assert rig.commander.mode is before
+
+
 @pytest.mark.parametrize(
     ("radius_m", "yaw", "flown_m"),
     [
