@@ -10,6 +10,8 @@ from pathlib import Path
 
 WALL_DEADLINE_S = 100.0
 """For every single thing that is waited for, also on a machine with a lot else to do."""
+UPLOAD_WAIT_S = 10.0
+"""A vehicle that is faster than real time may give up an upload that a busy machine is slow with."""
 
 
 class Mavproxy:
@@ -51,7 +53,7 @@ class Mavproxy:
             time.sleep(0.02)
         raise AssertionError(f"no {text!r} after {self.lines[: self._seen][-1:]} in {self.lines}")
 
-    def types_until(self, line: str, text: str, wait_s: float = 0.3) -> None:
+    def types_until(self, line: str, text: str, wait_s: float = 1.0) -> None:
         """Type the same again and again, until there is such a line."""
         deadline_s = time.monotonic() + WALL_DEADLINE_S
         while time.monotonic() < deadline_s:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.clients.mavproxy_process import Mavproxy
+from tests.clients.mavproxy_process import UPLOAD_WAIT_S, Mavproxy
 from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
@@ -33,8 +33,7 @@ def test_everyday_commands(tmp_path: Path) -> None:
             station.sees("Saved ")  # the parameters, at once: FTP is refused, not left to time out
             station.type("param set WPNAV_SPEED 800")
             station.types_until("param fetch WPNAV_SPEED", "WPNAV_SPEED = 800")
-            station.type(f"wp load {waypoints(tmp_path)}")
-            station.sees("Flight plan received")
+            station.types_until(f"wp load {waypoints(tmp_path)}", "Flight plan received", UPLOAD_WAIT_S)
             station.type("mode guided")
             station.sees("Mode GUIDED")
             station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")  # refused until there is a position

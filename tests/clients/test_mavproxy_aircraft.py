@@ -6,14 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.clients.mavproxy_process import Mavproxy
+from tests.clients.mavproxy_process import UPLOAD_WAIT_S, Mavproxy
 from tests.clients.runway import Runway
 from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
 
 SPEEDUP = 6.0  # ArduPilot asks for a plan's item again after a second of its own, which MAVProxy must beat
-UPLOAD_WAIT_S = 3.0
 RUNWAY = Runway(lat_deg=-35.3632621, lon_deg=149.1652374, alt_m=584.0, heading_rad=math.radians(353.0))
 
 

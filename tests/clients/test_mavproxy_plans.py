@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.clients.mavproxy_process import Mavproxy
+from tests.clients.mavproxy_process import UPLOAD_WAIT_S, Mavproxy
 from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
@@ -36,13 +36,11 @@ def test_fence_and_rally_modules(tmp_path: Path) -> None:
         station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
         try:
             station.sees("Saved ")
-            station.type(f"fence load {fence_file}")
-            station.sees("Fence received")
+            station.types_until(f"fence load {fence_file}", "Fence received", UPLOAD_WAIT_S)
             station.type("fence list")
             station.sees("5001 3")
             station.sees("5004 3 -35.3629621")
-            station.type(f"rally load {rally_file}")
-            station.sees("Rally points received")
+            station.types_until(f"rally load {rally_file}", "Rally points received", UPLOAD_WAIT_S)
             station.type("rally list")
             station.sees("5100 3 -35.363162")
             station.types_until("param fetch FENCE_TOTAL", "FENCE_TOTAL = 5")

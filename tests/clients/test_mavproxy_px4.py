@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.clients.mavproxy_process import Mavproxy
+from tests.clients.mavproxy_process import UPLOAD_WAIT_S, Mavproxy
 from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
@@ -35,8 +35,7 @@ def test_everyday_commands(tmp_path: Path) -> None:
             station.sees("Saved ")
             station.type("param set MPC_XY_CRUISE 6")
             station.types_until("param fetch MPC_XY_CRUISE", "MPC_XY_CRUISE = 6")
-            station.type(f"wp load {waypoints(tmp_path)}")
-            station.sees("ACCEPTED")
+            station.types_until(f"wp load {waypoints(tmp_path)}", "ACCEPTED", UPLOAD_WAIT_S)
             station.types_until("mode TAKEOFF", "Mode TAKEOFF", 2.0)
             station.types_until("arm throttle", "ARMED", 2.0)
             station.sees("height ")
