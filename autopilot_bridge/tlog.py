@@ -50,24 +50,32 @@ def append_records(buffer: bytearray, time_us: int, packet: bytes) -> int:
     start, size = 0, len(packet)
     try:
         while start < size:
-            magic = packet[start]
-            if magic == MAGIC_V2:
-                end = start + OVERHEAD_V2 + packet[start + 1]
-                if packet[start + 2] & INCOMPAT_SIGNED:
-                    end += SIGNATURE_SIZE
-            elif magic == MAGIC_V1:
-                end = start + OVERHEAD_V1 + packet[start + 1]
+            if packet[start] == MAGIC_V2 and not packet[start + 2]:
+                end = start + packet[start + 1] + OVERHEAD_V2
             else:
-                break
+                end = start + packet[start + 1] + _foreign_overhead(packet, start)
             frames.append(packet[start:end])
             start = end
-    except IndexError:  # it ends with the first bytes of a frame
+    except IndexError:  # no frame begins here, or a torn one
         pass
     if start != size:
         torn = size - len(frames[-1]) if start > size else start
         raise TlogError(f"a packet of {size} bytes has no whole frame at byte {torn}")
     buffer += _pack_time(time_us).join(frames)
     return len(frames) - 1
+
+
+def _foreign_overhead(packet: bytes, start: int) -> int:
+    """What a frame that is not of our own making has beside its payload.
+
+    Raises:
+        IndexError: no frame begins there.
+    """
+    if packet[start] == MAGIC_V1:
+        return OVERHEAD_V1
+    if packet[start] == MAGIC_V2:
+        return OVERHEAD_V2 + (SIGNATURE_SIZE if packet[start + 2] & INCOMPAT_SIGNED else 0)
+    raise IndexError(start)
 
 
 class TlogWriter:

@@ -53,6 +53,7 @@ if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
 
 SLOW_RATE_HZ: Final = 50
+_TURNS: Final = 5  # of the slow loop, in which each unhurried microservice is asked once
 _COMPONENT: Final = 1
 _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
 
@@ -242,12 +243,16 @@ class Autopilot:
             on_list=lambda channel: self._texts.banner(channel),
             on_fixed=self._tell_fixed,
         )
+        timed = [more for more in self._more if type(more).tick is not Microservice.tick]
         self._timed: tuple[TimedService, ...] = (
             self._parameter_service,
             self.missions,
-            *(more for more in self._more if type(more).tick is not Microservice.tick),
+            *(more for more in timed if not more.unhurried),
             self.intervals,
         )
+        unhurried = [more for more in timed if more.unhurried]
+        self._unhurried = tuple(unhurried[turn::_TURNS] for turn in range(_TURNS))
+        self._turn = 0
         self.commands = CommandService.for_flavour(
             flavour.name,
             self.commander,
@@ -338,6 +343,9 @@ class Autopilot:
         self._view.advance(time_us)
         self._streams.advance(time_us)
         for service in self._timed:
+            service.tick(time_us)
+        self._turn = turn = (self._turn + 1) % _TURNS
+        for service in self._unhurried[turn]:
             service.tick(time_us)
         for event in self.commander.drain_events():
             self._follow(event)

@@ -32,6 +32,8 @@ class Tunes(Microservice):
 class Px4Actuators(Microservice):
     """PX4's answers. Those of an action that takes time come in the end (the gripper)."""
 
+    unhurried = True
+
     _MOTORS: Final = range(1, 13)  # ACTUATOR_OUTPUT_FUNCTION
     _SERVOS: Final = range(33, 41)
     _NATIVE: Final = 1000  # from here on PX4's own numbers
@@ -89,6 +91,8 @@ class Px4Actuators(Microservice):
 
 class ArdupilotActuators(Microservice):
     """What ArduPilot's vehicles answer alike."""
+
+    unhurried = True
 
     _RELAYS: Final = 6
 

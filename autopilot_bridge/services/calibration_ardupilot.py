@@ -39,6 +39,8 @@ _GYRO, _BAROMETER = 1, 1  # param1, param3
 class ArdupilotCalibration(Microservice):
     """Calibrations of an ArduPilot vehicle but for the compass. Nothing is changed by them."""
 
+    unhurried = True
+
     def __init__(self, parts: AutopilotParts) -> None:
         self._parts = parts
         self._commander = parts.commander

@@ -30,6 +30,8 @@ _MILLIGAUSS: Final = 1000.0
 class CompassCalibration(Microservice):
     """Calibration of the one compass."""
 
+    unhurried = True
+
     def __init__(self, parts: AutopilotParts) -> None:
         self._parts = parts
         self._commander = parts.commander

@@ -37,6 +37,8 @@ class Px4Calibration(Microservice):
     errors are the navigation filter's business. A sensor that fails meanwhile makes it fail.
     """
 
+    unhurried = True
+
     def __init__(self, parts: AutopilotParts) -> None:
         self._commander = parts.commander
         self._announce = parts.announce

@@ -5,7 +5,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,12 @@ class Microservice:
     """One microservice; by default it does nothing.
 
     Everything is called between two steps of the autopilot, and never raises for what a message holds.
+
+    Attributes:
+        unhurried: its timers may be late by a tenth of a second: `tick` is called at 10 Hz only.
     """
+
+    unhurried: ClassVar[bool] = False
 
     @property
     def commands(self) -> Mapping[int, Handler]:
@@ -105,7 +110,7 @@ class Microservice:
         return False
 
     def tick(self, time_us: int) -> None:
-        """Timers and queues, at 50 Hz of vehicle time."""
+        """Timers and queues, at 50 Hz of vehicle time, or 10 Hz for the unhurried."""
 
     def follow(self, event: Event) -> None:
         """Something happened to the vehicle."""

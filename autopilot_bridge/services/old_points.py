@@ -55,6 +55,8 @@ class OldPoints(Microservice):
         announce: sends a STATUSTEXT.
     """
 
+    unhurried = True
+
     def __init__(
         self, parameters: ParameterStore, stores: Mapping[MissionType, MissionStore], announce: Announce
     ) -> None:

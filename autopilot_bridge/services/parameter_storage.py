@@ -72,6 +72,8 @@ class ParameterStorageService(Microservice):
         announce: sends a STATUSTEXT.
     """
 
+    unhurried = True
+
     def __init__(
         self,
         stored: StoredParameters,

@@ -72,6 +72,8 @@ class PowerService(Microservice):
         act: carries out; None: this autopilot can't be restarted.
     """
 
+    unhurried = True
+
     def __init__(self, policy: PowerPolicy, commander: Commander, act: PowerHook | None) -> None:
         self._policy = policy
         self._commander = commander

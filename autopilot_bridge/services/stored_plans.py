@@ -92,6 +92,8 @@ class StoredPlans(Microservice):
         announce: sends a STATUSTEXT.
     """
 
+    unhurried = True
+
     def __init__(
         self,
         stores: Mapping[MissionType, MissionStore],

@@ -110,16 +110,16 @@ class LinkChannel:
     def send_frame(self, raw: bytes) -> None:
         """Forward somebody else's frame as it is: with its own signature, or none."""
         if self._forward is None:
-            self._put(raw)
+            self._pass_on(raw)
         else:
             self._forward(raw)
 
     def send_own_frame(self, raw: bytes) -> None:
         """Send a frame of another component of the vehicle, which has no key of its own."""
-        if is_unsigned_v2(raw):
-            self._send(raw)
-        else:
-            self._put(raw)
+        signs = self._signs
+        if signs is not None and signs.state.active and is_unsigned_v2(raw):
+            raw = signs.sign(raw)
+        self._pass_on(raw)
 
     def _send(self, data: bytes) -> None:
         signs = self._signs
@@ -130,6 +130,11 @@ class LinkChannel:
     def _put(self, data: bytes) -> None:
         if self.line is not None:
             self.line.add(len(data))
+        self.link.send(data)
+
+    def _pass_on(self, data: bytes) -> None:
+        if self.line is not None:
+            self.line.forward(len(data))
         self.link.send(data)
 
     def receive(self) -> list[tuple[PeerId, list[Frame]]]:

@@ -38,18 +38,20 @@ class LineBudget:
     Attributes:
         bytes_per_s: as given.
         backlog_bytes: on their way.
+        forwarded_bytes: of other components, so far: sent at once, as they come.
 
     Raises:
         ValueError: the capacity is not above 0.
     """
 
-    __slots__ = ("_share_bytes", "_time_us", "backlog_bytes", "bytes_per_s")
+    __slots__ = ("_share_bytes", "_time_us", "backlog_bytes", "bytes_per_s", "forwarded_bytes")
 
     def __init__(self, bytes_per_s: float) -> None:
         if not 0.0 < bytes_per_s < float("inf"):
             raise ValueError(f"capacity {bytes_per_s} bytes/s is not above 0")
         self.bytes_per_s = bytes_per_s
         self.backlog_bytes = 0.0
+        self.forwarded_bytes = 0
         self._share_bytes = 0.0
         self._time_us = 0
 
@@ -64,6 +66,11 @@ class LineBudget:
     def add(self, size: int) -> None:
         """Bytes were given to the line."""
         self.backlog_bytes += size
+
+    def forward(self, size: int) -> None:
+        """Bytes of another component were given to the line."""
+        self.backlog_bytes += size
+        self.forwarded_bytes += size
 
     def spend_share(self, size: int) -> None:
         """So many bytes of streams were sent."""

@@ -2,7 +2,15 @@
 
 from typing import Final
 
-from autopilot_bridge.telemetry.line import MICROSECONDS, USED_SHARE, FlowControl, LineBudget, RadioFlow, fit
+from autopilot_bridge.telemetry.line import (
+    LEAST_SHARE,
+    MICROSECONDS,
+    USED_SHARE,
+    FlowControl,
+    LineBudget,
+    RadioFlow,
+    fit,
+)
 from autopilot_bridge.telemetry.streams import StreamTable
 
 _EVERY_US: Final = MICROSECONDS
@@ -11,7 +19,8 @@ _LEAST_MULTIPLIER: Final = 0.05
 
 
 class StreamThrottle:
-    """Thins the streams of a table.
+    """Thins the streams of a table. What the line carries for other components of the vehicle (a camera, a
+    gimbal) is not thinned: the table gets the rest.
 
     Args:
         table: the channel's streams.
@@ -22,13 +31,15 @@ class StreamThrottle:
         radio: what a radio on the channel has told.
     """
 
-    __slots__ = ("_due_us", "_line", "_table", "radio")
+    __slots__ = ("_due_us", "_forwarded_bytes", "_line", "_others_bytes_per_s", "_table", "radio")
 
     def __init__(self, table: StreamTable, line: LineBudget | None, control: FlowControl) -> None:
         self.radio = RadioFlow(control)
         self._table = table
         self._line = line
         self._due_us = 0
+        self._forwarded_bytes = 0
+        self._others_bytes_per_s = 0.0
 
     def advance(self, time_us: int) -> None:
         """Let the line carry on, and now and then look anew at what fits. Called at 50 Hz."""
@@ -37,6 +48,10 @@ class StreamThrottle:
         if time_us < self._due_us:
             return
         self._due_us = time_us + _EVERY_US
+        if self._line is not None:
+            others = (self._line.forwarded_bytes - self._forwarded_bytes) * MICROSECONDS / _EVERY_US
+            self._forwarded_bytes = self._line.forwarded_bytes
+            self._others_bytes_per_s += 0.5 * (others - self._others_bytes_per_s)
         self.radio.advance(time_us)
         self.fit()
 
@@ -44,7 +59,9 @@ class StreamThrottle:
         """Set the rates."""
         multiplier, stretch = 1.0, 1.0
         if self._line is not None:
-            multiplier, stretch = fit(self._table.loads(), USED_SHARE * self._line.bytes_per_s)
+            whole = self._line.bytes_per_s
+            rest = max(LEAST_SHARE * whole, USED_SHARE * whole - self._others_bytes_per_s)
+            multiplier, stretch = fit(self._table.loads(), rest)
         radio = self.radio.multiplier
         if radio < multiplier:
             multiplier, stretch = radio, max(stretch, _LEAST_MULTIPLIER / radio)
