@@ -1,11 +1,17 @@
 """The missions over a serial line as narrow as a real one, both flavours, at 57600 and 921600 baud.
 
-    python -m benchmarks.serial_missions [--baud 57600] [--flavour px4] [--mission lissajous] [--speedup 8]
+    python -m benchmarks.serial_missions [--baud 57600] [--flavour px4] [--mission plan] [--unplug]
 
 For each a `flightstack sitl` at one end and `flightstack fly --connect` at the other, each told the rate of
-the line; at a speedup the line is so much faster by the wall clock. A row tells how the mission ended, how
-much of the line was used, how long bytes waited for it, and the rates of telemetry that were left. Exit
-code 1: a mission did not end as planned, or bytes waited for half a second of vehicle time and more.
+the line; at a speedup the line is so much faster by the wall clock. A row tells how the mission ended, what
+of the line was used, how long bytes waited for it, how many commands there were, how many had to be repeated
+and how long the slowest answer took, and the rates of telemetry that were left: ATTITUDE,
+GLOBAL_POSITION_INT, HEARTBEAT. All times are the vehicle's (`tests.serial_meter`). With `--unplug` the line
+is pulled out in flight, longer than failsafes wait, and put in again.
+
+Exit code 1: a mission did not end as planned, bytes waited for half a second, a command was repeated, or
+heartbeats were missing. After unplugging, a mission whose autopilot has left the guided mode may end with its
+reason.
 """
 
 import argparse
@@ -14,19 +20,27 @@ import json
 import subprocess
 import sys
 import tempfile
-import time
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event, Thread
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from autopilot_bridge.mavlink import decode, definition
+from autopilot_bridge.tlog import TlogReader
 from tests.clients.sitl_process import running_sitl
-from tests.serial_line import serial_line
+from tests.serial_line import SerialLine, serial_line
+from tests.serial_meter import LineMeter
 
 FLAVOURS = ("px4", "ardupilot")
 BAUDS = (57600, 921600)
 LONGEST_WAIT_S = 0.5
+LONGEST_ANSWER_S = 1.0
+UNPLUGGED_S = 10.0
+"""Of vehicle time; looking for the device takes up to a second of the wall clock more."""
 DEADLINE_S = 1800.0
+_LONG, _INT, _ACK = (definition(name).message_id for name in ("COMMAND_LONG", "COMMAND_INT", "COMMAND_ACK"))
 SCRIPT = """
 from missions.vehicle import Setpoint
 import math
@@ -53,10 +67,12 @@ class Flight:
     Attributes:
         arguments: of `flightstack fly`.
         vehicle: of `flightstack sitl`.
+        unplug_after_s: in the air.
     """
 
     arguments: tuple[str, ...]
     vehicle: tuple[str, ...] = ()
+    unplug_after_s: float = 20.0
 
 
 SMALL = ("--size", "40", "--altitude", "10")
@@ -67,58 +83,142 @@ MISSIONS = {
     "sector": Flight(arguments=("sector", *SMALL)),
     "parallel-sweep": Flight(arguments=("parallel-sweep", *SMALL)),
     "expanding-square": Flight(arguments=("expanding-square", *SMALL)),
+    "plan": Flight(arguments=("PLAN",)),
     "script": Flight(arguments=("SCRIPT",)),
     "orbit": Flight(
-        arguments=("orbit", *ORBITED), vehicle=("--model", "aerosonde", "--camera", *ORBITED, "--wind", "4@0")
+        arguments=("orbit", *ORBITED, "--duration", "120"),
+        vehicle=("--model", "aerosonde", "--camera", *ORBITED, "--wind", "4@0"),
+        unplug_after_s=200.0,
     ),
     "occupancy": Flight(
         arguments=("occupancy", "--size", "800", "--map", "MAP"),
         vehicle=("--model", "aerosonde", "--map-target", "150,250", "--map", "MAP"),
+        unplug_after_s=150.0,
     ),
 }
 """Aircraft for orbit and occupancy, whose devices the vehicle carries."""
 
 
-def fly(name: str, flavour: str, baud: int, speedup: float, folder: Path) -> tuple[str, bool]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answers:
+    """Commands of a mission, by its log.
+
+    Attributes:
+        commands: sent for the first time.
+        repeated: sent again.
+        slowest_s: from the first of them to the answer.
+    """
+
+    commands: int
+    repeated: int
+    slowest_s: float
+
+
+def answers(log: Path) -> Answers:
+    """How the vehicle's autopilot answered."""
+    sent_us: dict[int, int] = {}
+    commands = repeated = slowest_us = 0
+    for time_us, frame in TlogReader(log):
+        if frame.message_id in (_LONG, _INT):
+            message = decode(frame)
+            if message.target_component not in (0, 1):
+                continue
+            if message.command in sent_us:
+                repeated += 1
+            else:
+                commands += 1
+                sent_us[message.command] = time_us
+        elif frame.message_id == _ACK and frame.component_id == 1:
+            since_us = sent_us.pop(decode(frame).command, None)
+            if since_us is not None:
+                slowest_us = max(slowest_us, time_us - since_us)
+    return Answers(commands=commands, repeated=repeated, slowest_s=slowest_us * 1e-6)
+
+
+def unplug_in_flight(line: SerialLine, meter: LineMeter, after_s: float, speedup: float, over: Event) -> None:
+    """Pull the plug out when the vehicle has been in the air for so long, and put it in again."""
+    while not over.wait(0.05):
+        if meter.airborne_s > after_s:
+            line.unplug()
+            over.wait(UNPLUGGED_S / speedup)
+            line.plug()
+            return
+
+
+def fly(
+    name: str, flavour: str, baud: int, speedup: float, folder: Path, *, unplug: bool = False
+) -> tuple[str, bool]:
     """Fly one mission; gives its row, and whether all was well."""
     flight = MISSIONS[name]
-    script = folder / "script.py"
-    script.write_text(SCRIPT)
-    files = {"SCRIPT": script}
-    if "MAP" in flight.vehicle:
-        files["MAP"] = magnetic_map(flavour, folder)
+    files = made_files(flight, flavour, folder)
     arguments, vehicle = (
         [str(files.get(text, text)) for text in texts] for texts in (flight.arguments, flight.vehicle)
     )
-    start_s = time.monotonic()
+    meter, over = LineMeter(baud), Event()
+    taps = (meter.take_down, meter.take_up)
     with (
-        serial_line(folder / "line", round(baud * speedup)) as line,
+        serial_line(folder / "line", round(baud * speedup), latency_s=0.005 / speedup, taps=taps) as line,
         running_sitl(flavour, [line.vehicle], speedup=speedup, options=vehicle),
     ):
         command = [sys.executable, "-m", "missions", "fly", *arguments, "--connect", line.ground]
         command += ["--yes", "--no-picture", "--out", str(folder / "run")]
+        hand = Thread(target=unplug_in_flight, args=(line, meter, flight.unplug_after_s, speedup, over))
+        if unplug:
+            hand.start()
         done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
-        carried, waited_s = line.down.carried_bytes, speedup * line.down.longest_wait_s
-        up, up_waited_s = line.up.carried_bytes, speedup * line.up.longest_wait_s
+        over.set()
+        if unplug:
+            hand.join()
     file = folder / "run" / "summary.json"
     if not file.exists():
         return f"did not begin: {(done.stdout + done.stderr).strip()[-200:]}", False
-    summary = json.loads(file.read_text())
+    return row(json.loads(file.read_text()), done.returncode, meter, baud, folder, unplug=unplug)
+
+
+def row(
+    summary: dict[str, Any], code: int, meter: LineMeter, baud: int, folder: Path, *, unplug: bool
+) -> tuple[str, bool]:
+    """What is printed of a flight, and whether all was well."""
     seconds = summary["sim_time_s"] or 1.0
-    counts = summary["message_counts"]
-    wall_s = time.monotonic() - start_s
-    rates = " ".join(
-        f"{counts.get(key, 0) / seconds:5.1f}" for key in ("ATTITUDE", "GLOBAL_POSITION_INT", "HEARTBEAT")
-    )
-    # the line was open longer than the mission: it is compared with the wall clock
-    share = 10.0 * carried / (baud * speedup * wall_s)
-    well = done.returncode == 0 and max(waited_s, up_waited_s) < LONGEST_WAIT_S
-    reason = "" if done.returncode == 0 else f"  {summary['reason'][:100]}"
+    rates = [
+        summary["message_counts"].get(key, 0) / seconds
+        for key in ("ATTITUDE", "GLOBAL_POSITION_INT", "HEARTBEAT")
+    ]
+    answered = answers(folder / "run" / "flight.tlog")
+    measured_s = max(meter.vehicle_s, 1.0)
+    down, up = (size * 10.0 / (baud * measured_s) for size in (meter.down_bytes, meter.up_bytes))
+    waited_s = max(meter.down.longest_wait_s, meter.up.longest_wait_s)
+    reason = "" if code == 0 else f"  {summary['reason'][:160]}"
+    # what is lost with an unplugged line is repeated, and missing
+    well = code == 0 and answered.repeated == 0 and answered.slowest_s < LONGEST_ANSWER_S and rates[2] > 0.95
+    if unplug:
+        well = code == 0 or (code == 1 and "left the guided mode" in reason)
     return (
-        f"{summary['outcome']:<10} {seconds:6.0f} s {100.0 * share:4.0f} % down, {up / seconds:6.0f} B/s up, "
-        f"waits {waited_s:4.2f} {up_waited_s:4.2f} s, rates {rates}{reason}",
-        well,
+        f"{summary['outcome']:<10} {seconds:5.0f} s, {100.0 * down:3.0f} % down {100.0 * up:3.0f} % up, "
+        f"waits {meter.down.longest_wait_s:4.2f} {meter.up.longest_wait_s:4.2f} s, "
+        f"{answered.commands:3d} commands, {answered.repeated} repeated, "
+        f"slowest {answered.slowest_s:4.2f} s, rates "
+        + " ".join(f"{rate_hz:5.1f}" for rate_hz in rates)
+        + reason,
+        well and waited_s < LONGEST_WAIT_S,
     )
+
+
+def made_files(flight: Flight, flavour: str, folder: Path) -> dict[str, Path]:
+    """Files that a mission is flown from, by the word that stands for them."""
+    words = (*flight.arguments, *flight.vehicle)
+    files: dict[str, Path] = {}
+    if "SCRIPT" in words:
+        files["SCRIPT"] = folder / "script.py"
+        files["SCRIPT"].write_text(SCRIPT)
+    if "PLAN" in words:
+        files["PLAN"] = folder / "sector.plan"
+        command = [sys.executable, "-m", "missions", "fly", "sector", *SMALL, "--autopilot", flavour]
+        command += ["--export-plan", str(files["PLAN"])]
+        subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=True)
+    if "MAP" in words:
+        files["MAP"] = magnetic_map(flavour, folder)
+    return files
 
 
 def magnetic_map(flavour: str, folder: Path) -> Path:
@@ -139,6 +239,7 @@ def main() -> int:
     parser.add_argument("--flavour", choices=FLAVOURS, help="one flavour alone")
     parser.add_argument("--mission", choices=tuple(MISSIONS), help="one mission alone")
     parser.add_argument("--speedup", type=float, default=8.0)
+    parser.add_argument("--unplug", action="store_true", help="pull the line out in flight")
     chosen = parser.parse_args()
     failed = False
     for name, flavour, baud in itertools.product(
@@ -147,7 +248,7 @@ def main() -> int:
         (chosen.baud,) if chosen.baud else BAUDS,
     ):
         with tempfile.TemporaryDirectory() as folder:
-            row, well = fly(name, flavour, baud, chosen.speedup, Path(folder))
+            row, well = fly(name, flavour, baud, chosen.speedup, Path(folder), unplug=chosen.unplug)
         failed |= not well
         sys.stdout.write(f"{name:<17}{flavour:<10}{baud:>7}  {'' if well else 'MISSED '}{row}\n")
         sys.stdout.flush()

@@ -6,7 +6,7 @@ two dictionary operations; it is decoded when somebody asks for it.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final, Protocol, Self
 
@@ -235,6 +235,16 @@ class Connection:
     def autopilots_heard(self) -> list[int]:
         """System ids of the autopilots heard on this link, in rising order."""
         return sorted(s for s, component in self._newest.components if component == AUTOPILOT_COMPONENT)
+
+    def newest(self, system_id: int, component_id: int = AUTOPILOT_COMPONENT) -> Mapping[int, Frame]:
+        """The newest frame of each message from one component, by message id, as they are now."""
+        return self._newest.of((system_id, component_id))
+
+    @property
+    def bytes_per_s(self) -> float | None:
+        """What the link carries in a second; None: not known, or a network."""
+        capacity: float | None = getattr(self._link, "bytes_per_s", None)
+        return capacity
 
     def keep(self, system_id: int) -> None:
         """Never forget this system's autopilot, however many others are heard."""

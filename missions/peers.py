@@ -3,6 +3,7 @@
 Components come and go, and anybody can send with any ids: they are kept for a limited number.
 """
 
+from collections.abc import Mapping
 from typing import Final
 
 from autopilot_bridge.mavlink import Frame, MAVLinkMessage, decode
@@ -35,6 +36,10 @@ class NewestFrames:
     def components(self) -> list[ComponentId]:
         """Those that were heard and are not forgotten."""
         return list(self._frames)
+
+    def of(self, component: ComponentId) -> Mapping[int, Frame]:
+        """The newest frames of a component by message id, as they are now."""
+        return dict(self._frames.get(component, {}))
 
     def keep(self, component: ComponentId) -> None:
         """Never forget this component."""

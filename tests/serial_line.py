@@ -9,7 +9,7 @@ import threading
 import time
 import tty
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,6 +19,7 @@ BITS_PER_BYTE: Final = 10
 BUFFER_BYTES: Final = 65536
 """What a driver takes before the writer has to wait."""
 _TICK_S: Final = 0.002
+Taps = tuple[Callable[[bytes], None], Callable[[bytes], None]]
 
 
 @dataclass
@@ -27,13 +28,15 @@ class Direction:
 
     Attributes:
         carried_bytes: so far.
-        longest_wait_s: of a byte that waited for the line to carry those before it.
+        longest_wait_s: of a byte that waited for the line to carry those before it, by the wall clock.
+        tap: called with what is given to the line.
     """
 
     bytes_per_s: float
     latency_s: float
     carried_bytes: int = 0
     longest_wait_s: float = 0.0
+    tap: Callable[[bytes], None] | None = None
     _queue: deque[tuple[float, bytes]] = field(default_factory=deque)
     _queued_bytes: int = 0
     _budget: float = 0.0
@@ -45,6 +48,8 @@ class Direction:
     def put(self, data: bytes, now_s: float) -> None:
         self._queue.append((now_s + self.latency_s, data))
         self._queued_bytes += len(data)
+        if self.tap is not None:
+            self.tap(data)
 
     def take(self, now_s: float, elapsed_s: float) -> bytes:
         """What arrives now."""
@@ -77,16 +82,21 @@ class SerialLine:
         folder: the devices' names appear in it, and stay the same when the plug is put in again.
         baud: of wall time.
         latency_s: one way.
+        taps: called with what the first and the second end have given to the line.
 
     Attributes:
         down: what the first end sends; up: what the second sends.
     """
 
-    def __init__(self, folder: Path, baud: int, *, latency_s: float = 0.005) -> None:
+    def __init__(
+        self, folder: Path, baud: int, *, latency_s: float = 0.005, taps: Taps | None = None
+    ) -> None:
         self.baud = baud
         self.names = (folder / "ttyVehicle", folder / "ttyGround")
         rate = baud / BITS_PER_BYTE
         self.down, self.up = Direction(rate, latency_s), Direction(rate, latency_s)
+        if taps is not None:
+            self.down.tap, self.up.tap = taps
         self._lock = threading.Lock()
         self._masters: list[int] = []
         self._slaves: list[int] = []
@@ -158,10 +168,12 @@ class SerialLine:
 
 
 @contextmanager
-def serial_line(folder: Path, baud: int, *, latency_s: float = 0.005) -> Iterator[SerialLine]:
+def serial_line(
+    folder: Path, baud: int, *, latency_s: float = 0.005, taps: Taps | None = None
+) -> Iterator[SerialLine]:
     """A plugged line, closed at the end."""
     folder.mkdir(parents=True, exist_ok=True)
-    line = SerialLine(folder, baud, latency_s=latency_s)
+    line = SerialLine(folder, baud, latency_s=latency_s, taps=taps)
     try:
         yield line
     finally:

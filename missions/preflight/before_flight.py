@@ -18,7 +18,7 @@ from missions.preflight.finding import Finding, Level, ok, problem, warning
 from missions.preflight.health import health_findings
 from missions.preflight.lost_link import PARAMETERS, lost_link_words
 from missions.preflight.settings import FENCE_PARAMETERS, RULES, fence, settings_findings, shapes_join
-from missions.preflight.snapshot import Snapshot
+from missions.preflight.snapshot import Snapshot, usual
 from missions.vehicle.vehicle import Vehicle
 
 FARTHEST_M: Final = 10_000.0
@@ -84,17 +84,23 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
     for name in (*_ASKED, _FILTER[vehicle.autopilot]):
         if vehicle.message(name) is None:
             await vehicle.set_message_rate(name, 2.0)
-    await vehicle.clock.sleep(_LISTEN_S)
-    parameters = await _parameters(vehicle)
-    try:
-        fence_items = await vehicle.download_plan(MissionType.FENCE)
-    except MissionError:  # an autopilot without a fence
-        fence_items = []
+    told: list[Mapping[str, Any]] = []  # of the filter
+    with vehicle.messages(_FILTER[vehicle.autopilot]) as stream:
+        await vehicle.clock.sleep(_LISTEN_S)
+        parameters = await _parameters(vehicle)
+        try:
+            fence_items = await vehicle.download_plan(MissionType.FENCE)
+        except MissionError:  # an autopilot without a fence
+            fence_items = []
+        while (status := stream.take()) is not None:
+            told.append(status.to_dict())
     messages: dict[str, Mapping[str, Any]] = {}
     for name in _SHOWN:
         message = vehicle.message(name)
         if message is not None:
             messages[name] = message.to_dict()
+    if told:
+        messages[_FILTER[vehicle.autopilot]] = usual(told)
     return Snapshot(
         flavour=vehicle.autopilot,
         kind=vehicle.kind,

@@ -1,13 +1,28 @@
 """What a vehicle has told, for checks that don't care how it was heard."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from statistics import median_high
 from typing import Any
 
 from missions.kind import VehicleKind
 
 Fields = Mapping[str, Any]
 """A message's fields by name, in wire units. What is not a number is None or NaN."""
+
+
+def usual(messages: Sequence[Fields]) -> Fields:
+    """The newest of some messages of a filter, with the median of how well measurements fit.
+
+    One measurement's ratio is mostly its noise (ArduPilot's `ekf_check` and PX4 smooth them as well).
+    """
+    newest = messages[-1]
+    smoothed = {
+        name: median_high([float(fields[name]) for fields in messages])
+        for name, value in newest.items()
+        if name.endswith(("_variance", "_ratio")) and isinstance(value, int | float)
+    }
+    return {**newest, **smoothed}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,6 +16,7 @@ from missions.errors import MissionError, VehicleTimeout
 from missions.piloting.energy import EnergyController, EnergyParameters, EnergyState
 from missions.piloting.pressure_height import PressureHeight
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
+from missions.vehicle.stream_room import make_room
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
@@ -54,6 +55,7 @@ class AttitudePilot:
         """
         for name, rate_hz in _RATES_HZ.items():
             await vehicle.set_message_rate(name, rate_hz)
+        await make_room(vehicle, {**vehicle.adapter.stream_rates_hz, **_RATES_HZ})
         position = await vehicle.position()
         if vehicle.armed and position.height_m > 5.0:
             raise MissionError("the pressure on the ground must be taken before takeoff")

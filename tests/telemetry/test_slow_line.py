@@ -77,6 +77,30 @@ def test_streams_fit_a_line_of_57600_baud(flavour: str) -> None:
         assert thinned["ATTITUDE"] / thinned["LOCAL_POSITION_NED"] == pytest.approx(100 / 30, rel=0.1)
 
 
+def test_streams_leave_room_for_a_gimbal() -> None:
+    """What other components of the vehicle say is not thinned; the autopilot's streams get the rest."""
+    client = Client("px4", BAUD_57600)
+    client.run(15.0)
+    (channel,) = client.sitl.vehicles[0].channels
+    frame = FrameEncoder(1, 154).encode(
+        dialect.MAVLink_gimbal_device_attitude_status_message(
+            0, 0, 1, 0, (1.0, 0.1, 0.1, 0.1), 1.0, 1.0, 1.0, 1
+        )
+    )
+    for step in range(round(250 * 20.0)):
+        if step == 250 * 5:
+            client.counts.clear()
+            client.bytes, client.longest_backlog_s = 0, 0.0
+        if step % 10 == 0:
+            channel.send_own_frame(frame)
+        client.sitl.advance()
+        client.longest_backlog_s = max(client.longest_backlog_s, channel.line.backlog_bytes / BAUD_57600)
+    assert client.counts["GIMBAL_DEVICE_ATTITUDE_STATUS"] == 25 * 15
+    assert client.counts["SYS_STATUS"] >= 14  # what comes once a second keeps its rate
+    assert 0.7 * 15.0 * BAUD_57600 < client.bytes < 0.95 * 15.0 * BAUD_57600
+    assert client.longest_backlog_s < 0.2
+
+
 def test_a_wide_line_changes_nothing() -> None:
     wide, free = Client("px4", 92160.0), Client("px4", None)
     for client in (wide, free):

@@ -1,0 +1,82 @@
+"""Room for the streams that a flight is steered by, on a line that does not carry all of them.
+
+An autopilot thins everything alike: of a set that is five times what a serial line carries, the attitude
+comes at a fifth of its rate as well. What is not needed is slowed down instead.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from autopilot_bridge.mavlink import DEFINITIONS
+
+if TYPE_CHECKING:
+    from missions.vehicle.vehicle import Vehicle
+
+ENOUGH: Final = 0.8
+"""Of the rate asked for."""
+SLOW_HZ: Final = 1.0
+"""What is not needed is asked for at this rate: for the log, and for people."""
+_LOOKS: Final = 10
+_LOOK_S: Final = 0.2
+_SLOWED_HZ: Final = 1.5
+_LEFT_ALONE: Final = frozenset({"HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "EVENT"})
+"""Streams that are not asked for, and answers."""
+
+
+async def make_room(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> list[str]:
+    """Look at what a serial line brings. When something needed comes too slowly, all that is not needed is
+    slowed down, and the rest asked for at the rates that are needed.
+
+    On other links nothing is done: they carry what is asked for, or do not tell what they carry.
+
+    Args:
+        needed_hz: the rates of the messages that have to come.
+
+    Returns:
+        The messages that were slowed down.
+    """
+    if vehicle.connection.bytes_per_s is None:
+        return []
+    heard, changed = await _listen(vehicle, needed_hz)
+    seconds = _LOOKS * _LOOK_S
+    if all(heard[name] >= ENOUGH * rate_hz * seconds for name, rate_hz in needed_hz.items()):
+        return []
+    slowed = [
+        name
+        for name, times in changed.items()
+        if times > _SLOWED_HZ * seconds and name not in needed_hz and name not in _LEFT_ALONE
+    ]
+    for name in slowed:
+        await vehicle.set_message_rate(name, SLOW_HZ)
+    for name, rate_hz in needed_hz.items():  # some may be asked for at more by the autopilot's own set
+        await vehicle.set_message_rate(name, rate_hz)
+    return slowed
+
+
+async def _listen(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> tuple[Counter[str], Counter[str]]:
+    """How often needed messages came, and in how many of ten looks each message was another."""
+    heard: Counter[str] = Counter()
+    changed: Counter[str] = Counter()
+
+    def counting(name: str) -> Callable[[Any], None]:
+        def count(frame: Any) -> None:
+            if (frame.system_id, frame.component_id) == (vehicle.system_id, 1):
+                heard[name] += 1
+
+        return count
+
+    stops = [vehicle.connection.listen(name, counting(name)) for name in needed_hz]
+    try:
+        before = vehicle.connection.newest(vehicle.system_id)
+        for _ in range(_LOOKS):
+            await vehicle.clock.sleep(_LOOK_S)
+            now = vehicle.connection.newest(vehicle.system_id)
+            for number, frame in now.items():
+                if before.get(number) is not frame:
+                    changed[DEFINITIONS[number].name] += 1
+            before = now
+    finally:
+        for stop in stops:
+            stop()
+    return heard, changed
