@@ -9,8 +9,10 @@ What the firmware does not offer is a test, too: it passes when the client is to
 page was not run. Every other run compares what it has with the page, and fails when they differ.
 """
 
+import contextlib
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -29,10 +31,12 @@ What other people's clients do with the emulated vehicles, headless, as the test
 
 "pass": the client's own calls did what its documentation says, seen on the client's side. Other words: what
 the firmware does not offer or the client can't do, and the test saw that the client is told so. An empty
-cell: not applicable, or not tried.
+cell: not tried there; aircraft fly what MAVSDK's action, offboard and mission plugins have for them in one
+flight, and carry the camera.
 
 DroneKit 2.9.2 does not import on Python 3.10 and later (it takes `MutableMapping` from `collections`).
 """
+_CLIENTS: Final = ("MAVSDK", "MAVProxy", "pymavlink")
 
 
 class Cell(NamedTuple):
@@ -53,11 +57,25 @@ def rendered(cells: Mapping[Cell, str]) -> str:
     rows: dict[tuple[str, str], dict[str, str]] = defaultdict(dict)
     for cell, words in cells.items():
         rows[cell.client, cell.feature][cell.vehicle] = words
-    lines = [_HEAD, f"| client | feature | {' | '.join(_TITLES)} |", "|---" * (2 + len(_TITLES)) + "|"]
+    lines = [
+        _HEAD,
+        f"Seen with {', '.join(_versions())}.\n",
+        f"| client | feature | {' | '.join(_TITLES)} |",
+        "|---" * (2 + len(_TITLES)) + "|",
+    ]
     for client, feature in sorted(rows):
         words = (rows[client, feature].get(vehicle, "") for vehicle in VEHICLES)
         lines.append(f"| {client} | {feature} | {' | '.join(words)} |")
     return "\n".join(lines) + "\n"
+
+
+def _versions() -> list[str]:
+    """The installed clients."""
+    found = []
+    for name in _CLIENTS:
+        with contextlib.suppress(PackageNotFoundError):
+            found.append(f"{name} {version(name)}")
+    return found
 
 
 def parsed(text: str) -> dict[Cell, str]:

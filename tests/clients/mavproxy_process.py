@@ -8,9 +8,11 @@ import threading
 import time
 from pathlib import Path
 
+from tests.clients.tied_process import tied
+
 WALL_DEADLINE_S = 100.0
 """For every single thing that is waited for, also on a machine with a lot else to do."""
-UPLOAD_WAIT_S = 10.0
+UPLOAD_WAIT_S = 20.0
 """A vehicle that is faster than real time may give up an upload that a busy machine is slow with."""
 
 
@@ -21,7 +23,7 @@ class Mavproxy:
         program = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
         command = [program, "--master", master, "--streamrate", "10"]
         self.process = subprocess.Popen(
-            command,
+            tied(command),
             cwd=folder,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

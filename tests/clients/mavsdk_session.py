@@ -38,6 +38,7 @@ class Session(ABC):
 
     def __init__(self) -> None:
         self._plugins: dict[str, Any] = {}
+        self._kept: list[Any] = []
         self.before_arming: Callable[[], None] = lambda: None
 
     def plugin(self, name: str) -> Any:
@@ -48,6 +49,11 @@ class Session(ABC):
 
     @abstractmethod
     def _new_plugin(self, name: str) -> Any: ...
+
+    def _keep_callbacks(self, plugin: str) -> None:
+        """Keep what MAVSDK calls back: its threads may do so once more after the end of a subscription."""
+        owner = self.plugin(plugin)
+        self._kept += getattr(getattr(owner, "_plugin", owner), "_subscriptions", {}).values()
 
     @abstractmethod
     def call(self, plugin: str, method: str, *arguments: Any) -> Any:
@@ -67,6 +73,10 @@ class Session(ABC):
     @abstractmethod
     def collect(self, plugin: str, method: str, *arguments: Any) -> list[Any]:
         """Everything that a method tells until it is done."""
+
+    @abstractmethod
+    def cut_short(self, plugin: str, method: str, stop: str) -> str:
+        """Begin a method that tells how it goes, call `stop` at the first word; the result's name."""
 
     def until(self, what: str, found: Callable[[], bool], wait_s: float = WALL_DEADLINE_S) -> None:
         """Poll a condition."""
@@ -136,6 +146,7 @@ class AsyncioSession(Session):
             try:
                 return await first(elements, found, f"{plugin}.{stream}", wait_s)
             finally:
+                self._keep_callbacks(plugin)
                 await elements.aclose()
                 if repeater is not None:
                     repeater.cancel()
@@ -152,6 +163,22 @@ class AsyncioSession(Session):
             return [element async for element in getattr(self.plugin(plugin), method)(*arguments)]
 
         return list(self._run(everything()))
+
+    def cut_short(self, plugin: str, method: str, stop: str) -> str:
+        from mavsdk.exceptions import MavsdkError
+
+        async def begin() -> str:
+            stopped = False
+            try:
+                async for _ in getattr(self.plugin(plugin), method)():
+                    if not stopped:
+                        stopped = True
+                        await getattr(self.plugin(plugin), stop)()
+            except MavsdkError as error:
+                return str(error).split(";")[0]
+            return "SUCCESS"
+
+        return str(self._run(begin()))
 
     def wait(self, seconds: float) -> None:
         self._runner.run(asyncio.sleep(seconds))
@@ -204,6 +231,7 @@ class SynchronousSession(Session):
                 if found(last):
                     return last
         finally:
+            self._keep_callbacks(plugin)
             getattr(owner, f"unsubscribe_{stream}")(handle)
         raise AssertionError(f"{plugin}.{stream} was not seen; last: {last}")
 
@@ -219,6 +247,16 @@ class SynchronousSession(Session):
             if result.name != "NEXT":
                 assert result.name == "SUCCESS", result
                 return elements
+
+    def cut_short(self, plugin: str, method: str, stop: str) -> str:
+        heard: queue.SimpleQueue[str] = queue.SimpleQueue()
+        owner = self.plugin(plugin)
+        getattr(owner, f"{method}_async")(lambda result, data, _user: heard.put(result.name))
+        heard.get(timeout=WALL_DEADLINE_S)
+        getattr(owner, stop)()
+        while (name := heard.get(timeout=WALL_DEADLINE_S)) == "NEXT":
+            pass
+        return name
 
     def wait(self, seconds: float) -> None:
         time.sleep(seconds)

@@ -1,6 +1,7 @@
 """A SITL in a process of its own, as a user starts it, for tests with other people's clients."""
 
 import contextlib
+import itertools
 import os
 import signal
 import socket
@@ -10,15 +11,25 @@ import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-START_DEADLINE_S = 90.0
+from tests.clients.tied_process import tied
+
+START_DEADLINE_S = 240.0  # a first start compiles the flight code, on a machine that has other work too
 READY_LINE = "ready"
+_PORTS = range(11_000, 20_000)  # below every system's ephemeral range
+_candidates = itertools.cycle((*_PORTS[os.getpid() * 37 % len(_PORTS) :], *_PORTS))
+"""Every process of a test run begins elsewhere."""
 
 
 def free_port(kind: int = socket.SOCK_DGRAM) -> int:
-    """A port that nobody uses at the moment."""
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A port that nobody uses at the moment, and that no socket without a port of its own is given.
+
+    Those get theirs from the ephemeral range, which on a busy machine is soon where a test wanted to listen.
+    """
+    for port in _candidates:
+        with socket.socket(socket.AF_INET, kind) as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("unreachable: the candidates don't end")
 
 
 @dataclass
@@ -48,7 +59,7 @@ def running_sitl(
         command += ["--link", link]
     command += options
     process = subprocess.Popen(
-        command,
+        tied(command),
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -10,6 +10,7 @@ from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
 
+SPEEDUP = 2.0  # ArduPilot asks for a plan's item again after a second of its own, which MAVProxy must beat
 HOME_DEG = (-35.3632621, 149.1652374)
 
 
@@ -27,7 +28,7 @@ def waypoints(folder: Path) -> Path:
 )
 def test_everyday_commands(tmp_path: Path) -> None:
     port = free_port(socket.SOCK_STREAM)
-    with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"]):
+    with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=SPEEDUP):
         station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
         try:
             station.sees("Saved ")  # the parameters, at once: FTP is refused, not left to time out

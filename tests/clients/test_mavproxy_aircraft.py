@@ -12,7 +12,7 @@ from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
 
-SPEEDUP = 6.0  # ArduPilot asks for a plan's item again after a second of its own, which MAVProxy must beat
+SPEEDUP = 3.0  # ArduPilot asks for a plan's item again after a second of its own, which MAVProxy must beat
 RUNWAY = Runway(lat_deg=-35.3632621, lon_deg=149.1652374, alt_m=584.0, heading_rad=math.radians(353.0))
 
 

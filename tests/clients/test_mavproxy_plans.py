@@ -11,6 +11,7 @@ from tests.clients.sitl_process import free_port, running_sitl
 
 pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
 
+SPEEDUP = 3.0
 LAT, LON = -35.3632621, 149.1652374  # home
 HALF_DEG = 6e-4
 CORNERS = ((-HALF_DEG, -HALF_DEG), (-HALF_DEG, HALF_DEG), (HALF_DEG, HALF_DEG), (HALF_DEG, -HALF_DEG))
@@ -32,7 +33,7 @@ def test_fence_and_rally_modules(tmp_path: Path) -> None:
     fence_file = waypoint_file(tmp_path / "fence.txt", [*fence, (3, 5004, 8.0, LAT + 3e-4, LON, 0.0)])
     rally_file = waypoint_file(tmp_path / "rally.txt", [(3, 5100, 0.0, LAT + 1e-4, LON + 1e-4, 12.0)])
     port = free_port(socket.SOCK_STREAM)
-    with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"]):
+    with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=SPEEDUP):
         station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
         try:
             station.sees("Saved ")
