@@ -52,7 +52,8 @@ def test_everyday_commands(tmp_path: Path, request: pytest.FixtureRequest) -> No
             station.sees("required argument is not a float")  # it sends the names' triples as they are
             changes_mode(station, "TAKEOFF")
             station.types_until("arm throttle", "ARMED", 5.0)
-            station.sees("height ")
+            station.sees("Takeoff detected")
+            station.sees("Mode LOITER")  # it holds where the take-off ends
             changes_mode(station, "MISSION")
             changes_mode(station, "LOITER")
             changes_mode(station, "RTL")
