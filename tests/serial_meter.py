@@ -47,13 +47,14 @@ class LineMeter:
     Attributes:
         down, up: the two ways.
         vehicle_s: vehicle time over which there were stamps.
+        longest_gap_s: between two stamps: how long the line was out.
         down_bytes, up_bytes: given to the line in that time.
         airborne_s: the part of it since the vehicle was first more than 3 m above home.
     """
 
     def __init__(self, baud: int) -> None:
         self.down, self.up = Backlog(baud / BITS_PER_BYTE), Backlog(baud / BITS_PER_BYTE)
-        self.vehicle_s = 0.0
+        self.vehicle_s = self.longest_gap_s = 0.0
         self.down_bytes = self.up_bytes = 0
         self._left_ground_s: float | None = None
         self._parser = FrameParser()
@@ -83,6 +84,7 @@ class LineMeter:
         now_ms = int.from_bytes(frame.payload[offset : offset + 4].ljust(4, b"\0"), "little")
         if self._time_ms is not None:
             elapsed_s = max(0, now_ms - self._time_ms) * 1e-3
+            self.longest_gap_s = max(self.longest_gap_s, elapsed_s)
             self.down.pass_time(elapsed_s)
             self.up.pass_time(elapsed_s)
             if elapsed_s <= _LARGEST_STEP_S:

@@ -3,15 +3,18 @@ repetitions and swaps. Over a bad one (30 %) they may fail, but nothing is done 
 """
 
 import asyncio
+import math
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pymavlink import mavftp, mavparm
 
 from autopilot_bridge.links import Impairment
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
 from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
 from tests.lossy_proxy import LossyProxy, lossy_proxy
@@ -132,5 +135,65 @@ def test_mavsdk_over_a_poor_radio(flavour: str) -> None:
         assert [item.x for item in back][1:] == places[1:]
 
     with radio(flavour, POOR, 2) as (url, proxy):
+        asyncio.run(script(url))
+        assert proxy.lost > 10
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_mavsdk_flies_by_setpoints_over_a_poor_radio(flavour: str) -> None:
+    """Offboard: both corners are reached, and the vehicle never leaves the guided mode."""
+    pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
+    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+    from mavsdk.asyncio.plugins.action import ActionAsync
+    from mavsdk.asyncio.plugins.offboard import OffboardAsync
+    from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+    from mavsdk.plugins.offboard import PositionNedYaw
+    from mavsdk.plugins.telemetry import FlightMode
+
+    async def until_accepted(ask: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Ask again where an answer was lost, or it can't be done yet."""
+        from mavsdk.exceptions import MavsdkError
+
+        async with asyncio.timeout(WALL_DEADLINE_S):
+            while True:
+                try:
+                    return await ask()
+                except MavsdkError:
+                    await asyncio.sleep(0.5)
+
+    async def script(url: str) -> None:
+        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
+        async with Mavsdk(configuration) as sdk:
+            await sdk.add_any_connection(url.replace("udpin:", "udpin://"))
+            system = await sdk.first_autopilot(timeout_s=60.0)
+            assert system is not None
+            telemetry, action, offboard = TelemetryAsync(system), ActionAsync(system), OffboardAsync(system)
+            if flavour == "ardupilot":  # which sends what it is asked for
+                await until_accepted(lambda: telemetry.set_rate_position(4.0))
+                await until_accepted(lambda: telemetry.set_rate_position_velocity_ned(4.0))
+                await until_accepted(lambda: telemetry.set_rate_landed_state(2.0))
+            await until_accepted(lambda: action.set_takeoff_altitude(8.0))
+
+            async def take_off() -> None:
+                await action.arm()  # ArduPilot arms before it has a position, and disarms again by itself
+                await action.takeoff()
+
+            await until_accepted(take_off)
+            await first(telemetry.subscribe_position(), lambda p: p.relative_altitude_m > 7.0, "height")
+            await first(telemetry.subscribe_landed_state(), lambda state: state.name == "IN_AIR", "in air")
+            await offboard.set_position_ned(PositionNedYaw(0.0, 0.0, -8.0, 0.0))
+            await until_accepted(offboard.start)
+            for north_m, east_m in ((8.0, 0.0), (8.0, 8.0)):
+                await offboard.set_position_ned(PositionNedYaw(north_m, east_m, -8.0, 0.0))
+
+                def there(at: Any, north_m: float = north_m, east_m: float = east_m) -> bool:
+                    return math.hypot(at.position.north_m - north_m, at.position.east_m - east_m) < 1.0
+
+                await first(telemetry.subscribe_position_velocity_ned(), there, f"{north_m}, {east_m}")
+                assert await first(telemetry.subscribe_flight_mode(), bool, "mode") == FlightMode.OFFBOARD
+            await until_accepted(action.land)
+            await first(telemetry.subscribe_armed(), lambda armed: not armed, "landing")
+
+    with radio(flavour, POOR, 4) as (url, proxy):
         asyncio.run(script(url))
         assert proxy.lost > 10
