@@ -194,6 +194,7 @@ def row(
     well = code == 0
     if unplug:
         well = code == 0 or (code == 1 and "left the guided mode" in reason)
+        waited_s = meter.down.longest_wait_s  # the clock of the other way stands while the line is out
         well = well and meter.longest_gap_s > 0.8 * UNPLUGGED_S
     return (
         f"{summary['outcome']:<10} {seconds:5.0f} s, {100.0 * down:3.0f} % down {100.0 * up:3.0f} % up, "

@@ -111,6 +111,12 @@ async def _send_plan(
                 if reply.type == dialect.MAV_MISSION_ERROR and all_sent and asked >= 0:
                     # "no transfer": it is over, and how it ended was lost
                     raise VehicleTimeout(f"how the vehicle took the {what} is not known; {vehicle.heard()}")
+                if reply.type == dialect.MAV_MISSION_ERROR and asked >= 0:
+                    # an item came after the vehicle had given the transfer up (PX4: nothing heard for 5 s)
+                    raise VehicleTimeout(
+                        f"the vehicle gave the {what} up after {asked + 1} of {len(items)} items: "
+                        f"{_result_name(reply.type)}; {vehicle.heard()}"
+                    )
                 errors += 1
                 if reply.type == dialect.MAV_MISSION_ERROR and asked < 0 and errors <= _ERRORS_BORNE:
                     continue  # perhaps to an item of an earlier transfer that came twice

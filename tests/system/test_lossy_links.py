@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
-from autopilot_bridge.links import Impairment, LossyLink
+from autopilot_bridge.links import Impairment, LossyLink, MemoryLink
+from autopilot_bridge.mavlink import FrameParser, decode, definition
 from autopilot_bridge.mission_plan import MissionItem
 from missions.connection import Connection
 from missions.errors import MissionError
@@ -26,6 +27,7 @@ POOR = Impairment(loss=0.05, duplicate=0.05, reorder=0.05, jitter_s=0.2)
 BAD = Impairment(loss=0.3, duplicate=0.05, reorder=0.05, jitter_s=0.2)
 SPEEDS = {"px4": ("MPC_XY_VEL_MAX", "MPC_ACC_HOR"), "ardupilot": ("WPNAV_SPEED", "WPNAV_ACCEL")}
 WAYPOINT = 16
+ITEM = definition("MISSION_ITEM_INT").message_id
 LIMIT_S = 900.0
 
 
@@ -166,3 +168,45 @@ def test_nothing_is_done_by_half_over_a_bad_radio(flavour: str, seed: int) -> No
 
     radio.mission(script)
     assert all(len(text) > 20 for text in failures)
+
+
+class Stalled:
+    """A link whose way up stands still once, for so long, from the item with a number on."""
+
+    def __init__(self, link: MemoryLink, seq: int, seconds: float, time_us: Callable[[], int]) -> None:
+        self._link, self._seq, self._us, self._time_us = link, seq, round(seconds * 1e6), time_us
+        self._until_us: int | None = None
+        self._held: list[bytes] = []
+        self.receive, self.filenos, self.close = link.receive, link.filenos, link.close
+
+    def send(self, data: bytes) -> None:
+        now_us = self._time_us()
+        if self._until_us is None:
+            for frame in FrameParser().feed(data):
+                if frame.message_id == ITEM and decode(frame).seq == self._seq:
+                    self._until_us = now_us + self._us
+        if self._until_us is not None and now_us < self._until_us:
+            self._held.append(data)
+            return
+        for held in self._held:
+            self._link.send(held)
+        self._held.clear()
+        self._link.send(data)
+
+
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_an_upload_that_the_vehicle_gave_up_is_done_anew(flavour: str) -> None:
+    """PX4 gives a transfer up after 5 s, and answers the item that comes then with ERROR."""
+    flying = Flying(flavour)
+    sitl = flying.sitl
+
+    async def main() -> None:
+        link = Stalled(sitl.connect(0), 3, 7.0, lambda: sitl.time_us)
+        async with Connection(link, LoopClock()) as connection:  # type: ignore[arg-type]
+            vehicle = Vehicle(connection)
+            await vehicle.wait_ready()
+            await vehicle.upload_mission(plan(vehicle, 8, 30.0))
+
+    run(main(), VirtualTimeLoop(sitl.advance, lambda: sitl.time_us, max_time_us=round(LIMIT_S * 1e6)))
+    items = flying.autopilot.commander.missions.items
+    assert [item.z for item in items][-8:] == [30.0] * 8
