@@ -51,6 +51,7 @@ class SitlVehicle:
     Attributes:
         vehicle: the JSBSim vehicle.
         sensors: its sensor suite; `sensors.faults` switches failures.
+        failures: takes MAV_CMD_INJECT_FAILURE.
         autopilot: the emulated autopilot.
         payload: what it carries, as MAVLink components on a link of their own; None: nothing.
         links: its open links, who is heard on them, and the key it signs with.
@@ -83,7 +84,7 @@ class SitlVehicle:
             truth=self.vehicle.truth,
             seeds=lambda name: streams.child("vehicle", index, "sensor", name),
         )
-        failures = FailureInjector(self.vehicle, self.sensors)
+        self.failures = FailureInjector(self.vehicle, self.sensors)
         self._new_autopilot = partial(
             Autopilot,
             flavour,
@@ -95,8 +96,8 @@ class SitlVehicle:
                 **specification.parameters,
             },
             envelope=_envelope(airframe, configuration) if aircraft else None,
-            inject_failure=failures.inject,
-            simulation=failures,
+            inject_failure=self.failures.inject,
+            simulation=self.failures,
             card=card,
             power=self._on_power,
         )

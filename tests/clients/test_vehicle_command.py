@@ -1,9 +1,9 @@
 """`flightstack vehicle` as a user calls it, against a SITL of each flavour."""
 
-import io
 import json
+import subprocess
+import sys
 from collections.abc import Iterator
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,6 @@ import pytest
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
 from autopilot_bridge.parameter_files import read_untyped_parameter_file
-from missions.cli import run_command_line
 from tests.clients.sitl_process import free_port, running_sitl
 
 FLOAT = {"px4": "MPC_XY_CRUISE", "ardupilot": "WPNAV_SPEED"}
@@ -30,17 +29,16 @@ class Said:
 
 
 class User:
-    """Somebody at a terminal, with a SITL beside them. The commands run in this process, to be quick."""
+    """Somebody at a terminal, with a SITL beside them."""
 
     def __init__(self, flavour: str, port: int) -> None:
         self.flavour = flavour
         self.url = f"udpin:127.0.0.1:{port}"
 
     def run(self, *words: str) -> Said:
-        out, err = io.StringIO(), io.StringIO()
-        with redirect_stdout(out), redirect_stderr(err):
-            code = run_command_line(["vehicle", *words, "--connect", self.url])
-        return Said(code, out.getvalue(), err.getvalue())
+        command = [sys.executable, "-m", "missions", "vehicle", *words, "--connect", self.url]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=200.0, check=False)
+        return Said(done.returncode, done.stdout, done.stderr)
 
     def json(self, *words: str) -> Any:
         done = self.run(*words, "--json")

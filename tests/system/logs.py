@@ -36,15 +36,17 @@ def counts(path: Path) -> Counter[str]:
     return Counter(DEFINITIONS[frame.message_id].name for _, frame in TlogReader(path))
 
 
+def known_name(name: str) -> str:
+    """A message's name by pymavlink's, which calls what is newer than its dialect UNKNOWN_n."""
+    return DEFINITIONS[int(name.removeprefix(UNKNOWN))].name if name.startswith(UNKNOWN) else name
+
+
 def mavutil_counts(path: Path) -> Counter[str]:
     """Messages by name, as pymavlink's mavutil reads the log."""
     log = mavutil.mavlink_connection(str(path), dialect="all")
     found: Counter[str] = Counter()
     while (message := log.recv_msg()) is not None:
-        name = message.get_type()
-        if name.startswith(UNKNOWN):  # newer than pymavlink's dialect
-            name = DEFINITIONS[int(name.removeprefix(UNKNOWN))].name
-        found[name] += 1
+        found[known_name(message.get_type())] += 1
     log.close()
     return found
 

@@ -8,7 +8,6 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification, compile_flight_code, team
-from autopilot_bridge.sitl.failures import FailureInjector
 from flightsim import truth as t
 from flightsim.airframe import AirframeError, AirframeKind
 
@@ -91,7 +90,7 @@ def test_the_parameters_a_client_reads_are_those_of_the_aircraft() -> None:
 def test_motor_and_servo_failures() -> None:
     sitl = aircraft()
     vehicle = sitl.vehicles[0]
-    inject = FailureInjector(vehicle.vehicle, vehicle.sensors).inject
+    inject = vehicle.failures.inject
     motor, servo = mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_UNIT_SYSTEM_SERVO
     off, stuck, ok = mavlink.FAILURE_TYPE_OFF, mavlink.FAILURE_TYPE_STUCK, mavlink.FAILURE_TYPE_OK
     assert inject(motor, off, 0) is Result.ACCEPTED
@@ -109,7 +108,7 @@ def test_motor_and_servo_failures() -> None:
 def test_a_quadrotors_motor_fails_too() -> None:
     sitl = Sitl(SitlConfiguration())
     vehicle = sitl.vehicles[0]
-    inject = FailureInjector(vehicle.vehicle, vehicle.sensors).inject
+    inject = vehicle.failures.inject
     assert inject(mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_OFF, 3) is Result.ACCEPTED
     assert [vehicle.vehicle.motor_effectiveness(k) for k in range(4)] == [1.0, 1.0, 0.0, 1.0]
     assert inject(mavlink.FAILURE_UNIT_SYSTEM_SERVO, mavlink.FAILURE_TYPE_OFF, 1) is Result.UNSUPPORTED
