@@ -132,7 +132,7 @@ SITL = {
 
 
 def refused(capsys: pytest.CaptureFixture[str], arguments: list[str], exit_code: int = USAGE) -> str:
-    """Run the command line; the one line it says on stderr, without notices (a slow first start, an open link)."""
+    """Run the command line; the one line it says on stderr, without notices (slow start, open link)."""
     assert run_command_line(arguments) == exit_code
     out, err = capsys.readouterr()
     notices = ("starting (", "flightstack: warning: ")
