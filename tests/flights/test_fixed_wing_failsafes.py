@@ -204,7 +204,7 @@ def test_arduplane_radio_lost_for_a_moment() -> None:
     flight.fly(5.0)
     flight.vehicle.autopilot.commander.pilot.radio_failed_since_us = flight.sitl.time_us
     flight.stop_repeating()
-    flight.fly(3.0)
+    flight.fly(4.0)  # RC_OVERRIDE_TIME of them the override still counts
     assert flight.mode == "circle" and status(flight) == CRITICAL
     flight.vehicle.autopilot.commander.pilot.radio_failed_since_us = None
     flight.sticks(roll=0.0, throttle=0.6)

@@ -13,6 +13,7 @@ from pymavlink import mavutil
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.session import RunRequest, fly
+from tests.system.logs import known_name
 
 RADIUS_M = 20.0
 HEIGHT_M = 8.0
@@ -27,7 +28,7 @@ class Recorded:
         self.messages: dict[str, list[Any]] = {}
         log = mavutil.mavlink_connection(str(folder / "flight.tlog"), dialect="all")
         while (message := log.recv_msg()) is not None:
-            name = message.get_type()
+            name = known_name(message.get_type())
             self.counts[name] += 1
             self.messages.setdefault(name, []).append(message)
 

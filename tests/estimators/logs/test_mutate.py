@@ -231,7 +231,7 @@ def test_kinds_and_units_are_those_of_the_simulated_sensors():
     assert {kind.name for kind in FaultType} - {"OK"} <= ours
     assert ours - {kind.name for kind in FaultType} == {"NOISE", "SPIKE", "DROP"}
     known = {unit.name.lower() for unit in SensorUnit}
-    assert set(UNITS) <= known and known - set(UNITS) == {"optical_flow", "vio"}
+    assert set(UNITS) <= known and known - set(UNITS) == {"optical_flow", "vio", "avoidance"}
 
 
 def test_the_flight_has_every_message_once():
