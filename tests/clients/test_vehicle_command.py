@@ -128,6 +128,7 @@ def test_parameters_that_are_not_there(user: User, tmp_path: Path) -> None:
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_doctor(user: User) -> None:
     found = user.json("doctor")
     assert (found["would_arm"], found["problems"]) == (True, 0)
