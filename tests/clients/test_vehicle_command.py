@@ -17,6 +17,7 @@ from tests.clients.sitl_process import free_port, running_sitl
 
 FLOAT = {"px4": "MPC_XY_CRUISE", "ardupilot": "WPNAV_SPEED"}
 INTEGER = {"px4": "NAV_DLL_ACT", "ardupilot": "FS_GCS_ENABLE"}
+BOOT_LOOKS = 10
 
 
 @dataclass
@@ -128,9 +129,12 @@ def test_parameters_that_are_not_there(user: User, tmp_path: Path) -> None:
     assert not any(tmp_path.iterdir())
 
 
-@pytest.mark.slow
 def test_doctor(user: User) -> None:
     found = user.json("doctor")
+    for _ in range(BOOT_LOOKS):  # an ArduPilot has its position 40 s after boot, and the doctor says so
+        if [f["subject"] for f in found["findings"] if f["level"] == "problem"] != ["navigation"]:
+            break
+        found = user.json("doctor")
     assert (found["would_arm"], found["problems"]) == (True, 0)
     subjects = {finding["subject"] for finding in found["findings"]}
     assert subjects >= {
