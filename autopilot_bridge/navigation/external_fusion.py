@@ -1,7 +1,7 @@
 """Measurement updates of external odometry: position, velocity and heading, against the history.
 
-As in `fusion`, a delayed measurement is compared with the past, and its Jacobian carries the past back. The
-heading of r_ned_from_frd with the attitude error theta (NED): with r the rotation matrix,
+Position and velocity are those of `delayed_fusion`. The heading of r_ned_from_frd with the attitude error
+theta (NED): with r the rotation matrix,
     d heading = theta_d - r[2, 0] (r[0, 0] theta_n + r[1, 0] theta_e) / (r[0, 0]^2 + r[1, 0]^2).
 """
 
@@ -12,20 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.covariance import apply_scalar, inject, is_sound
-from autopilot_bridge.navigation.fusion import body_axis_in_ned, velocity_dot, velocity_ph
+from autopilot_bridge.navigation.delayed_fusion import body_axis_in_ned, fuse_position, fuse_velocity
 from autopilot_bridge.navigation.states import (
     ATT,
-    CORRECTION_POS,
-    CORRECTION_VEL,
     DX,
-    GRAVITY,
-    HISTORY_POS,
-    HISTORY_VEL,
     PH,
-    POS,
-    VEL,
-    X_VEL,
-    R,
 )
 from flightsim.kernels import kernel
 
@@ -57,20 +48,6 @@ EXT_HAS_YAW: Final = 8
 EXT_UNSOUND: Final = 32
 
 _LEAST_LEVEL: Final = 1e-3  # horizontal part of the nose, squared, below which there is no heading
-
-
-@kernel
-def place_dot(work: Array, base: int, axis: int, delay: float) -> float:
-    """H times the vector at `base` of `work`, for a position axis."""
-    return work[base + POS + axis] - delay * work[base + VEL + axis]
-
-
-@kernel
-def place_ph(p: Array, work: Array, axis: int, delay: float) -> float:
-    """PH of a position axis; returns H P H^T."""
-    for i in range(p.shape[0]):
-        work[PH + i] = p[i, POS + axis] - delay * p[i, VEL + axis]
-    return place_dot(work, PH, axis, delay)
 
 
 @kernel
@@ -111,67 +88,32 @@ def fuse_heading(p: Array, history: Array, work: Array, obs: Array, row: int) ->
 
 
 @kernel
-def fuse_velocity(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> bool:
-    """The three velocity axes, gated as a whole."""
-    d = obs[EXT_DELAY_S]
-    ux = core[X_VEL] - history[row, HISTORY_VEL] - core[CORRECTION_VEL]
-    uy = core[X_VEL + 1] - history[row, HISTORY_VEL + 1] - core[CORRECTION_VEL + 1]
-    uz = core[X_VEL + 2] - history[row, HISTORY_VEL + 2] - core[CORRECTION_VEL + 2] - core[GRAVITY] * d
-    worst = 0.0
-    for again in range(2):  # gate first, then fuse
-        for a in range(3):
-            un = uy if a == 0 else (uz if a == 1 else ux)
-            ul = uz if a == 0 else (ux if a == 1 else uy)
-            b0, b1, b2 = d * core[R + 3 * a], d * core[R + 3 * a + 1], d * core[R + 3 * a + 2]
-            s = velocity_ph(p, work, a, un, ul, b0, b1, b2) + obs[EXT_VEL_VAR + a]
-            residual = obs[EXT_VEL + a] - history[row, HISTORY_VEL + a] - core[CORRECTION_VEL + a]
-            residual -= velocity_dot(work, DX, a, un, ul, b0, b1, b2)
-            if again == 0:
-                worst = max(worst, abs(residual) / (obs[EXT_GATE_VEL] * math.sqrt(s)))
-            else:
-                apply_scalar(p, work, residual, s)
-        if again == 0:
-            obs[EXT_RATIO_VEL] = worst
-            if not worst <= 1.0:
-                return False
-    return True
-
-
-@kernel
-def fuse_place(
-    p: Array, core: Array, history: Array, work: Array, obs: Array, row: int, first: int, last: int
-) -> bool:
-    """Position axes `first` up to `last`, gated as a whole."""
-    d = obs[EXT_DELAY_S]
-    worst = 0.0
-    for again in range(2):
-        for a in range(first, last):
-            s = place_ph(p, work, a, d) + obs[EXT_POS_VAR + a]
-            residual = obs[EXT_POS + a] - history[row, HISTORY_POS + a] - core[CORRECTION_POS + a]
-            residual -= place_dot(work, DX, a, d)
-            if again == 0:
-                worst = max(worst, abs(residual) / (obs[EXT_GATE_POS] * math.sqrt(s)))
-            else:
-                apply_scalar(p, work, residual, s)
-        if again == 0:
-            obs[EXT_RATIO_POS if first == 0 else EXT_RATIO_HEIGHT] = worst
-            if not worst <= 1.0:
-                return False
-    return True
-
-
-@kernel
 def fuse_external(p: Array, core: Array, history: Array, work: Array, obs: Array, has: int, row: int) -> int:
     """Fuse the parts of one sample that are there (`has`) and inject; returns those that were accepted."""
     accepted = 0
+    delay = obs[EXT_DELAY_S]
     if has & EXT_HAS_YAW and fuse_heading(p, history, work, obs, row):
         accepted |= EXT_HAS_YAW
-    if has & EXT_HAS_VEL and fuse_velocity(p, core, history, work, obs, row):
-        accepted |= EXT_HAS_VEL
-    if has & EXT_HAS_POS and fuse_place(p, core, history, work, obs, row, 0, 2):
-        accepted |= EXT_HAS_POS
-    if has & EXT_HAS_HEIGHT and fuse_place(p, core, history, work, obs, row, 2, 3):
-        accepted |= EXT_HAS_HEIGHT
+    if has & EXT_HAS_VEL:
+        vel, vel_var = obs[EXT_VEL : EXT_VEL + 3], obs[EXT_VEL_VAR : EXT_VEL_VAR + 3]
+        obs[EXT_RATIO_VEL] = fuse_velocity(
+            p, core, history, work, row, vel, vel_var, obs[EXT_GATE_VEL], delay
+        )
+        if obs[EXT_RATIO_VEL] <= 1.0:
+            accepted |= EXT_HAS_VEL
+    pos, pos_var, gate = obs[EXT_POS : EXT_POS + 3], obs[EXT_POS_VAR : EXT_POS_VAR + 3], obs[EXT_GATE_POS]
+    if has & EXT_HAS_POS:
+        obs[EXT_RATIO_POS] = fuse_position(
+            p, core, history, work, row, 0, 2, pos, pos_var, gate, delay, False
+        )
+        if obs[EXT_RATIO_POS] <= 1.0:
+            accepted |= EXT_HAS_POS
+    if has & EXT_HAS_HEIGHT:
+        obs[EXT_RATIO_HEIGHT] = fuse_position(
+            p, core, history, work, row, 2, 3, pos, pos_var, gate, delay, False
+        )
+        if obs[EXT_RATIO_HEIGHT] <= 1.0:
+            accepted |= EXT_HAS_HEIGHT
     if accepted:
         inject(core, work)
     if not is_sound(p, core):

@@ -1,10 +1,7 @@
 """Measurement updates: scalar by scalar, each with its Jacobian written out on the few states it touches.
 
-Delayed measurements are compared with the history at the time they were taken. Their Jacobians refer to the
-present
-errors, so they carry the past back: over a delay d with the specific force integrated to u (NED),
-    p(t - d) error = p error - d * velocity error,
-    v(t - d) error = v error + u x theta + d * R accel_bias error (first order in d).
+Delayed measurements are compared with the history at the time they were taken: see `delayed_fusion`, which
+has the positions and velocities.
 """
 
 import math
@@ -14,20 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.covariance import apply_scalar, inject, is_sound, predict
+from autopilot_bridge.navigation.delayed_fusion import body_axis_in_ned, fuse_position, fuse_velocity
 from autopilot_bridge.navigation.states import (
-    ACCEL_BIAS,
     ATT,
     BARO_OFFSET,
     CORRECTION_POS,
-    CORRECTION_VEL,
     DX,
     EARTH_RATE,
-    GPS_ERROR,
-    GRAVITY,
     GYRO_BIAS,
     HISTORY_POS,
-    HISTORY_Q,
-    HISTORY_VEL,
     MAG_BIAS,
     PH,
     POS,
@@ -35,7 +27,6 @@ from autopilot_bridge.navigation.states import (
     SUM_GYRO_TIME,
     VEL,
     X_BARO_OFFSET,
-    X_GPS_ERROR,
     X_GYRO_BIAS,
     X_MAG_BIAS,
     X_POS,
@@ -99,54 +90,6 @@ def single_ph(p: Array, work: Array, index: int) -> None:
 
 
 @kernel
-def position_dot(work: Array, base: int, axis: int, delay: float) -> float:
-    """H times the vector at `base` of `work`, for a GPS position axis."""
-    return work[base + POS + axis] - delay * work[base + VEL + axis] + work[base + GPS_ERROR + axis]
-
-
-@kernel
-def position_ph(p: Array, work: Array, axis: int, delay: float) -> float:
-    """PH of a GPS position axis; returns H P H^T."""
-    a, b, c = POS + axis, VEL + axis, GPS_ERROR + axis
-    for i in range(p.shape[0]):
-        work[PH + i] = p[i, a] - delay * p[i, b] + p[i, c]
-    return position_dot(work, PH, axis, delay)
-
-
-@kernel
-def velocity_dot(
-    work: Array, base: int, axis: int, u_next: float, u_last: float, b0: float, b1: float, b2: float
-) -> float:
-    """H times the vector at `base`; (u x theta)_axis = u[axis+1] theta[axis+2] - u[axis+2] theta[axis+1]."""
-    return (
-        work[base + VEL + axis]
-        + u_next * work[base + ATT + (axis + 2) % 3]
-        - u_last * work[base + ATT + (axis + 1) % 3]
-        + b0 * work[base + ACCEL_BIAS]
-        + b1 * work[base + ACCEL_BIAS + 1]
-        + b2 * work[base + ACCEL_BIAS + 2]
-    )
-
-
-@kernel
-def velocity_ph(
-    p: Array, work: Array, axis: int, u_next: float, u_last: float, b0: float, b1: float, b2: float
-) -> float:
-    """PH of a GPS velocity axis; returns H P H^T."""
-    a, n, m = VEL + axis, ATT + (axis + 2) % 3, ATT + (axis + 1) % 3
-    for i in range(p.shape[0]):
-        work[PH + i] = (
-            p[i, a]
-            + u_next * p[i, n]
-            - u_last * p[i, m]
-            + b0 * p[i, ACCEL_BIAS]
-            + b1 * p[i, ACCEL_BIAS + 1]
-            + b2 * p[i, ACCEL_BIAS + 2]
-        )
-    return velocity_dot(work, PH, axis, u_next, u_last, b0, b1, b2)
-
-
-@kernel
 def baro_dot(work: Array, base: int, delay: float) -> float:
     """H times the vector at `base`, for the pressure altitude."""
     return -work[base + POS + 2] + delay * work[base + VEL + 2] + work[base + BARO_OFFSET]
@@ -180,68 +123,21 @@ def mag_ph(p: Array, work: Array, axis: int, h0: float, h1: float, h2: float) ->
 
 
 @kernel
-def body_axis_in_ned(history: Array, row: int, axis: int) -> tuple[float, float, float]:
-    """Column `axis` of r_ned_from_frd at a row of the history."""
-    w, x, y, z = (
-        history[row, HISTORY_Q],
-        history[row, HISTORY_Q + 1],
-        history[row, HISTORY_Q + 2],
-        history[row, HISTORY_Q + 3],
-    )
-    if axis == 0:
-        return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
-    if axis == 1:
-        return 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
-    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
-
-
-@kernel
 def fuse_gps(p: Array, core: Array, history: Array, work: Array, obs: Array, row: int) -> int:
     """GPS velocity, horizontal position and height, each gated as a whole."""
     accepted = 0
-    d = obs[GPS_DELAY_S]
-    ux = core[X_VEL] - history[row, HISTORY_VEL] - core[CORRECTION_VEL]
-    uy = core[X_VEL + 1] - history[row, HISTORY_VEL + 1] - core[CORRECTION_VEL + 1]
-    uz = core[X_VEL + 2] - history[row, HISTORY_VEL + 2] - core[CORRECTION_VEL + 2] - core[GRAVITY] * d
-    worst = 0.0
-    for again in range(2):  # gate first, then fuse
-        for a in range(3):
-            un = uy if a == 0 else (uz if a == 1 else ux)
-            ul = uz if a == 0 else (ux if a == 1 else uy)
-            b0, b1, b2 = d * core[R + 3 * a], d * core[R + 3 * a + 1], d * core[R + 3 * a + 2]
-            s = velocity_ph(p, work, a, un, ul, b0, b1, b2) + obs[GPS_VEL_VAR + a]
-            residual = obs[GPS_VEL + a] - history[row, HISTORY_VEL + a] - core[CORRECTION_VEL + a]
-            residual -= velocity_dot(work, DX, a, un, ul, b0, b1, b2)
-            if again == 0:
-                worst = max(worst, abs(residual) / (obs[GATE_GPS_VEL] * math.sqrt(s)))
-            else:
-                apply_scalar(p, work, residual, s)
-        if again == 0:
-            obs[RATIO_VEL] = worst
-            if not worst <= 1.0:
-                break
-            accepted |= ACCEPTED_GPS_VEL
-
-    for height in range(2):
-        axes = range(2, 3) if height == 1 else range(2)
-        worst = 0.0
-        for again in range(2):
-            for a in axes:
-                s = position_ph(p, work, a, d) + obs[GPS_POS_VAR + a]
-                residual = obs[GPS_POS + a] - history[row, HISTORY_POS + a] - core[CORRECTION_POS + a]
-                residual -= core[X_GPS_ERROR + a] + position_dot(work, DX, a, d)
-                if again == 0:
-                    worst = max(worst, abs(residual) / (obs[GATE_GPS] * math.sqrt(s)))
-                else:
-                    apply_scalar(p, work, residual, s)
-            if again == 0:
-                if height == 1:
-                    obs[RATIO_GPS_HEIGHT] = worst
-                else:
-                    obs[RATIO_POS] = worst
-                if not worst <= 1.0:
-                    break
-                accepted |= ACCEPTED_GPS_HEIGHT if height == 1 else ACCEPTED_GPS_POS
+    delay = obs[GPS_DELAY_S]
+    vel, vel_var = obs[GPS_VEL : GPS_VEL + 3], obs[GPS_VEL_VAR : GPS_VEL_VAR + 3]
+    obs[RATIO_VEL] = fuse_velocity(p, core, history, work, row, vel, vel_var, obs[GATE_GPS_VEL], delay)
+    if obs[RATIO_VEL] <= 1.0:
+        accepted |= ACCEPTED_GPS_VEL
+    pos, pos_var, gate = obs[GPS_POS : GPS_POS + 3], obs[GPS_POS_VAR : GPS_POS_VAR + 3], obs[GATE_GPS]
+    obs[RATIO_POS] = fuse_position(p, core, history, work, row, 0, 2, pos, pos_var, gate, delay, True)
+    if obs[RATIO_POS] <= 1.0:
+        accepted |= ACCEPTED_GPS_POS
+    obs[RATIO_GPS_HEIGHT] = fuse_position(p, core, history, work, row, 2, 3, pos, pos_var, gate, delay, True)
+    if obs[RATIO_GPS_HEIGHT] <= 1.0:
+        accepted |= ACCEPTED_GPS_HEIGHT
     return accepted
 
 

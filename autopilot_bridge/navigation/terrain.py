@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from autopilot_bridge.navigation.fusion import body_axis_in_ned
+from autopilot_bridge.navigation.delayed_fusion import body_axis_in_ned
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import CORRECTION_POS, TERRAIN_DOWN, X_POS, X_VEL

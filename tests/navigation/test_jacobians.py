@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from autopilot_bridge.navigation import NavigationParameters, air_fusion, covariance, fusion, mechanisation
+from autopilot_bridge.navigation import (
+    NavigationParameters,
+    air_fusion,
+    covariance,
+    delayed_fusion,
+    fusion,
+    mechanisation,
+)
 from autopilot_bridge.navigation import states as s
 from autopilot_bridge.navigation.solution import process_from
 from flightsim.random_streams import RandomStreams
@@ -124,6 +131,8 @@ def prediction(error: Array, kind: str, axis: int) -> float:
     if kind == "velocity":
         return float(core[s.X_VEL + axis])
     if kind == "position":
+        return float(core[s.X_POS + axis])
+    if kind == "GPS position":
         return float(core[s.X_POS + axis] + core[s.X_GPS_ERROR + axis])
     if kind == "baro":
         return float(-core[s.X_POS + 2] + core[s.X_BARO_OFFSET])
@@ -142,13 +151,13 @@ def analytic_row(kind: str, axis: int, delay_s: float, core: Array, u: Array) ->
     if kind == "velocity":
         r = core[s.R : s.R + 9].reshape(3, 3)
         b = delay_s * r[axis]
-        fusion.velocity_ph(p, work, axis, u[(axis + 1) % 3], u[(axis + 2) % 3], b[0], b[1], b[2])
-    elif kind == "position":
-        fusion.position_ph(p, work, axis, delay_s)
+        delayed_fusion.velocity_ph(p, work, axis, u[(axis + 1) % 3], u[(axis + 2) % 3], b[0], b[1], b[2])
+    elif kind in ("position", "GPS position"):
+        delayed_fusion.position_ph(p, work, axis, delay_s, kind == "GPS position")
     elif kind == "baro":
         fusion.baro_ph(p, work, delay_s)
     else:
-        rx, ry, rz = fusion.body_axis_in_ned(history_row(core), 0, axis)
+        rx, ry, rz = delayed_fusion.body_axis_in_ned(history_row(core), 0, axis)
         mx, my, mz = 0.2, 0.02, 0.43
         fusion.mag_ph(p, work, axis, ry * mz - rz * my, rz * mx - rx * mz, rx * my - ry * mx)
     return work[s.PH :].copy()
@@ -164,7 +173,7 @@ def numerical_row(kind: str, axis: int) -> Array:
     return out
 
 
-@pytest.mark.parametrize("kind", ["velocity", "position", "baro", "mag"])
+@pytest.mark.parametrize("kind", ["velocity", "position", "GPS position", "baro", "mag"])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_measurement(kind: str, axis: int) -> None:
     core = core_with(np.zeros(SIZE))
@@ -172,7 +181,7 @@ def test_measurement(kind: str, axis: int) -> None:
     np.testing.assert_allclose(row, numerical_row(kind, axis), atol=1e-6)
 
 
-@pytest.mark.parametrize("kind", ["velocity", "position", "baro"])
+@pytest.mark.parametrize("kind", ["velocity", "position", "GPS position", "baro"])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_delayed_measurement(kind: str, axis: int) -> None:
     """A measurement of the past refers to the present error through the inverse of the transition since."""
