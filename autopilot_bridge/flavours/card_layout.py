@@ -39,6 +39,7 @@ class CardLayout:
         plans: folder of the stored plans, on the card.
         save_after_s: so long after a change the parameters are stored.
         log_times: when to log, by the parameters; None: not at all.
+        armed_refusal: what is said to who asks for logs of an armed vehicle; empty: it is sent them.
     """
 
     mount: VehiclePath
@@ -49,6 +50,7 @@ class CardLayout:
     plans: VehiclePath
     save_after_s: float
     log_times: Callable[[ParameterStore], LogTimes | None]
+    armed_refusal: str = ""
 
 
 def _px4_log_times(parameters: ParameterStore) -> LogTimes | None:
@@ -94,6 +96,7 @@ CARD_LAYOUTS: Final[Mapping[str, CardLayout]] = MappingProxyType(
             plans=("PLANS",),
             save_after_s=0.0,
             log_times=_ardupilot_log_times,
+            armed_refusal="Disarm for log download",
         ),
     }
 )

@@ -25,6 +25,14 @@ REPLIES_PER_TICK: Final = 40
 _MAX_RANGES: Final = 64
 _MAX_CLIENTS: Final = 16
 _IDLE_US: Final = 60_000_000
+_REQUESTS: Final = frozenset(
+    (
+        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_LIST,
+        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_DATA,
+        mavlink.MAVLINK_MSG_ID_LOG_ERASE,
+        mavlink.MAVLINK_MSG_ID_LOG_REQUEST_END,
+    )
+)
 
 
 @dataclass(slots=True)
@@ -62,16 +70,30 @@ class LogTransferService(Microservice):
     Args:
         book: the logs.
         recording: path of the log that is being written, which is not erased; None: none is.
+        armed: whether the vehicle is armed.
+        armed_refusal: what who asks meanwhile is told, once; empty: logs are sent in flight too.
     """
 
-    def __init__(self, book: LogBook, recording: Callable[[], VehiclePath | None]) -> None:
+    def __init__(
+        self,
+        book: LogBook,
+        recording: Callable[[], VehiclePath | None],
+        armed: Callable[[], bool],
+        armed_refusal: str,
+    ) -> None:
         self._book = book
         self._recording = recording
+        self._armed = armed
+        self._armed_refusal = armed_refusal
+        self._refused = False
         self._logs: list[LogFile] = []  # as they were listed: numbers keep their meaning
         self._downloads: dict[tuple[str, int, int], _Download] = {}
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take the requests of the log protocol."""
+        if message.get_msgId() in _REQUESTS and self._waits:
+            self._refuse(source)
+            return True
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_LIST:
                 self._list(message, self._download(source, time_us))
@@ -87,7 +109,7 @@ class LogTransferService(Microservice):
 
     def tick(self, time_us: int) -> None:
         """Send what was asked for; forget who went away."""
-        if not self._downloads:
+        if not self._downloads or self._waits:
             return
         for key, download in tuple(self._downloads.items()):
             self._continue(download)
@@ -100,8 +122,20 @@ class LogTransferService(Microservice):
         for download in self._downloads.values():
             download.close()
 
+    @property
+    def _waits(self) -> bool:
+        """Nothing is sent while the vehicle is armed; what was under way goes on afterwards."""
+        return bool(self._armed_refusal) and self._armed()
+
+    def _refuse(self, source: Source) -> None:
+        if not self._refused:
+            text = self._armed_refusal.encode()
+            source.channel.send(mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_ERROR, text))
+        self._refused = True
+
     def _download(self, source: Source, time_us: int) -> _Download:
         key = (source.channel.name, source.system_id, source.component_id)
+        self._refused = False
         download = self._downloads.get(key)
         if download is None or download.source.channel is not source.channel:
             if len(self._downloads) >= _MAX_CLIENTS:

@@ -47,7 +47,12 @@ def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
         places["@PARAM",] = _packed_parameters(parts.parameters)
         places["@MISSION",] = plan_files(parts.stores)
     files = FileTransferService(MountTable(places))
-    logs = LogTransferService(book, lambda: None if recorder is None else recorder.path)
+    logs = LogTransferService(
+        book,
+        lambda: None if recorder is None else recorder.path,
+        lambda: parts.commander.armed,
+        layout.armed_refusal,
+    )
     storage = ParameterStorageService(
         memory.stored, parts.parameters, parts.commander, STORAGE_POLICIES[name], layout, parts.announce
     )

@@ -7,11 +7,13 @@ from typing import Final
 from mavsdk.asyncio.plugins.log_files import LogFilesAsync
 from mavsdk.plugins.log_files import Entry, LogFilesError, LogFilesResult
 
+from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError, PlanError
 from missions.vehicle_client.client import VehicleClient
 
 _TRIES: Final = 3
 _HEADS: Final = ((b"ULog\x01\x12\x35", ".ulg"), (b"\xa3\x95", ".bin"))
+_ARMED: Final = "; it is armed: ArduPilot has logs for disarmed vehicles only"
 _HEAD_BYTES: Final = 16
 _TLOG_MAGICS: Final = (0xFE, 0xFD)
 
@@ -23,6 +25,7 @@ class VehicleLogs:
     """
 
     def __init__(self, client: VehicleClient) -> None:
+        self._client = client
         self._system_id = client.system_id
         self._plugin = LogFilesAsync(client.system)
 
@@ -38,7 +41,7 @@ class VehicleLogs:
             if error.result is LogFilesResult.NO_LOGFILES:
                 return []
             raise MissionError(
-                f"vehicle {self._system_id} does not list its logs: {error.result.name.lower()}"
+                f"vehicle {self._system_id} does not list its logs: {error.result.name.lower()}{self._armed}"
             ) from error
         return sorted(found, key=lambda entry: entry.id)
 
@@ -68,8 +71,15 @@ class VehicleLogs:
             part.unlink(missing_ok=True)
             raise MissionError(
                 f"log {entry.id} was not fetched in {_TRIES} attempts: {failure or 'no file came'}"
+                f"{self._armed}"
             )
         return _named(part, entry)
+
+    @property
+    def _armed(self) -> str:
+        """Why nothing came, if it is for that."""
+        base_mode = int(self._client.messages.get("HEARTBEAT", {}).get("base_mode", 0))
+        return _ARMED if base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED else ""
 
     async def erase(self) -> None:
         """Delete all logs of the vehicle.

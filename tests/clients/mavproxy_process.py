@@ -44,19 +44,19 @@ class Mavproxy:
         assert self.process.stdin is not None
         self.process.stdin.write(line + "\n")
 
-    def sees(self, text: str, wait_s: float = WALL_DEADLINE_S) -> None:
-        """Wait for a line that comes after those seen before."""
+    def sees(self, text: str, wait_s: float = WALL_DEADLINE_S) -> str:
+        """Wait for a line that comes after those seen before, and give it."""
         deadline_s = time.monotonic() + wait_s
         while time.monotonic() < deadline_s:
             for index in range(self._seen, len(self.lines)):
                 if text in self.lines[index]:
                     self._seen = index + 1
-                    return
+                    return self.lines[index]
             time.sleep(0.02)
         raise AssertionError(f"no {text!r} after {self.lines[: self._seen][-1:]} in {self.lines}")
 
-    def types_until(self, line: str, text: str, wait_s: float = 1.0) -> None:
-        """Type the same again and again, until there is such a line."""
+    def types_until(self, line: str, text: str, wait_s: float = 1.0) -> str:
+        """Type the same again and again, until there is such a line, and give it."""
         deadline_s = time.monotonic() + WALL_DEADLINE_S
         while time.monotonic() < deadline_s:
             self.type(line)

@@ -12,12 +12,17 @@ import pytest
 
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from autopilot_bridge.parameter_files import read_untyped_parameter_file
+from autopilot_bridge.tlog import TlogReader
+from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
 
 FLOAT = {"px4": "MPC_XY_CRUISE", "ardupilot": "WPNAV_SPEED"}
 INTEGER = {"px4": "NAV_DLL_ACT", "ardupilot": "FS_GCS_ENABLE"}
 BOOT_LOOKS = 10
+SPEEDUP = 5.0
 
 
 @dataclass
@@ -30,11 +35,12 @@ class Said:
 
 
 class User:
-    """Somebody at a terminal, with a SITL beside them."""
+    """Somebody at a terminal, with a SITL beside them; a script flies it over `script_port`."""
 
-    def __init__(self, flavour: str, port: int) -> None:
+    def __init__(self, flavour: str, port: int, script_port: int = 0) -> None:
         self.flavour = flavour
         self.url = f"udpin:127.0.0.1:{port}"
+        self.script_port = script_port
 
     def run(self, *words: str) -> Said:
         command = [sys.executable, "-m", "missions", "vehicle", *words, "--connect", self.url]
@@ -49,9 +55,10 @@ class User:
 
 @pytest.fixture(scope="module", params=["px4", "ardupilot"])
 def user(request: pytest.FixtureRequest) -> Iterator[User]:
-    port = free_port()
-    with running_sitl(request.param, [f"udpout:127.0.0.1:{port}"], speedup=5.0):
-        yield User(request.param, port)
+    port, script_port = free_port(), free_port()
+    links = [f"udpout:127.0.0.1:{number}" for number in (port, script_port)]
+    with running_sitl(request.param, links, speedup=SPEEDUP):
+        yield User(request.param, port, script_port)
 
 
 def test_info(user: User) -> None:
@@ -163,15 +170,40 @@ def test_nobody_there_is_one_line() -> None:
         assert len(done.stderr.splitlines()) == 1
 
 
+def logged_flight(user: User) -> None:
+    """ArduPilot begins its log when it is armed, and has no logs for clients until it is disarmed."""
+    script = Client(user.flavour, f"udpin:127.0.0.1:{user.script_port}", speedup=SPEEDUP)
+    try:
+        script.ready()
+        script.link.mav.param_set_send(1, 1, b"DISARM_DELAY", 0.0, mavlink.MAV_PARAM_TYPE_INT8)
+        script.set_mode("GUIDED")
+        script.arm()
+        refused = user.run("logs", "list", "--timeout", "1")
+        assert refused.returncode == 1
+        assert "it is armed" in refused.stderr
+        script.result(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+        script.next("HEARTBEAT", lambda m: not m.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+    finally:
+        script.link.close()
+
+
 def test_logs_are_fetched_once_and_erased_when_asked_for(user: User, tmp_path: Path) -> None:
-    if not user.json("logs", "list"):  # ArduPilot begins its log when it is armed
+    if user.flavour == "ardupilot":
+        assert user.json("logs", "list") == []
         assert user.run("logs", "download", "--to", str(tmp_path)).returncode == 2
-        return
+        logged_flight(user)
+    first = {"px4": 0, "ardupilot": 1}[user.flavour]
+    assert [log["id"] for log in user.json("logs", "list")] == [first]
     fetched = user.run("logs", "download", "newest", "--to", str(tmp_path))
     assert (fetched.returncode, fetched.stderr) == (0, "")
     (path,) = tmp_path.iterdir()
-    assert path.suffix in (".tlog", ".ulg", ".bin")
+    assert path.suffix == ".tlog"
     assert f"{path.stat().st_size} bytes" in fetched.stdout
+    names = {frame.definition.name for _, frame in TlogReader(path)}
+    assert {"HEARTBEAT", "ATTITUDE", "PARAM_VALUE"} <= names
+    if user.flavour == "ardupilot":  # PX4's goes on until a disarming
+        again = user.json("logs", "download", "all", "--to", str(tmp_path))
+        assert [(log["file"], log["fetched"]) for log in again] == [(str(path), False)]
     wrong = user.run("logs", "download", "99", "--to", str(tmp_path))
     assert wrong.returncode == 2
     assert "accepted: all, newest, or one of" in wrong.stderr
@@ -179,3 +211,5 @@ def test_logs_are_fetched_once_and_erased_when_asked_for(user: User, tmp_path: P
     assert unasked.returncode == 2
     assert "give --yes" in unasked.stderr
     assert user.run("logs", "erase", "--yes").returncode == 0
+    left = {"px4": [first], "ardupilot": []}[user.flavour]  # what is being written stays
+    assert [log["id"] for log in user.json("logs", "list")] == left

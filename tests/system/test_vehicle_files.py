@@ -150,6 +150,36 @@ def test_a_flight_is_logged_listed_and_downloaded(
     assert not exists(memory.files, path)
 
 
+@pytest.mark.parametrize(("flavour", "sent"), [("px4", True), ("ardupilot", False)])
+def test_logs_of_an_armed_vehicle(flavour: str, sent: bool) -> None:
+    """ArduPilot sends none, says so once, and goes on with what was under way when it is disarmed again."""
+    first = 0 if flavour == "px4" else 1
+    client = Client(flavour, card(), {"SDLOG_MODE": 2} if flavour == "px4" else {})
+    client.fly()
+    listing = mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF)
+    client.heard.clear()
+    client.send(listing)
+    client.run(0.1)
+    size = client.all("LOG_ENTRY")[0].size
+    client.send(mavlink.MAVLink_log_request_data_message(1, 1, first, 0, size))
+    assert client.command(ARM, 1) == 0
+    client.run(1.0)
+    assert bool(client.all("LOG_DATA")) is sent
+    client.heard.clear()
+    for _ in range(3):
+        client.send(listing)
+        client.run(0.1)
+    if not sent:
+        client.send(mavlink.MAVLink_log_erase_message(1, 1))
+    assert bool(client.all("LOG_ENTRY")) is sent
+    refusals = [m.severity for m in client.all("STATUSTEXT") if m.text == "Disarm for log download"]
+    assert refusals == [] if sent else [mavlink.MAV_SEVERITY_ERROR]
+    if not sent:
+        assert client.command(ARM, 0) == 0
+        client.run(2.0)
+        assert sum(m.count for m in client.all("LOG_DATA")) > size // 2
+
+
 @pytest.mark.parametrize(("name", "value"), [("SDLOG_MODE", -1), ("SDLOG_MODE", 0)])
 def test_no_log_when_none_is_wanted(name: str, value: float) -> None:
     memory = card()
