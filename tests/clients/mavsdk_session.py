@@ -75,8 +75,8 @@ class Session(ABC):
         """Everything that a method tells until it is done."""
 
     @abstractmethod
-    def cut_short(self, plugin: str, method: str, stop: str) -> str:
-        """Begin a method that tells how it goes, call `stop` at the first word; the result's name."""
+    def cut_short(self, plugin: str, method: str, stop: str, found: Found) -> str:
+        """Begin a method that tells how it goes, call `stop` at the element `found`; the result's name."""
 
     def until(self, what: str, found: Callable[[], bool], wait_s: float = WALL_DEADLINE_S) -> None:
         """Poll a condition."""
@@ -164,14 +164,14 @@ class AsyncioSession(Session):
 
         return list(self._run(everything()))
 
-    def cut_short(self, plugin: str, method: str, stop: str) -> str:
+    def cut_short(self, plugin: str, method: str, stop: str, found: Found) -> str:
         from mavsdk.exceptions import MavsdkError
 
         async def begin() -> str:
             stopped = False
             try:
-                async for _ in getattr(self.plugin(plugin), method)():
-                    if not stopped:
+                async for _, data in getattr(self.plugin(plugin), method)():
+                    if not stopped and found(data):
                         stopped = True
                         await getattr(self.plugin(plugin), stop)()
             except MavsdkError as error:
@@ -248,15 +248,18 @@ class SynchronousSession(Session):
                 assert result.name == "SUCCESS", result
                 return elements
 
-    def cut_short(self, plugin: str, method: str, stop: str) -> str:
-        heard: queue.SimpleQueue[str] = queue.SimpleQueue()
+    def cut_short(self, plugin: str, method: str, stop: str, found: Found) -> str:
+        heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
         owner = self.plugin(plugin)
-        getattr(owner, f"{method}_async")(lambda result, data, _user: heard.put(result.name))
-        heard.get(timeout=WALL_DEADLINE_S)
-        getattr(owner, stop)()
-        while (name := heard.get(timeout=WALL_DEADLINE_S)) == "NEXT":
-            pass
-        return name
+        getattr(owner, f"{method}_async")(lambda result, data, _user: heard.put((result.name, data)))
+        stopped = False
+        while True:
+            name, data = heard.get(timeout=WALL_DEADLINE_S)
+            if name != "NEXT":
+                return str(name)
+            if not stopped and found(data):
+                stopped = True
+                getattr(owner, stop)()
 
     def wait(self, seconds: float) -> None:
         time.sleep(seconds)

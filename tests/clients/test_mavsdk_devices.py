@@ -1,5 +1,7 @@
 """MAVSDK's plugins for what a vehicle is and has, on the ground: both interfaces, every vehicle."""
 
+from typing import Any
+
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -61,8 +63,20 @@ def test_calibration(mavsdk: Session, sitl: PluginSitl, client: str, request: py
 
 @compatibility(feature="calibration")
 def test_calibration_is_cancelled(mavsdk: Session, sitl: PluginSitl) -> None:
-    if sitl.flavour == "px4":
-        assert mavsdk.cut_short("calibration", "calibrate_magnetometer", "cancel") == "CANCELLED"
+    """And what is calibrated next is not disturbed.
+
+    In a pause: MAVSDK 4.1 waits for the acknowledgement of `cancel` under the lock that its reader of texts
+    takes, and hangs for ever when a text comes in between.
+    """
+    if sitl.flavour == "ardupilot":
+        return
+
+    def paused(data: Any) -> bool:
+        return data.has_status_text and "hold vehicle still on a pending side" in data.status_text
+
+    for name in ("magnetometer", "accelerometer"):
+        assert mavsdk.cut_short("calibration", f"calibrate_{name}", "cancel", paused) == "CANCELLED"
+        assert mavsdk.collect("calibration", "calibrate_gyro")[-1][0].name == "SUCCESS"
 
 
 @compatibility(feature="gripper")
