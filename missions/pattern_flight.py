@@ -159,7 +159,7 @@ async def _fly_setpoints(
         waypoints_ned_m=np.zeros((0, 3)),
         acceptance_m=options.acceptance_m,
     )
-    notes.begin("takeoff", clock.time_us)
+    notes.begin("takeoff", clock.stamp_us)
     await vehicle.takeoff(altitude_m)
     notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
     above_home = (0.0, 0.0, -altitude_m)
@@ -167,10 +167,10 @@ async def _fly_setpoints(
     last = setpoint_at(trajectory.at(trajectory.duration_s), centre)
     assert first.position_ned_m is not None and last.position_ned_m is not None
     async with vehicle.guided(options.rate_hz) as guided:
-        notes.begin("transit", clock.time_us)
+        notes.begin("transit", clock.stamp_us)
         await _fly_line(vehicle, guided, above_home, first.position_ned_m, limits)
         await _turn(vehicle, guided, first.position_ned_m, first.yaw_rad or 0.0, limits)
-        notes.begin(PATTERN, clock.time_us)
+        notes.begin(PATTERN, clock.stamp_us)
         duration_s = trajectory.duration_s
 
         def source(t: float) -> Setpoint | None:
@@ -178,10 +178,10 @@ async def _fly_setpoints(
             return setpoint_at(trajectory.at(t), centre) if t <= duration_s else None
 
         await guided.follow(source)
-        notes.begin("return", clock.time_us)
+        notes.begin("return", clock.stamp_us)
         await _fly_line(vehicle, guided, last.position_ned_m, above_home, limits)
     await vehicle.land()
-    notes.end(clock.time_us)
+    notes.end(clock.stamp_us)
 
 
 async def _fly_line(
@@ -328,15 +328,15 @@ async def _fly_waypoints(
         waypoints_ned_m=np.array([(n, e, down_m) for n, e in points]) + offset,
         acceptance_m=acceptance_m,
     )
-    notes.begin("upload", clock.time_us)
+    notes.begin("upload", clock.stamp_us)
     start = await vehicle.upload_mission(plan.items)
     first, last = start + plan.first, start + plan.last
-    notes.begin("takeoff", clock.time_us)
+    notes.begin("takeoff", clock.stamp_us)
     await vehicle.start_mission()
     route_m = float(np.linalg.norm(np.diff(notes.commanded.points_ned_m, axis=0), axis=1).sum())
     reach_m = float(np.linalg.norm(notes.commanded.points_ned_m, axis=1).max())
     await vehicle.wait_item_reached(first, 60.0 + 3.0 * options.own_altitude_m + reach_m)
-    notes.begin(PATTERN, clock.time_us)
+    notes.begin(PATTERN, clock.stamp_us)
 
     def progress(done: int) -> None:
         notes.progress = min(1.0, max(0.0, (done - first) / max(1, last - first)))
@@ -350,9 +350,9 @@ async def _fly_waypoints(
         if options.search_time_s is None:
             raise
         await vehicle.return_to_launch(wait=False)  # the search time is over
-    notes.begin("return", clock.time_us)
+    notes.begin("return", clock.stamp_us)
     await vehicle.wait_disarmed(300.0 + 2.0 * reach_m)
-    notes.end(clock.time_us)
+    notes.end(clock.stamp_us)
 
 
 def _flat_path(curve: Curve, length_m: float | None, down_m: float) -> Array:

@@ -202,7 +202,9 @@ async def _fly(
             await _fly_all(mission, flight.vehicles, request)
         finally:
             for vehicle in flight.vehicles:
-                vehicle.notes.end(vehicle.clock.time_us)
+                vehicle.notes.end(vehicle.clock.stamp_us)
+            if request.connect:
+                flight.started_us = flight.vehicles[0].first_heard_us
             reporter.cancel()
             await asyncio.gather(reporter, return_exceptions=True)
 
@@ -227,8 +229,6 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
     vehicle.notes.autopilot = vehicle.autopilot
     vehicle.notes.kind = str(vehicle.kind)
     if request.connect:
-        if vehicle is flight.vehicles[0]:
-            flight.started_us = vehicle.clock.time_us
         await vehicle.set_parameters(request.parameters)
     await vehicle.wait_ready()
 
@@ -263,7 +263,7 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
 
 
 async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request: RunRequest) -> None:
-    vehicle.notes.begin("flight", vehicle.clock.time_us)  # until the mission names a phase of its own
+    vehicle.notes.begin("flight", vehicle.clock.stamp_us)  # until the mission names a phase of its own
     async with vehicle.safe_on_exit(request.on_failure):
         await flying
         if vehicle.armed:

@@ -13,6 +13,14 @@ class Clock(Protocol):
         """Microseconds since the vehicle booted; never runs backwards."""
         ...
 
+    @property
+    def stamp_us(self) -> int:
+        """What the vehicle would stamp a message with now, microseconds: to be compared with time stamps.
+
+        The same as `time_us`, but for vehicles that booted after the clock began, boot anew or stand still.
+        """
+        ...
+
     async def sleep_until(self, time_us: int) -> None:
         """Wait until the vehicle's time has come; a time in the past only yields to other tasks."""
         ...
@@ -35,6 +43,11 @@ class LoopClock:
     def time_us(self) -> int:
         """Microseconds of the loop's time."""
         return round(asyncio.get_running_loop().time() * 1e6)
+
+    @property
+    def stamp_us(self) -> int:
+        """The same: the loop's time is the vehicle's."""
+        return self.time_us
 
     async def sleep_until(self, time_us: int) -> None:
         """Wait until the loop's time has come."""

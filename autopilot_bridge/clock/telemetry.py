@@ -21,11 +21,12 @@ _MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are looked at ag
 class TelemetryClock:
     """Vehicle time, carried on between messages at the rate (speed factor) seen lately.
 
-    `time_us` follows the vehicle's own time since boot. It never runs backwards: when the vehicle reboots,
-    or comes back from a pause during which deadlines went on, time continues from where it was. Messages that
-    waited while this process was busy are no pause: time stands until they have been read. When nothing
-    is heard, time goes on at the last rate, so that deadlines expire on a dead link too. The first
-    observation sets the time; waits begun before keep what they had left.
+    `time_us` follows the vehicle's own time since boot. The first observation sets it, and waits begun before
+    keep what they had left. From then on it never runs backwards: when the vehicle reboots, or comes back
+    from a pause during which deadlines went on, time continues from where it was, and differs from what
+    messages are stamped with (`stamp_us`). Messages that waited while this process was busy are no pause:
+    time stands until they have been read. When nothing is heard, time goes on at the last rate, so that
+    deadlines expire on a dead link too.
 
     Args:
         monotonic: wall clock in seconds.
@@ -66,9 +67,18 @@ class TelemetryClock:
     @property
     def time_us(self) -> int:
         """Vehicle time now; never runs backwards."""
-        elapsed_us = (self._monotonic() - self._wall_s) * 1e6 * self._rate
-        self._reported_us = max(self._reported_us, math.floor(self._base_us + elapsed_us))
+        self._reported_us = max(self._reported_us, math.floor(self._base_us + self._since_us))
         return self._reported_us
+
+    @property
+    def stamp_us(self) -> int:
+        """The vehicle's own time now; runs backwards when it boots anew, or stands still and goes on."""
+        return math.floor(self._base_us - self._offset_us + self._since_us)
+
+    @property
+    def _since_us(self) -> float:
+        """Vehicle time since the newest observation."""
+        return (self._monotonic() - self._wall_s) * 1e6 * self._rate
 
     def observe(self, vehicle_time_us: int) -> None:
         """Take the timestamp of a message that arrived just now."""
@@ -138,12 +148,9 @@ class TelemetryClock:
                 self._remove_deadline(deadline)
 
     def _set_first(self, vehicle_time_us: int, now_us: int) -> None:
-        if vehicle_time_us >= now_us:
-            for deadline in self._deadlines:
-                deadline.time_us += vehicle_time_us - now_us
-            self._reported_us = vehicle_time_us
-        else:  # the vehicle booted after us
-            self._offset_us = now_us - vehicle_time_us
+        for deadline in self._deadlines:
+            deadline.time_us += vehicle_time_us - now_us
+        self._reported_us = vehicle_time_us
 
     def _update_rate(self, wall_s: float, vehicle_us: int) -> None:
         history = self._history

@@ -98,7 +98,7 @@ class SearchTeam:
         self._traffic = Traffic([own.own_altitude_m for own in options])
         # vehicles elsewhere booted at different times: the first one's clock is the team's
         now_us = self._vehicles[0].clock.time_us
-        self._offsets_us = [now_us - vehicle.clock.time_us for vehicle in self._vehicles]
+        self._offsets_us = [now_us - vehicle.clock.stamp_us for vehicle in self._vehicles]
 
     @property
     def over(self) -> bool:
@@ -115,14 +115,14 @@ class SearchTeam:
     async def _fly_one(self, index: int) -> None:
         vehicle, own, traffic = self._vehicles[index], self._options[index], self._traffic
         notes, clock = vehicle.notes, vehicle.clock
-        notes.begin("checks", clock.time_us)
+        notes.begin("checks", clock.stamp_us)
         await self._check(vehicle, own)
         traffic.checked(index)
         await self._wait(vehicle, lambda: traffic.may_rise(index), "the layers above to be taken", _TAKEOFF_S)
-        notes.begin("takeoff", clock.time_us)
+        notes.begin("takeoff", clock.stamp_us)
         await vehicle.takeoff(own.own_altitude_m)
         traffic.risen(index)
-        notes.begin(SEARCH, clock.time_us)
+        notes.begin(SEARCH, clock.stamp_us)
         if not self.over:
             speed_m_s = own.speed_m_s or 0.0
             async with steering(
@@ -130,7 +130,7 @@ class SearchTeam:
             ) as flight:
                 await self._search(index, flight)
         self.search.leave(index)
-        notes.begin("return", clock.time_us)
+        notes.begin("return", clock.stamp_us)
         if not traffic.may_land(index):
             await vehicle.hold()
             await self._wait(
@@ -145,7 +145,7 @@ class SearchTeam:
         else:
             await vehicle.return_to_launch(timeout_s=_LANDING_S)
         traffic.down(index)
-        notes.end(clock.time_us)
+        notes.end(clock.stamp_us)
 
     async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
         """What can only be refused when the vehicle is heard, and still stands on the ground."""

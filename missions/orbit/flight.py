@@ -70,8 +70,13 @@ class OrbitFlight:
     def _now_us(self) -> int:
         return self._vehicle.clock.time_us
 
+    @property
+    def _stamp_us(self) -> int:
+        """Now, as images and attitudes are stamped: the tracker's time."""
+        return self._vehicle.clock.stamp_us
+
     def _begin(self, phase: str) -> None:
-        self._vehicle.notes.begin(phase, self._now_us)
+        self._vehicle.notes.begin(phase, self._stamp_us)
 
     async def fly(self) -> None:
         """From the ground back to the ground.
@@ -108,7 +113,7 @@ class OrbitFlight:
                 stop()
         self._begin("landing")
         await vehicle.land_along()
-        vehicle.notes.end(self._now_us)
+        vehicle.notes.end(self._stamp_us)
 
     # the target
 
@@ -161,7 +166,7 @@ class OrbitFlight:
         height_m, airspeed_m_s = pilot.height_m, pilot.airspeed_true_m_s
         if not (math.isfinite(height_m) and math.isfinite(airspeed_m_s)):
             return
-        now_us = self._now_us
+        now_us = self._stamp_us
         tracker.height(height_m - self._options.target_ground_m)
         if self._with_gps and tracker.status is not TargetStatus.SEEN:
             self._believe(now_us, airspeed_m_s)
@@ -176,7 +181,7 @@ class OrbitFlight:
         attitude = self._vehicle.latest(telemetry.Attitude)
         if p is None or attitude is None:
             return
-        (north_m, east_m), (vn, ve) = self._target_ne(now_us)
+        (north_m, east_m), (vn, ve) = self._target_ne(self._now_us)
         frame = LocalFrame(self._vehicle.home)
         own_north_m, own_east_m, _ = frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
         wind_n = p.vel_ned_m_s[0] - airspeed_m_s * math.cos(attitude.yaw_rad)
@@ -331,15 +336,16 @@ class OrbitFlight:
         now_us, options, tracker = self._now_us, self._options, self._tracker
         attitude = self._told_attitude()
         assert self._pilot is not None
-        unseen_s = tracker.unseen_s(now_us)
+        stamp_us = self._stamp_us
+        unseen_s = tracker.unseen_s(stamp_us)
         if min(unseen_s, (now_us - entered_us) * 1e-6) > options.lost_limit_s:
             seen = "never seen" if math.isinf(unseen_s) else f"lost {unseen_s:.0f} s ago"
             raise MissionError(f"the target was {seen}; {self._vehicle.heard()}")
         # Without inertial messages nothing is seen either, and the flight ends by `lost_limit_s`; until then
         # the autopilot's roll is better than an old one.
-        filtered_rad = None if self._filter is None else self._filter.roll_rad(now_us)
+        filtered_rad = None if self._filter is None else self._filter.roll_rad(stamp_us)
         roll_rad = attitude.roll_rad if filtered_rad is None else filtered_rad
-        command = self._guidance.command(tracker.state(now_us), attitude.yaw_rad, roll_rad)
+        command = self._guidance.command(tracker.state(stamp_us), attitude.yaw_rad, roll_rad)
         self._command = command
         self._note(command, now_us, entered_us)
         return self._pilot.setpoint(now_us, command.roll_rad)
@@ -391,7 +397,7 @@ class OrbitFlight:
                 "without using it, "
                 "or allow it (PX4: SYS_FAILURE_EN 1)"
             ) from error
-        vehicle.notes.marks["gps_lost_at_s"] = self._now_us * 1e-6
+        vehicle.notes.marks["gps_lost_at_s"] = self._stamp_us * 1e-6
 
     async def _regain_gps(self) -> None:
         """GPS on, and wait for a fix (which it may have had all the time)."""
@@ -407,7 +413,7 @@ class OrbitFlight:
         if "gps_lost_at_s" not in notes.marks:
             return
         await vehicle.command(dialect.MAV_CMD_INJECT_FAILURE, float(_GPS), float(_SOUND), 0.0)
-        notes.marks["gps_back_at_s"] = self._now_us * 1e-6
+        notes.marks["gps_back_at_s"] = self._stamp_us * 1e-6
 
 
 def _raise_if_ended(task: "asyncio.Task[None]") -> None:

@@ -64,7 +64,7 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
             waypoints_ned_m=np.array([stop.position_ned_m for stop in stops]),
             acceptance_m=await _acceptance_m(vehicle, document, stops),
         )
-    notes.begin("upload", clock.time_us)
+    notes.begin("upload", clock.stamp_us)
     vehicle.note_runway()
     if document.fence:
         await vehicle.upload_plan(MissionType.FENCE, document.fence)
@@ -72,7 +72,7 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
         await vehicle.upload_plan(MissionType.RALLY, document.rally)
     items = placed(document.items, home, vehicle.adapter.unset)
     first = await vehicle.upload_mission(items)
-    notes.begin("takeoff", clock.time_us)
+    notes.begin("takeoff", clock.stamp_us)
     watch = MissionWatch(vehicle, document, route, stops, first)
     expected_s = route.duration_s(own_speed_m_s(document, vehicle.kind))
     tallest_m = max((-stop.position_ned_m[2] for stop in route.stops), default=0.0)
@@ -84,14 +84,14 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
         if options.time_limit_s is None:
             raise
         ended = False
-    notes.begin("return", clock.time_us)
+    notes.begin("return", clock.stamp_us)
     if not (ended and document.lands):
         if options.then is Then.LAND:
             await (vehicle.land_along(wait=False) if wings else vehicle.land(wait=False))
         else:
             await vehicle.return_to_launch(wait=False)
     await vehicle.wait_disarmed(_LANDING_S + 2.0 * expected_s)
-    notes.end(clock.time_us)
+    notes.end(clock.stamp_us)
 
 
 async def _acceptance_m(vehicle: Vehicle, document: MissionDocument, stops: tuple[Stop, ...]) -> float:

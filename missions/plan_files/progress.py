@@ -118,15 +118,15 @@ class MissionWatch:
         again = bool(notes.reached) and notes.reached[-1][0] == index  # PX4 repeats each for ten seconds
         if again or (not self._jumps and index <= self._highest):
             return
-        notes.reached.append((index, clock.time_us))
+        notes.reached.append((index, clock.stamp_us))
         self._highest = max(self._highest, index)
         notes.progress = min(1.0, (index + 1) / len(items))
         ahead = (k for k in range(self._done, len(self._stops)) if self._stops[k].index == index)
         self._done = next(ahead, self._done - 1) + 1  # messages may have been lost: places between are done
         if index == self._scored_from and notes.current == "takeoff":
-            notes.begin(self._phase, clock.time_us)
+            notes.begin(self._phase, clock.stamp_us)
         if self._flown and notes.current == self._phase:
-            notes.begin("return", clock.time_us)
+            notes.begin("return", clock.stamp_us)
 
     def _heartbeat(self, message: Any) -> bool:
         vehicle = self._vehicle

@@ -10,7 +10,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
-from autopilot_bridge.clock import Clock
+from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, decode, dialect, enum_name
 from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
@@ -56,7 +56,7 @@ class VehicleView:
         connection: as given.
         notes: where a mission notes its phases, its progress and what it commands, for the run's summary.
         status_texts: the newest texts from the autopilot, oldest first.
-        first_heard_us: vehicle time of the first heartbeat.
+        first_heard_us: vehicle time of the first heartbeat that came when that time was known.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -70,6 +70,7 @@ class VehicleView:
         self._heard_us: int | None = None
         self._sound: dict[type, tuple[Any, int]] = {}  # newest telemetry of use, and when it was looked at
         self.first_heard_us = 0
+        self._timed = False  # whether that was a time of the vehicle's
         self._assembler = StatusTextAssembler()
         self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
         self._watch.on_lost = self._link_lost
@@ -123,7 +124,10 @@ class VehicleView:
             self._adapter = ADAPTERS[firmware, kind]()
             self._system_id = frame.system_id
             self.connection.keep(frame.system_id)
-            self.first_heard_us = self.clock.time_us
+        if not self._timed:
+            clock = self.clock
+            self._timed = not isinstance(clock, TelemetryClock) or clock.vehicle_time_us is not None
+            self.first_heard_us = clock.time_us
         self._heard_us = self.clock.time_us
         self._watch.on_heartbeat()
 

@@ -51,7 +51,7 @@ class PlaceOnPath:
         if not vehicle.armed:
             raise MissionError(f"the vehicle disarmed before the pattern was flown; {vehicle.heard()}")
         north, east, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
-        late_s = min(_OLDEST_S, max(0.0, (vehicle.clock.time_us - p.time_us) * 1e-6))
+        late_s = min(_OLDEST_S, max(0.0, (vehicle.clock.stamp_us - p.time_us) * 1e-6))
         self.vel_north_m_s, self.vel_east_m_s = p.vel_ned_m_s[0], p.vel_ned_m_s[1]
         self.north_m = north + late_s * self.vel_north_m_s
         self.east_m = east + late_s * self.vel_east_m_s

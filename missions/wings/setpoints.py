@@ -28,10 +28,10 @@ async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     notes, clock, options = vehicle.notes, vehicle.clock, flight.options
     notes.commanded = flight.commanded(vehicle, [], options.acceptance_m)
     gains = await _gains(vehicle, flight)
-    notes.begin("takeoff", clock.time_us)
+    notes.begin("takeoff", clock.stamp_us)
     await vehicle.takeoff(options.own_altitude_m)
     notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
-    notes.begin("transit", clock.time_us)
+    notes.begin("transit", clock.stamp_us)
     await _to_the_start(vehicle, flight)
     stream = _Stream(vehicle, flight, gains)
     if vehicle.adapter.roll_alone:
@@ -40,7 +40,7 @@ async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     else:
         await vehicle.follow(stream.point, options.rate_hz)
     await vehicle.land_along(flight.approach(vehicle))
-    notes.end(clock.time_us)
+    notes.end(clock.stamp_us)
 
 
 async def _to_the_start(vehicle: Vehicle, flight: PatternFlight) -> None:
@@ -98,11 +98,11 @@ class _Stream:
         if place.arc_m < 0.0:
             return True
         if notes.current != PATTERN:
-            notes.begin(PATTERN, self._vehicle.clock.time_us)
+            notes.begin(PATTERN, self._vehicle.clock.stamp_us)
         notes.progress = min(1.0, place.arc_m / length_m)
         if place.arc_m < length_m:
             return True
-        notes.begin("return", self._vehicle.clock.time_us)
+        notes.begin("return", self._vehicle.clock.stamp_us)
         return False
 
     def point(self, _time_s: float) -> AnySetpoint | None:

@@ -61,17 +61,17 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     plan = mission_items(vehicle, flight)
     first, last = plan.first, plan.last
     notes.commanded = flight.commanded(vehicle, plan.waypoints, acceptance_m)
-    notes.begin("upload", clock.time_us)
+    notes.begin("upload", clock.stamp_us)
     start = await vehicle.upload_mission(plan.items)
-    notes.begin("takeoff", clock.time_us)
+    notes.begin("takeoff", clock.stamp_us)
     await vehicle.start_mission()
     place = PlaceOnPath(vehicle, flight.route, -options.speed_m_s)
     await vehicle.wait_item_reached(start + first - 1, 180.0 + 2.0 * options.own_altitude_m + flight.away_s)
-    notes.begin("transit", clock.time_us)
+    notes.begin("transit", clock.stamp_us)
     lead_s = -float(flight.route.arc_m[0]) / flight.slow_m_s
     await vehicle.wait_item_reached(start + first, 60.0 + lead_s)
     await _passed(vehicle, place, 0.0)
-    notes.begin(PATTERN, clock.time_us)
+    notes.begin(PATTERN, clock.stamp_us)
 
     def progress(done: int) -> None:
         place.update()
@@ -88,9 +88,9 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
         if options.search_time_s is None:
             raise
         await vehicle.land_along(flight.approach(vehicle), wait=False)  # the search time is over
-    notes.begin("return", clock.time_us)
+    notes.begin("return", clock.stamp_us)
     await vehicle.wait_disarmed(600.0 + 2.0 * flight.away_s)
-    notes.end(clock.time_us)
+    notes.end(clock.stamp_us)
 
 
 def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:

@@ -133,6 +133,23 @@ def test_the_first_message_sets_the_time_and_leaves_waits_what_they_had():
     telemetry_run(main)
 
 
+def test_a_vehicle_that_boots_after_us_sets_the_time_too():
+    """Who waits for a vehicle to be switched on is not ahead of it ever after."""
+
+    async def main(clock, world):
+        waiting = asyncio.create_task(clock.sleep(30.0))
+        await asyncio.sleep(20.0)
+        assert clock.time_us == clock.stamp_us == pytest.approx(20_000_000, abs=10_000)
+        telling = asyncio.create_task(stream(clock, world, start_us=1_200_000, rate=1.0))
+        await asyncio.sleep(1.0)
+        assert clock.time_us == clock.stamp_us == pytest.approx(2_200_000, abs=10_000)
+        await waiting
+        assert world.now_us == pytest.approx(30_000_000, abs=20_000)
+        telling.cancel()
+
+    telemetry_run(main)
+
+
 def test_a_reboot_does_not_stop_the_clock():
     async def main(clock, world):
         telling = asyncio.create_task(stream(clock, world, start_us=900_000_000, rate=1.0))
@@ -145,6 +162,7 @@ def test_a_reboot_does_not_stop_the_clock():
         assert clock.reboots == 1
         assert clock.time_us == pytest.approx(before_us + 3_000_000, abs=20_000)
         assert clock.vehicle_time_us == pytest.approx(3_100_000, abs=110_000)
+        assert clock.stamp_us == pytest.approx(3_100_000, abs=20_000)
         telling.cancel()
 
     telemetry_run(main)
@@ -160,6 +178,7 @@ def test_a_vehicle_that_stood_still_goes_on_with_the_clock():
         telling = asyncio.create_task(stream(clock, world, start_us=15_000_000, rate=1.0))
         await asyncio.sleep(1.0)
         assert clock.time_us == pytest.approx(before_us + 1_000_000, abs=20_000)
+        assert clock.stamp_us == pytest.approx(16_000_000, abs=20_000)  # what its messages say
         assert clock.reboots == 0
         telling.cancel()
 
