@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import external_fusion as e
+from autopilot_bridge.navigation.clocks import Clocks
 from autopilot_bridge.navigation.external import (
     POSITION_M,
     Q_LOCAL_FROM_FRD,
@@ -26,7 +27,6 @@ from autopilot_bridge.navigation.external import (
 from autopilot_bridge.navigation.external_heading import ExternalHeading
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.navigation.health import NavigationHealth
-from autopilot_bridge.navigation.report import Clocks
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
 from autopilot_bridge.navigation.standby import Standby
 from autopilot_bridge.navigation.states import GYRO, HISTORY_Q, X_GYRO_BIAS
@@ -99,11 +99,10 @@ class ExternalAiding:
         self._gap: Array = np.zeros(3)
         self.counts = ExternalCounts()
         self.heading = ExternalHeading(solution=solution, health=health, obs=self._obs)
-        self.restart(clocks)
+        self.restart()
 
-    def restart(self, clocks: Clocks) -> None:
+    def restart(self) -> None:
         """The filter aligns anew: nothing of the sender is known."""
-        self._clocks = clocks
         self._queue.clear()
         self._last = b""
         self._equal = self._coherent = 0

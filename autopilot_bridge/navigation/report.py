@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.clocks import Clocks
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
@@ -13,41 +14,6 @@ _IN_USE_US: Final = 1_000_000
 _MAX_TILT_SIGMA_RAD: Final = math.radians(10.0)
 _STILL_M_S: Final = 0.5
 _REFUSED_US: Final = 1_000_000  # both height sensors refused for this long: the accelerometer is suspected
-
-
-class Clocks:
-    """Times of the last accepted updates, microseconds since boot; -1 for never."""
-
-    __slots__ = (
-        "aligned_us",
-        "baro_us",
-        "gps_height_refused_us",
-        "gps_height_us",
-        "gps_judged_us",
-        "gps_position_us",
-        "gps_us",
-        "gps_velocity_us",
-        "height_held",
-        "height_us",
-        "horizontal_aid_us",
-        "mag_refused_us",
-        "mag_us",
-    )
-
-    def __init__(self) -> None:
-        self.aligned_us = -1
-        self.baro_us = -1
-        self.gps_height_us = -1
-        self.gps_height_refused_us = -1
-        self.gps_judged_us = -1
-        self.gps_position_us = -1
-        self.gps_us = -1
-        self.gps_velocity_us = -1
-        self.height_us = -1
-        self.horizontal_aid_us = -1
-        self.mag_us = -1
-        self.mag_refused_us = -1
-        self.height_held = False
 
 
 def report(

@@ -8,9 +8,9 @@ import math
 from typing import Final
 
 from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.clocks import Clocks
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
-from autopilot_bridge.navigation.report import Clocks
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import (
     GYRO_BIAS,
@@ -35,6 +35,7 @@ class Standby:
 
     __slots__ = (
         "_adrift",
+        "_clocks",
         "_health",
         "_rested",
         "_solution",
@@ -43,9 +44,10 @@ class Standby:
         "held",
     )
 
-    def __init__(self, solution: Solution, health: NavigationHealth) -> None:
+    def __init__(self, solution: Solution, health: NavigationHealth, clocks: Clocks) -> None:
         self._solution = solution
         self._health = health
+        self._clocks = clocks
         self.restart()
 
     def restart(self) -> None:
@@ -63,7 +65,6 @@ class Standby:
     def prepare(
         self,
         parameters: NavigationParameters,
-        clocks: Clocks,
         time_us: int,
         *,
         at_rest: bool,
@@ -76,7 +77,7 @@ class Standby:
             at_rest: the vehicle stands on the ground.
             winged, flying: it is a fixed wing, and in flight.
         """
-        p, solution, obs = parameters, self._solution, self._solution.obs
+        p, solution, obs, clocks = parameters, self._solution, self._solution.obs, self._clocks
         has = 0
         if at_rest:
             if self._rested and not self._is_turned(parameters, time_us):
@@ -84,18 +85,18 @@ class Standby:
             else:
                 f.restart_mean_rate(solution.core)
                 if self.held and not self._rested:
-                    self._forget_velocity(clocks)
+                    self._forget_velocity()
         self._rested = at_rest
         lost = clocks.horizontal_aid_us < 0 or time_us - clocks.horizontal_aid_us > p.no_aid_timeout_s * 1e6
         if lost and not self.held:
-            self._hold(clocks, flying=flying)
+            self._hold(flying=flying)
         may_leave = clocks.horizontal_aid_us >= 0 or winged  # a launch must not be held back
         sigma = p.no_aid_noise_m if may_leave and not at_rest else p.at_rest_noise_m
         if self.held and flying:
             self._adrift = True
         elif self.held:
             if self._adrift:
-                self._hold(clocks, flying=False)
+                self._hold(flying=False)
             obs[f.HOLD_VAR] = sigma * sigma
             has |= f.HAS_HOLD
         if time_us - clocks.height_us > p.height_timeout_s * 1e6:
@@ -131,19 +132,19 @@ class Standby:
             self._turn_rad_s = (rate[0], rate[1], rate[2])
         return time_us - self._turning_since_us < _STEADY_US
 
-    def _hold(self, clocks: Clocks, *, flying: bool) -> None:
+    def _hold(self, *, flying: bool) -> None:
         """From now on the position is held where it is, and the velocity taken as about zero."""
         solution, core = self._solution, self._solution.core
         solution.obs[f.HOLD : f.HOLD + 2] = core[X_POS : X_POS + 2]
         self.held = True
         self._adrift = flying
         if not flying:
-            self._forget_velocity(clocks)
+            self._forget_velocity()
 
-    def _forget_velocity(self, clocks: Clocks) -> None:
+    def _forget_velocity(self) -> None:
         """About zero is the best guess of a horizontal velocity that nothing has measured lately."""
         solution, core = self._solution, self._solution.core
-        if clocks.horizontal_aid_us >= 0:
+        if self._clocks.horizontal_aid_us >= 0:
             north, east = float(core[X_VEL]), float(core[X_VEL + 1])
             solution.change_velocity(-north, -east, sigma_m_s=_HELD_VELOCITY_M_S)
             self._health.velocity_resets += 1

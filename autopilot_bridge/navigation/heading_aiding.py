@@ -1,0 +1,145 @@
+"""The heading: by the magnetometer, and turned where the field or the flight says that it was wrong."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.geodesy import GeodeticPosition
+from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.alignment import magnetic_heading_rad
+from autopilot_bridge.navigation.clocks import Clocks
+from autopilot_bridge.navigation.heading_check import HeadingCheck
+from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from autopilot_bridge.navigation.solution import Solution
+from autopilot_bridge.navigation.states import R
+from flightsim.interface import SensorReadings
+from flightsim.magnetics import magnetic_field_ned_gauss
+
+Array = NDArray[np.float64]
+
+
+class HeadingAiding:
+    """Prepares magnetometer updates of a `Solution`, and turns its yaw."""
+
+    __slots__ = (
+        "_check",
+        "_clocks",
+        "_field_ned_gauss",
+        "_health",
+        "_parameters",
+        "_readings",
+        "_solution",
+    )
+
+    def __init__(
+        self,
+        parameters: NavigationParameters,
+        *,
+        readings: SensorReadings,
+        solution: Solution,
+        health: NavigationHealth,
+        clocks: Clocks,
+    ) -> None:
+        self._parameters = parameters
+        self._readings = readings
+        self._solution = solution
+        self._health = health
+        self._clocks = clocks
+        self._check = HeadingCheck()
+        self._field_ned_gauss: Array | None = None
+        if parameters.mag_ned_gauss is not None:
+            self._field_ned_gauss = np.array(parameters.mag_ned_gauss)
+
+    def restart(self) -> None:
+        """As at boot, but for the field of the place."""
+        self._check.restart()
+        if self._field_ned_gauss is not None:
+            self._solution.obs[f.MAG_NED : f.MAG_NED + 3] = self._field_ned_gauss
+
+    def set_parameters(self, parameters: NavigationParameters) -> None:
+        """New tuning for the samples to come."""
+        self._parameters = parameters
+
+    def set_place(self, origin: GeodeticPosition) -> None:
+        """The field is that of this place, unless it was given."""
+        p, obs = self._parameters, self._solution.obs
+        if p.mag_ned_gauss is not None:
+            return
+        field = magnetic_field_ned_gauss(origin.lat_deg, origin.lon_deg, origin.alt_m, p.magnetic_year)
+        self._field_ned_gauss = field
+        before = math.atan2(obs[f.MAG_NED + 1], obs[f.MAG_NED])
+        obs[f.MAG_NED : f.MAG_NED + 3] = field
+        if self._health.yaw_aligned:
+            self._turn(math.atan2(field[1], field[0]) - before)
+
+    def yaw_from_field(self, mag_frd_gauss: Array, roll_rad: float, pitch_rad: float) -> float:
+        """Yaw from the field; without a known field the one measured, with its horizontal part to the
+        north."""
+        heading, horizontal, down = magnetic_heading_rad(mag_frd_gauss, roll_rad, pitch_rad)
+        field = self._field_ned_gauss
+        if field is None:
+            self._solution.obs[f.MAG_NED : f.MAG_NED + 3] = horizontal, 0.0, down
+            return heading
+        return heading + math.atan2(field[1], field[0])
+
+    def align_with_course(self, north_m_s: float, east_m_s: float) -> bool:
+        """A wing that has no heading, for want of a magnetometer, flies about where it points; True if so."""
+        if math.hypot(north_m_s, east_m_s) < self._parameters.airspeed_threshold_m_s:
+            return False
+        self._turn(math.atan2(east_m_s, north_m_s) - self._yaw_rad())
+        self._health.yaw_aligned = True
+        return True
+
+    def check_with_course(self, time_us: int, *, accepted: bool, at_rest: bool) -> bool:
+        """A wing's heading that was wrong on the ground shows in the first seconds of a flight, by GPS
+        velocities that are refused; True when it has been turned."""
+        obs = self._solution.obs
+        north, east = float(obs[f.GPS_VEL]), float(obs[f.GPS_VEL + 1])
+        if at_rest:
+            self._check.restart()
+        elif math.hypot(north, east) > self._parameters.airspeed_threshold_m_s:
+            course = math.atan2(east, north)
+            angle = self._check.judge(time_us, accepted=accepted, course_rad=course, yaw_rad=self._yaw_rad())
+            if angle:
+                self._turn(angle)
+                return True
+        return False
+
+    def prepare(self, time_us: int) -> int:
+        """Write the newest magnetometer sample into `obs`; its row of the history, -1: not to be used."""
+        reading, solution, health = self._readings.magnetometer, self._solution, self._health
+        row = solution.row_at(reading.time_us, time_us)
+        norm = math.hypot(*reading.values.tolist())
+        if row < 0 or not 0.05 < norm < 2.0 or self._check.magnetometer_wrong:
+            return -1
+        if not health.yaw_aligned:
+            rotation = solution.core[R : R + 9]
+            roll, pitch = math.atan2(rotation[7], rotation[8]), math.asin(max(-1.0, min(1.0, -rotation[6])))
+            heading = self.yaw_from_field(reading.values, roll, pitch)
+            health.yaw_aligned = True
+            self._turn(heading - self._yaw_rad())
+        solution.obs[f.MAG : f.MAG + 3] = reading.values
+        return row
+
+    def note(self, time_us: int, *, accepted: bool) -> None:
+        """The sample was fused or refused. Refused for long while it speaks, perhaps the magnetometer's bias
+        has changed, and is learnt anew."""
+        clocks = self._clocks
+        if accepted:
+            clocks.mag_us = clocks.mag_refused_us = time_us
+            return
+        since_us = max(clocks.mag_refused_us, clocks.aligned_us)
+        if time_us - since_us > self._parameters.magnetometer_timeout_s * 1e6:
+            self._solution.forget_mag_bias()
+            clocks.mag_refused_us = time_us
+
+    def _yaw_rad(self) -> float:
+        rotation = self._solution.core[R : R + 9]
+        return math.atan2(rotation[3], rotation[0])
+
+    def _turn(self, angle_rad: float) -> None:
+        self._solution.turn_yaw(angle_rad, yaw_sigma_rad=self._parameters.alignment_yaw_rad)
+        self._health.yaw_resets += 1
+        self._health.yaw_reset_rad = angle_rad
