@@ -56,6 +56,33 @@ def shortfalls(
     return tuple(reasons)
 
 
+def mode_obstacle(
+    mode: FlightMode,
+    situation: Situation,
+    policy: CommanderPolicy,
+    parameters: CommanderParameters,
+    *,
+    locked: bool,
+) -> Reason | None:
+    """Why a mode can't be commanded now; on the ground almost any can, in flight it must be possible.
+
+    Args:
+        locked: what a broken geofence asked for is flown, in another mode.
+    """
+    if situation.terminated:
+        return Reason.TERMINATED
+    if mode is FlightMode.FOLLOW and not parameters.follow_enabled:
+        return Reason.MODE_UNAVAILABLE
+    if not situation.armed:
+        return None if mode in policy.ground_modes else Reason.MODE_UNAVAILABLE
+    if mode not in policy.flown_modes:
+        return Reason.MODE_UNAVAILABLE
+    if parameters.fence.locks_mode and locked:
+        return Reason.FENCE_RECOVERY
+    missing = shortfalls(mode, situation, policy, parameters)
+    return missing[0] if missing else None
+
+
 def arming_reasons(
     mode: FlightMode,
     situation: Situation,

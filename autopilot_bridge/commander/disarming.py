@@ -1,16 +1,20 @@
 """Automatic disarming: an armed vehicle that never takes off, and one that has landed."""
 
 from autopilot_bridge.commander.events import DisarmReason, Event, LandingDetected, TakeoffDetected
+from autopilot_bridge.commander.modes import LANDING_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.tasks import TaskRunner
+from autopilot_bridge.flight.context import FlightContext
 
 
 class AutoDisarm:
     """Follows one armed period: take-off, landing, and when the motors are to be stopped."""
 
-    __slots__ = ("_flew", "_landed_since_us", "_waiting_since_us")
+    __slots__ = ("_flew", "_landed_since_us", "_policy", "_waiting_since_us")
 
-    def __init__(self) -> None:
+    def __init__(self, policy: CommanderPolicy) -> None:
+        self._policy = policy
         self._flew = False
         self._landed_since_us = -1
         self._waiting_since_us = 0
@@ -25,9 +29,12 @@ class AutoDisarm:
         """Somebody commanded a mode: wait anew for the take-off."""
         self._waiting_since_us = time_us
 
-    def follow(self, time_us: int, *, on_ground: bool) -> Event | None:
+    def follow(self, context: FlightContext) -> Event | None:
         """Note take-off and landing of an armed vehicle; the event of it, if any."""
-        if not on_ground:
+        if not context.armed:
+            return None
+        time_us = context.time_us
+        if not context.on_ground:
             self._landed_since_us = -1
             if self._flew:
                 return None
@@ -39,23 +46,16 @@ class AutoDisarm:
         return None
 
     def due(
-        self,
-        time_us: int,
-        parameters: CommanderParameters,
-        policy: CommanderPolicy,
-        *,
-        lifting_off: bool,
-        landing: bool,
+        self, mode: FlightMode, context: FlightContext, tasks: TaskRunner, parameters: CommanderParameters
     ) -> DisarmReason | None:
-        """Why the motors should stop now, on the ground; None while they should not.
-
-        Args:
-            lifting_off: a take-off is under way.
-            landing: what is flown ends on the ground.
-        """
-        if lifting_off:
+        """Why the motors should stop now, on the ground; None while they should not."""
+        if not context.armed or not context.on_ground:
+            return None
+        policy, time_us = self._policy, context.time_us
+        if tasks.lifting_off:
             self._waiting_since_us = time_us
             return None
+        landing = mode in LANDING_MODES or tasks.ends_on_ground
         if self._flew and (landing or policy.disarm_landed_everywhere):
             delay_s, since_us = parameters.disarm_landed_s, self._landed_since_us
         else:

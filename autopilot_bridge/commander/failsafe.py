@@ -94,11 +94,6 @@ class FailsafeMonitor:
         active = self._active.get(FailsafeKind.GEOFENCE)
         return active is not None and active.present and active.action > FailsafeAction.WARN
 
-    @property
-    def any(self) -> bool:
-        """Some condition is up, or its action still flown."""
-        return bool(self._active)
-
     def update(self, situation: Situation, parameters: CommanderParameters) -> list[Event]:
         """Judge every condition; returns what came up or cleared. `started` holds this update's new ones."""
         events: list[Event] = []
@@ -141,6 +136,23 @@ class FailsafeMonitor:
                 action = FailsafeAction.HOLD
             strongest = max(strongest, action)
         return strongest
+
+    def due(self, time_us: int, parameters: CommanderParameters) -> FailsafeAction:
+        """What is to be done now: while it lasts where the commanded mode is kept, else as it comes up."""
+        if self._keeps_mode:
+            return self.action(time_us, parameters)
+        action = max((action for _, action in self.started), default=FailsafeAction.NONE)
+        self.started.clear()
+        if action > FailsafeAction.WARN:
+            # what is up already and left to nobody goes before a weaker newcomer
+            action = max(action, self.action(time_us, parameters))
+        return action
+
+    def active(self, time_us: int, parameters: CommanderParameters) -> bool:
+        """A failsafe takes action (or, where the flavour says so, only warns)."""
+        if self._policy.critical_on_warning:
+            return bool(self._active)
+        return self.action(time_us, parameters) > FailsafeAction.WARN
 
     def override(self) -> None:
         """A person chose a mode: what is up now is left to them until it clears and comes up again."""

@@ -1,8 +1,10 @@
 """Home: where the vehicle returns to, and the reference of relative altitudes."""
 
 import math
+from collections.abc import Callable
 from typing import Final
 
+from autopilot_bridge.commander.events import Event, HomeSet
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import layout as nav
@@ -13,16 +15,21 @@ _SETTLING_M: Final = 0.1
 class Home:
     """Keeps home as a geodetic position and mirrors it into the flight context's local frame.
 
+    Args:
+        context: where it is mirrored into.
+        emit: takes the news of every new home.
+
     Attributes:
         position: home, or None while unknown.
         yaw_rad: heading there; NaN when a client set home.
         commanded: a client chose it: arming does not move it.
     """
 
-    __slots__ = ("_context", "_frame", "commanded", "position", "yaw_rad")
+    __slots__ = ("_context", "_emit", "_frame", "commanded", "position", "yaw_rad")
 
-    def __init__(self, context: FlightContext) -> None:
+    def __init__(self, context: FlightContext, emit: Callable[[Event], None]) -> None:
         self._context = context
+        self._emit = emit
         self._frame: LocalFrame | None = None
         self.position: GeodeticPosition | None = None
         self.yaw_rad = math.nan
@@ -33,8 +40,26 @@ class Home:
         if self._context.frame is not self._frame and self.position is not None:
             self._mirror()
 
-    def set_here(self) -> bool:
-        """Home is where the vehicle is; False while that is not known."""
+    def command(self, lat_deg: float, lon_deg: float, alt_m: float) -> bool:
+        """A client chose home; False when that can't be."""
+        if not self._set(lat_deg, lon_deg, alt_m):
+            return False
+        self.commanded = True
+        return True
+
+    def command_here(self) -> bool:
+        """A client wants home where the vehicle is, for now; False while that is not known."""
+        if not self._set_here():
+            return False
+        self.commanded = False
+        return True
+
+    def begin_flight(self) -> None:
+        """At arming home is here, unless a client chose it."""
+        if not self.commanded:
+            self._set_here()
+
+    def _set_here(self) -> bool:
         context = self._context
         north_m, east_m, down_m = context.nav[nav.POS_NED_M].tolist()
         if context.frame is None or not (
@@ -42,9 +67,9 @@ class Home:
         ):
             return False
         lat_deg, lon_deg, alt_m = context.frame.geodetic_from_ned(north_m, east_m, down_m)
-        return self.set(lat_deg, lon_deg, alt_m, yaw_rad=float(context.nav[nav.EULER_RAD][2]))
+        return self._set(lat_deg, lon_deg, alt_m, yaw_rad=float(context.nav[nav.EULER_RAD][2]))
 
-    def set(self, lat_deg: float, lon_deg: float, alt_m: float, *, yaw_rad: float = math.nan) -> bool:
+    def _set(self, lat_deg: float, lon_deg: float, alt_m: float, *, yaw_rad: float = math.nan) -> bool:
         """Home is there; False for no place on Earth, or while the vehicle does not know its own."""
         if self._context.frame is None:
             return False
@@ -54,22 +79,22 @@ class Home:
             return False
         self.yaw_rad = yaw_rad
         self._mirror()
+        self._emit(HomeSet(time_us=self._context.time_us, home=self.position))
         return True
 
-    def settle(self, *, settled: bool, once_a_second: bool) -> bool:
-        """Before arming: home where the vehicle stands; True when it was set.
+    def settle(self, *, settled: bool, once_a_second: bool) -> None:
+        """Before arming: home where the vehicle stands.
 
         Args:
             settled: the position is taken as good; until then home follows it: the altitude moves.
             once_a_second: this is a moment to follow.
         """
         if self.commanded:
-            return False
-        if self.position is None:
-            return self.set_here()
-        return not settled and once_a_second and self.moved_m() > _SETTLING_M and self.set_here()
+            return
+        if self.position is None or (not settled and once_a_second and self._moved_m() > _SETTLING_M):
+            self._set_here()
 
-    def moved_m(self) -> float:
+    def _moved_m(self) -> float:
         """Distance of the vehicle from home, vertical distance included; infinite while unknown."""
         if self.position is None:
             return math.inf

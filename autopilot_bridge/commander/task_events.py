@@ -49,7 +49,9 @@ class TaskFollower:
             case flight.HomeChangeRequested():
                 frame = commander.context.frame
                 if frame is not None:
-                    commander.set_home(*frame.geodetic_from_ned(event.north_m, event.east_m, event.down_m))
+                    commander.home.command(
+                        *frame.geodetic_from_ned(event.north_m, event.east_m, event.down_m)
+                    )
             case flight.TaskFinished() if (
                 commander.mode is commander.policy.takeoff_mode and commander.mode is commander.commanded_mode
             ):

@@ -161,7 +161,7 @@ class ArduPilotCommands(CommandHandlers):
         home = self.commander.home.position
         if command.frame in RELATIVE_FRAMES and home is not None:
             altitude_m += home.alt_m
-        placed = self.commander.set_home(command.x, command.y, altitude_m)
+        placed = self.commander.home.command(command.x, command.y, altitude_m)
         return Result.ACCEPTED if placed else Result.FAILED
 
     def terminate(self, command: Command, source: Source) -> Result:

@@ -134,7 +134,7 @@ class Px4Commands(CommandHandlers):
         if whole(command.p1) == 1:
             here = self.commander.set_home_here()
             return Result.ACCEPTED if here else Result.TEMPORARILY_REJECTED
-        placed = self.commander.set_home(command.x, command.y, command.z)
+        placed = self.commander.home.command(command.x, command.y, command.z)
         return Result.ACCEPTED if placed else Result.TEMPORARILY_REJECTED
 
     def start_mission(self, command: Command, source: Source) -> Result:

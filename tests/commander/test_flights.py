@@ -135,7 +135,7 @@ def test_home_is_set_when_the_position_is_good_and_again_at_arming() -> None:
 
 def test_a_commanded_home_stays_when_arming() -> None:
     rig = Rig("px4")
-    assert rig.commander.set_home(47.4, 8.55, 500.0)
+    assert rig.commander.home.command(47.4, 8.55, 500.0)
     rig.commander.arm()
     assert rig.commander.home.position is not None
     assert rig.commander.home.position.lat_deg == 47.4
@@ -147,7 +147,7 @@ def test_a_commanded_home_stays_when_arming() -> None:
 def test_home_is_a_place_on_earth(place: tuple[float, float, float]) -> None:
     rig = Rig("px4")
     before = rig.commander.home.position
-    assert not rig.commander.set_home(*place)
+    assert not rig.commander.home.command(*place)
     assert rig.commander.home.position == before
 
 

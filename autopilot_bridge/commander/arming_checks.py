@@ -1,0 +1,45 @@
+"""The arming checks of one vehicle: their newest result, and when it is told unasked (ArduPilot's prearm)."""
+
+from autopilot_bridge.commander.arming import MODE_REASONS, arming_reasons
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.situation import Situation
+from autopilot_bridge.commander.verdict import Reason
+
+
+class ArmingChecks:
+    """Runs the arming checks and keeps what they found.
+
+    Attributes:
+        reasons: everything against arming.
+    """
+
+    __slots__ = ("_policy", "_reported_us", "reasons")
+
+    def __init__(self, policy: CommanderPolicy) -> None:
+        self._policy = policy
+        self._reported_us = 0
+        self.reasons: tuple[Reason, ...] = (Reason.BOOTING,)
+
+    @property
+    def passed(self) -> bool:
+        """Nothing is against arming; ArduPilot shows what lies in the mode only when somebody arms."""
+        if self._policy.standby_when_armable:
+            return not self.reasons
+        return MODE_REASONS.issuperset(self.reasons)
+
+    def run(
+        self, mode: FlightMode, situation: Situation, parameters: CommanderParameters
+    ) -> tuple[Reason, ...]:
+        """Look again; what is against arming in a mode."""
+        self.reasons = arming_reasons(mode, situation, self._policy, parameters)
+        return self.reasons
+
+    def report_due(self, time_us: int) -> bool:
+        """What is against arming is to be told again, unasked."""
+        interval_us = self._policy.prearm_report_s * 1e6
+        if interval_us <= 0.0 or self.passed or time_us - self._reported_us < interval_us:
+            return False
+        self._reported_us = time_us
+        return True
