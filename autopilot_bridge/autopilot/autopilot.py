@@ -23,6 +23,7 @@ from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flavours.flavour import Flavour
+from autopilot_bridge.flavours.gps_source import connected
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
@@ -124,7 +125,6 @@ class Autopilot:
         self.channels: list[AutopilotChannel] = []
         self._firmware = firmware
         self._simulation = simulation
-        self._readings = readings
         self._address = firmware.address(system_id)
         self._divisor = physics_rate_hz // SLOW_RATE_HZ
         self._until_slow = self._divisor
@@ -148,6 +148,8 @@ class Autopilot:
             remove_channel=self.remove_channel,
             power=power,
         )
+        readings = connected(readings, flavour.gps_source(self.parameters))
+        self._readings = readings
         self.navigation = NavigationFilter(
             flavour.navigation_parameters(self.parameters), readings=readings, physics_rate_hz=physics_rate_hz
         )
@@ -170,7 +172,10 @@ class Autopilot:
             parameters=flavour.commander_parameters(self.parameters),
             vehicle=flavour.vehicle_tasks(self.context, stores[MissionType.MISSION], flavour.policy),
             health=HealthMonitor(
-                readings, NavigationJudgement(self.navigation), airspeed=flavour.has_airspeed
+                readings,
+                NavigationJudgement(self.navigation),
+                airspeed=flavour.has_airspeed,
+                gps_may_repeat=self.navigation.parameters.gps_may_repeat,
             ),
             land_detector=flavour.land_detector(),
             thrust=lambda: self.controller.thrust,

@@ -79,11 +79,12 @@ class VehicleHealth:
 class _Watch:
     """Freshness of one sensor: late samples and values that never change."""
 
-    __slots__ = ("_equal", "_last", "_last_time_us", "_reading", "_stale_us")
+    __slots__ = ("_equal", "_last", "_last_time_us", "_may_repeat", "_reading", "_stale_us")
 
-    def __init__(self, reading: Reading, stale_us: int) -> None:
+    def __init__(self, reading: Reading, stale_us: int, *, may_repeat: bool = False) -> None:
         self._reading = reading
         self._stale_us = stale_us
+        self._may_repeat = may_repeat
         self._last = reading.values.tobytes()
         self._last_time_us = -1
         self._equal = 0
@@ -97,7 +98,7 @@ class _Watch:
             newest = reading.values.tobytes()  # NaN fields compare equal as bytes
             self._equal = self._equal + 1 if newest == self._last else 0
             self._last = newest
-        return self._equal < _FROZEN_SAMPLES
+        return self._equal < _FROZEN_SAMPLES or self._may_repeat
 
 
 class HealthMonitor:
@@ -107,6 +108,7 @@ class HealthMonitor:
         readings: the vehicle's newest sensor samples.
         navigation: the filter's own judgement.
         airspeed: the vehicle has, and needs, a pitot tube.
+        gps_may_repeat: fixes that are the same to the last digit are no sign of a receiver that is stuck.
     """
 
     __slots__ = (
@@ -123,7 +125,12 @@ class HealthMonitor:
     )
 
     def __init__(
-        self, readings: SensorReadings, navigation: NavigationStatus, *, airspeed: bool = False
+        self,
+        readings: SensorReadings,
+        navigation: NavigationStatus,
+        *,
+        airspeed: bool = False,
+        gps_may_repeat: bool = False,
     ) -> None:
         self.health = VehicleHealth(has_airspeed=airspeed)
         self.navigation = navigation
@@ -131,7 +138,7 @@ class HealthMonitor:
         self._imu = _Watch(readings.imu, _STALE_US["imu"])
         self._barometer = _Watch(readings.barometer, _STALE_US["barometer"])
         self._magnetometer = _Watch(readings.magnetometer, _STALE_US["magnetometer"])
-        self._gps = _Watch(readings.gps, _STALE_US["gps"])
+        self._gps = _Watch(readings.gps, _STALE_US["gps"], may_repeat=gps_may_repeat)
         self._battery = _Watch(readings.battery, _STALE_US["battery"])
         self._airspeed = _Watch(readings.airspeed, _STALE_US["airspeed"]) if airspeed else None
         self._rangefinder = _Watch(readings.rangefinder, _STALE_US["barometer"])

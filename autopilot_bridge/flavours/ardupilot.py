@@ -13,6 +13,7 @@ from autopilot_bridge.flavours import ardupilot_mapping, ardupilot_modes
 from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
 from autopilot_bridge.flavours.ardupilot_texts import notices
 from autopilot_bridge.flavours.flavour import Flavour, Identity, SensorBits
+from autopilot_bridge.flavours.gps_source import ardupilot_gps_source
 from autopilot_bridge.flavours.mapping import airframe_overrides
 from autopilot_bridge.flavours.texts import Notice, Severity
 from autopilot_bridge.flight.land_detector import LandDetector
@@ -153,4 +154,5 @@ ARDUPILOT: Final = Flavour(
     heartbeat_on_mode_change=True,
     sends_events=False,
     bytewise_parameters=False,
+    gps_source=ardupilot_gps_source,
 )

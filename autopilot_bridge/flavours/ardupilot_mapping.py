@@ -15,6 +15,7 @@ from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours.external_mapping import ardupilot_external
+from autopilot_bridge.flavours.gps_source import GpsSource, ardupilot_gps_source
 from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
 from autopilot_bridge.flavours.surroundings_mapping import (
     ardupilot_avoidance,
@@ -342,6 +343,7 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         store,
         NAVIGATION,
         use_gps=gps_is_fused(store),
+        gps_may_repeat=ardupilot_gps_source(store) is GpsSource.MESSAGES,
         external=ardupilot_external(store),
         **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
     )

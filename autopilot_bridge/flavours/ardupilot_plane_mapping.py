@@ -15,6 +15,7 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.flavours import ardupilot_mapping, mapping
 from autopilot_bridge.flavours.ardupilot_plane_parameters import ARDUPILOT_PLANE_PARAMETERS
+from autopilot_bridge.flavours.gps_source import GpsSource, ardupilot_gps_source
 from autopilot_bridge.flavours.mapping import (
     FieldMap,
     NoiseMap,
@@ -330,6 +331,7 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         store,
         NAVIGATION,
         use_gps=ardupilot_mapping.gps_is_fused(store),
+        gps_may_repeat=ardupilot_gps_source(store) is GpsSource.MESSAGES,
         fixed_wing=True,
         use_airspeed=integer(store, "ARSPD_TYPE", 2) > 0 and integer(store, "ARSPD_USE", 1) > 0,
         airspeed_scale=math.sqrt(calibration),

@@ -12,6 +12,7 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
+from autopilot_bridge.flavours.gps_source import GpsSource, own_receiver
 from autopilot_bridge.flavours.texts import Notice
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mission_plan import MissionStore
@@ -164,6 +165,7 @@ class Flavour:
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
         sends_events: what happens is told in EVENT messages, texts repeat them.
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
+        gps_source: which receiver the first GPS is, as the parameters were at boot.
     """
 
     name: str
@@ -195,3 +197,4 @@ class Flavour:
     heartbeat_on_mode_change: bool
     sends_events: bool
     bytewise_parameters: bool
+    gps_source: Callable[[ParameterStore], GpsSource] = own_receiver

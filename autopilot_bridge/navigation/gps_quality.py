@@ -4,6 +4,8 @@ Two checks more. Over two seconds the position must move about as the velocity s
 nonsense in good form would be believed once the filter has nothing else left. And a receiver that repeats
 itself to the last digit doesn't measure any more: believed, its constant velocity would have the vehicle
 chase it faster and faster, unseen.
+
+A velocity, or its vertical part, may be NaN: not known.
 """
 
 import math
@@ -97,7 +99,7 @@ class GpsQuality:
             and abs(values[GPS_ALT_M]) <= 1.0e5
             and math.hypot(north, east, down) <= 1.0e3
         )
-        if self._repeats_itself(values):
+        if self._repeats_itself(values) and not p.gps_may_repeat:
             self.good = False
         if self.good and not self._moves_as_it_says(values, measured_us):
             self.good = False
@@ -140,7 +142,8 @@ class GpsQuality:
         down_m = anchor[GPS_ALT_M] - values[GPS_ALT_M]
         north, east, down = travelled
         allowed_m = _ALLOWED_SIGMAS * math.hypot(values[GPS_EPH_M], values[GPS_EPV_M]) + _ALLOWED_M
-        coherent = math.hypot(north_m - north, east_m - east, down_m - down) <= allowed_m
+        apart_m = _known((north_m - north, east_m - east, down_m - down))
+        coherent = math.hypot(*apart_m) <= allowed_m
         if measured_us - self._anchor_us >= _WINDOW_US:
             self._set_anchor(values, measured_us)
         else:
@@ -157,3 +160,9 @@ class GpsQuality:
         """No sample lately: the receiver is not good."""
         if time_us - self._newest_us > 2_000_000:
             self.good = False
+
+
+def _known(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Zero for what is not known."""
+    x, y, z = vector
+    return (0.0 if x != x else x, 0.0 if y != y else y, 0.0 if z != z else z)

@@ -16,6 +16,7 @@ _MAY_BE_ZERO = frozenset(
         "barometer_scale_error",
         "terrain_walk_m_per_sqrt_s",
         "terrain_gradient",
+        "gps_may_repeat",
         "use_gps",
         "fixed_wing",
         "use_airspeed",
@@ -57,6 +58,7 @@ class NavigationParameters:
         gps_required_satellites, gps_required_eph_m, gps_required_epv_m, gps_required_speed_accuracy_m_s,
             gps_required_hdop: quality checks before use (EKF2_REQ_NSATS, _EPH, _EPV, _SACC, _PDOP).
         gps_check_time_s: how long the checks must have passed before GPS is taken into use (EKF2_REQ_GPS_H).
+        gps_may_repeat: fixes that are the same to the last digit are no sign of a receiver that is stuck.
         gps_gate, gps_velocity_gate, barometer_gate, magnetometer_gate, rangefinder_gate: innovation gates.
         gps_timeout_s: GPS refused for this long although it is good: the filter resets to it (7 s).
         no_aid_timeout_s: without horizontal aiding for this long, position and velocity are no longer valid
@@ -138,6 +140,7 @@ class NavigationParameters:
     gps_velocity_noise_m_s: tuple[float, float, float] = (0.06, 0.077, 0.158)
     gps_nominal_speed_accuracy_m_s: float = 0.11
     use_gps: bool = True
+    gps_may_repeat: bool = False
     gps_required_satellites: int = 6
     gps_required_eph_m: float = 3.0
     gps_required_epv_m: float = 5.0

@@ -1,7 +1,8 @@
-"""What a vehicle takes in by messages besides commands: odometry, targets, obstacles."""
+"""What a vehicle takes in by messages besides commands: odometry, fixes, targets, obstacles."""
 
 from autopilot_bridge.services.external_odometry import ExternalOdometryService
 from autopilot_bridge.services.follow import FollowService
+from autopilot_bridge.services.gps_input import GpsInputService
 from autopilot_bridge.services.landing_target import LandingTargetService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.obstacles import ObstacleService
@@ -13,6 +14,7 @@ def incoming_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
         parts.simulation.attend(parts)
     return (
         ExternalOdometryService(parts),
+        GpsInputService(parts),
         FollowService(parts),
         LandingTargetService(parts),
         ObstacleService(parts),

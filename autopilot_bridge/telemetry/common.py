@@ -60,6 +60,7 @@ class CommonMessages:
     servo_unused_us = 0
     servo_disarmed_us = 1000
     gps_timeout_us = 4_000_000  # ArduPilot's GPS_TIMEOUT_MS
+    gps_told_before_first = True
 
     def __init__(self, sources: TelemetrySources) -> None:
         self.sources = sources
@@ -113,11 +114,17 @@ class CommonMessages:
         """
         gps = self.sources.readings.gps
         if gps.time_us < 0:
-            return None
+            if not self.gps_told_before_first:
+                return None
+            return (self.view.time_us, _NO_GPS, 0, 0, 0, UINT16_UNKNOWN, UINT16_UNKNOWN) + (0,) * 9
         v = gps.values.tolist()
         silent = self.view.time_us - gps.time_us > self.gps_timeout_us
         fix_type = _NO_GPS if silent else int(v[interface.GPS_FIX_TYPE])
         vn, ve, _ = v[interface.GPS_VEL_NED_M_S]
+        speed_cm_s = course_cdeg = UINT16_UNKNOWN
+        if vn == vn:  # else it was not told
+            speed_cm_s = round(math.hypot(vn, ve) * 100.0)
+            course_cdeg = round(math.degrees(math.atan2(ve, vn)) % 360.0 * 100.0) % 36000
         if fix_type < 2 or not math.isfinite(v[interface.GPS_LAT_DEG]):
             counted = not silent and math.isfinite(v[interface.GPS_SATELLITES])
             satellites = int(v[interface.GPS_SATELLITES]) if counted else 0
@@ -133,8 +140,8 @@ class CommonMessages:
             alt_mm,
             round(v[interface.GPS_HDOP] * 100.0),
             round(v[interface.GPS_VDOP] * 100.0),
-            round(math.hypot(vn, ve) * 100.0),
-            round(math.degrees(math.atan2(ve, vn)) % 360.0 * 100.0) % 36000,
+            speed_cm_s,
+            course_cdeg,
             int(v[interface.GPS_SATELLITES]),
             alt_mm,
             round(v[interface.GPS_EPH_M] * 1000.0),
