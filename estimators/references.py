@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from estimators.euler import euler_from_quaternions
 
 if TYPE_CHECKING:
     from estimators.logs import Log, Table
@@ -191,13 +192,8 @@ def _truth(log: "Log", system_id: int, boot: int | None, frame: LocalFrame | Non
 
 
 def _from_hil_state(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
-    w, x, y, z = _floats(table["attitude_quaternion"]).T
-    # ZYX Euler angles of a Hamilton quaternion that takes FRD to NED
-    angles = {
-        "roll_rad": np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        "pitch_rad": np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
-        "yaw_rad": np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-    }
+    names = ("roll_rad", "pitch_rad", "yaw_rad")
+    angles = dict(zip(names, euler_from_quaternions(table["attitude_quaternion"]), strict=True))
     return _series(table, angles | _places(table, frame))
 
 

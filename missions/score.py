@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from estimators.euler import euler_from_quaternions
 from missions.notes import PATTERN, FlightNotes
 from missions.records import FlightRecords
 from missions.waypoint_passes import waypoint_misses_m
@@ -209,12 +210,10 @@ def _positions(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
 def _track(table: NDArray[np.void], origin: GeodeticPosition, field: str, scale: float) -> Track | None:
     if not len(table):
         return None
-    q = table["attitude_quaternion"].astype(np.float64)
-    w, x, y, z = q.T
     return Track(
         time_s=table[field] * scale,
         pos_ned_m=_positions(table, origin),
-        yaw_rad=np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        yaw_rad=euler_from_quaternions(table["attitude_quaternion"])[2],
     )
 
 

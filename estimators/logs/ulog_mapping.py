@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
+from estimators.euler import euler_from_quaternions
 from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, newest, value_at
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
@@ -115,7 +116,7 @@ def _attitude(topics: Topics) -> list[Part]:
     if rates is not None:
         body = [newest(rates.time_us, rates.columns["xyz"][:, axis], times) for axis in range(3)]
     speeds = dict(zip(("rollspeed", "pitchspeed", "yawspeed"), body, strict=True))
-    roll, pitch, yaw = _euler(q)
+    roll, pitch, yaw = euler_from_quaternions(q)
     return [
         mavlink_part("ATTITUDE", times, roll=roll, pitch=pitch, yaw=yaw, **speeds),
         mavlink_part("ATTITUDE_QUATERNION", times, q1=q[:, 0], q2=q[:, 1], q3=q[:, 2], q4=q[:, 3], **speeds),
@@ -336,12 +337,3 @@ def _mav_types(status: Records) -> Array:
 def _custom_mode(nav_state: int) -> int:
     main, sub = _CUSTOM_MODES.get(nav_state, (0, 0))
     return main << 16 | sub << 24
-
-
-def _euler(q: Array) -> tuple[Array, Array, Array]:
-    """Roll, pitch, yaw (ZYX) of q_ned_from_frd, (n, 4), w first."""
-    w, x, y, z = (q[:, index].astype(np.float64) for index in range(4))
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
-    yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return roll, pitch, yaw

@@ -17,6 +17,7 @@ from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.payload import GroundTargetParameters, PayloadParameters
 from missions.telemetry import StatusTextAssembler
+from tests.rotations import yaw_rad
 
 FLAVOURS: Final = ("px4", "ardupilot")
 SYSTEM_ID: Final = 1
@@ -198,8 +199,7 @@ class Flight:
 
     @property
     def yaw_rad(self) -> float:
-        w, x, y, z = self.truth[t.Q_NED_FROM_FRD]
-        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return yaw_rad(self.truth[t.Q_NED_FROM_FRD])
 
     # what is said
 

@@ -13,7 +13,8 @@ from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.payload import CameraParameters, GroundTargetParameters, PayloadParameters, Static
 from tests.flights.flight import FLAVOURS, SYSTEM_ID, Flight
-from tests.flights.tracker import VISION, Tracker, frame_at_home, rotation, wall_to_the_north
+from tests.flights.tracker import VISION, Tracker, frame_at_home, wall_to_the_north
+from tests.rotations import rotation_matrix
 
 GPS, VIO = 4, 6
 OFF, GARBAGE, OK = 1, 3, 0
@@ -220,7 +221,7 @@ def test_a_target_lost_in_the_descent_is_searched_and_then_done_without(flavour:
         if not seen[0]:
             return dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
         offset = np.array((*PAD, 0.0)) - flight.position_ned_m
-        line = rotation(flight.truth[t.Q_NED_FROM_FRD]).T @ offset
+        line = rotation_matrix(flight.truth[t.Q_NED_FROM_FRD]).T @ offset
         return dialect.MAVLink_landing_target_message(
             flight.sitl.time_us,
             0,

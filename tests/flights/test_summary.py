@@ -13,6 +13,7 @@ from pymavlink import mavutil
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.session import RunRequest, fly
+from tests.rotations import rotation_matrix
 from tests.system.logs import known_name
 
 RADIUS_M = 20.0
@@ -130,14 +131,7 @@ def test_attitude_error(recorded: Recorded) -> None:
         share = (m.time_boot_ms * 1e-3 - time_s[k - 1]) / (time_s[k] - time_s[k - 1])
         after = q[k] if q[k] @ q[k - 1] > 0.0 else -q[k]
         true = (1.0 - share) * q[k - 1] + share * after
-        w, x, y, z = true / np.linalg.norm(true)
-        r_true = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        r_true = rotation_matrix(true / np.linalg.norm(true))
         (cr, cp, cy), (sr, sp, sy) = (
             [function(a) for a in (m.roll, m.pitch, m.yaw)] for function in (math.cos, math.sin)
         )

@@ -10,6 +10,7 @@ from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
 from flightsim import truth as t
 from tests.flights.flight import Flight
+from tests.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
 
@@ -27,18 +28,6 @@ VISION: dict[str, dict[str, float]] = {
 """Parameters of a vehicle that flies by external odometry."""
 
 
-def rotation(q: Array) -> Array:
-    """r_ned_from_frd."""
-    w, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 class Tracker:
     """Sees the vehicle from outside, to a centimetre."""
 
@@ -52,7 +41,7 @@ class Tracker:
         truth = self.flight.truth
         q = truth[t.Q_NED_FROM_FRD]
         place = np.array(self.flight.position_ned_m) + self._rng.normal(0.0, 0.01, 3) + self.jump_m
-        velocity = rotation(q).T @ truth[t.VEL_NED_M_S] + self._rng.normal(0.0, 0.02, 3)
+        velocity = rotation_matrix(q).T @ truth[t.VEL_NED_M_S] + self._rng.normal(0.0, 0.02, 3)
         unknown = [math.nan] * 21
         return dialect.MAVLink_odometry_message(
             self.flight.sitl.time_us,
@@ -73,7 +62,7 @@ class Tracker:
 
     def vision(self, time_s: float) -> Any:
         """VISION_POSITION_ESTIMATE, with a Unix time stamp."""
-        r = rotation(self.flight.truth[t.Q_NED_FROM_FRD])
+        r = rotation_matrix(self.flight.truth[t.Q_NED_FROM_FRD])
         place = np.array(self.flight.position_ned_m) + self._rng.normal(0.0, 0.01, 3) + self.jump_m
         angles = math.atan2(r[2, 1], r[2, 2]), -math.asin(r[2, 0]), math.atan2(r[1, 0], r[0, 0])
         stamp_us = 1_700_000_000_000_000 + self.flight.sitl.time_us

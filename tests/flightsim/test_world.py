@@ -14,6 +14,7 @@ from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.random_streams import RandomStreams
 from flightsim.world import World, WorldParameters
+from tests.rotations import yaw_rad
 
 
 def test_clock_counts_whole_microseconds() -> None:
@@ -42,8 +43,7 @@ def test_vehicles_stand_at_their_offsets() -> None:
         )  # fmt: skip
         assert (north, east) == pytest.approx(offset, abs=0.002)
         assert truth[t.ALT_M] - home.alt_m == pytest.approx(truth[t.HEIGHT_ABOVE_GROUND_M], abs=1e-4)
-        w, x, y, z = truth[t.Q_NED_FROM_FRD]
-        yaw = math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+        yaw = math.degrees(yaw_rad(truth[t.Q_NED_FROM_FRD]))
         assert yaw % 360.0 == pytest.approx(353.0, abs=1e-3)
 
 

@@ -11,21 +11,11 @@ from flightsim import truth as t
 from flightsim.random_streams import RandomStreams
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 from tests.navigation.kinematic_flight import MAG_NED_GAUSS, RATE_HZ
+from tests.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
 
 PARAMETERS = NavigationParameters(mag_ned_gauss=MAG_NED_GAUSS)
-
-
-def rotation_matrix(q: Array) -> Array:
-    w, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def attitude_error(q_true: Array, q_estimated: Array) -> Array:

@@ -14,8 +14,9 @@ from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.sensors.gps import RTK_FIX_AFTER_10_S, GpsParameters
 from flightsim.sensors.suite import SensorSuiteParameters
-from tests.navigation.bench import PARAMETERS, Bench, rotation_matrix
+from tests.navigation.bench import PARAMETERS, Bench
 from tests.navigation.kinematic_flight import HOME, Lissajous, fly
+from tests.rotations import rotation_matrix, yaw_rad
 
 Array = NDArray[np.float64]
 
@@ -191,9 +192,7 @@ def test_state_is_complete_and_consistent(flight: Array) -> None:
         state[layout.SPECIFIC_FORCE_FRD_M_S2], truth[t.SPECIFIC_FORCE_FRD_M_S2], atol=0.2
     )
     np.testing.assert_allclose(state[layout.ACC_NED_M_S2], state_acceleration(truth), atol=0.25)
-    w, x, y, z = truth[t.Q_NED_FROM_FRD]
-    yaw = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    assert state[layout.EULER_RAD][2] == pytest.approx(yaw, abs=0.02)
+    assert state[layout.EULER_RAD][2] == pytest.approx(yaw_rad(truth[t.Q_NED_FROM_FRD]), abs=0.02)
     assert np.isnan(state[layout.WIND_NED_M_S]).all()
 
 

@@ -23,8 +23,9 @@ from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from flightsim import truth as t
 from flightsim.random_streams import RandomStreams
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
-from tests.navigation.bench import PARAMETERS, Bench, rotation_matrix
+from tests.navigation.bench import PARAMETERS, Bench
 from tests.navigation.kinematic_flight import HOME, fly
+from tests.rotations import rotation_matrix, yaw_rad
 
 Array = NDArray[np.float64]
 
@@ -120,8 +121,7 @@ def position_error_m(odometry: Odometry) -> float:
 
 
 def yaw_error_rad(odometry: Odometry) -> float:
-    w, x, y, z = odometry.bench.truth[t.Q_NED_FROM_FRD]
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    yaw = yaw_rad(odometry.bench.truth[t.Q_NED_FROM_FRD])
     return math.remainder(float(odometry.bench.filter.state[layout.EULER_RAD][2]) - yaw, math.tau)
 
 

@@ -8,6 +8,7 @@ from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from autopilot_bridge.payload.camera_video import VideoStream
 from tests.payload.test_components import HOME, SYSTEM, World
+from tests.rotations import pitch_rad, yaw_rad
 
 START, STOP = m.MAV_CMD_IMAGE_START_CAPTURE, m.MAV_CMD_IMAGE_STOP_CAPTURE
 ACCEPTED, DENIED, FAILED = m.MAV_RESULT_ACCEPTED, m.MAV_RESULT_DENIED, m.MAV_RESULT_FAILED
@@ -68,11 +69,8 @@ def test_a_photo_says_where_and_when_by_what_the_vehicle_told(world):
         1,
     )
     assert photo.time_utc == 1_700_000_000_000_000 + 2_000_000
-    w, x, y, z = photo.q
-    assert math.degrees(math.asin(2.0 * (w * y - z * x))) == pytest.approx(-30.0, abs=1.5)
-    assert math.degrees(math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))) == pytest.approx(
-        20.0, abs=5
-    )
+    assert math.degrees(pitch_rad(photo.q)) == pytest.approx(-30.0, abs=1.5)
+    assert math.degrees(yaw_rad(photo.q)) == pytest.approx(20.0, abs=5)
 
 
 def test_an_old_position_is_none(world):

@@ -31,6 +31,7 @@ from flightsim.payload import (
     SurveyMagnetometerParameters,
 )
 from flightsim.rotations import quaternion_from_euler
+from tests.rotations import pitch_rad, yaw_rad
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 STEP_US = 4000
@@ -119,10 +120,9 @@ def world() -> World:
 def pointing(world: World) -> SimpleNamespace:
     """Pitch, yaw (deg) by the newest attitude status, and what its yaw refers to."""
     status = world.messages(m.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS)[-1]
-    w, x, y, z = status.q
     return SimpleNamespace(
-        pitch=math.degrees(math.asin(2.0 * (w * y - z * x))),
-        yaw=math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))),
+        pitch=math.degrees(pitch_rad(status.q)),
+        yaw=math.degrees(yaw_rad(status.q)),
         in_earth=bool(status.flags & m.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME),
         delta=math.degrees(status.delta_yaw),
     )

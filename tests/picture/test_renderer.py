@@ -21,6 +21,7 @@ from flightsim.payload import (
 )
 from flightsim.picture import Renderer, Scenery
 from flightsim.rotations import quaternion_from_euler
+from tests.rotations import rotation_matrix
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 MODEL = PinholeModel()
@@ -134,15 +135,7 @@ def test_home_is_marked_and_the_ground_stays_where_it_is():
     assert (pictures[0] > 225).all(axis=2).sum() > 2000  # white paint
 
     def homography(view):  # ground (north, east, 1) to pixels
-        w, x, y, z = view.q_ned_from_mount
-        r = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        camera_from_ned = r.T[[1, 2, 0]]
+        camera_from_ned = rotation_matrix(view.q_ned_from_mount).T[[1, 2, 0]]
         ground = np.column_stack([np.eye(3)[:, :2], -np.array(view.eye_ned_m)])
         return MODEL.matrix @ camera_from_ned @ ground
 

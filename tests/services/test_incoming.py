@@ -31,6 +31,7 @@ from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from flightsim.airframe import AirframeKind
 from flightsim.interface import SensorReadings
 from flightsim.rotations import quaternion_from_euler
+from tests.rotations import rotation_matrix
 
 FLAVOURS = ("px4", "ardupilot")
 _UNKNOWN = [math.nan] * 21
@@ -251,10 +252,10 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
         status = m.MAVLink_gimbal_device_attitude_status_message(0, 0, 1000, 0, gimbal_q, 0.0, 0.0, 0.0, 0)
         service.handle(status, Source(None, 1, 154), 1_000_000)  # type: ignore[arg-type]
         heading = _euler(0.0, 0.0, attitude[2])
-        seen = _inverse_rotated(gimbal_q, _inverse_rotated(heading, line))
+        seen = rotation_matrix(gimbal_q).T @ rotation_matrix(heading).T @ line
         right, down = seen[1] / seen[0], seen[2] / seen[0]
     else:
-        seen = _inverse_rotated(q, line)
+        seen = rotation_matrix(q).T @ line
         right, down = seen[1] / seen[2], -seen[0] / seen[2]
     message = m.MAVLink_landing_target_message(
         1_000_000, 0, m.MAV_FRAME_BODY_FRD, math.atan(right), math.atan(down), 0.0, 0.0, 0.0
@@ -262,18 +263,6 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
     assert service.handle(message, _CAMERA if by_gimbal else _ELSEWHERE, 1_000_000)
     track = autopilot.context.surroundings.landing_target
     assert track.place(1_000_000) == pytest.approx((102.0, 51.0), abs=1e-6)
-
-
-def _inverse_rotated(q: Any, vector: Any) -> Any:
-    w, x, y, z = q
-    r = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    return r.T @ vector
 
 
 # the circle of obstacles

@@ -11,6 +11,7 @@ from autopilot_bridge.rotation import from_euler
 from estimators.interface import Outcome
 from estimators.messages import message_class
 from estimators.target_fusion import TargetFusionEstimator, TargetFusionParameters
+from tests.rotations import rotation_matrix
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 FRAME = LocalFrame(HOME)
@@ -115,15 +116,7 @@ class Flight:
         angles = np.zeros(2)
         if self.fixed:
             message = self.attitude(t, system)
-            w, x, y, z = from_euler(message.roll, message.pitch, message.yaw)
-            rotation = np.array(
-                [
-                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-                ]
-            )
-            body = rotation.T @ ahead
+            body = rotation_matrix(from_euler(message.roll, message.pitch, message.yaw)).T @ ahead
             angles = np.arctan2(
                 [body[1], -body[0]], body[2]
             )  # straight down: right, and down the picture is aft

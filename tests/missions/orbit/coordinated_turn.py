@@ -7,8 +7,10 @@ from collections import deque
 
 import numpy as np
 
+from autopilot_bridge.rotation import from_euler, product
 from missions.telemetry import Attitude
 from missions.vehicle.payload import Detection, GimbalAttitude
+from tests.rotations import rotation_matrix
 
 STEP_US = 20_000
 G = 9.80665
@@ -71,10 +73,10 @@ class PointMass:
         for k, name in enumerate(("az", "el")):
             turn = math.remainder(self.pointed[k] - getattr(self, name), math.tau)
             setattr(self, name, getattr(self, name) + float(np.clip(turn, -2.1 * dt, 2.1 * dt)))
-        q_body = _q(self.phi, 0.03, self.psi)
-        q_gimbal = _multiply(q_body, _q(0.0, self.el, self.az))  # in NED
-        level = _multiply(_q(0.0, 0.0, -self.psi), q_gimbal)
-        tilted = _multiply(_q(self.roll_error, 0.0, 0.0), level)
+        q_body = from_euler(self.phi, 0.03, self.psi)
+        q_gimbal = product(q_body, from_euler(0.0, self.el, self.az))  # in NED
+        level = product(from_euler(0.0, 0.0, -self.psi), q_gimbal)
+        tilted = product(from_euler(self.roll_error, 0.0, 0.0), level)
         attitude = Attitude(
             time_us=self.time_us,
             roll_rad=self.phi,
@@ -97,15 +99,7 @@ class PointMass:
             x, y = self.rng.uniform(-0.57, 0.57), self.rng.uniform(-0.32, 0.32)
             self.late.append((self.time_us, Detection(time_us=self.time_us, target=0, image_x=x, image_y=y)))
         d = np.array((*(self.target - self.p), self.h))
-        w, x, y, z = q_gimbal
-        r = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        forward, right, down = r.T @ d
+        forward, right, down = rotation_matrix(q_gimbal).T @ d
         if forward <= 0 or self.blind or self.rng.random() > self.detection:
             return
         u, v = right / forward, down / forward
@@ -113,24 +107,3 @@ class PointMass:
             u, v = np.array((u, v)) + self.noise * self.rng.standard_normal(2)
             found = Detection(time_us=self.time_us, target=0, image_x=float(u), image_y=float(v))
             self.late.append((self.time_us, found))
-
-
-def _q(roll, pitch, yaw):
-    (cr, cp, cy), (sr, sp, sy) = (f(0.5 * np.array((roll, pitch, yaw))) for f in (np.cos, np.sin))
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-
-
-def _multiply(a, b):
-    w, x, y, z = a
-    p, q, r, s = b
-    return (
-        w * p - x * q - y * r - z * s,
-        w * q + x * p + y * s - z * r,
-        w * r - x * s + y * p + z * q,
-        w * s + x * r - y * q + z * p,
-    )
