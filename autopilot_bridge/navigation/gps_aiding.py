@@ -29,6 +29,8 @@ from flightsim.interface import (
 
 Array = NDArray[np.float64]
 
+_UNTOLD_VARIANCE_M2_S2 = 1e4
+
 
 class GpsAiding:
     """Prepares GPS updates of a `Solution`.
@@ -164,6 +166,9 @@ class GpsAiding:
         scale = max(1.0, float(values[GPS_SPEED_ACCURACY_M_S]) / p.gps_nominal_speed_accuracy_m_s) ** 2
         for i, noise in enumerate(p.gps_velocity_noise_m_s):
             obs[f.GPS_VEL_VAR + i] = scale * noise * noise
+            if obs[f.GPS_VEL + i] != obs[f.GPS_VEL + i]:  # not told: nothing is learnt of it
+                obs[f.GPS_VEL + i] = solution.past_velocity(row)[i]
+                obs[f.GPS_VEL_VAR + i] = _UNTOLD_VARIANCE_M2_S2
         solution.set_gps_accuracy(float(values[GPS_EPH_M]), float(values[GPS_EPV_M]))
 
     def _reset(self, row: int, time_us: int) -> None:

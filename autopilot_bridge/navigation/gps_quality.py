@@ -97,7 +97,7 @@ class GpsQuality:
             and abs(values[GPS_LAT_DEG]) <= 90.0
             and abs(values[GPS_LON_DEG]) <= 180.0
             and abs(values[GPS_ALT_M]) <= 1.0e5
-            and math.hypot(north, east, down) <= 1.0e3
+            and math.hypot(*_known((north, east, down))) <= 1.0e3
         )
         if self._repeats_itself(values) and not p.gps_may_repeat:
             self.good = False

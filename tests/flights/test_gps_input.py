@@ -130,7 +130,7 @@ def test_a_script_may_say_the_same_place_again_and_again() -> None:
     assert (position.lat, position.lon) == pytest.approx((place["lat"], place["lon"]), abs=10)
 
 
-@pytest.mark.parametrize("ignored", [ALT, EPH | EPV | SPEED])
+@pytest.mark.parametrize("ignored", [VERTICAL, HORIZONTAL | VERTICAL, ALT, EPH | EPV | SPEED])
 def test_what_a_sender_does_not_know(ignored: int) -> None:
     flight = copter(**MAV)
     wild = {name: math.nan for name in ("horiz_accuracy", "vert_accuracy", "speed_accuracy")}
@@ -149,7 +149,9 @@ def test_what_a_sender_does_not_know(ignored: int) -> None:
         assert abs(flight.newest["GPS_RAW_INT"].alt) < 1
         return
     hovers(flight)
-    assert flight.newest["GPS_RAW_INT"].h_acc == (400 if not ignored & EPH else 800)
+    shown = flight.newest["GPS_RAW_INT"]
+    assert shown.h_acc == 800  # what its dilution of precision stands for
+    assert (shown.vel == 65535) is bool(ignored & HORIZONTAL)
 
 
 @pytest.mark.parametrize(
