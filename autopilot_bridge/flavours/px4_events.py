@@ -114,32 +114,39 @@ _HEALTH: Final = EventEnum(
     entries={1 << bit: entry for bit, entry in _COMPONENTS.items()},
     bits=True,
 )
-ARMING_SUMMARY: Final = EventKind(
-    name="arming_check_summary",
-    message="Arming check summary event",
-    level=LogLevel.PROTOCOL,
-    group="arming_check",
-    type="summary",
-    arguments=(
-        Argument("chunk_idx", "uint8_t"),
-        Argument("error", _HEALTH),
-        Argument("warning", _HEALTH),
-        Argument("can_arm", _MODES),
-        Argument("can_run", _MODES),
-    ),
+
+
+def _summary(name: str, message: str, group: str, **bits: EventEnum) -> EventKind:
+    """A message of the report for clients alone: a number, and bits of these kinds."""
+    return EventKind(
+        name=name,
+        message=message,
+        level=LogLevel.PROTOCOL,
+        group=group,
+        type="summary",
+        arguments=(
+            Argument("chunk_idx", "uint8_t"),
+            *(Argument(argument, kind) for argument, kind in bits.items()),
+        ),
+    )
+
+
+ARMING_SUMMARY: Final = _summary(
+    "arming_check_summary",
+    "Arming check summary event",
+    "arming_check",
+    error=_HEALTH,
+    warning=_HEALTH,
+    can_arm=_MODES,
+    can_run=_MODES,
 )
-HEALTH_SUMMARY: Final = EventKind(
-    name="health_summary",
-    message="Health report summary event",
-    level=LogLevel.PROTOCOL,
-    group="health",
-    type="summary",
-    arguments=(
-        Argument("chunk_idx", "uint8_t"),
-        Argument("is_present", _HEALTH),
-        Argument("error", _HEALTH),
-        Argument("warning", _HEALTH),
-    ),
+HEALTH_SUMMARY: Final = _summary(
+    "health_summary",
+    "Health report summary event",
+    "health",
+    is_present=_HEALTH,
+    error=_HEALTH,
+    warning=_HEALTH,
 )
 CHECKS: Final[Mapping[Reason, EventKind]] = MappingProxyType(
     {

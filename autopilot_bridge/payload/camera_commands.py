@@ -1,12 +1,12 @@
 """The commands of camera protocol v2, and older ones that people still send (DO_DIGICAM_CONTROL, ...)."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY, STORAGE_ID
-from autopilot_bridge.payload.camera_video import STREAM_ID
+from autopilot_bridge.payload.camera_video import STREAM_ID, VideoStream
 from autopilot_bridge.payload.component import Answer, CommandHandler, parameters, whole
 
 if TYPE_CHECKING:
@@ -176,17 +176,18 @@ class CameraCommands:
         return _ACCEPTED
 
     def _zoom(self, message: Any, sender: Sender) -> int | None:
-        if not self._camera.lens.has_zoom:
-            return _UNSUPPORTED
-        if not self._camera.lens.zoom(whole(message.param1, -1), message.param2):
-            return _DENIED
-        self._camera.move_lens()
-        return _ACCEPTED
+        lens = self._camera.lens
+        return self._drive_lens(message, lens.zoom if lens.has_zoom else None)
 
     def _focus(self, message: Any, sender: Sender) -> int | None:
-        if not self._camera.lens.has_focus:
+        lens = self._camera.lens
+        return self._drive_lens(message, lens.focus if lens.has_focus else None)
+
+    def _drive_lens(self, message: Any, drive: Callable[[int, float], bool] | None) -> int:
+        """p1 how p2 is meant, p2 how far."""
+        if drive is None:
             return _UNSUPPORTED
-        if not self._camera.lens.focus(whole(message.param1, -1), message.param2):
+        if not drive(whole(message.param1, -1), message.param2):
             return _DENIED
         self._camera.move_lens()
         return _ACCEPTED
@@ -216,37 +217,32 @@ class CameraCommands:
     # the stream
 
     def _set_streaming(self, message: Any, running: bool) -> int | None:
-        stream = self._camera.stream
-        if stream is None:
-            return _UNSUPPORTED
-        if whole(message.param1, -1) not in (0, STREAM_ID):
-            return _DENIED
-        stream.running = running
-        self._camera.send(stream.status(self._fov_deg()))
-        return _ACCEPTED
+        def switch(stream: VideoStream, fov_deg: float) -> None:
+            stream.running = running
+            self._camera.send(stream.status(fov_deg))
+
+        return self._with_stream(message.param1, switch)
 
     def _send_stream(self, number: float) -> int:
-        stream = self._camera.stream
-        if stream is None:
-            return _UNSUPPORTED
-        if whole(number, -1) not in (0, STREAM_ID):
-            return _DENIED
-        self._camera.send(stream.information(self._fov_deg()))
-        return _ACCEPTED
+        return self._with_stream(number, lambda stream, fov: self._camera.send(stream.information(fov)))
 
     def _send_stream_status(self, number: float) -> int:
+        def tell(stream: VideoStream, fov_deg: float) -> None:
+            # MAVSDK 4.1 asks for the status only, and learns the address from nothing but the information
+            self._camera.send(stream.information(fov_deg))
+            self._camera.send(stream.status(fov_deg))
+
+        return self._with_stream(number, tell)
+
+    def _with_stream(self, number: float, act: Callable[[VideoStream, float], None]) -> int:
+        """Do something with the stream of a number (0: all) and the field of view, degrees."""
         stream = self._camera.stream
         if stream is None:
             return _UNSUPPORTED
         if whole(number, -1) not in (0, STREAM_ID):
             return _DENIED
-        # MAVSDK 4.1 asks for the status only, and learns the address from nothing but the information
-        self._camera.send(stream.information(self._fov_deg()))
-        self._camera.send(stream.status(self._fov_deg()))
+        act(stream, math.degrees(self._camera.lens.fov_rad[0]))
         return _ACCEPTED
-
-    def _fov_deg(self) -> float:
-        return math.degrees(self._camera.lens.fov_rad[0])
 
     # following things
 

@@ -33,13 +33,7 @@ class VideoStream:
             STREAM_ID,
             1,
             mavlink.VIDEO_STREAM_TYPE_RTSP,
-            self._flags,
-            self.rate_hz,
-            self.width_px,
-            self.height_px,
-            self.bitrate,
-            0,
-            round(fov_deg),
+            *self._picture(fov_deg),
             fixed_text("camera", 32),
             fixed_text(self.uri, 160),
             encoding=mavlink.VIDEO_STREAM_ENCODING_H264,
@@ -47,17 +41,11 @@ class VideoStream:
 
     def status(self, fov_deg: float) -> Any:
         """VIDEO_STREAM_STATUS."""
-        return mavlink.MAVLink_video_stream_status_message(
-            STREAM_ID,
-            self._flags,
-            self.rate_hz,
-            self.width_px,
-            self.height_px,
-            self.bitrate,
-            0,
-            round(fov_deg),
-        )
+        return mavlink.MAVLink_video_stream_status_message(STREAM_ID, *self._picture(fov_deg))
 
-    @property
-    def _flags(self) -> int:
-        return int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0
+    def _picture(self, fov_deg: float) -> tuple[float, ...]:
+        """What both messages have in common, from the flags to the field of view."""
+        flags = int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0
+        rotation_deg = 0
+        size = (self.width_px, self.height_px)
+        return (flags, self.rate_hz, *size, self.bitrate, rotation_deg, round(fov_deg))

@@ -44,6 +44,24 @@ class OpenFile(Protocol):
         ...
 
 
+class HeldBytes:
+    """What reading is for an open file whose bytes are in memory."""
+
+    __slots__ = ("_data",)
+
+    def __init__(self, data: bytes | bytearray) -> None:
+        self._data = data
+
+    @property
+    def size(self) -> int:
+        """Bytes at the moment."""
+        return len(self._data)
+
+    def read(self, offset: int, size: int) -> bytes:
+        """Up to `size` bytes from `offset`; fewer at the end, none behind it."""
+        return bytes(self._data[offset : offset + size])
+
+
 class FileStore(Protocol):
     """A tree of files. Every method raises `OSError` and then has changed nothing."""
 

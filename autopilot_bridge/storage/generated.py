@@ -4,7 +4,7 @@ import errno
 from collections.abc import Callable, Mapping
 from typing import Final
 
-from autopilot_bridge.storage.files import Entry, Mode, OpenFile
+from autopilot_bridge.storage.files import Entry, HeldBytes, Mode, OpenFile
 from autopilot_bridge.storage.paths import VehiclePath, error
 
 Content = Callable[[Mapping[str, str]], bytes]
@@ -77,20 +77,10 @@ class GeneratedStore:
         return name, {key: value for key, _, value in pairs}
 
 
-class _Snapshot:
+class _Snapshot(HeldBytes):
     """The bytes of a generated file as they were when it was opened."""
 
-    __slots__ = ("_data",)
-
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-
-    @property
-    def size(self) -> int:
-        return len(self._data)
-
-    def read(self, offset: int, size: int) -> bytes:
-        return self._data[offset : offset + size]
+    __slots__ = ()
 
     def write(self, offset: int, data: bytes) -> None:
         raise error(errno.EBADF)
@@ -99,21 +89,16 @@ class _Snapshot:
         """Nothing to give back."""
 
 
-class _Upload:
+class _Upload(HeldBytes):
     """A file being written, taken as a whole when it is closed."""
 
-    __slots__ = ("_data", "_take")
+    __slots__ = ("_take",)
+
+    _data: bytearray
 
     def __init__(self, take: Upload) -> None:
-        self._data = bytearray()
+        super().__init__(bytearray())
         self._take: Upload | None = take
-
-    @property
-    def size(self) -> int:
-        return len(self._data)
-
-    def read(self, offset: int, size: int) -> bytes:
-        return bytes(self._data[offset : offset + size])
 
     def write(self, offset: int, data: bytes) -> None:
         end = offset + len(data)

@@ -2,7 +2,7 @@
 
 import errno
 
-from autopilot_bridge.storage.files import Entry, Mode
+from autopilot_bridge.storage.files import Entry, HeldBytes, Mode
 from autopilot_bridge.storage.paths import VehiclePath, check_names, error
 from autopilot_bridge.storage.quota import MEMORY_QUOTA, Quota, Usage
 
@@ -130,22 +130,17 @@ class MemoryStore:
         return self._directory(path[:-1]), path[-1]
 
 
-class _MemoryFile:
+class _MemoryFile(HeldBytes):
     """An open file of a `MemoryStore`; removed meanwhile, it can still be read, as on a disk."""
 
-    __slots__ = ("_data", "_store", "_writable")
+    __slots__ = ("_store", "_writable")
+
+    _data: bytearray
 
     def __init__(self, store: MemoryStore, data: bytearray, *, writable: bool) -> None:
+        super().__init__(data)
         self._store = store
-        self._data = data
         self._writable = writable
-
-    @property
-    def size(self) -> int:
-        return len(self._data)
-
-    def read(self, offset: int, size: int) -> bytes:
-        return bytes(self._data[offset : offset + size])
 
     def write(self, offset: int, data: bytes) -> None:
         if not self._writable:
