@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Self
 
 from tests.clients.tied_process import tied
 
@@ -17,7 +18,7 @@ UPLOAD_WAIT_S = 20.0
 
 
 class Mavproxy:
-    """A MAVProxy process that is typed into."""
+    """A MAVProxy process that is typed into; it ends with its `with`."""
 
     def __init__(self, master: str, folder: Path) -> None:
         program = shutil.which("mavproxy.py", path=str(Path(sys.executable).parent)) or "mavproxy.py"
@@ -34,6 +35,13 @@ class Mavproxy:
         self.lines: list[str] = []
         self._seen = 0
         threading.Thread(target=self._read, daemon=True).start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.process.kill()
+        self.process.wait()
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -63,3 +71,10 @@ class Mavproxy:
             with contextlib.suppress(AssertionError):
                 return self.sees(text, wait_s)
         raise AssertionError(f"no {text!r} whatever was typed: {self.lines}")
+
+    def take_off(self, height_m: int) -> None:
+        """Arm and take off in ArduPilot's guided mode; arming is refused until there is a position."""
+        self.types_until("arm throttle", "ARM_DISARM: ACCEPTED")
+        self.type(f"takeoff {height_m}")
+        self.sees("NAV_TAKEOFF: ACCEPTED")
+        self.sees("height ")

@@ -1,6 +1,6 @@
 """What tests by MAVSDK do again and again: ask, be refused, take off, hold, land."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import pytest
@@ -9,6 +9,37 @@ from tests.clients.mavsdk_session import Session
 
 HEIGHT_M: Final = 8.0
 DEG_PER_M: Final = 1.0 / 111_195.0
+
+
+def raw_item(
+    seq: int,
+    command: int,
+    latitude_deg: float,
+    longitude_deg: float,
+    *,
+    frame: int = 6,
+    height_m: float = 10.0,
+    parameters: Sequence[float] = (),
+) -> Any:
+    """An item of a mission as `mission_raw` has them; frame 6: height over home."""
+    from mavsdk.plugins.mission_raw import MissionItem
+
+    param1, param2, param3, param4 = (*parameters, *(0.0,) * (4 - len(parameters)))
+    return MissionItem(
+        seq=seq,
+        frame=frame,
+        command=command,
+        current=int(seq == 0),
+        autocontinue=1,
+        param1=param1,
+        param2=param2,
+        param3=param3,
+        param4=param4,
+        x=round(latitude_deg * 1e7),
+        y=round(longitude_deg * 1e7),
+        z=height_m,
+        mission_type=0,
+    )
 
 
 def rejected(session: Session, plugin: str, method: str, *arguments: Any) -> str:

@@ -19,6 +19,7 @@ SYNCHRONOUS: Final = "MAVSDK synchronous"
 DISCOVERY_S: Final = 100.0
 
 Found = Callable[[Any], bool]
+Each = Callable[[], None] | None
 
 
 def _anything(element: Any) -> bool:
@@ -59,16 +60,19 @@ class Session(ABC):
     def call(self, plugin: str, method: str, *arguments: Any) -> Any:
         """What a method returns."""
 
-    @abstractmethod
     def first(
         self,
         plugin: str,
         stream: str,
         found: Found = _anything,
-        each: Callable[[], None] | None = None,
+        each: Each = None,
         wait_s: float = WALL_DEADLINE_S,
     ) -> Any:
         """The first element of a stream for which `found`; `each` is called at some 40 Hz meanwhile."""
+        return self._first(plugin, stream, found, each, wait_s)
+
+    @abstractmethod
+    def _first(self, plugin: str, stream: str, found: Found, each: Each, wait_s: float) -> Any: ...
 
     @abstractmethod
     def collect(self, plugin: str, method: str, *arguments: Any) -> list[Any]:
@@ -130,14 +134,7 @@ class AsyncioSession(Session):
     def call(self, plugin: str, method: str, *arguments: Any) -> Any:
         return self._run(getattr(self.plugin(plugin), method)(*arguments))
 
-    def first(
-        self,
-        plugin: str,
-        stream: str,
-        found: Found = _anything,
-        each: Callable[[], None] | None = None,
-        wait_s: float = WALL_DEADLINE_S,
-    ) -> Any:
+    def _first(self, plugin: str, stream: str, found: Found, each: Each, wait_s: float) -> Any:
         owner = self.plugin(plugin)
 
         async def watch() -> Any:
@@ -207,14 +204,7 @@ class SynchronousSession(Session):
     def call(self, plugin: str, method: str, *arguments: Any) -> Any:
         return getattr(self.plugin(plugin), method)(*arguments)
 
-    def first(
-        self,
-        plugin: str,
-        stream: str,
-        found: Found = _anything,
-        each: Callable[[], None] | None = None,
-        wait_s: float = WALL_DEADLINE_S,
-    ) -> Any:
+    def _first(self, plugin: str, stream: str, found: Found, each: Each, wait_s: float) -> Any:
         owner = self.plugin(plugin)
         heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
         handle = getattr(owner, f"subscribe_{stream}")(lambda data, _user: heard.put(data))

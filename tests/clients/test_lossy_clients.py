@@ -14,7 +14,8 @@ import pytest
 from pymavlink import mavftp, mavparm
 
 from autopilot_bridge.links import Impairment
-from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
+from tests.clients.mavsdk_flying import raw_item
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station
 from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
 from tests.lossy_proxy import LossyProxy, lossy_proxy
@@ -102,23 +103,15 @@ def test_mavsdk_over_a_poor_radio(flavour: str) -> None:
     up at that, so its user tries again.
     """
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
-    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
     from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
     from mavsdk.asyncio.plugins.param import ParamAsync
-    from mavsdk.plugins.mission_raw import MissionItem, MissionRawError
+    from mavsdk.plugins.mission_raw import MissionRawError
 
     places = [473977418 + 10 * seq for seq in range(15)]
-    items = [
-        MissionItem(seq, 6, 16, int(seq == 0), 1, 0.0, 0.0, 0.0, 0.0, x, 85455939, 20.0, 0)
-        for seq, x in enumerate(places)
-    ]
+    items = [raw_item(seq, 16, x * 1e-7, 8.5455939, height_m=20.0) for seq, x in enumerate(places)]
 
     async def script(url: str) -> None:
-        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-        async with Mavsdk(configuration) as sdk:
-            await sdk.add_any_connection(url.replace("udpin:", "udpin://"))
-            system = await sdk.first_autopilot(timeout_s=60.0)
-            assert system is not None
+        async with ground_station(url.replace("udpin:", "udpin://")) as system:
             async with asyncio.timeout(120.0):
                 everything = await ParamAsync(system).get_all_params()
             assert len(everything.float_params) + len(everything.int_params) > 300
@@ -143,7 +136,6 @@ def test_mavsdk_over_a_poor_radio(flavour: str) -> None:
 def test_mavsdk_flies_by_setpoints_over_a_poor_radio(flavour: str) -> None:
     """Offboard: both corners are reached, and the vehicle never leaves the guided mode."""
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
-    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
     from mavsdk.asyncio.plugins.action import ActionAsync
     from mavsdk.asyncio.plugins.offboard import OffboardAsync
     from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
@@ -162,11 +154,7 @@ def test_mavsdk_flies_by_setpoints_over_a_poor_radio(flavour: str) -> None:
                     await asyncio.sleep(0.5)
 
     async def script(url: str) -> None:
-        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-        async with Mavsdk(configuration) as sdk:
-            await sdk.add_any_connection(url.replace("udpin:", "udpin://"))
-            system = await sdk.first_autopilot(timeout_s=60.0)
-            assert system is not None
+        async with ground_station(url.replace("udpin:", "udpin://")) as system:
             telemetry, action, offboard = TelemetryAsync(system), ActionAsync(system), OffboardAsync(system)
             if flavour == "ardupilot":  # which sends what it is asked for
                 await until_accepted(lambda: telemetry.set_rate_position(4.0))

@@ -28,24 +28,19 @@ def waypoints(folder: Path) -> Path:
 )
 def test_everyday_commands(tmp_path: Path) -> None:
     port = free_port(socket.SOCK_STREAM)
-    with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=SPEEDUP):
-        station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
-        try:
-            station.sees("Saved ")  # the parameters, at once: FTP is refused, not left to time out
-            station.type("param set WPNAV_SPEED 800")
-            station.types_until("param fetch WPNAV_SPEED", "WPNAV_SPEED = 800")
-            station.types_until(f"wp load {waypoints(tmp_path)}", "Flight plan received", UPLOAD_WAIT_S)
-            station.type("mode guided")
-            station.sees("Mode GUIDED")
-            station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")  # refused until there is a position
-            station.type("takeoff 10")
-            station.sees("NAV_TAKEOFF: ACCEPTED")
-            station.sees("height ")  # AUTO waits for its start while the vehicle stands
-            station.type("mode auto")
-            station.sees("DO_SET_MODE: ACCEPTED")
-            station.sees("Reached command #2")
-            station.type("rtl")
-            station.sees("DISARMED")
-        finally:
-            station.process.kill()
-            station.process.wait()
+    with (
+        running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=SPEEDUP),
+        Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path) as station,
+    ):
+        station.sees("Saved ")  # the parameters, at once: FTP is refused, not left to time out
+        station.type("param set WPNAV_SPEED 800")
+        station.types_until("param fetch WPNAV_SPEED", "WPNAV_SPEED = 800")
+        station.types_until(f"wp load {waypoints(tmp_path)}", "Flight plan received", UPLOAD_WAIT_S)
+        station.type("mode guided")
+        station.sees("Mode GUIDED")
+        station.take_off(10)  # AUTO waits for its start while the vehicle stands
+        station.type("mode auto")
+        station.sees("DO_SET_MODE: ACCEPTED")
+        station.sees("Reached command #2")
+        station.type("rtl")
+        station.sees("DISARMED")

@@ -34,24 +34,21 @@ def plan(folder: Path) -> Path:
 )
 def test_everyday_commands(tmp_path: Path) -> None:
     port = free_port(socket.SOCK_STREAM)
-    with running_sitl(
-        "ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=SPEEDUP, options=["--model", "aerosonde"]
+    options = ["--model", "aerosonde"]
+    with (
+        running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=SPEEDUP, options=options),
+        Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path) as station,
     ):
-        station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
-        try:
-            station.sees("Saved ")  # the parameters
-            station.types_until(f"wp load {plan(tmp_path)}", "Flight plan received", wait_s=UPLOAD_WAIT_S)
-            station.type("mode takeoff")
-            station.sees("Mode TAKEOFF")
-            station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")
-            station.sees("height ")  # that it is flying
-            station.type("mode auto")
-            station.sees("Mode AUTO")
-            station.sees("Reached waypoint #2")
-            station.type("loiter")
-            station.sees("Mode LOITER")
-            station.type("rtl")
-            station.sees("Mode RTL")
-        finally:
-            station.process.kill()
-            station.process.wait()
+        station.sees("Saved ")  # the parameters
+        station.types_until(f"wp load {plan(tmp_path)}", "Flight plan received", wait_s=UPLOAD_WAIT_S)
+        station.type("mode takeoff")
+        station.sees("Mode TAKEOFF")
+        station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")
+        station.sees("height ")  # that it is flying
+        station.type("mode auto")
+        station.sees("Mode AUTO")
+        station.sees("Reached waypoint #2")
+        station.type("loiter")
+        station.sees("Mode LOITER")
+        station.type("rtl")
+        station.sees("Mode RTL")

@@ -41,26 +41,24 @@ def changes_mode(station: Mavproxy, name: str) -> None:
 def test_everyday_commands(tmp_path: Path, request: pytest.FixtureRequest) -> None:
     """PX4 knows no GUIDED; it takes off by its mode."""
     port = free_port()
-    with running_sitl("px4", [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP):
-        station = Mavproxy(f"udpin:127.0.0.1:{port}", tmp_path)
-        try:
-            station.sees("Saved ")
-            station.type("param set MPC_XY_CRUISE 6")
-            station.types_until("param fetch MPC_XY_CRUISE", "MPC_XY_CRUISE = 6", 10.0)
-            station.types_until(f"wp load {waypoints(tmp_path)}", "TYPE_MISSION: ACCEPTED", UPLOAD_WAIT_S)
-            station.type("mode TAKEOFF")
-            station.sees("required argument is not a float")  # it sends the names' triples as they are
-            changes_mode(station, "TAKEOFF")
-            station.types_until("arm throttle", "ARMED", 5.0)
-            station.sees("Takeoff detected")
-            station.sees("Mode LOITER")  # it holds where the take-off ends
-            changes_mode(station, "MISSION")
-            changes_mode(station, "LOITER")
-            changes_mode(station, "RTL")
-            station.sees("DISARMED")
-        finally:
-            station.process.kill()
-            station.process.wait()
+    with (
+        running_sitl("px4", [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP),
+        Mavproxy(f"udpin:127.0.0.1:{port}", tmp_path) as station,
+    ):
+        station.sees("Saved ")
+        station.type("param set MPC_XY_CRUISE 6")
+        station.types_until("param fetch MPC_XY_CRUISE", "MPC_XY_CRUISE = 6", 10.0)
+        station.types_until(f"wp load {waypoints(tmp_path)}", "TYPE_MISSION: ACCEPTED", UPLOAD_WAIT_S)
+        station.type("mode TAKEOFF")
+        station.sees("required argument is not a float")  # it sends the names' triples as they are
+        changes_mode(station, "TAKEOFF")
+        station.types_until("arm throttle", "ARMED", 5.0)
+        station.sees("Takeoff detected")
+        station.sees("Mode LOITER")  # it holds where the take-off ends
+        changes_mode(station, "MISSION")
+        changes_mode(station, "LOITER")
+        changes_mode(station, "RTL")
+        station.sees("DISARMED")
     not_offered(
         request, "no GUIDED; modes by `long DO_SET_MODE`, as MAVProxy 1.8.75 can't send PX4's by `mode`"
     )

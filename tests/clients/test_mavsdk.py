@@ -6,6 +6,7 @@ The whole action, mission and offboard surface on the px4 flavour; on ardupilot 
 import asyncio
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -13,19 +14,19 @@ pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed
 
 from mavsdk import Configuration as SyncConfiguration
 from mavsdk import Mavsdk as SyncMavsdk
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+from mavsdk.asyncio import ComponentType
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mission import MissionAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.action import Action, ActionError
 from mavsdk.plugins.mission import Mission, MissionItem, MissionPlan
-from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.mission_raw import MissionRaw
 from mavsdk.plugins.offboard import Offboard, PositionNedYaw
 from mavsdk.plugins.telemetry import Telemetry
 
-from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
+from tests.clients.mavsdk_flying import raw_item
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station
 from tests.clients.sitl_process import free_port, running_sitl
 
 SPEEDUP = 10.0
@@ -46,35 +47,17 @@ def mission_items(latitude_deg: float, longitude_deg: float) -> list[MissionItem
     ]
 
 
-def raw_items(latitude_deg: float, longitude_deg: float) -> list[RawItem]:
+def raw_items(latitude_deg: float, longitude_deg: float) -> list[Any]:
     """Home, a take-off and two waypoints, as they go over the wire."""
     corners = ((0, 16, 0.0, 0.0), (6, 22, 0.0, 0.0), (6, 16, 2e-4, 0.0), (6, 16, 2e-4, 2e-4))
     return [
-        RawItem(
-            seq=seq,
-            frame=frame,
-            command=command,
-            current=int(seq == 0),
-            autocontinue=1,
-            param1=0.0,
-            param2=0.0,
-            param3=0.0,
-            param4=0.0,
-            x=round((latitude_deg + north) * 1e7),
-            y=round((longitude_deg + east) * 1e7),
-            z=10.0,
-            mission_type=0,
-        )
+        raw_item(seq, command, latitude_deg + north, longitude_deg + east, frame=frame)
         for seq, (frame, command, north, east) in enumerate(corners)
     ]
 
 
 async def fly_px4(url: str) -> None:
-    configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-    async with Mavsdk(configuration) as mavsdk:
-        await mavsdk.add_any_connection(url)
-        system = await mavsdk.first_autopilot(timeout_s=100.0)
-        assert system is not None
+    async with ground_station(url) as system:
         telemetry, action = TelemetryAsync(system), ActionAsync(system)
         await first(telemetry.subscribe_health_all_ok(), bool, "health")
         await first(telemetry.subscribe_health(), lambda health: health.is_armable, "armable")

@@ -3,12 +3,12 @@
 import asyncio
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
 
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
-from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.mission import MissionAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
@@ -17,11 +17,11 @@ from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.plugins.action import ActionError, OrbitYawBehavior
 from mavsdk.plugins.mission import MissionItem, MissionPlan
-from mavsdk.plugins.mission_raw import MissionItem as RawItem
 from mavsdk.plugins.offboard import Attitude
 from mavsdk.plugins.telemetry import FlightMode, LandedState, Position
 
-from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
+from tests.clients.mavsdk_flying import raw_item
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station
 from tests.clients.runway import Place, PlanItem, Runway
 from tests.clients.sitl_process import free_port, running_sitl
 
@@ -30,27 +30,14 @@ NAN = math.nan
 AIRCRAFT = ("--model", "aerosonde")
 
 
-def raw(items: Sequence[PlanItem]) -> list[RawItem]:
+def raw(items: Sequence[PlanItem]) -> list[Any]:
     """Items as they go over the wire."""
     plan = []
     for seq, item in enumerate(items):
         lat, lon, height_m = item.place or (0.0, 0.0, 0.0)
-        parameters = (*item.parameters, *(0.0,) * (4 - len(item.parameters)))
         plan.append(
-            RawItem(
-                seq=seq,
-                frame=item.frame,
-                command=item.command,
-                current=int(seq == 0),
-                autocontinue=1,
-                param1=parameters[0],
-                param2=parameters[1],
-                param3=parameters[2],
-                param4=parameters[3],
-                x=round(lat * 1e7),
-                y=round(lon * 1e7),
-                z=height_m,
-                mission_type=0,
+            raw_item(
+                seq, item.command, lat, lon, frame=item.frame, height_m=height_m, parameters=item.parameters
             )
         )
     return plan
@@ -207,20 +194,9 @@ async def land_by_mission(pilot: Pilot) -> None:
     await pilot.lands()
 
 
-async def connected(url: str, mavsdk: Mavsdk) -> Pilot:
-    await mavsdk.add_any_connection(url)
-    system = await mavsdk.first_autopilot(timeout_s=100.0)
-    assert system is not None
-    return Pilot(system)
-
-
-def configuration() -> Configuration:
-    return Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-
-
 async def fly_px4(url: str) -> None:
-    async with Mavsdk(configuration()) as mavsdk:
-        pilot = await connected(url, mavsdk)
+    async with ground_station(url) as system:
+        pilot = Pilot(system)
         await pilot.ready()
         for part in (take_off, go_places, fly_at_speeds, fly_attitudes, fly_waypoints, land_by_mission):
             await part(pilot)
@@ -246,8 +222,8 @@ def test_px4_aircraft() -> None:
 
 
 async def fly_arduplane(url: str) -> None:
-    async with Mavsdk(configuration()) as mavsdk:
-        pilot = await connected(url, mavsdk)
+    async with ground_station(url) as system:
+        pilot = Pilot(system)
         telemetry = pilot.telemetry
         for rate in (
             telemetry.set_rate_position,

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
 from tests.clients.compatibility import not_offered
-from tests.clients.mavsdk_flying import DEG_PER_M, HEIGHT_M, accepted, fly, land, moved, rejected
+from tests.clients.mavsdk_flying import DEG_PER_M, HEIGHT_M, accepted, fly, land, moved, raw_item, rejected
 from tests.clients.mavsdk_session import Session
 
 compatibility = pytest.mark.compatibility
@@ -100,27 +100,11 @@ def test_mission(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest) 
 
 @compatibility(feature="mission_raw: flown")
 def test_raw_mission(mavsdk: Session, vehicle: str) -> None:
-    from mavsdk.plugins.mission_raw import MissionItem
-
     here = fly(mavsdk)
-    places = ((16, 0.0), (16, 15.0), (16, 30.0))
+    any_heading = (0.0, 0.0, 0.0, math.nan if vehicle == "px4" else 0.0)
     items = [
-        MissionItem(
-            seq=seq,
-            frame=6,
-            command=command,
-            current=int(seq == 0),
-            autocontinue=1,
-            param1=0.0,
-            param2=0.0,
-            param3=0.0,
-            param4=math.nan if vehicle == "px4" else 0.0,
-            x=round((here.latitude_deg + north_m * DEG_PER_M) * 1e7),
-            y=round(here.longitude_deg * 1e7),
-            z=10.0,
-            mission_type=0,
-        )
-        for seq, (command, north_m) in enumerate(places)
+        raw_item(seq, 16, here.latitude_deg + north * DEG_PER_M, here.longitude_deg, parameters=any_heading)
+        for seq, north in enumerate((0.0, 15.0, 30.0))
     ]
     mavsdk.call("mission_raw", "upload_mission", items)
     assert len(mavsdk.call("mission_raw", "download_mission")) == 3

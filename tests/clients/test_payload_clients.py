@@ -159,14 +159,10 @@ async def use_lens_and_video(system: Any) -> None:
 @pytest.mark.compatibility(client="MAVSDK asyncio", feature="camera, gimbal", plane=True)
 def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
-    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+    from tests.clients.mavsdk_waiting import ground_station
 
     async def use(url: str) -> None:
-        configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
-        async with Mavsdk(configuration) as mavsdk:
-            await mavsdk.add_any_connection(url)
-            system = await mavsdk.first_autopilot(timeout_s=100.0)
-            assert system is not None
+        async with ground_station(url) as system:
             await use_gimbal(system)
             await use_camera(system)
             await use_lens_and_video(system)

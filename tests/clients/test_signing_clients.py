@@ -161,19 +161,14 @@ def test_mavproxy_flies_signed(tmp_path: Path, key_file: Path) -> None:
     pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
     port = free_port(socket.SOCK_STREAM)
     options = ("--signing-key", str(key_file))
-    with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=8.0, options=options):
-        station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
-        try:
-            station.sees("online system")
-            station.types_until(f"signing key {PASSPHRASE}", "Setup signing key")
-            station.types_until("mode guided", "Mode GUIDED", 1.0)
-            station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")
-            station.type("takeoff 10")
-            station.sees("NAV_TAKEOFF: ACCEPTED")
-            station.sees("height ")
-        finally:
-            station.process.kill()
-            station.process.wait()
+    with (
+        running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=8.0, options=options),
+        Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path) as station,
+    ):
+        station.sees("online system")
+        station.types_until(f"signing key {PASSPHRASE}", "Setup signing key")
+        station.types_until("mode guided", "Mode GUIDED", 1.0)
+        station.take_off(10)
 
 
 @pytest.mark.slow
@@ -182,16 +177,14 @@ def test_mavproxy_brings_the_key(tmp_path: Path) -> None:
     pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
     port, store = free_port(socket.SOCK_STREAM), tmp_path / "store"
     options = ("--signing-store", str(store))
-    with running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=8.0, options=options):
-        station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
-        try:
-            station.sees("online system")
-            station.types_until(f"signing setup {PASSPHRASE}", "Signing key set", 2.0)
-            station.types_until("mode guided", "Mode GUIDED", 1.0)
-            station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")
-        finally:
-            station.process.kill()
-            station.process.wait()
+    with (
+        running_sitl("ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=8.0, options=options),
+        Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path) as station,
+    ):
+        station.sees("online system")
+        station.types_until(f"signing setup {PASSPHRASE}", "Signing key set", 2.0)
+        station.types_until("mode guided", "Mode GUIDED", 1.0)
+        station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")
     assert SECRET.hex() in store.read_text()
     with running_sitl(
         "ardupilot", [f"tcpin:127.0.0.1:{port}"], speedup=8.0, options=options

@@ -142,16 +142,11 @@ def test_mavproxy_flies_one_of_five_on_one_link(tmp_path: Path) -> None:
     pytest.importorskip("MAVProxy", reason="MAVProxy is not installed")
     port = free_port(socket.SOCK_STREAM)
     options = ("--count", str(COUNT), "--gcs-link", f"tcpin:127.0.0.1:{port}")
-    with running_sitl("ardupilot", [], speedup=8.0, options=options):
-        station = Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path)
-        try:
-            station.sees("online system")
-            station.type("vehicle 3")
-            station.type("mode guided")
-            station.types_until("arm throttle", "ARM_DISARM: ACCEPTED")
-            station.type("takeoff 10")
-            station.sees("NAV_TAKEOFF: ACCEPTED")
-            station.sees("height ")
-        finally:
-            station.process.kill()
-            station.process.wait()
+    with (
+        running_sitl("ardupilot", [], speedup=8.0, options=options),
+        Mavproxy(f"tcp:127.0.0.1:{port}", tmp_path) as station,
+    ):
+        station.sees("online system")
+        station.type("vehicle 3")
+        station.type("mode guided")
+        station.take_off(10)

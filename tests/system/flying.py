@@ -104,7 +104,9 @@ class Flying:
         sitl = self.sitl
 
         async def main() -> T:
-            connection = Connection(_Borrowed(self.link, sendings), LoopClock(), signing=self.signing)
+            connection = Connection(
+                _Borrowed(self.link, _sendings=sendings), LoopClock(), signing=self.signing
+            )
             async with connection:
                 vehicle = Vehicle(connection)
                 await vehicle.wait_heartbeat()
@@ -132,18 +134,28 @@ class Flying:
             self.sitl.advance()
 
 
-class _Borrowed:
-    """A link that a connection may use but not close."""
+class WrappedLink:
+    """A link that is used as it is, but for what a class derived from this one does otherwise.
 
-    def __init__(self, link: Any, sendings: int) -> None:
+    Args:
+        link: that link.
+        own: attributes of the wrapper itself.
+    """
+
+    def __init__(self, link: Any, **own: Any) -> None:
         object.__setattr__(self, "_link", link)
-        object.__setattr__(self, "_sendings", sendings)
+        for name, value in own.items():
+            object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._link, name)
 
     def __setattr__(self, name: str, value: object) -> None:
         setattr(self._link, name, value)
+
+
+class _Borrowed(WrappedLink):
+    """A link that a connection may use but not close."""
 
     def send(self, data: bytes) -> None:
         for _ in range(self._sendings):

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as dialect
 
-from autopilot_bridge.links import MemoryLink, Reach
+from autopilot_bridge.links import Reach
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, LinkSigning, SigningKey, SigningState, decode
 from autopilot_bridge.mavlink.signing import MINUTE, Refusal
 from autopilot_bridge.sitl import (
@@ -21,7 +21,7 @@ from autopilot_bridge.sitl import (
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
 from missions.vehicle import Vehicle
-from tests.system.flying import Flying
+from tests.system.flying import Flying, WrappedLink
 from tests.system.hostile import commands, parameter_sets, valid_frames
 
 KEY, OTHER_KEY = SigningKey.from_passphrase("ours"), SigningKey.from_passphrase("theirs")
@@ -55,18 +55,8 @@ def attacks() -> list[bytes]:
     return frames + parameter_sets(13, 500, ["MPC_XY_VEL_MAX", "COM_RCL_EXCEPT"], target=1)
 
 
-class _Tapped:
+class _Tapped(WrappedLink):
     """A client's link, and whoever listens."""
-
-    def __init__(self, link: MemoryLink, sent: list[bytes]) -> None:
-        object.__setattr__(self, "_link", link)
-        object.__setattr__(self, "_sent", sent)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._link, name)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        setattr(self._link, name, value)
 
     def send(self, data: bytes) -> None:
         self._sent.append(data)
@@ -78,7 +68,7 @@ def recorded() -> tuple[list[bytes], int]:
     """What the true client of a flight sent, signed, and when it ended."""
     flying = Flying(key=KEY, reach=Reach.NETWORK)
     sent: list[bytes] = []
-    flying.link = _Tapped(flying.link, sent)  # type: ignore[assignment]
+    flying.link = _Tapped(flying.link, _sent=sent)  # type: ignore[assignment]
     flying.take_off(10.0)
     return sent, flying.now()
 
