@@ -16,10 +16,10 @@ def is_hardware(connections: Sequence[str]) -> bool:
     Raises:
         AddressError: a connection string that is none.
     """
-    from autopilot_bridge.links import SerialPort, parse_address
+    from autopilot_bridge.links import VEHICLE_FORMS, SerialPort, parse_address
     from autopilot_bridge.links.reach import Reach, reach_of
 
-    addresses = [parse_address(text) for text in connections]
+    addresses = [parse_address(text, VEHICLE_FORMS) for text in connections]
     return any(isinstance(a, SerialPort) or reach_of(a) is Reach.NETWORK for a in addresses)
 
 

@@ -79,7 +79,6 @@ def estimate(**given: Any) -> int:
     usage, 130 interrupted before --duration was over.
     """
     from autopilot_bridge.errors import AddressError, BridgeError
-    from autopilot_bridge.links import parse_address
     from estimators.errors import EstimatorError
     from missions.errors import PlanError
     from missions.estimation.live import LiveRequest
@@ -89,7 +88,6 @@ def estimate(**given: Any) -> int:
     teller = _Teller()
     try:
         key = key_from(given["signing_key"])
-        warn_if_open(parse_address(given["connect"]), key)
         result = run_estimator(
             LiveRequest(
                 estimator=given["name"],
@@ -106,6 +104,7 @@ def estimate(**given: Any) -> int:
                 picture=not given["no_picture"],
                 command=" ".join(["flightstack", *sys.argv[1:]]),
                 signing_key=key,
+                on_open=lambda: warn_if_open((given["connect"],), key),
             ),
             teller,
         )

@@ -320,7 +320,6 @@ def _fly(given: dict[str, Any]) -> int:
     if terminal and not given["connect"]:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
-    from autopilot_bridge.links import parse_address
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
     from missions.request import REGAIN_S
     from missions.session import RunRequest as Request
@@ -337,8 +336,6 @@ def _fly(given: dict[str, Any]) -> int:
     line = ProgressLine()
     try:
         key = key_from(given["signing_key"])
-        for address in map(parse_address, given["connect"]):
-            warn_if_open(address, key)
         request = Request(
             options=options,
             connect=given["connect"],
@@ -360,6 +357,7 @@ def _fly(given: dict[str, Any]) -> int:
             on_failure=Mode(given["on_failure"]),
             max_error_m=given["max_error"],
             confirm=confirm,
+            on_open=lambda: warn_if_open(given["connect"], key),
             regain_s=REGAIN_S if given["regain"] is None else given["regain"],
             estimator=given["estimator"],
             estimator_settings=given["settings"],

@@ -270,9 +270,9 @@ def play(
             if terminal:
                 click.echo(f"\r{played.log_s:8.1f} s  {played.frames} frames", err=True, nl=False)
 
-        warn_if_open(address, key)
         signing = client_signing(key)
         connection = open_link(address)
+        warn_if_open((link,), key)
         if not connection.peers:
             click.echo(f"waiting for somebody on {connection.description}", err=True)
         try:

@@ -1,5 +1,6 @@
 """What the commands that speak on links have in common: the option for a key, the warning without one."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,12 +32,13 @@ def key_from(path: Path | None) -> "SigningKey | None":
     return read_key(path)
 
 
-def warn_if_open(address: "Address", key: "SigningKey | None") -> None:
-    """Say in one line that a link listens to a network, when whoever speaks there is believed."""
-    from autopilot_bridge.links import listens_to_network, open_unsigned
+def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
+    """Say in one line of each link that listens to a network, when whoever speaks there is believed."""
+    from autopilot_bridge.links import listens_to_network, open_unsigned, parse_address
 
-    if key is None and listens_to_network(address):
-        click.echo(f"flightstack: warning: {open_unsigned(address)}", err=True)
+    for address in map(parse_address, connections) if key is None else ():
+        if listens_to_network(address):
+            click.echo(f"flightstack: warning: {open_unsigned(address)}", err=True)
 
 
 def vehicle_signing(key: Path | None, unsigned: str, store: Path | None) -> "SigningParameters":

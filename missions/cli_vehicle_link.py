@@ -42,10 +42,10 @@ def connected(command: Callable[..., Any]) -> Callable[..., Any]:
 def address(text: str) -> "Address":
     """A connection string of the command line."""
     from autopilot_bridge.errors import AddressError
-    from autopilot_bridge.links import parse_address
+    from autopilot_bridge.links import VEHICLE_FORMS, parse_address
 
     try:
-        return parse_address(text)
+        return parse_address(text, VEHICLE_FORMS)
     except AddressError as error:
         raise click.UsageError(str(error)) from error
 

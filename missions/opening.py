@@ -92,9 +92,9 @@ def open_vehicles(request: RunRequest) -> Stage:
         PlanError: an address that is no vehicle's.
         BridgeError: a link can't be opened.
     """
-    from autopilot_bridge.links import ReplayLog, open_link, parse_address
+    from autopilot_bridge.links import VEHICLE_FORMS, ReplayLog, open_link, parse_address
 
-    addresses = [parse_address(text) for text in request.connect]
+    addresses = [parse_address(text, VEHICLE_FORMS) for text in request.connect]
     for address in addresses:
         if isinstance(address, ReplayLog):
             raise PlanError(f"--connect {address}: a log can't be flown; give the link of a vehicle")

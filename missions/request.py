@@ -1,6 +1,6 @@
 """What a run is asked for."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -41,6 +41,7 @@ class RunRequest:
         estimator_settings: its parameters as NAME=VALUE.
         confirm: shown what was found of the vehicles before they fly, says whether to go on; None: they are
             not looked at.
+        on_open: called once the links are open, or the world is.
         regain_s: how long a lost link may take to come back before the mission is given up, in seconds of
             this machine's clock.
         command: the command line, for the summary.
@@ -69,6 +70,7 @@ class RunRequest:
     estimator: str | None = None
     estimator_settings: Sequence[str] = ()
     confirm: "Confirm | None" = None
+    on_open: Callable[[], object] = lambda: None
     regain_s: float = REGAIN_S
     command: str = ""
     signing_key: SigningKey | None = None

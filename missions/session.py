@@ -110,6 +110,7 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     stage = None
     try:
         stage = open_vehicles(request) if request.connect else open_world(mission, request, folder)
+        request.on_open()
         check_stage(mission, request, stage)
     except BaseException:
         if stage is not None:

@@ -1,6 +1,7 @@
 """Links: bytes to and from peers over memory, UDP, TCP, serial lines and logs. Non-blocking."""
 
 from autopilot_bridge.links.address import (
+    VEHICLE_FORMS,
     Address,
     ReplayLog,
     SerialPort,
@@ -22,6 +23,7 @@ from autopilot_bridge.links.tcp import TcpClientLink, TcpServerLink
 from autopilot_bridge.links.udp import UdpLink
 
 __all__ = [
+    "VEHICLE_FORMS",
     "Address",
     "Impairment",
     "Link",

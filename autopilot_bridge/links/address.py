@@ -18,6 +18,11 @@ from autopilot_bridge.errors import AddressError
 
 LOOPBACK: Final = "127.0.0.1"
 DEFAULT_BAUD: Final = 115200
+VEHICLE_FORMS: Final = (
+    "udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT (each also with ://), "
+    "serial:DEVICE:BAUD or DEVICE,BAUD"
+)
+"""What leads to a vehicle, with any client."""
 ACCEPTED_FORMS: Final = (
     "udpin:HOST:PORT, udpout:HOST:PORT, udppeer:HOST:PORT,HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT "
     "(each also with ://), serial:DEVICE:BAUD, DEVICE,BAUD, or a path ending in .tlog"
@@ -119,50 +124,69 @@ _SCHEME: Final = re.compile(r"([A-Za-z]+):(//)?(.*)", re.DOTALL)
 _DEVICE: Final = re.compile(r"/dev/.+")
 
 
-def parse_address(text: str) -> Address:
+def parse_address(text: str, accepted: str = ACCEPTED_FORMS) -> Address:
     """The address a connection string means; `str()` of the result is its canonical form.
 
     Servers without a host listen on loopback only. `udp:` means `udpin:`, as in pymavlink and MAVSDK.
 
+    Args:
+        accepted: what an error says of the forms that are; all are parsed.
+
     Raises:
-        AddressError: the text is none of the accepted forms; the message says which are.
+        AddressError: the text is none of the forms; the message says which are accepted.
     """
+    try:
+        return _parsed(text)
+    except _Refused as refusal:
+        raise AddressError(f"connection {text!r}: {refusal}; accepted: {accepted}") from None
+
+
+class _Refused(ValueError):
+    """Why a text is no address."""
+
+
+def _parsed(text: str) -> Address:
     stripped = text.strip()
     if stripped.lower().endswith(".tlog"):
         return ReplayLog(Path(stripped))
     if _DEVICE.fullmatch(stripped):
-        return _serial(text, *_split_baud(stripped, ","))
+        return _serial(*_split_baud(stripped, ","))
     match = _SCHEME.fullmatch(stripped)
     if match is None:
-        raise _error(text, "no such form")
+        raise _Refused("no such form")
     scheme, rest = match[1].lower(), match[3]
     if scheme == "serial":
         device, baud = _split_baud(rest, "," if "," in rest else ":")
-        return _serial(text, device, baud)
+        return _serial(device, baud)
     if scheme == "udppeer":
         local, comma, remote = rest.partition(",")
         if not comma:
-            raise _error(text, "the partner after the comma is missing")
-        return UdpPeer(*_host_port(text, local, server=True), *_host_port(text, remote, server=False))
+            raise _Refused("the partner after the comma is missing")
+        return UdpPeer(*_host_port(local, server=True), *_host_port(remote, server=False))
     if scheme in _SERVERS:
-        return _SERVERS[scheme](*_host_port(text, rest, server=True))
+        return _SERVERS[scheme](*_host_port(rest, server=True))
     if scheme in _CLIENTS:
-        return _CLIENTS[scheme](*_host_port(text, rest, server=False))
-    raise _error(text, f"unknown kind '{scheme}:'")
+        return _CLIENTS[scheme](*_host_port(rest, server=False))
+    raise _Refused(f"unknown kind '{scheme}:'")
 
 
-def _host_port(text: str, rest: str, *, server: bool) -> tuple[str, int]:
-    host, _, port_text = rest.strip().rstrip("/").rpartition(":")
+def _host_port(rest: str, *, server: bool) -> tuple[str, int]:
+    place = rest.strip().rstrip("/")
+    host, colon, port_text = place.rpartition(":")
+    if not place:
+        raise _Refused("the port is missing" if server else "host and port are missing")
+    if not place.isdigit() and (not port_text or not colon or place.endswith("]")):
+        raise _Refused("the port is missing")
     host = host.removeprefix("[").removesuffix("]")
     if not host:
         if not server:
-            raise _error(text, "the host is missing")
+            raise _Refused("the host is missing")
         host = LOOPBACK
     if re.search(r"[\s,/\[\]]", host):
-        raise _error(text, f"host {host!r} is not a name or an address")
+        raise _Refused(f"host {host!r} is not a name or an address")
     lowest = 0 if server else 1
     if not (port_text.isascii() and port_text.isdigit()) or not lowest <= int(port_text) <= 65535:
-        raise _error(text, f"port {port_text!r} is not in {lowest}..65535")
+        raise _Refused(f"port {port_text!r} is not in {lowest}..65535")
     return host, int(port_text)
 
 
@@ -174,19 +198,15 @@ def _split_baud(rest: str, separator: str) -> tuple[str, str]:
     return head, tail
 
 
-def _serial(text: str, device: str, baud_text: str) -> SerialPort:
+def _serial(device: str, baud_text: str) -> SerialPort:
     if not device or re.search(r"[\s,]", device):
-        raise _error(text, f"device {device!r} is not a serial port")
+        raise _Refused(f"device {device!r} is not a serial port")
     if not baud_text:
         return SerialPort(device)
     if not (baud_text.isascii() and baud_text.isdigit()) or not 1 <= int(baud_text) <= 20_000_000:
-        raise _error(text, f"baud rate {baud_text!r} is not a number such as {DEFAULT_BAUD}")
+        raise _Refused(f"baud rate {baud_text!r} is not a number such as {DEFAULT_BAUD}")
     return SerialPort(device, int(baud_text))
 
 
 def _join(host: str, port: int) -> str:
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-
-
-def _error(text: str, reason: str) -> AddressError:
-    return AddressError(f"connection {text!r}: {reason}; accepted: {ACCEPTED_FORMS}")

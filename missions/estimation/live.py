@@ -17,7 +17,7 @@ from typing import Any, Final
 from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import TlogError
-from autopilot_bridge.links import Link, ReplayLog, open_link, parse_address
+from autopilot_bridge.links import VEHICLE_FORMS, Link, ReplayLog, open_link, parse_address
 from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
 from autopilot_bridge.tlog import TlogWriter
 from estimators.errors import EstimatorError
@@ -61,6 +61,7 @@ class LiveRequest:
         picture: whether to draw `errors.png`.
         command: the command line, for the summary.
         signing_key: shared with the vehicle; None: unsigned.
+        on_open: called once the link is open.
     """
 
     estimator: str
@@ -77,6 +78,7 @@ class LiveRequest:
     picture: bool = True
     command: str = ""
     signing_key: SigningKey | None = None
+    on_open: Callable[[], object] = lambda: None
 
     def __post_init__(self) -> None:
         if self.component_id not in ESTIMATOR_COMPONENTS:
@@ -283,7 +285,7 @@ def estimate(
     """
     found = estimator_class(request.estimator)
     parameters = parameters_from(found, request.settings)
-    address = parse_address(request.connect)
+    address = parse_address(request.connect, VEHICLE_FORMS)
     if isinstance(address, ReplayLog):
         raise EstimatorError(f"--connect {address}: that is a log; use flightstack replay {address}")
 
@@ -294,6 +296,7 @@ def estimate(
     fleet = Fleet(make, system_ids=only, single=True)
     link = open_link(address)
     try:
+        request.on_open()
         folder = create_run_folder(request.out, fleet.name)
         begun_wall_s = wall_time_s()
         log = TlogWriter(folder / LOG_NAME)

@@ -17,7 +17,14 @@ from missions.preflight.fence_geometry import first_outside
 from missions.preflight.finding import Finding, Level, ok, problem, warning
 from missions.preflight.health import health_findings
 from missions.preflight.lost_link import PARAMETERS, lost_link_words
-from missions.preflight.settings import FENCE_PARAMETERS, RULES, fence, settings_findings, shapes_join
+from missions.preflight.settings import (
+    FENCE_PARAMETERS,
+    RULES,
+    areas_watched,
+    fence,
+    settings_findings,
+    shapes_join,
+)
 from missions.preflight.snapshot import Snapshot, usual
 from missions.vehicle.vehicle import Vehicle
 
@@ -53,11 +60,12 @@ async def look(vehicle: Vehicle, mission: Mission[Any], options: MissionOptions)
     """Look at a vehicle that is ready to arm, and at what is to be flown with it."""
     snapshot, fence_items = await _snapshot(vehicle)
     outline = await mission.outline(vehicle, options)
-    own_fence = tuple(fence_items) if outline is None or not outline.fence else outline.fence
+    planned = () if outline is None else outline.fence
+    own_fence = planned or tuple(fence_items)
     findings = [
         *_match(vehicle, mission),
         *health_findings(snapshot),
-        fence(snapshot),
+        fence(snapshot, len(planned)),
         *_way(vehicle, outline, own_fence, snapshot.parameters),
         _endurance(snapshot, outline),
         *settings_findings(snapshot),
@@ -174,7 +182,8 @@ def _way(
                     "way", f"the plan's home is {away_m:.0f} m from the vehicle's", "see that it fits here"
                 )
             )
-    shapes = fence_shapes(items, LocalFrame(vehicle.home))
+    watched = areas_watched(vehicle.autopilot, parameters)
+    shapes = fence_shapes(items, LocalFrame(vehicle.home)) if watched else ()
     join = shapes_join(vehicle.autopilot, parameters)
     outside = first_outside(shapes, [(n, e) for n, e, _ in points], join=join)
     if outside is not None:

@@ -114,25 +114,34 @@ def settings_findings(snapshot: Snapshot) -> list[Finding]:
     return findings or [ok("parameters", f"nothing unusual in {len(parameters)} of them")]
 
 
-def fence(snapshot: Snapshot) -> Finding:
-    """Whether a geofence keeps the vehicle in."""
+def fence(snapshot: Snapshot, planned: int = 0) -> Finding:
+    """Whether a geofence keeps the vehicle in.
+
+    Args:
+        planned: points of the fence that the mission brings; it takes the place of the vehicle's own.
+    """
     parameters = snapshot.parameters
-    items = snapshot.fence_items or 0
+    items = planned or snapshot.fence_items or 0
+    areas = f"{items} points of areas{' that the mission brings' if planned else ''}"
     parts = []
     if snapshot.flavour == "ardupilot":
         if not parameters.get("FENCE_ENABLE"):
-            held = f" ({items} points of one are stored)" if items else ""
+            held = (
+                f" ({items} points of one are {'in the mission' if planned else 'stored'})" if items else ""
+            )
             return _no_fence(f"none is enabled{held}", "set FENCE_ENABLE to 1, or fly without on purpose")
-        types = int(parameters.get("FENCE_TYPE", 0.0))
+        types = _bits(parameters, "FENCE_TYPE")
         if types & _FENCE_ALTITUDE:
             parts.append(f"up to {parameters.get('FENCE_ALT_MAX', math.nan):g} m")
         if types & _FENCE_CIRCLE:
             parts.append(f"within {parameters.get('FENCE_RADIUS', math.nan):g} m of home")
         if types & _FENCE_POLYGONS and items:
-            parts.append(f"{items} points of areas")
+            parts.append(areas)
+        elif planned:
+            return _no_fence(f"{areas} are not watched (FENCE_TYPE {types})", "add 4 to FENCE_TYPE")
     else:
         if items:
-            parts.append(f"{items} points of areas")
+            parts.append(areas)
         if parameters.get("GF_MAX_HOR_DIST", 0.0) > 0.0:
             parts.append(f"within {parameters['GF_MAX_HOR_DIST']:g} m of home")
         if parameters.get("GF_MAX_VER_DIST", 0.0) > 0.0:
@@ -142,9 +151,22 @@ def fence(snapshot: Snapshot) -> Finding:
     return ok("geofence", ", ".join(parts))
 
 
+def areas_watched(flavour: str, parameters: Mapping[str, float]) -> bool:
+    """Whether the autopilot keeps to the areas of its fence: PX4 always, ArduPilot when it is told to."""
+    if flavour == "px4":
+        return True
+    return bool(parameters.get("FENCE_ENABLE")) and bool(_bits(parameters, "FENCE_TYPE") & _FENCE_POLYGONS)
+
+
 def shapes_join(flavour: str, parameters: Mapping[str, float]) -> bool:
     """Whether of several areas to stay in one is enough: PX4 always, ArduPilot when it is told so."""
-    return flavour == "px4" or bool(int(parameters.get("FENCE_OPTIONS", 0.0)) & _FENCE_UNION)
+    return flavour == "px4" or bool(_bits(parameters, "FENCE_OPTIONS") & _FENCE_UNION)
+
+
+def _bits(parameters: Mapping[str, float], name: str) -> int:
+    """A parameter of flags; none when it is not told, or no number."""
+    value = parameters.get(name, 0.0)
+    return int(value) if math.isfinite(value) else 0
 
 
 def _no_fence(text: str, advice: str) -> Finding:

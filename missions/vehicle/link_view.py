@@ -29,6 +29,8 @@ T = TypeVar("T")
 
 _TEXTS_KEPT: Final = 50
 _SOUND_FOR_US: Final = 1_000_000
+_DEAF_AFTER_US: Final = 3_000_000
+_DEAF_LOOK_S: Final = 0.5
 ADAPTERS: Final[Mapping[tuple[str, VehicleKind], Callable[[], Adapter]]] = MappingProxyType(
     {
         ("px4", VehicleKind.MULTICOPTER): Px4,
@@ -295,9 +297,34 @@ class VehicleView:
 
     @asynccontextmanager
     async def deadline(self, seconds: float, awaited: str | Callable[[], str]) -> AsyncIterator[None]:
-        """`async with`: TimeoutError after `seconds` of vehicle time, LinkClosed when the link is lost."""
-        async with self.link_guard(awaited), self.clock.timeout(seconds):
-            yield
+        """`async with`: TimeoutError after `seconds` of vehicle time, LinkClosed when the link is lost.
+
+        Where a lost link may come back, the time in which nothing is heard does not count.
+        """
+        if not self.regain_s:
+            async with self.link_guard(awaited), self.clock.timeout(seconds):
+                yield
+            return
+        async with self.link_guard(awaited), asyncio.timeout(None) as scope:
+            running_out = asyncio.ensure_future(self._run_out(scope, seconds))
+            try:
+                yield
+            finally:
+                running_out.cancel()
+
+    async def _run_out(self, scope: asyncio.Timeout, seconds: float) -> None:
+        """Let a deadline pass; who was not heard then gets all of it anew when it is."""
+        await self.clock.sleep(seconds)
+        while self._deaf:
+            while self._deaf:
+                await self.clock.sleep(_DEAF_LOOK_S)
+            await self.clock.sleep(seconds)
+        scope.reschedule(asyncio.get_running_loop().time())
+
+    @property
+    def _deaf(self) -> bool:
+        """Whether no heartbeat has come for three seconds of vehicle time."""
+        return self._heard_us is not None and self.clock.time_us - self._heard_us > _DEAF_AFTER_US
 
     async def wait_until(
         self,

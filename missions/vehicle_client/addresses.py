@@ -1,6 +1,7 @@
 """Our connection strings as MAVSDK takes them."""
 
 from autopilot_bridge.links import (
+    VEHICLE_FORMS,
     Address,
     ReplayLog,
     SerialPort,
@@ -31,7 +32,4 @@ def mavsdk_url(address: Address) -> str:
         case SerialPort():
             return f"serial://{address.device}:{address.baud}"
         case UdpPeer() | ReplayLog():
-            raise PlanError(
-                f"--connect {address}: not for this command; accepted: udpin:, udpout:, tcp:, tcpin:, "
-                "serial: or DEVICE,BAUD"
-            )
+            raise PlanError(f"--connect {address}: not for this command; accepted: {VEHICLE_FORMS}")

@@ -87,6 +87,18 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize("command", COMMANDS)
+def test_a_link_that_does_not_open_is_not_warned_of(command: str) -> None:
+    busy = open_link("udpin:0.0.0.0:0")
+    port = busy.port  # type: ignore[union-attr]
+    unasked = ("--yes",) if command == "fly" else ()
+    words = [word.replace("127.0.0.1:0", f"0.0.0.0:{port}") for word in COMMANDS[command]]
+    done = flightstack(*words, *unasked)
+    busy.close()
+    assert done.exit_code == 2 and str(port) in done.output
+    assert "warning" not in done.output
+
+
+@pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("content", [None, b"", b"\0" * 32, b"two\nlines"])
 def test_a_file_without_a_key_is_refused_by_name(command: str, content: bytes | None, tmp_path: Path) -> None:
     path = tmp_path / "no.key"

@@ -10,6 +10,7 @@ from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import LinkClosed, MissionError
 from missions.vehicle import Setpoint
+from missions.vehicle.adapter import Mode
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 
@@ -120,6 +121,28 @@ def test_setpoints_end_when_the_mode_is_no_longer_ours(flown):
         MissionError, match=r"left the guided mode for Return; .*the link had been lost for 2\d s"
     ):
         flown(script)
+
+
+@both
+@pytest.mark.parametrize("asking", ["command", "mode", "parameter"])
+def test_what_is_asked_in_the_silence_is_answered_after_it(flown, flavour, asking):
+    """A command is sent five times, a second apart, and nobody hears it for much longer."""
+
+    async def script(vehicle, autopilot):
+        vehicle.regain_s = 60.0
+        await vehicle.takeoff(10.0)
+        cut(vehicle, autopilot, after_s=0.0, for_s=25.0)
+        await vehicle.clock.sleep(4.0)
+        begun_us = autopilot.time_us
+        if asking == "command":
+            await vehicle.set_message_rate("VFR_HUD", 10.0)
+        elif asking == "mode":
+            await vehicle.set_mode(Mode.LAND)
+        else:
+            await vehicle.parameter("MPC_XY_VEL_MAX" if flavour == "px4" else "WPNAV_SPEED")
+        return (autopilot.time_us - begun_us) * 1e-6
+
+    assert 20.0 < flown(script, flavour) < 25.0
 
 
 def test_streams_are_asked_for_again(flown):

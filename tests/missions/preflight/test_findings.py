@@ -14,7 +14,7 @@ from missions.preflight.fence_geometry import first_outside
 from missions.preflight.finding import Finding, Level
 from missions.preflight.health import health_findings, reasons_against_arming
 from missions.preflight.lost_link import lost_link_words
-from missions.preflight.settings import fence, settings_findings, shapes_join
+from missions.preflight.settings import areas_watched, fence, settings_findings, shapes_join
 from missions.preflight.snapshot import Snapshot
 
 HEALTH, PRESENT = "onboard_control_sensors_health", "onboard_control_sensors_present"
@@ -145,6 +145,42 @@ def test_fence(flavour: str, parameters: dict, items: int, level: Level, words: 
     finding = fence(snapshot(flavour, parameters, items=items))
     assert finding.level is level
     assert words in finding.text
+
+
+ALTITUDE_AND_AREAS = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 5.0, "FENCE_ALT_MAX": 100.0}
+
+
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "level", "words"),
+    [
+        ("px4", {}, Level.OK, "4 points of areas that the mission brings"),
+        ("ardupilot", ALTITUDE_AND_AREAS, Level.OK, "up to 100 m, 4 points of areas that the mission brings"),
+        ("ardupilot", ALTITUDE_AND_AREAS | {"FENCE_TYPE": 3.0}, Level.WARNING, "not watched (FENCE_TYPE 3)"),
+        ("ardupilot", {"FENCE_ENABLE": 0.0}, Level.WARNING, "(4 points of one are in the mission)"),
+        ("ardupilot", {"FENCE_ENABLE": 1.0, "FENCE_TYPE": math.nan}, Level.WARNING, "(FENCE_TYPE 0)"),
+    ],
+)
+def test_a_fence_that_the_mission_brings(flavour: str, parameters: dict, level: Level, words: str) -> None:
+    """It is what will be watched, whatever the vehicle has stored, if areas are watched at all."""
+    finding = fence(snapshot(flavour, parameters, items=9), planned=4)
+    assert finding.level is level
+    assert words in finding.text
+
+
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "watched"),
+    [
+        ("px4", {}, True),
+        ("ardupilot", ALTITUDE_AND_AREAS, True),
+        ("ardupilot", ALTITUDE_AND_AREAS | {"FENCE_ENABLE": 0.0}, False),
+        ("ardupilot", ALTITUDE_AND_AREAS | {"FENCE_TYPE": 3.0}, False),
+        ("ardupilot", {}, False),
+    ],
+)
+def test_a_fence_that_is_switched_off_is_not_in_the_way(
+    flavour: str, parameters: dict, watched: bool
+) -> None:
+    assert areas_watched(flavour, parameters) == watched
 
 
 @pytest.mark.parametrize(
