@@ -5,8 +5,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.commander import Commander
-from autopilot_bridge.commander.events import FailsafeAction
-from autopilot_bridge.commander.health import VehicleHealth
+from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
 from autopilot_bridge.flavours.flavour import Flavour, Identity, ModeDisplay
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.streams import Values
@@ -14,6 +13,7 @@ from autopilot_bridge.telemetry.streams import Values
 MAVLINK_VERSION: Final = 3
 PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 GEOFENCE: Final = mavlink.MAV_SYS_STATUS_GEOFENCE
+RECEIVER: Final = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 
 
 class NavigationJudgement:
@@ -112,19 +112,22 @@ class StatusReport:
         if commander.time_us < self._boot_us:
             return (0, 0, 0)
         health = bits.health_armed if commander.armed else bits.health
-        for bit, works in _sensors(commander.situation.health):
+        for bit, works in _sensors(commander):
             if not works:
                 health &= ~bit
+        sticks = _sticks(commander)
+        present = _with(bits.present, RECEIVER, bool(bits.present & RECEIVER) or sticks)
+        health = _with(health, RECEIVER, sticks)
         if not (commander.armed or commander.armable):
             health &= ~PREARM_CHECK
         enabled = bits.enabled_armed if commander.armed else bits.enabled
         if not self._flavour.policy.fence_in_status:
-            return (bits.present, enabled, health)
+            return (present, enabled, health)
         fence, parameters = commander.fence, commander.parameters.fence
         there = fence.present(parameters)
         acts = there and fence.enabled(parameters) and parameters.action > FailsafeAction.WARN
         return (
-            _with(bits.present, GEOFENCE, there),
+            _with(present, GEOFENCE, there),
             _with(enabled, GEOFENCE, acts),
             _with(health, GEOFENCE, not (there and fence.broken)),
         )
@@ -138,7 +141,17 @@ def _with(bits: int, bit: int, on: bool) -> int:
     return bits | bit if on else bits & ~bit
 
 
-def _sensors(health: VehicleHealth) -> tuple[tuple[int, bool], ...]:
+def _sticks(commander: Commander) -> bool:
+    """A radio or somebody else's sticks are heard."""
+    parameters = commander.parameters
+    limit_s = parameters.manual_loss_s or parameters.stick_timeout_s
+    return commander.situation.sticks_age_s <= limit_s
+
+
+def _sensors(commander: Commander) -> tuple[tuple[int, bool], ...]:
+    """Bits of what may break; both firmwares count a battery as broken from its first warning on."""
+    health = commander.situation.health
+    charged = health.battery and commander.battery_level < BatteryLevel.LOW
     return (
         (mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO, health.gyro),
         (mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL, health.accelerometer),
@@ -146,7 +159,7 @@ def _sensors(health: VehicleHealth) -> tuple[tuple[int, bool], ...]:
         (mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, health.barometer),
         (mavlink.MAV_SYS_STATUS_SENSOR_GPS, health.gps and health.position),
         (mavlink.MAV_SYS_STATUS_AHRS, health.attitude),
-        (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY, health.battery),
+        (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY, charged),
         (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, health.airspeed or not health.has_airspeed),
     )
 

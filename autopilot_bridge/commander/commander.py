@@ -7,6 +7,7 @@ Requests answer with a `Verdict`; what happens is told in typed events, which fl
 from collections.abc import Callable
 from typing import Final
 
+from autopilot_bridge.commander.aids_watch import AidsWatch
 from autopilot_bridge.commander.airspeed import AirspeedWatch
 from autopilot_bridge.commander.arming import arming_reasons, mode_obstacle
 from autopilot_bridge.commander.arming_checks import ArmingChecks
@@ -24,7 +25,6 @@ from autopilot_bridge.commander.events import (
     FailsafeAction,
     ModeChanged,
     ModeDenied,
-    NavigationReady,
     SystemStatus,
 )
 from autopilot_bridge.commander.failsafe import FailsafeMonitor, failsafe_mode
@@ -139,6 +139,7 @@ class Commander:
         self._disarming = AutoDisarm(policy)
         self._override = StickOverride()
         self._airspeed = AirspeedWatch()
+        self._aids = AidsWatch()
         self._memory = ModeMemory(active=policy.radio_restores_mode)
         self._follower = TaskFollower(self)
 
@@ -304,6 +305,7 @@ class Commander:
         changed = self._airspeed.update(self.situation.health, armed=self.armed, time_us=time_us)
         if changed is not None:
             self.emit(changed)
+        self._events.extend(self._aids.update(self.situation, self.parameters, self.context.health))
         told = self.failsafes.update(self.situation, self.parameters)
         self._events.extend(told)
         self._select()
@@ -317,14 +319,12 @@ class Commander:
 
     def _refresh(self) -> None:
         """Bring the situation up to date."""
-        located = self._survey.update(
+        self._events += self._survey.update(
             self.parameters,
             mode=self.commanded_mode,
             terminated=self.terminated,
             mission_problem=self.mission_problem,
         )
-        if located:
-            self.emit(NavigationReady(time_us=self.time_us))
         self._events.extend(self._fence_keeper.update(self.situation))
 
     @property

@@ -36,6 +36,14 @@ class FailsafeKind(Enum):
     ATTITUDE_EXCESSIVE = auto()
 
 
+class Aid(Enum):
+    """What a flight leans on, and may be lost."""
+
+    GROUND_STATION = auto()
+    STICKS = auto()
+    GPS = auto()  # as far as the navigation filter uses it
+
+
 class FailsafeAction(IntEnum):
     """What a failsafe does. The order is the precedence: the greatest of all active actions is flown."""
 
@@ -158,9 +166,10 @@ class FailsafeActivated(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailsafeCleared(Event):
-    """The condition of a failsafe went away."""
+    """The condition of a failsafe went away, which had asked for an action."""
 
     kind: FailsafeKind
+    action: FailsafeAction
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,6 +236,20 @@ class BatteryWarning(Event):
     level: BatteryLevel
     voltage_v: float
     used_ah: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AidChanged(Event):
+    """Something that the flight leans on was lost, or is back `after_s` seconds."""
+
+    aid: Aid
+    present: bool
+    after_s: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NavigationLost(Event):
+    """The navigation filter has no position any more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -113,7 +113,7 @@ class FailsafeMonitor:
                 active.action = action  # its parameter may have been changed meanwhile
             elif active is not None:
                 if active.present:
-                    events.append(FailsafeCleared(time_us=time_us, kind=kind))
+                    events.append(FailsafeCleared(time_us=time_us, kind=kind, action=active.action))
                 active.present = False
                 latched = self._keeps_mode and kind in _LATCHING and active.action >= FailsafeAction.RETURN
                 if not latched or active.overridden or not situation.armed:

@@ -4,6 +4,7 @@ import math
 from typing import Final
 
 from autopilot_bridge.commander.battery import BatteryMonitor
+from autopilot_bridge.commander.events import Event, NavigationLost, NavigationReady
 from autopilot_bridge.commander.home import Home
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
@@ -60,8 +61,8 @@ class Survey:
         mode: FlightMode,
         terminated: bool,
         mission_problem: Reason | None,
-    ) -> bool:
-        """Look at everything; True when a position has just become known.
+    ) -> list[Event]:
+        """Look at everything; whether a position has just become known, or is lost.
 
         Args:
             mode: the commanded one.
@@ -89,7 +90,9 @@ class Survey:
         roll, pitch, _ = context.nav[nav.EULER_RAD].tolist()
         situation.roll_rad, situation.pitch_rad = roll, pitch
         situation.tilt_rad = math.acos(math.cos(roll) * math.cos(pitch))
-        return situation.position and not was_known
+        if situation.position == was_known:
+            return []
+        return [(NavigationLost if was_known else NavigationReady)(time_us=time_us)]
 
     def _position_known(self, parameters: CommanderParameters) -> bool:
         situation = self._situation

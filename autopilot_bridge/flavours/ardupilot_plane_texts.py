@@ -28,6 +28,7 @@ _LINKS: Final[Mapping[FailsafeKind, str]] = {
 _AS_ON_THE_COPTER: Final = (
     events.Booted,
     events.NavigationReady,
+    events.NavigationLost,
     events.BatteryWarning,
     events.CommandDenied,
     events.FenceBreached,

@@ -79,6 +79,8 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
             return (Notice(Severity.INFO, "ArduPilot Ready"),)
         case events.NavigationReady():
             return (Notice(Severity.INFO, "EKF3 IMU0 is using GPS"),)
+        case events.NavigationLost():
+            return (Notice(Severity.WARNING, "EKF3 IMU0 stopped aiding"),)
         case events.Armed():
             return (Notice(Severity.INFO, "Arming motors"),)
         case events.Disarmed(reason=reason):

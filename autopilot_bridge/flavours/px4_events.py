@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Final
 
 from autopilot_bridge.commander import events
-from autopilot_bridge.commander.events import FailsafeAction, FailsafeKind
+from autopilot_bridge.commander.events import Aid, FailsafeAction, FailsafeKind
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.flavours import px4_plane_texts, px4_texts
@@ -184,6 +184,25 @@ FAILSAFE: Final = EventKind(
 FAILSAFE_CLEARED: Final = EventKind(
     name="failsafe_cleared", message="Failsafe cleared: {1}", arguments=(Argument("cause", _CAUSES),)
 )
+LINKS: Final[Mapping[tuple[Aid, bool], EventKind]] = MappingProxyType(
+    {
+        (Aid.GROUND_STATION, False): EventKind(
+            name="commander_gcs_lost",
+            message="Connection to ground control station lost",
+            level=Severity.WARNING,
+        ),
+        (Aid.GROUND_STATION, True): EventKind(
+            name="commander_gcs_regained", message="GCS connection regained"
+        ),
+        (Aid.STICKS, False): EventKind(name="commander_rc_lost", message="Manual control lost"),
+        (Aid.STICKS, True): EventKind(
+            name="commander_rc_regained",
+            message="Manual control regained after {1:.1} s",
+            arguments=(Argument("after", "float"),),
+        ),
+    }
+)
+"""What has no text: a link was lost, or is back."""
 LAUNCH: Final = EventKind(
     name="launch_detected",
     message="Launch detected. Enabling motors in {1:.1}s",
@@ -203,6 +222,7 @@ KINDS: Final = (
     *_OF_TEXT.values(),
     FAILSAFE,
     FAILSAFE_CLEARED,
+    *LINKS.values(),
     LAUNCH,
     ARMING_SUMMARY,
     *CHECKS.values(),
@@ -218,6 +238,13 @@ def occurrences(event: events.Event, notices: tuple[Notice, ...]) -> tuple[Occur
         notices: its texts.
     """
     match event:
+        case events.AidChanged(aid=aid, present=present, after_s=after_s) if (aid, present) in LINKS:
+            link = LINKS[aid, present]
+            return (Occurrence(link, (after_s,) if link.arguments else ()),)
+        case events.FailsafeActivated(action=FailsafeAction.NONE):
+            return ()
+        case events.FailsafeCleared(action=FailsafeAction.NONE):
+            return ()
         case events.FailsafeActivated(kind=kind, action=action):
             level = Severity.CRITICAL if action > FailsafeAction.WARN else Severity.WARNING
             return (Occurrence(FAILSAFE, (_CAUSE_NUMBERS[kind], action.value), level),)

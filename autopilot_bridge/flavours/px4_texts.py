@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from autopilot_bridge.commander import events
-from autopilot_bridge.commander.events import BatteryLevel, DisarmReason, FailsafeAction
+from autopilot_bridge.commander.events import Aid, BatteryLevel, DisarmReason, FailsafeAction
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.flavours.px4_modes import MODE_NAMES
 from autopilot_bridge.flavours.texts import Notice, Severity
@@ -71,6 +71,8 @@ _DISARMING_DENIED: Final = Notice(Severity.CRITICAL, "Disarming denied: not land
 _TAKEOFF: Final = Notice(Severity.INFO, "Takeoff detected")
 _LANDING: Final = Notice(Severity.INFO, "Landing detected")
 _MISSION_FINISHED: Final = Notice(Severity.INFO, "Mission finished, loitering")
+_GPS_STOPPED: Final = Notice(Severity.WARNING, "GNSS data fusion stopped")
+_GPS_STARTED: Final = Notice(Severity.INFO, "GNSS data fusion started")
 
 FIXED: Final = (
     _ARMED,
@@ -79,6 +81,8 @@ FIXED: Final = (
     _TAKEOFF,
     _LANDING,
     _MISSION_FINISHED,
+    _GPS_STOPPED,
+    _GPS_STARTED,
     *(Notice(Severity.INFO, text) for text in dict.fromkeys(_DISARMED.values())),
     *(Notice(Severity.CRITICAL, _SWITCHING.format(name)) for name in dict.fromkeys(MODE_NAMES.values())),
     *(Notice(Severity.CRITICAL, text) for text in _BATTERY.values()),
@@ -115,6 +119,8 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
         case events.BatteryWarning(level=level):
             text = _BATTERY.get(level)
             return () if text is None else (Notice(Severity.CRITICAL, text),)
+        case events.AidChanged(aid=Aid.GPS, present=present):
+            return (_GPS_STARTED if present else _GPS_STOPPED,)
         case events.TakeoffDetected():
             return (_TAKEOFF,)
         case events.LandingDetected():

@@ -1,0 +1,49 @@
+"""Watching what the flight leans on: links to people, and GPS in the navigation filter. News, no actions."""
+
+from typing import Final
+
+from autopilot_bridge.commander.events import Aid, AidChanged, Event
+from autopilot_bridge.commander.parameters import CommanderParameters
+from autopilot_bridge.commander.situation import Situation
+from autopilot_bridge.navigation.health import NavigationHealth
+
+_GPS_STOPPED_US: Final = 7_000_000
+"""Not fused for so long: it has stopped (PX4's EKF2 gives it up then)."""
+
+
+class AidsWatch:
+    """Tells when a link or GPS is lost, and when it is back; what never was there is not missed."""
+
+    __slots__ = ("_lost_us",)
+
+    def __init__(self) -> None:
+        self._lost_us: dict[Aid, int | None] = {}  # None: it is there
+
+    def update(
+        self, situation: Situation, parameters: CommanderParameters, navigation: NavigationHealth | None
+    ) -> list[Event]:
+        """Look at the newest situation; what has changed."""
+        told = [
+            self._judge(Aid.GROUND_STATION, situation.gcs_age_s, parameters.gcs_loss_s, situation.time_us),
+            self._judge(Aid.STICKS, situation.sticks_age_s, parameters.manual_loss_s, situation.time_us),
+        ]
+        if navigation is not None and navigation.time_since_gps_us >= 0:
+            age_s, limit_s = navigation.time_since_gps_us * 1e-6, _GPS_STOPPED_US * 1e-6
+            news = self._judge(Aid.GPS, age_s, limit_s, situation.time_us)
+            told.append(news if situation.armed else None)
+        return [event for event in told if event is not None]
+
+    def _judge(self, aid: Aid, age_s: float, limit_s: float, time_us: int) -> AidChanged | None:
+        if limit_s <= 0.0:
+            return None
+        present = age_s <= limit_s
+        if aid not in self._lost_us:
+            if present:
+                self._lost_us[aid] = None
+            return None
+        since_us = self._lost_us[aid]
+        if present is (since_us is None):
+            return None
+        since_us = time_us if since_us is None else since_us
+        self._lost_us[aid] = None if present else time_us - (round(age_s * 1e6) if age_s < 1e6 else 0)
+        return AidChanged(time_us=time_us, aid=aid, present=present, after_s=(time_us - since_us) * 1e-6)
