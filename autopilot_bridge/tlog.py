@@ -29,55 +29,6 @@ FLUSH_INTERVAL_US: Final = 1_000_000
 _CHUNK_BYTES: Final = 1 << 20
 
 
-def append_records(buffer: bytearray, time_us: int, packet: bytes) -> int:
-    """Append the frames of a packet that a channel of ours has sent, as records, to the bytes of a log.
-
-    They are told apart by their lengths only; what comes from elsewhere goes through a parser first. Among
-    them may be somebody else's that were forwarded as they came: MAVLink 1, or signed.
-
-    Args:
-        buffer: where to.
-        time_us: microseconds of the Unix epoch.
-        packet: one or more whole frames, one behind the other.
-
-    Returns:
-        How many records.
-
-    Raises:
-        TlogError: the packet does not end with a frame.
-    """
-    frames = [b""]
-    start, size = 0, len(packet)
-    try:
-        while start < size:
-            if packet[start] == MAGIC_V2 and not packet[start + 2]:
-                end = start + packet[start + 1] + OVERHEAD_V2
-            else:
-                end = start + packet[start + 1] + _foreign_overhead(packet, start)
-            frames.append(packet[start:end])
-            start = end
-    except IndexError:  # no frame begins here, or a torn one
-        pass
-    if start != size:
-        torn = size - len(frames[-1]) if start > size else start
-        raise TlogError(f"a packet of {size} bytes has no whole frame at byte {torn}")
-    buffer += _pack_time(time_us).join(frames)
-    return len(frames) - 1
-
-
-def _foreign_overhead(packet: bytes, start: int) -> int:
-    """What a frame that is not of our own making has beside its payload.
-
-    Raises:
-        IndexError: no frame begins there.
-    """
-    if packet[start] == MAGIC_V1:
-        return OVERHEAD_V1
-    if packet[start] == MAGIC_V2:
-        return OVERHEAD_V2 + (SIGNATURE_SIZE if packet[start + 2] & INCOMPAT_SIGNED else 0)
-    raise IndexError(start)
-
-
 class TlogWriter:
     """Writes a new log; whole records only, so that the file is readable whatever ends the process.
 
@@ -87,18 +38,23 @@ class TlogWriter:
     Args:
         path: the file; it must not exist.
 
+    Attributes:
+        records: how many were written; those of packets count when they are handed over.
+
     Raises:
         TlogError: the file exists or can't be created.
     """
 
-    __slots__ = ("_buffer", "_file", "_flushed_us", "bytes_written", "path", "records")
+    __slots__ = ("_buffer", "_file", "_flushed_us", "_kept", "_packets", "_times_us", "path", "records")
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.records = 0
-        self.bytes_written = 0
         self._buffer = bytearray()
-        self._flushed_us: int | None = None
+        self._times_us: list[int] = []  # packets that are not taken apart yet, newer than the buffer
+        self._packets: list[bytes] = []
+        self._kept = 0  # bytes
+        self._flushed_us = 0
         try:
             self._file: BinaryIO | None = open(self.path, "xb", buffering=0)  # noqa: SIM115
         except FileExistsError as error:
@@ -118,32 +74,34 @@ class TlogWriter:
         Raises:
             TlogError: the log is closed, or the disk is full.
         """
-        buffer = self._buffer
-        buffer += _pack_time(time_us)
-        buffer += frame
+        if self._packets:  # they come first
+            self.write_packet(time_us, frame)
+            return
+        self._buffer += _pack_time(time_us) + frame
         self.records += 1
-        self._flush_if_due(time_us)
+        self._kept += len(frame)
+        if self._kept >= FLUSH_BYTES or not 0 <= time_us - self._flushed_us < FLUSH_INTERVAL_US:
+            self._flushed_us = time_us
+            self.flush()
 
     def write_packet(self, time_us: int, packet: bytes) -> None:
         """Append the frames of a packet that a channel of ours has sent.
 
-        They are told apart by their lengths only; what comes from elsewhere goes through a parser first.
+        They are told apart when they are handed over, by their lengths only; what comes from elsewhere goes
+        through a parser first.
 
         Args:
             time_us: microseconds of the Unix epoch.
             packet: one or more frames, one behind the other.
 
         Raises:
-            TlogError: the packet does not end with a frame, the log is closed, or the disk is full.
+            TlogError: a packet since the last flush does not end with a frame (those before it are written),
+                the log is closed, or the disk is full.
         """
-        self.records += append_records(self._buffer, time_us, packet)
-        self._flush_if_due(time_us)
-
-    def _flush_if_due(self, time_us: int) -> None:
-        flushed_us = self._flushed_us
-        if flushed_us is None:
-            self._flushed_us = flushed_us = time_us
-        if len(self._buffer) >= FLUSH_BYTES or abs(time_us - flushed_us) >= FLUSH_INTERVAL_US:
+        self._times_us.append(time_us)
+        self._packets.append(packet)
+        self._kept += len(packet)
+        if self._kept >= FLUSH_BYTES or not 0 <= time_us - self._flushed_us < FLUSH_INTERVAL_US:
             self._flushed_us = time_us
             self.flush()
 
@@ -151,17 +109,31 @@ class TlogWriter:
         """Hand everything to the operating system.
 
         Raises:
-            TlogError: the log is closed, or the disk is full.
+            TlogError: a packet does not end with a frame, the log is closed, or the disk is full.
         """
         if self._file is None:
             raise TlogError(f"{self.path} is closed; open a new log")
+        wrong = self._take_apart() if self._packets else ""
         try:
             while self._buffer:
                 written = self._file.write(self._buffer)
-                self.bytes_written += written
                 del self._buffer[:written]
         except OSError as error:
             raise TlogError(f"can't write {self.path}: {error.strerror}; check the disk") from error
+        self._kept = 0
+        if wrong:
+            raise TlogError(wrong)
+
+    def _take_apart(self) -> str:
+        """Turn the packets into records; what is wrong with them."""
+        from autopilot_bridge.packet_records import packet_records  # brings a compiler
+
+        data, count, wrong = packet_records(self._times_us, self._packets)
+        self._times_us.clear()
+        self._packets.clear()
+        self._buffer += data
+        self.records += count
+        return wrong
 
     def close(self) -> None:
         """Write what is left and close; a second time does nothing."""

@@ -106,7 +106,7 @@ def mechanisation_us() -> float:
     count = 50_000
     start = time.perf_counter()
     for _ in range(count):
-        mechanisation.step(core, nav.state, history, imu, True, 0, 0.004, 60.0, 400.0, 0.2)
+        mechanisation.step(core, nav.state, history, imu, 0.004, 60.0, 400.0, 0.2, True, 0)
     return (time.perf_counter() - start) / count * 1e6
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flightsim.airframe import ActuatorChannel, Airframe, AirframeError, AirframeKind, Role
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
 from flightsim.jsbsim_model import find_property
-from flightsim.kernels import compiled_for, kernel
+from flightsim.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 
@@ -29,14 +29,14 @@ _Entry = tuple[Callable[[float], Any], Array, tuple[float, float, float]]
 
 
 @kernel
-def _scale(commands: Array, scales: Array, limits: Array, values: Array) -> None:
+def _scale(scales: Array, limits: Array, values: Array, commands: Array) -> None:
     """Values of properties: the offset and every command times its scale, clipped.
 
     Args:
-        commands: (n,).
         scales: (properties, n).
         limits: (properties, 3): offset, minimum, maximum.
         values: (properties,), written.
+        commands: (n,).
     """
     for i in range(values.shape[0]):
         value = limits[i, 0]
@@ -55,17 +55,16 @@ class _Properties:
         limits: (properties, 3): offset, minimum, maximum.
     """
 
-    __slots__ = ("_kernel", "_limits", "_scales", "_setters", "_values")
+    __slots__ = ("_scale", "_setters", "_values")
 
     def __init__(self, setters: Sequence[Callable[[float], Any]], scales: Array, limits: Array) -> None:
         self._setters = tuple(setters)
-        self._scales, self._limits = scales, limits
         self._values = np.zeros(len(self._setters))
-        self._kernel = compiled_for(_scale, np.zeros(MAX_ACTUATORS), scales, limits, self._values)
+        self._scale = bound(_scale, scales, limits, self._values, then=(np.zeros(MAX_ACTUATORS),))
 
     def write(self, commands: Array) -> None:
         """Set them from (MAX_ACTUATORS,) commands."""
-        self._kernel(commands, self._scales, self._limits, self._values)
+        self._scale(commands)
         deque(map(call, self._setters, self._values.tolist()), 0)  # every step: no loop of bytecode
 
 
@@ -75,6 +74,7 @@ class FixedWingActuators:
     A property that several roles name takes their sum: elevons, V-tails, brakes that steer.
 
     Attributes:
+        write: writes flying surfaces and throttle from (MAX_ACTUATORS,) commands.
         roles: those the vehicle has.
         parked: chocks are before the wheels, until throttle is given or it is launched: brakes are full on.
     """
@@ -82,7 +82,6 @@ class FixedWingActuators:
     __slots__ = (
         "_channels",
         "_effectiveness",
-        "_fast",
         "_fdm",
         "_name",
         "_nodes",
@@ -90,6 +89,7 @@ class FixedWingActuators:
         "_stuck",
         "parked",
         "roles",
+        "write",
     )
 
     def __init__(self, fdm: jsbsim.FGFDMExec, airframe: Airframe) -> None:
@@ -122,10 +122,6 @@ class FixedWingActuators:
         self._stuck: dict[Role, dict[str, float]] = {}
         self.parked = False
         self._arrange()
-
-    def write(self, commands: Array) -> None:
-        """Write flying surfaces and throttle from (MAX_ACTUATORS,) commands."""
-        self._fast.write(commands)
 
     def write_slow(self, commands: Array) -> None:
         """Write flaps, steering and brake."""
@@ -224,7 +220,8 @@ class FixedWingActuators:
             (slow if slowly else fast).append(
                 (self._nodes[name].set_double_value, scales, (total_offset, low, high))
             )
-        self._fast, self._slow = _properties(fast), _properties(slow)
+        self.write = _properties(fast).write
+        self._slow = _properties(slow)
 
 
 def _properties(entries: list[_Entry]) -> _Properties:

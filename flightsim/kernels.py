@@ -13,19 +13,23 @@ import uuid
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from enum import Enum
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numba
 import numpy as np
-from numba.extending import is_jitted
+from numba.core import cgutils
+from numba.core.imputils import impl_ret_borrowed
+from numba.extending import intrinsic, is_jitted
+from numba.np.arrayobj import populate_array
 
 try:
     from numba.core.serialize import dumps
 except ImportError:  # Numba's internals have moved: its own cache serves then
     dumps = None
 
-__all__ = ["compiled_for", "kernel", "source_stamp"]
+__all__ = ["bound", "compiled_for", "kernel", "source_stamp"]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -63,6 +67,103 @@ def compiled_for(function: Function, *arguments: object) -> Function:
         return function
     code: Function = function.compile(tuple(map(numba.typeof, arguments)))  # type: ignore[attr-defined]
     return code
+
+
+def bound(function: Callable[..., Any], *arguments: object, then: tuple[object, ...] = ()) -> Any:
+    """The machine code of a kernel with its first arguments given, once and for all.
+
+    Handing an array to machine code costs as much as a call of a Python function, at every call. Here they
+    are handed over once: what is called reads where they lie from a table.
+
+    Args:
+        function: a kernel.
+        arguments: its first arguments: arrays, whose elements may change later on, and numbers, which don't.
+        then: examples of the others, three at most, which the caller gives; as for `compiled_for`, it is
+            taken at its word.
+    """
+    typed = tuple(map(numba.typeof, arguments))
+    entry = _entry(function, typed, len(then)) if is_jitted(function) else None
+    if entry is None:
+        return partial(compiled_for(function, *arguments, *then), *arguments)
+    table = np.array([slot for argument in arguments for slot in _slots(argument)], dtype=np.int64)
+    call = partial(entry.compile((numba.intp, *map(numba.typeof, then))), table.ctypes.data)
+    call.kept = table, arguments  # type: ignore[attr-defined]  # as long as it may be called
+    return call
+
+
+def _slots(argument: object) -> list[int]:
+    """What the machine code needs to know of an argument, in 64-bit words."""
+    if isinstance(argument, np.ndarray):
+        return [argument.ctypes.data, *argument.shape, *argument.strides]
+    return [int(np.array(argument, dtype=np.int64 if isinstance(argument, int) else float).view(np.int64))]
+
+
+@cache
+def _entry(function: Any, typed: tuple[Any, ...], more: int) -> Any:
+    """A compiled function that takes the first arguments of a kernel from a table, and so many more as they
+    are; None: it can't be kept from run to run."""
+    own = getattr(getattr(function, "_cache", None), "_cache_file", None)
+    if not isinstance(own, _CacheFile) or not all(map(_fits_table, typed)):
+        return None
+    take = _taker(typed)
+
+    entry: Callable[..., Any] = (
+        lambda address: function(*take(address, ())),
+        lambda address, a: function(*take(address, (a,))),
+        lambda address, a, b: function(*take(address, (a, b))),
+        lambda address, a, b, c: function(*take(address, (a, b, c))),
+    )[more]
+    dispatcher = numba.njit(cache=True)(entry)
+    variant = "".join(_code_parts(_taker.__code__, set())) + repr(typed)
+    dispatcher._cache._cache_file = own.beside(f"bound{more}", entry, variant)
+    return dispatcher
+
+
+def _fits_table(kind: Any) -> bool:
+    """Arrays, float64 and int64 do."""
+    return isinstance(kind, numba.types.Array) or kind in (numba.float64, numba.int64)
+
+
+def _taker(typed: tuple[Any, ...]) -> Any:
+    """A function for compiled code: the address of a table of arguments of these types, and a tuple of more,
+    to a tuple of all."""
+
+    @intrinsic
+    def take(_context: Any, _address: Any, more: Any) -> Any:
+        def build(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            word = context.get_value_type(numba.int64)
+            slots = iter(range(sum(map(_slots_of, typed))))
+            table = builder.inttoptr(arguments[0], word.as_pointer())
+
+            def following() -> Any:
+                return builder.load(cgutils.gep_inbounds(builder, table, next(slots)))
+
+            values = []
+            for kind in typed:
+                if not isinstance(kind, numba.types.Array):
+                    values.append(builder.bitcast(following(), context.get_value_type(kind)))
+                    continue
+                array = context.make_array(kind)(context, builder)
+                populate_array(
+                    array,
+                    data=builder.inttoptr(following(), array.data.type),
+                    shape=[following() for _ in range(kind.ndim)],
+                    strides=[following() for _ in range(kind.ndim)],
+                    itemsize=context.get_abi_sizeof(context.get_data_type(kind.dtype)),
+                    meminfo=None,
+                )
+                values.append(array._getvalue())
+            values.extend(cgutils.unpack_tuple(builder, arguments[1]))
+            taken = context.make_tuple(builder, signature.return_type, values)
+            return impl_ret_borrowed(context, builder, signature.return_type, taken)
+
+        return numba.types.Tuple((*typed, *more.types))(numba.intp, more), build
+
+    return take
+
+
+def _slots_of(kind: Any) -> int:
+    return 1 + 2 * kind.ndim if isinstance(kind, numba.types.Array) else 1
 
 
 def source_stamp(function: Callable[..., Any]) -> str:
@@ -146,10 +247,15 @@ class _CacheFile:
     name says what it holds, so processes that run different versions of the sources do not read each other's.
     """
 
-    def __init__(self, folder: Path, base: str, function: Callable[..., Any]) -> None:
+    def __init__(self, folder: Path, base: str, function: Callable[..., Any], variant: str = "") -> None:
         self._folder = folder
         self._base = base
         self._function = function
+        self._variant = variant
+
+    def beside(self, name: str, function: Callable[..., Any], variant: str) -> "_CacheFile":
+        """Of a function that calls the kernel, in one of several variants that don't replace each other."""
+        return _CacheFile(self._folder, f"{self._base}-{name}", function, variant)
 
     def load(self, key: object) -> Any:
         """What was saved under the key, or None."""
@@ -175,10 +281,13 @@ class _CacheFile:
         with suppress(OSError):
             self._remove(keep=None)
 
-    def _path(self, key: object) -> Path:
-        # The stamp is taken on use, not at definition: by then every name that the kernel uses is there.
-        signature = hashlib.sha256(repr(key).encode()).hexdigest()[:_STAMP_DIGITS]
-        return self._folder / f"{self._base}.{source_stamp(self._function)}.{signature}.nbc"
+    def _path(self, key: Any) -> Path:
+        # The stamp is taken on use, not at definition: by then every name that the kernel uses is there. It
+        # stands for Numba's own digest of the function, which for a closure differs from process to process.
+        signature, target, _ = key  # as numba.core.caching.Cache makes it
+        name = f"{signature!r} {target!r} {self._variant}"
+        digest = hashlib.sha256(name.encode()).hexdigest()[:_STAMP_DIGITS]
+        return self._folder / f"{self._base}.{source_stamp(self._function)}.{digest}.nbc"
 
     def _remove(self, *, keep: str | None) -> None:
         for old in self._folder.glob(f"{self._base}.*.nbc"):

@@ -1,6 +1,7 @@
 """One simulated vehicle: a JSBSim model in its air, stepped by actuator commands, writing its truth."""
 
 import math
+from collections.abc import Callable
 from operator import call
 from pathlib import Path
 from struct import Struct
@@ -25,7 +26,7 @@ from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
-from flightsim.kernels import compiled_for
+from flightsim.kernels import bound
 from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.truth_reading import (
@@ -75,12 +76,9 @@ class Vehicle:
     """
 
     __slots__ = (
-        "_accel_scale",
-        "_breaks_at_m_s2",
         "_fdm",
         "_get_motion",
         "_get_slow",
-        "_ground_alt_m",
         "_gusts",
         "_initial",
         "_magnetic_steps",
@@ -99,8 +97,6 @@ class Vehicle:
         "_steps",
         "_surfaces",
         "_touches",
-        "_truth_extra",
-        "_truth_scale",
         "_turbulence",
         "_write_truth",
         "airframe",
@@ -152,23 +148,19 @@ class Vehicle:
         self.physics_rate_hz = physics_rate_hz
         self.truth: Array = np.zeros(t.TRUTH_SIZE)
         self._seed_sequence = seed_sequence
-        self._truth_extra = np.array([index for index, _ in self.airframe.truth], dtype=np.int64)
-        self._truth_scale = np.array(
-            self.airframe.truth_scale or np.ones(len(self.airframe.truth)), dtype=float
-        )
         self._raw = np.zeros(STATE_SIZE + len(self.airframe.truth))
         self._raw_view = self._raw.data
         self._pack_motion = Struct(f"{MOTION_SIZE}d").pack_into  # faster than setting elements of an array
         self._pack_slow = Struct(f"{self._raw.size - MOTION_SIZE}d").pack_into
-        self._ground_alt_m = float(home.alt_m)
-        self._write_truth = compiled_for(
+        airframe, fixed_wing = self.airframe, self.airframe.kind is AirframeKind.FIXED_WING
+        self._write_truth: Callable[[], int] = bound(
             write_truth,
             self._raw,
-            ACCEL_SCALE,
-            self._truth_extra,
-            self._truth_scale,
-            BREAKS_AT_M_S2,
-            self._ground_alt_m,
+            LOAD_FACTOR_SCALE if fixed_wing else ACCEL_SCALE,
+            np.array([index for index, _ in airframe.truth], dtype=np.int64),
+            np.array(airframe.truth_scale or np.ones(len(airframe.truth)), dtype=float),
+            BREAKS_AT_M_S2 if fixed_wing else math.inf,
+            float(home.alt_m),
             self.truth,
         )
         self._slow_steps = max(1, physics_rate_hz // (slow_rate_hz or physics_rate_hz))
@@ -200,9 +192,7 @@ class Vehicle:
         self._fdm = fdm
         self._run = fdm.run
         self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
-        self._breaks_at_m_s2 = BREAKS_AT_M_S2 if fixed_wing else math.inf
         self._sink_max_m_s = self.airframe.limits.touchdown_sink_max_m_s if fixed_wing else math.inf
-        self._accel_scale = LOAD_FACTOR_SCALE if fixed_wing else ACCEL_SCALE
         name = self.airframe.name
         state = [LOAD_FACTORS.get(prop, prop) for prop in STATE] if fixed_wing else STATE
         properties = (*state, *(prop for _, prop in self.airframe.truth))
@@ -408,15 +398,7 @@ class Vehicle:
         if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
             self._pack_slow(self._raw_view, MOTION_SIZE * _FLOAT64_SIZE, *map(call, self._get_slow))
             sink_m_s = self._touches.observe(self._steps, bool(raw[GEAR_FORCE_Z] != 0.0), self.truth)
-        motion: int = self._write_truth(
-            raw,
-            self._accel_scale,
-            self._truth_extra,
-            self._truth_scale,
-            self._breaks_at_m_s2,
-            self._ground_alt_m,
-            self.truth,
-        )
+        motion = self._write_truth()
         if self.launcher is not None and not self.launcher.released:
             self.truth[t.ON_GROUND] = 1.0  # the launcher carries its weight
         return Motion.BROKEN if sink_m_s > self._sink_max_m_s and motion == Motion.SOUND else motion

@@ -1,6 +1,7 @@
 """The multicopter controller: navigation state and setpoint in, motor commands out, once per physics step."""
 
 import math
+from collections.abc import Callable
 from dataclasses import astuple, replace
 from typing import Final
 
@@ -21,7 +22,7 @@ from autopilot_bridge.control.position import (
 )
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.kernels import compiled_for, kernel
+from flightsim.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 
@@ -183,11 +184,12 @@ class MulticopterController:
         nav: navigation state, layout `navigation.layout`, shared with the filter.
 
     Attributes:
+        step: writes `actuators` for this physics step from `nav` and `setpoint`.
         setpoint: layout `control.setpoint`; starts at level OFF.
         actuators: motor commands 0..1 (front right, rear left, front left, rear right), then zeros.
     """
 
-    __slots__ = ("_nav", "_packed", "_parameters", "_scratch", "_state", "_step", "actuators", "setpoint")
+    __slots__ = ("_packed", "_parameters", "_state", "actuators", "setpoint", "step")
 
     def __init__(
         self, parameters: MulticopterParameters | None = None, *, physics_rate_hz: float, nav: Array
@@ -198,10 +200,8 @@ class MulticopterController:
             raise ValueError(
                 f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({NAV_SIZE},) is accepted"
             )
-        self._nav = nav
         self._packed: Array = np.zeros(len(c.PARAMETER_NAMES))
         self._state: Array = np.zeros(c.STATE_SIZE)
-        self._scratch: Array = np.zeros(8)
         self.setpoint: Array = np.full(sp_layout.SETPOINT_SIZE, np.nan)
         self.setpoint[sp_layout.LEVEL] = sp_layout.OFF
         self.actuators: Array = np.zeros(MAX_ACTUATORS)
@@ -211,8 +211,8 @@ class MulticopterController:
         state[c.COUNTER] = state[c.DIVISOR]
         state[c.Q_SETPOINT] = 1.0
         state[c.HOVER_VARIANCE] = 0.01
-        self._step = compiled_for(
-            _step, nav, self.setpoint, self._packed, state, self._scratch, self.actuators
+        self.step: Callable[[], None] = bound(
+            _step, nav, self.setpoint, self._packed, state, np.zeros(8), self.actuators
         )
         self.set_parameters(MulticopterParameters() if parameters is None else parameters)
         state[c.HOVER] = self._parameters.hover_thrust
@@ -236,10 +236,6 @@ class MulticopterController:
     def set_ground_contact(self, contact: bool) -> None:
         """Tell whether the ground may carry part of the weight; hover thrust is not learnt meanwhile."""
         self._state[c.GROUND_CONTACT] = 1.0 if contact else 0.0
-
-    def step(self) -> None:
-        """Write `actuators` for this physics step from `nav` and `setpoint`."""
-        self._step(self._nav, self.setpoint, self._packed, self._state, self._scratch, self.actuators)
 
     @property
     def hover_thrust(self) -> float:

@@ -30,7 +30,7 @@ from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import GYRO, GYRO_LAST, HISTORY_Q
 from flightsim.interface import SensorReadings
-from flightsim.kernels import compiled_for
+from flightsim.kernels import bound
 
 FIXED_IN_FLIGHT: Final = (
     "covariance_rate_hz",
@@ -38,6 +38,7 @@ FIXED_IN_FLIGHT: Final = (
     "alignment_time_s",
     "fixed_wing",
     "gps_check_time_s",
+    "gps_may_repeat",
     "mag_ned_gauss",
     "magnetic_year",
 )
@@ -61,6 +62,7 @@ class NavigationFilter:
         "_countdown",
         "_divisor",
         "_dt_s",
+        "_imu",
         "_limits",
         "_mechanise",
         "_parameters",
@@ -97,6 +99,7 @@ class NavigationFilter:
             )
         self._parameters = parameters
         self._readings = readings
+        self._imu = readings.imu
         self._dt_s = 1.0 / physics_rate_hz
         self._divisor = physics_rate_hz // parameters.covariance_rate_hz
         self._limits = (parameters.gyro_range_rad_s, parameters.accel_range_m_s2, parameters.imu_timeout_s)
@@ -106,16 +109,15 @@ class NavigationFilter:
         self._alignment = Alignment(duration_s=parameters.alignment_time_s, dt_s=self._dt_s)
         self._solution = Solution(parameters, physics_rate_hz=physics_rate_hz)
         solution, imu = self._solution, readings.imu
-        self._mechanise = compiled_for(
+        self._mechanise = bound(
             mechanisation.step,
             solution.core,
             self.state,
             solution.history,
             imu.values,
-            imu.fresh,
-            solution.row,
             self._dt_s,
             *map(float, self._limits),
+            then=(imu.fresh, solution.row),
         )
         self._slow_readings = (
             (readings.magnetometer, HAS_MAG),
@@ -229,20 +231,7 @@ class NavigationFilter:
         if row == solution.rows:
             row = 0
         solution.row = row
-        imu = self._readings.imu
-        gyro_range, accel_range, timeout_s = self._limits
-        self._mechanise(
-            solution.core,
-            self.state,
-            solution.history,
-            imu.values,
-            imu.fresh,
-            row,
-            self._dt_s,
-            gyro_range,
-            accel_range,
-            timeout_s,
-        )
+        self._mechanise(self._imu.fresh, row)
         self._countdown -= 1
         if self._countdown == 0:
             self._countdown = self._divisor

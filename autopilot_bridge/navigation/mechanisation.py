@@ -188,12 +188,12 @@ def step(
     nav: Array,
     history: Array,
     imu: Array,
-    fresh: bool,
-    row: int,
     dt: float,
     gyro_range: float,
     accel_range: float,
     sample_timeout_s: float,
+    fresh: bool,
+    row: int,
 ) -> None:
     """One physics step: take the sample, mechanise, write `nav` and row `row` of `history` (shape (n,
     10))."""

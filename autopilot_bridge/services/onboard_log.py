@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.events import Armed, Disarmed, Event
 from autopilot_bridge.flavours.card_layout import CardLayout, LogTimes
 from autopilot_bridge.mavlink import FrameEncoder
+from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, MavlinkMessage
 from autopilot_bridge.services.log_book import LogBook
@@ -20,7 +21,6 @@ from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE
 from autopilot_bridge.storage import OpenFile, VehiclePath
 from autopilot_bridge.telemetry.motion import MotionMessages
-from autopilot_bridge.tlog import append_records
 
 _STOP_AFTER_US: Final = 2_000_000
 """A log goes on so long after disarming, so that the end of the flight is in it."""
@@ -35,7 +35,6 @@ class LogChannel:
 
     Attributes:
         motion: set by the autopilot that the channel is added to.
-        buffer: records that are not on the card yet.
         hears_all: texts are for it, whether somebody has greeted or not.
         line: what it can carry: whatever there is.
     """
@@ -46,23 +45,38 @@ class LogChannel:
 
     def __init__(self, system_id: int, unix_us: Callable[[], int]) -> None:
         self.motion: MotionMessages | None = None
-        self.buffer = bytearray()
+        self._times_us: list[int] = []
+        self._packets: list[bytes] = []
         self._encoder = FrameEncoder(system_id, 1)
         self._unix_us = unix_us
 
     def send(self, message: MavlinkMessage) -> None:
         """Log a message."""
-        append_records(self.buffer, self._unix_us(), self._encoder.encode(message))
+        self._keep(self._encoder.encode(message))
 
     def send_payload(self, message_id: int, payload: bytes) -> None:
         """Log a packed payload."""
-        append_records(self.buffer, self._unix_us(), self._encoder.encode_payload(message_id, payload))
+        self._keep(self._encoder.encode_payload(message_id, payload))
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Log what is due together."""
         packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
         packet += b"".join(self._encoder.encode_payloads(payloads))
-        append_records(self.buffer, self._unix_us(), packet)
+        if packet:
+            self._keep(packet)
+
+    def take(self) -> bytes:
+        """The records since the last call."""
+        if not self._packets:
+            return b""
+        data, _, _ = packet_records(self._times_us, self._packets)
+        self._times_us.clear()
+        self._packets.clear()
+        return data
+
+    def _keep(self, packet: bytes) -> None:
+        self._times_us.append(self._unix_us())
+        self._packets.append(packet)
 
 
 class OnboardLog(Microservice):
@@ -118,8 +132,7 @@ class OnboardLog(Microservice):
             times = self._times
             if times is not None and times.from_boot:
                 self._start()
-        if self._channel.buffer:
-            self._flush()
+        self._flush()
         if self._stop_us is not None and time_us >= self._stop_us:
             self.close()
             times = self._times
@@ -145,10 +158,8 @@ class OnboardLog(Microservice):
         if file is None:
             return
         self._remove_channel(self._channel)
-        if self._channel.buffer:
-            with contextlib.suppress(OSError):
-                file.write(self._size, bytes(self._channel.buffer))
-        self._channel.buffer.clear()
+        with contextlib.suppress(OSError):
+            file.write(self._size, self._channel.take())
         file.close()
         self.path = None
 
@@ -162,16 +173,13 @@ class OnboardLog(Microservice):
         self._add_channel(self._channel, LOG_ROLE)
 
     def _flush(self) -> None:
-        if self._file is None:
-            self._channel.buffer.clear()
+        data = self._channel.take()
+        if self._file is None or not data:
             return
-        data = bytes(self._channel.buffer)
         try:
             self._file.write(self._size, data)
         except OSError as failure:
-            self._channel.buffer.clear()
             self.close()
             self._announce(mavlink.MAV_SEVERITY_ERROR, f"Logging stopped: {failure.strerror}")
             return
         self._size += len(data)
-        self._channel.buffer.clear()

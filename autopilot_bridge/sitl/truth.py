@@ -16,7 +16,7 @@ from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type, whole
 from flightsim.home import Home
-from flightsim.kernels import compiled_for, kernel
+from flightsim.kernels import bound, kernel
 from flightsim.payload import GroundTargets
 from flightsim.truth import TRUTH_SIZE
 
@@ -28,7 +28,7 @@ _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 
 
 @kernel
-def _fill(truth: NDArray[np.float64], time_us: int, out: NDArray[np.void]) -> None:
+def _fill(truth: NDArray[np.float64], out: NDArray[np.void], time_us: int) -> None:
     """Layout of `flightsim.truth` to the wire's units."""
     r = out[0]
     r.time_usec = time_us
@@ -56,19 +56,18 @@ class TruthEncoder:
         truth: layout of `flightsim.truth`, written in place by the vehicle.
     """
 
-    __slots__ = ("_encoder", "_fill", "_record", "_truth")
+    __slots__ = ("_encoder", "_fill", "_record")
 
     def __init__(self, system_id: int, truth: NDArray[np.float64]) -> None:
         if truth.shape != (TRUTH_SIZE,):
             raise ValueError(f"truth has shape {truth.shape}; accepted: ({TRUTH_SIZE},)")
         self._encoder = FrameEncoder(system_id, SIMULATOR_COMPONENT)
-        self._truth = truth
         self._record = np.zeros(1, record_type(definition(_MESSAGE_ID)))
-        self._fill = compiled_for(_fill, truth, 0, self._record)
+        self._fill = bound(_fill, truth, self._record, then=(0,))
 
     def encode(self, time_us: int) -> bytes:
         """One HIL_STATE_QUATERNION frame of the present truth."""
-        self._fill(self._truth, time_us, self._record)
+        self._fill(time_us)
         return self._encoder.encode_payload(_MESSAGE_ID, self._record.tobytes())
 
     def encode_text(self, text: str) -> bytes:

@@ -19,6 +19,7 @@ from autopilot_bridge.navigation.external import (
     ExternalFrame,
     ExternalSample,
 )
+from autopilot_bridge.packet_records import packet_records
 from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.sitl import Sitl
 from flightsim.airframe import AirframeKind, load_airframe
@@ -49,7 +50,9 @@ def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpeci
         encoder = FrameEncoder(1, 191)
         for k in range(5):
             time_us = sitl.time_us
-            link.send(encoder.encode(dialect.MAVLink_vision_position_estimate_message(time_us, *(0.0,) * 6)))
+            frame = encoder.encode(dialect.MAVLink_vision_position_estimate_message(time_us, *(0.0,) * 6))
+            link.send(frame)
+            packet_records([time_us], [frame])
             _advance(sitl, 0.1 * (k + 1))
         link.receive()
         sitl.close()

@@ -22,7 +22,7 @@ from autopilot_bridge.telemetry.records import record_type, whole
 from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
-from flightsim.kernels import compiled_for, kernel
+from flightsim.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 
@@ -52,8 +52,8 @@ def _fill(
     covariance: Array,
     place: Array,
     home_ned_m: Array,
-    time_us: int,
     out: NDArray[np.void],
+    time_us: int,
 ) -> None:
     r = out[0]
     time_ms = time_us // 1000
@@ -133,7 +133,7 @@ _PARTS: Final = _parts()
 
 
 @kernel
-def _frames(record: NDArray[np.uint8], due: int, sender: int, sequence: int, out: NDArray[np.uint8]) -> int:
+def _frames(record: NDArray[np.uint8], out: NDArray[np.uint8], due: int, sender: int, sequence: int) -> int:
     """MAVLink 2 frames of the parts whose bit is set in `due`, one behind the other; returns their length.
 
     Args:
@@ -194,7 +194,6 @@ class MotionMessages:
         self._context = context
         self._navigation = navigation
         self._readings = readings
-        self._covariance = navigation.covariance
         self._place = np.zeros(_PLACE_SIZE)
         self._place[3:5] = 1.0
         self._frame: object = None
@@ -212,19 +211,18 @@ class MotionMessages:
         }
         self._packet = np.zeros(self._record.nbytes + len(MESSAGES) * OVERHEAD_V2, np.uint8)
         self._packet_bytes = self._packet.data
-        self._record_bytes = self._record.view(np.uint8)
-        self._make_frames = compiled_for(_frames, self._record_bytes, 0, 0, 0, self._packet)
-        self._fill = compiled_for(
+        self._make_frames = bound(_frames, self._record.view(np.uint8), self._packet, then=(0, 0, 0))
+        self._fill = bound(
             _fill,
             navigation.state,
             readings.imu.values,
             readings.magnetometer.values,
             readings.barometer.values,
-            self._covariance,
+            navigation.covariance,
             self._place,
             context.home_ned_m,
-            0,
             self._record,
+            then=(0,),
         )
         self.bits: Mapping[int, int] = {
             message_id: 1 << index for index, (_, _, message_id, _) in enumerate(_PARTS.tolist())
@@ -249,7 +247,7 @@ class MotionMessages:
         sequence = encoder.sequence
         encoder.sequence = (sequence + due.bit_count()) & 0xFF
         sender = encoder.system_id << 8 | encoder.component_id
-        end = self._make_frames(self._record_bytes, due, sender, sequence, self._packet)
+        end = self._make_frames(due, sender, sequence)
         return self._packet_bytes[:end].tobytes()
 
     def builders(self) -> Mapping[int, Builder]:
@@ -296,16 +294,5 @@ class MotionMessages:
             self._frame = frame
             origin = frame.origin
             place[:] = origin.lat_deg, origin.lon_deg, origin.alt_m, *frame.metres_per_degree
-        readings = self._readings
-        self._fill(
-            self._navigation.state,
-            readings.imu.values,
-            readings.magnetometer.values,
-            readings.barometer.values,
-            self._covariance,
-            place,
-            context.home_ned_m,
-            time_us,
-            self._record,
-        )
+        self._fill(time_us)
         return self._bytes

@@ -23,6 +23,7 @@ Builder = Callable[[], Values | bytes | None]
 
 GRID_US: Final = 10_000
 """Streams of 50 Hz and slower are sent on this grid of vehicle time; their rate stays exact on average."""
+SLOW_US: Final = 2 * GRID_US
 HEARTBEAT: Final = 0
 """Never thinned, never waits."""
 
@@ -94,8 +95,7 @@ class _Group:
     @property
     def wake_us(self) -> int:
         """When they are sent: the slower ones wait for the grid, to share a packet with others."""
-        due_us = self.due_us
-        return due_us if self.step_us < 2 * GRID_US else -(-due_us // GRID_US) * GRID_US
+        return self.due_us if self.step_us < SLOW_US else -(-self.due_us // GRID_US) * GRID_US
 
 
 class StreamTable:
@@ -213,17 +213,22 @@ class StreamTable:
         heap, cache = self._heap, self._cache
         motion = 0
         woken: list[tuple[int, list[int]]] = []
-        while heap and heap[0][0] <= time_us:
+        next_us = heap[0][0] if heap else self.NEVER
+        while next_us <= time_us:
             wake_us, serial, group = heap[0]
-            next_us = group.due_us + group.step_us
-            if next_us <= time_us:  # a stream never bursts to catch up
-                next_us = time_us + group.step_us
-            group.due_us = next_us
-            heapreplace(heap, (group.wake_us, serial, group))
+            step_us = group.step_us
+            due_us = group.due_us + step_us
+            if due_us <= time_us:  # a stream never bursts to catch up
+                due_us = time_us + step_us
+            group.due_us = due_us
+            heapreplace(
+                heap, (due_us if step_us < SLOW_US else -(-due_us // GRID_US) * GRID_US, serial, group)
+            )
+            next_us = heap[0][0]
             motion |= group.motion
             if group.message_ids:
                 woken.append((wake_us, group.message_ids))
-        self.next_due_us = heap[0][0] if heap else self.NEVER
+        self.next_due_us = next_us
         if self._line is not None:
             self._send_within(self._line, motion, woken, time_us)
             return

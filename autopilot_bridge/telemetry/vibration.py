@@ -1,11 +1,12 @@
 """Vibration metrics as VIBRATION reports them: the level of what the accelerometers feel faster than 5 Hz."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.kernels import compiled_for, kernel
+from flightsim.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 
@@ -27,21 +28,21 @@ class VibrationMeter:
         accel_frd_m_s2: newest accelerometer sample, shape (3,), written in place by the sensor; what is not a
             finite number is passed over.
         rate_hz: calls of `update` per second.
+
+    Attributes:
+        update: takes the newest sample.
     """
 
-    __slots__ = ("_accel", "_blend_level", "_blend_slow", "_level", "_slow", "_take")
+    __slots__ = ("_level", "update")
 
     def __init__(self, accel_frd_m_s2: Array, *, rate_hz: float) -> None:
-        self._accel = accel_frd_m_s2
-        self._slow = np.array([0.0, 0.0, -9.80665])
         self._level = np.zeros(3)
-        self._blend_slow = min(1.0, 2.0 * math.pi * 5.0 / rate_hz)
-        self._blend_level = min(1.0, 2.0 * math.pi * 2.0 / rate_hz)
-        self._take = compiled_for(_update, accel_frd_m_s2, self._slow, self._level, 0.0, 0.0)
-
-    def update(self) -> None:
-        """Take the newest sample."""
-        self._take(self._accel, self._slow, self._level, self._blend_slow, self._blend_level)
+        blend_slow = min(1.0, 2.0 * math.pi * 5.0 / rate_hz)
+        blend_level = min(1.0, 2.0 * math.pi * 2.0 / rate_hz)
+        slow = np.array([0.0, 0.0, -9.80665])
+        self.update: Callable[[], None] = bound(
+            _update, accel_frd_m_s2, slow, self._level, blend_slow, blend_level
+        )
 
     @property
     def rms_m_s2(self) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.interface import Reading
-from flightsim.kernels import compiled_for
+from flightsim.kernels import bound
 from flightsim.sensors.fault_kinds import FaultTarget
 from flightsim.sensors.fault_stage import FaultPoint
 
@@ -74,20 +74,17 @@ class Sensor:
 
     __slots__ = (
         "_block",
-        "_constants",
         "_deliveries_to_skip",
         "_failing",
         "_head",
-        "_kernel",
+        "_measure",
         "_measured_us",
         "_ring",
         "_rng",
         "_row",
         "_scratch",
-        "_state",
         "_tail",
         "_taken",
-        "_truth",
         "fault_points",
         "interval_steps",
         "latency_steps",
@@ -114,15 +111,12 @@ class Sensor:
         self._failing: set[FaultPoint] = set()  # those of them with a failure in force
         for point in fault_points:
             point.failing = self._failing
-        self._constants = model.constants
-        self._state = model.state
-        self._truth = truth
         self._rng = rng
         self._block: Array = np.empty((NOISE_ROWS, model.normals_per_sample))
         self._row = NOISE_ROWS
         self._scratch: Array = np.empty(model.size)
-        self._kernel = compiled_for(
-            model.kernel, truth, model.constants, model.state, self._block, 0, self._scratch
+        self._measure = bound(
+            model.kernel, truth, model.constants, model.state, self._block, then=(0, self._scratch)
         )
         # Delay line: the samples between measurement and delivery, newest at _head.
         depth = latency_steps // interval_steps + 1
@@ -142,11 +136,11 @@ class Sensor:
             row = 0
         self._row = row + 1
         if self._failing:
-            taken = self._kernel(self._truth, self._constants, self._state, self._block, row, self._scratch)
+            taken = self._measure(row, self._scratch)
             self._deliver_faulty(taken, self._scratch, time_us)
             return
         reading = self.reading
-        if self._kernel(self._truth, self._constants, self._state, self._block, row, reading.values):
+        if self._measure(row, reading.values):
             reading.time_us = time_us
             reading.fresh = True
         else:
@@ -160,9 +154,7 @@ class Sensor:
             row = 0
         self._row = row + 1
         head = self._head
-        self._taken[head] = self._kernel(
-            self._truth, self._constants, self._state, self._block, row, self._ring[head]
-        )
+        self._taken[head] = self._measure(row, self._ring[head])
         self._measured_us[head] = time_us
         self._head = head + 1 if head + 1 < len(self._ring) else 0
 

@@ -82,8 +82,24 @@ def test_packets_are_split_into_records(tmp_path):
 
 @pytest.mark.parametrize("packet", [b"\xfd", b"\xfd\x09", b"abc", records(1)[0][1] + b"\xfe\x01"])
 def test_packets_that_are_no_frames_are_refused(tmp_path, packet):
-    with TlogWriter(tmp_path / "a.tlog") as log, pytest.raises(TlogError, match="no whole frame"):
-        log.write_packet(EPOCH_US, packet)
+    good = records(1)[0][1]
+    log = TlogWriter(tmp_path / "a.tlog")
+    log.write_packet(EPOCH_US, good)
+    log.write_packet(EPOCH_US, packet)
+    log.write_packet(EPOCH_US, good)
+    at = len(good) if len(packet) > 3 else 0
+    with pytest.raises(TlogError, match=f"packet of {len(packet)} bytes has no whole frame at byte {at}"):
+        log.close()
+    assert [frame.raw for _, frame in TlogReader(tmp_path / "a.tlog")] == [good] * (3 if at else 2)
+
+
+def test_frames_and_packets_keep_their_order(tmp_path):
+    items = records(40)
+    with TlogWriter(tmp_path / "a.tlog") as log:
+        for index, (time_us, frame) in enumerate(items):
+            (log.write_packet if index % 3 == 1 else log.write)(time_us, frame)
+    assert [(time_us, frame.raw) for time_us, frame in TlogReader(tmp_path / "a.tlog")] == items
+    assert log.records == len(items)
 
 
 def test_pymavlink_reads_it(tmp_path):

@@ -1,5 +1,6 @@
 """The compile cache of kernels: code made from other sources is never used, and nothing is compiled twice."""
 
+import math
 import os
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from flightsim.kernels import compiled_for, source_stamp
+from flightsim.kernels import bound, compiled_for, kernel, source_stamp
 from flightsim.rotations import quaternion_from_euler
 
 ROOT = Path(__file__).parents[2]
@@ -43,6 +44,18 @@ PROGRAM = """
 import numpy as np
 from tiny.outer import outer
 print(outer(np.array([1.0, 2.0, 3.0])), sum(outer.stats.cache_hits.values()))
+"""
+
+
+BINDING_PROGRAM = """
+import numba
+import numpy as np
+from flightsim.kernels import _entry, bound
+from tiny.outer import outer
+arrays = np.array([1.0, 2.0, 3.0]), np.zeros((4, 3))[:, 1]
+print(sum(bound(outer, array)() for array in arrays))
+entries = [_entry(outer, (numba.typeof(array),), 0) for array in arrays]
+print(sum(sum(entry.stats.cache_hits.values()) for entry in entries))
 """
 
 
@@ -106,9 +119,9 @@ class Package:
         path.write_text(text.format(package="tiny"), encoding="utf-8")
         os.utime(path, ns=(later_ns, later_ns))
 
-    def start(self, **environment: str) -> "subprocess.Popen[str]":
+    def start(self, program: str = PROGRAM, **environment: str) -> "subprocess.Popen[str]":
         return subprocess.Popen(
-            [sys.executable, "-c", PROGRAM],
+            [sys.executable, "-c", program],
             cwd=self.folder,
             env={**os.environ, "PYTHONPATH": f"{self.folder}{os.pathsep}{ROOT}", **environment},
             stdout=subprocess.PIPE,
@@ -119,6 +132,12 @@ class Package:
     def run(self, **environment: str) -> tuple[float, int]:
         """Result, and how much of it came out of the cache."""
         return finished(self.start(**environment))
+
+    def say(self, program: str) -> str:
+        """What a program prints."""
+        out, error = self.start(program).communicate()
+        assert not error
+        return out
 
     def cached(self) -> list[Path]:
         return list((self.parts / "__pycache__").glob("outer.outer-*.nbc"))
@@ -176,3 +195,46 @@ def test_code_for_given_types_does_what_the_kernel_does() -> None:
 
 def test_a_function_that_is_no_kernel_stays_as_it_is() -> None:
     assert compiled_for(len, [1]) is len
+
+
+@kernel
+def _mixed(
+    table: np.ndarray, column: np.ndarray, count: int, factor: float, more: np.ndarray, at: int
+) -> float:
+    more[at] += factor * table[1, 2] + column[1]
+    table[0, 0] += count
+    return float(more[at])
+
+
+def test_a_bound_kernel_sees_its_arrays_as_they_are_at_the_call() -> None:
+    table, grid, more = np.zeros((2, 3)), np.zeros((3, 2)), np.zeros(4)
+    call = bound(_mixed, table, grid[:, 1], 3, 0.5, then=(more, 0))
+    table[1, 2], grid[1, 1] = 8.0, 100.0
+    assert call(more, 1) == 104.0
+    grid[1, 1] = 0.0
+    assert call(more, 1) == 108.0
+    assert more.tolist() == [0.0, 108.0, 0.0, 0.0]
+    assert table[0, 0] == 6.0
+
+
+def test_a_bound_kernel_keeps_its_arrays_and_lets_go_of_the_callers() -> None:
+    more = np.zeros(4)
+    call = bound(_mixed, np.ones((2, 3)), np.ones(3), 1, 1.0, then=(more, 0))
+    others = sys.getrefcount(more)
+    for _ in range(1000):
+        call(more, 0)
+        np.full(6, math.nan)  # where the arrays would be, had they been forgotten
+    assert sys.getrefcount(more) == others
+    assert more[0] == 2000.0
+
+
+def test_a_function_that_is_no_kernel_is_bound_too() -> None:
+    assert bound(max, 3, then=(0,))(5) == 5
+
+
+def test_bound_kernels_of_several_types_are_kept_from_run_to_run(package: Package) -> None:
+    """What one process has compiled, the next one finds, and no type displaces another."""
+    assert package.say(BINDING_PROGRAM).split() == ["16.0", "0"]
+    assert package.say(BINDING_PROGRAM).split() == ["16.0", "2"]
+    package.write("layout", SOURCES["layout"].replace("FACTOR = 2.0", "FACTOR = 4.0"))
+    assert package.say(BINDING_PROGRAM).split() == ["30.0", "0"]

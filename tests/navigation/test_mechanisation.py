@@ -38,7 +38,7 @@ def integrate(truths: Array, position_ned_m: Array, rate_hz: int) -> tuple[Array
     for k in range(1, len(truths)):
         imu[0:3] = truths[k, t.RATES_FRD_RAD_S]
         imu[3:6] = truths[k, t.SPECIFIC_FORCE_FRD_M_S2]
-        mechanisation.step(core, nav, history, imu, True, k % 4, 1.0 / rate_hz, 60.0, 400.0, 0.2)
+        mechanisation.step(core, nav, history, imu, 1.0 / rate_hz, 60.0, 400.0, 0.2, True, k % 4)
     return core, nav
 
 

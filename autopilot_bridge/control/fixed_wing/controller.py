@@ -1,6 +1,7 @@
 """The fixed-wing controller: navigation state and setpoint in, actuator commands out, every physics step."""
 
 import math
+from collections.abc import Callable
 from dataclasses import astuple, replace
 from typing import Final
 
@@ -13,7 +14,7 @@ from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.control.fixed_wing.step import control_step
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.kernels import compiled_for
+from flightsim.kernels import bound
 
 Array = NDArray[np.float64]
 
@@ -44,11 +45,12 @@ class FixedWingController:
         nav: navigation state, layout `navigation.layout`, shared with the filter.
 
     Attributes:
+        step: writes `actuators` for this physics step from `nav` and `setpoint`.
         setpoint: layout `control.fixed_wing_setpoint`; starts at level OFF.
         actuators: roles of `flightsim.interface`, `AILERON` ... `BRAKE`.
     """
 
-    __slots__ = ("_nav", "_packed", "_parameters", "_state", "_step", "actuators", "setpoint")
+    __slots__ = ("_packed", "_parameters", "_state", "actuators", "setpoint", "step")
 
     def __init__(
         self, parameters: FixedWingParameters | None = None, *, physics_rate_hz: float, nav: Array
@@ -59,7 +61,6 @@ class FixedWingController:
             raise ValueError(
                 f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({NAV_SIZE},) is accepted"
             )
-        self._nav = nav
         self._packed: Array = np.zeros(len(c.PARAMETER_NAMES))
         self._state: Array = np.zeros(c.STATE_SIZE)
         self.setpoint: Array = np.full(sp_layout.SETPOINT_SIZE, np.nan)
@@ -68,7 +69,9 @@ class FixedWingController:
         state = self._state
         state[c.DT] = 1.0 / physics_rate_hz
         state[c.DIVISOR] = max(1.0, math.floor(physics_rate_hz / GUIDANCE_RATE_HZ))
-        self._step = compiled_for(control_step, nav, self.setpoint, self._packed, state, self.actuators)
+        self.step: Callable[[], None] = bound(
+            control_step, nav, self.setpoint, self._packed, state, self.actuators
+        )
         self.set_parameters(FixedWingParameters() if parameters is None else parameters)
         self.step()
 
@@ -89,10 +92,6 @@ class FixedWingController:
     def set_ground_contact(self, contact: bool) -> None:
         """Tell whether the ground or a launcher may carry the vehicle; integrators rest meanwhile."""
         self._state[c.GROUND_CONTACT] = 1.0 if contact else 0.0
-
-    def step(self) -> None:
-        """Write `actuators` for this physics step from `nav` and `setpoint`."""
-        self._step(self._nav, self.setpoint, self._packed, self._state, self.actuators)
 
     @property
     def hover_thrust(self) -> float:

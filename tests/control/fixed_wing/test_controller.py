@@ -28,10 +28,17 @@ def level_flight(nav: np.ndarray, *, roll: float = 0.0, pitch: float = 0.0, yaw:
     nav[n.AIRSPEED_M_S] = nav[n.AIRSPEED_TRUE_M_S] = 15.0
 
 
-def controller(**setpoint: float) -> FixedWingController:
-    nav = np.zeros(n.NAV_SIZE)
-    level_flight(nav)
-    made = FixedWingController(physics_rate_hz=250.0, nav=nav)
+class Controller(FixedWingController):
+    """With the navigation state that it reads."""
+
+    def __init__(self) -> None:
+        self.nav = np.zeros(n.NAV_SIZE)
+        level_flight(self.nav)
+        super().__init__(physics_rate_hz=250.0, nav=self.nav)
+
+
+def controller(**setpoint: float) -> Controller:
+    made = Controller()
     write(made, **setpoint)
     return made
 
@@ -69,7 +76,7 @@ def test_direct_surfaces_and_throttle_go_through() -> None:
     expected[[AILERON, ELEVATOR, RUDDER, STEERING]] = (0.2, -0.3, 1.0, 1.0)
     expected[[THROTTLE, FLAPS, BRAKE]] = (0.7, 0.5, 1.0)
     assert made.actuators == pytest.approx(expected)
-    made._nav[:] = math.nan  # nothing known: the sticks still work
+    made.nav[:] = math.nan  # nothing known: the sticks still work
     made.step()
     assert made.actuators == pytest.approx(expected)
 
@@ -90,7 +97,7 @@ def test_rates_are_answered_by_their_surfaces() -> None:
 def test_surfaces_scale_with_airspeed(airspeed: float) -> None:
     made = controller(level=sp.RATES, throttle=0.4)
     made.setpoint[sp.RATES_FRD_RAD_S] = (0.5, 0.0, 0.0)
-    made._nav[n.AIRSPEED_M_S] = made._nav[n.AIRSPEED_TRUE_M_S] = airspeed
+    made.nav[n.AIRSPEED_M_S] = made.nav[n.AIRSPEED_TRUE_M_S] = airspeed
     made.step()
     p = made.parameters
     ratio = 15.0 / airspeed
@@ -102,7 +109,7 @@ def test_surfaces_scale_with_airspeed(airspeed: float) -> None:
 def test_turn_rate_of_a_coordinated_turn_is_asked_for() -> None:
     bank = math.radians(35.0)
     made = controller(roll_rad=bank, pitch_rad=0.0, throttle=0.5)
-    level_flight(made._nav, roll=bank)
+    level_flight(made.nav, roll=bank)
     run(made, 5)
     turn = 9.80665 * math.tan(bank) / 15.0
     assert made.rate_setpoint_frd_rad_s == pytest.approx(
@@ -144,15 +151,15 @@ def test_lateral_acceleration_alone_gives_its_bank() -> None:
 
 def test_ground_speed_is_kept_up_against_the_wind() -> None:
     made = controller(course_rad=0.0, down_m=-100.0)
-    made._nav[n.WIND_NED_M_S] = (-12.0, 0.0, 0.0)
-    made._nav[n.VEL_NED_M_S] = (3.0, 0.0, 0.0)
+    made.nav[n.WIND_NED_M_S] = (-12.0, 0.0, 0.0)
+    made.nav[n.VEL_NED_M_S] = (3.0, 0.0, 0.0)
     run(made, 10)
     assert made.airspeed_setpoint_m_s == pytest.approx(12.0 + made.parameters.ground_speed_min_m_s)
 
 
 def test_switching_to_fly_starts_from_the_present_attitude() -> None:
     made = controller(level=sp.RATES, throttle=0.8)
-    level_flight(made._nav, roll=0.5, pitch=0.1)
+    level_flight(made.nav, roll=0.5, pitch=0.1)
     run(made, 50)
     write(made, heading_rad=0.0, down_m=-100.0)
     made.step()
@@ -175,7 +182,7 @@ def test_integrators_rest_on_the_ground() -> None:
 @pytest.mark.parametrize("yaw_deg", [-20.0, 15.0])
 def test_wheels_and_rudder_steer_back_to_the_heading(yaw_deg: float) -> None:
     made = controller(roll_rad=0.0, pitch_rad=0.0, throttle=1.0, steering_heading_rad=0.0)
-    level_flight(made._nav, yaw=math.radians(yaw_deg))
+    level_flight(made.nav, yaw=math.radians(yaw_deg))
     made.set_ground_contact(True)
     made.step()
     assert made.actuators[STEERING] * yaw_deg < 0.0
@@ -189,8 +196,8 @@ def test_a_flare_flies_its_sink_rate_even_when_slow() -> None:
     """Throttle and a height rate: the pitch goes up as the aircraft sinks, whatever the airspeed."""
     made = controller(throttle=0.0, height_rate_m_s=-0.3, airspeed_m_s=15.0)
     made.change(pitch_damping=0.6)
-    made._nav[n.AIRSPEED_M_S] = made._nav[n.AIRSPEED_TRUE_M_S] = 8.0
-    made._nav[n.VEL_NED_M_S] = (8.0, 0.0, 1.5)
+    made.nav[n.AIRSPEED_M_S] = made.nav[n.AIRSPEED_TRUE_M_S] = 8.0
+    made.nav[n.VEL_NED_M_S] = (8.0, 0.0, 1.5)
     run(made, 250)
     assert made.pitch_setpoint_rad > 0.04
     assert made.underspeed == 0.0
@@ -201,7 +208,7 @@ def test_a_flare_flies_its_sink_rate_even_when_slow() -> None:
 
 def test_too_slow_means_nose_down_and_full_throttle() -> None:
     made = controller(down_m=-120.0)
-    made._nav[n.AIRSPEED_M_S] = made._nav[n.AIRSPEED_TRUE_M_S] = 7.5
+    made.nav[n.AIRSPEED_M_S] = made.nav[n.AIRSPEED_TRUE_M_S] = 7.5
     run(made, 500)
     assert made.underspeed == 1.0
     assert made.pitch_setpoint_rad < 0.0
@@ -226,7 +233,7 @@ def test_pitch_alone_leaves_the_airspeed_to_the_throttle() -> None:
 @pytest.mark.parametrize(("airspeed", "sign"), [(12.0, -1.0), (18.0, 1.0)])
 def test_throttle_alone_leaves_the_airspeed_to_the_pitch(airspeed: float, sign: float) -> None:
     made = controller(throttle=1.0)
-    made._nav[n.AIRSPEED_M_S] = made._nav[n.AIRSPEED_TRUE_M_S] = airspeed
+    made.nav[n.AIRSPEED_M_S] = made.nav[n.AIRSPEED_TRUE_M_S] = airspeed
     run(made, 250)
     assert sign * made.pitch_setpoint_rad > 0.02
     assert made.actuators[THROTTLE] == 1.0
@@ -257,7 +264,7 @@ def test_parameters_are_replaced_in_flight() -> None:
 def test_unknown_attitude_stops_the_propeller() -> None:
     made = controller(down_m=-120.0)
     run(made, 100)
-    made._nav[n.EULER_RAD] = math.nan
+    made.nav[n.EULER_RAD] = math.nan
     made.step()
     assert not made.actuators.any()
 
@@ -280,12 +287,12 @@ def test_whatever_comes_in_what_goes_out_is_within_limits(
     made.setpoint[:] = setpoint
     made.setpoint[sp.LEVEL] = level
     for index, value in spoiled:
-        made._nav[index] = value
+        made.nav[index] = value
     run(made, 30)
     assert np.isfinite(made.actuators).all()
     assert (np.abs(made.actuators) <= 1.0).all()
     assert (made.actuators[[THROTTLE, FLAPS, BRAKE]] >= 0.0).all()
-    level_flight(made._nav)
+    level_flight(made.nav)
     write(made, down_m=-100.0, heading_rad=0.0)
     made.set_ground_contact(False)
     run(made, 1000)  # nothing bad has stayed inside
