@@ -32,7 +32,7 @@ def info(**given: Any) -> int:
     """What is connected: autopilot, versions, capabilities, components, position, battery, mode."""
     from missions.vehicle_client.information import information
 
-    found = with_client(given, information)
+    found = with_client(given, information, asks=False)
     if given["as_json"]:
         print_json(found)
         return 0

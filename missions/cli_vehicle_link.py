@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 FAILED: Final = 1
+_LISTEN_S: Final = 2.0
 
 _OPTIONS = (
     click.option(
@@ -64,14 +65,30 @@ def run(work: Coroutine[Any, Any, T]) -> T:
         raise click.ClickException(str(error)) from error
 
 
-def with_client(given: Mapping[str, Any], work: "Callable[[VehicleClient], Coroutine[Any, Any, T]]") -> T:
-    """Do something with the vehicle that the options name."""
+def with_client(
+    given: Mapping[str, Any],
+    work: "Callable[[VehicleClient], Coroutine[Any, Any, T]]",
+    *,
+    asks: bool = True,
+) -> T:
+    """Do something with the vehicle that the options name; with `asks`, only when it answers."""
     link = address(given["connect"])
+    from missions.errors import VehicleTimeout
     from missions.vehicle_client.client import open_client
+    from missions.vehicle_client.listening import SIGNED, listen
 
     async def whole() -> T:
-        async with open_client(link, timeout_s=given["timeout"], system_id=given["system_id"]) as client:
-            return await work(client)
+        heard = False
+        try:
+            async with open_client(link, timeout_s=given["timeout"], system_id=given["system_id"]) as client:
+                heard = True
+                if asks:
+                    await client.require_answers()
+                return await work(client)
+        except VehicleTimeout as error:
+            if heard and (await listen(link, _LISTEN_S, given["system_id"])).signed:
+                raise VehicleTimeout(f"{error}; {SIGNED}") from error
+            raise
         raise AssertionError("not reached")
 
     return run(whole())

@@ -130,7 +130,8 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
             except KeyboardInterrupt:
                 outcome, reason = INTERRUPTED, INTERRUPTED
             except (MissionError, PlanError, BridgeError) as error:
-                outcome, reason = FAILED, "; ".join((str(error), *getattr(error, "__notes__", ())))
+                notes = (*getattr(error, "__notes__", ()), *_key_missing(request, flight))
+                outcome, reason = FAILED, "; ".join((str(error), *notes))
     finally:
         stage.close()
         stage.loop.close()
@@ -210,6 +211,18 @@ async def _fly(
             await asyncio.gather(reporter, return_exceptions=True)
 
 
+def _key_missing(request: RunRequest, flight: "Flight") -> list[str]:
+    """What keeps a vehicle that signs from answering anybody without its key, when that is what happened."""
+    if not request.connect or request.signing_key is not None:
+        return []
+    return [
+        f"vehicle {vehicle.system_id} signs what it says, and has answered nothing: is its key missing "
+        "(--signing-key FILE)?"
+        for vehicle in flight.vehicles
+        if vehicle.signs and not vehicle.answered
+    ]
+
+
 async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
     wanted = request.system_ids[flight.vehicles.index(vehicle)] if request.system_ids else None
     try:
@@ -222,9 +235,10 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
         signing = vehicle.connection.signing
         if signing is not None and signing.counters.refused_frames:
             heard += f" (refused by the signing key: {signing.counters.reasons})"
-        raise MissionError(
-            f"no vehicle{which} was heard{where}{heard}: {error}; is it on, and sending there?"
-        ) from error
+        asked = "is it on, and sending there?"
+        if request.connect and request.signing_key is None and not others:
+            asked += " Does it ask for signatures (--signing-key)?"
+        raise MissionError(f"no vehicle{which} was heard{where}{heard}: {error}; {asked}") from error
     vehicle.notes.system_id = vehicle.system_id
     vehicle.regain_s = request.regain_s if request.connect else 0.0
     vehicle.notes.autopilot = vehicle.autopilot

@@ -25,7 +25,7 @@ from missions.preflight.settings import (
     settings_findings,
     shapes_join,
 )
-from missions.preflight.snapshot import Snapshot, usual
+from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
 from missions.vehicle.vehicle import Vehicle
 
 FARTHEST_M: Final = 10_000.0
@@ -33,8 +33,7 @@ _FAR_M: Final = 1000.0
 _PLAN_HOME_M: Final = 200.0
 _RESERVE: Final = 1.3
 _ASKED: Final = ("SYS_STATUS", "GPS_RAW_INT", "BATTERY_STATUS", "RC_CHANNELS")
-_FILTER: Final = {"px4": "ESTIMATOR_STATUS", "ardupilot": "EKF_STATUS_REPORT"}
-_SHOWN: Final = (*_ASKED, *_FILTER.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
+_SHOWN: Final = (*_ASKED, *FILTER_STATUS.values(), "HEARTBEAT", "HOME_POSITION", "GLOBAL_POSITION_INT")
 _LISTEN_S: Final = 1.5
 _PARAMETERS_AT_ONCE: Final = 4
 
@@ -89,11 +88,11 @@ async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
 
 
 async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
-    for name in (*_ASKED, _FILTER[vehicle.autopilot]):
+    for name in (*_ASKED, FILTER_STATUS[vehicle.autopilot]):
         if vehicle.message(name) is None:
             await vehicle.set_message_rate(name, 2.0)
     told: list[Mapping[str, Any]] = []  # of the filter
-    with vehicle.messages(_FILTER[vehicle.autopilot]) as stream:
+    with vehicle.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
         await vehicle.clock.sleep(_LISTEN_S)
         parameters = await _parameters(vehicle)
         try:
@@ -108,7 +107,7 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
         if message is not None:
             messages[name] = message.to_dict()
     if told:
-        messages[_FILTER[vehicle.autopilot]] = usual(told)
+        messages[FILTER_STATUS[vehicle.autopilot]] = usual(told)
     return Snapshot(
         flavour=vehicle.autopilot,
         kind=vehicle.kind,

@@ -3,18 +3,27 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median_high
-from typing import Any
+from types import MappingProxyType
+from typing import Any, Final
 
 from missions.kind import VehicleKind
 
 Fields = Mapping[str, Any]
 """A message's fields by name, in wire units. What is not a number is None or NaN."""
 
+FILTER_STATUS: Final[Mapping[str, str]] = MappingProxyType(
+    {"px4": "ESTIMATOR_STATUS", "ardupilot": "EKF_STATUS_REPORT"}
+)
+"""By flavour: the message by which the navigation filter tells how it is; see `usual`."""
+
 
 def usual(messages: Sequence[Fields]) -> Fields:
     """The newest of some messages of a filter, with the median of how well measurements fit.
 
     One measurement's ratio is mostly its noise (ArduPilot's `ekf_check` and PX4 smooth them as well).
+
+    Args:
+        messages: of one name, oldest first; at least one.
     """
     newest = messages[-1]
     smoothed = {

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock, TelemetryClock
 from autopilot_bridge.geodesy import GeodeticPosition
-from autopilot_bridge.mavlink import MAVLinkMessage, command_name, decode, dialect, enum_name
+from autopilot_bridge.mavlink import MAVLinkMessage, command_name, decode, definition, dialect, enum_name
 from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.errors import VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
@@ -28,6 +28,7 @@ from missions.vehicle.px4_plane import Px4Plane
 T = TypeVar("T")
 
 _TEXTS_KEPT: Final = 50
+_HEARTBEAT: Final = definition("HEARTBEAT").message_id
 _SOUND_FOR_US: Final = 1_000_000
 _DEAF_AFTER_US: Final = 3_000_000
 _DEAF_LOOK_S: Final = 0.5
@@ -132,6 +133,19 @@ class VehicleView:
             self.first_heard_us = clock.time_us
         self._heard_us = self.clock.time_us
         self._watch.on_heartbeat()
+
+    @property
+    def signs(self) -> bool:
+        """Whether the newest heartbeat was signed."""
+        if self._system_id is None:
+            return False
+        heartbeat = self.connection.newest(self._system_id).get(_HEARTBEAT)
+        return heartbeat is not None and heartbeat.signed
+
+    @property
+    def answered(self) -> bool:
+        """Whether a command was ever answered."""
+        return self._last_ack is not None
 
     @property
     def regain_s(self) -> float:

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections import deque
 from collections.abc import AsyncIterator, Collection, Container, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from typing import Any, Final
@@ -17,7 +18,7 @@ from autopilot_bridge.links import Address
 from autopilot_bridge.mavlink import definition, dialect
 from missions.errors import MissionError, VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
-from missions.preflight.snapshot import Snapshot
+from missions.preflight.snapshot import FILTER_STATUS, Snapshot, usual
 from missions.vehicle.link_view import ADAPTERS
 from missions.vehicle_client.addresses import mavsdk_url
 from missions.vehicle_client.listening import listen
@@ -27,6 +28,7 @@ _FLAVOURS: Final = {dialect.MAV_AUTOPILOT_PX4: "px4", dialect.MAV_AUTOPILOT_ARDU
 _LOOK_S: Final = 0.05
 _LISTEN_S: Final = 2.0
 _KEPT_TEXTS: Final = 100
+_KEPT_FILTER: Final = 25
 
 WANTED: Final[Mapping[str, tuple[str, ...]]] = {
     "px4": ("SYS_STATUS", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "HOME_POSITION", "ESTIMATOR_STATUS",
@@ -56,6 +58,8 @@ class VehicleClient:
         self.messages: dict[str, Mapping[str, Any]] = {}
         self.texts: list[str] = []
         self.parameter_types: dict[str, int] = {}
+        self._filter: deque[Mapping[str, Any]] = deque(maxlen=_KEPT_FILTER)  # what it told of itself lately
+        self._answers = False
         self._tasks: list[asyncio.Task[None]] = []
 
     def start(self) -> None:
@@ -76,6 +80,8 @@ class VehicleClient:
             with suppress(ValueError):  # NaN in a field is no JSON
                 fields = json.loads(message.fields_json)
                 self.messages[message.message_name] = fields
+                if message.message_name == FILTER_STATUS.get(self.flavour):
+                    self._filter.append(fields)
                 if message.message_name == "PARAM_VALUE":
                     self.parameter_types[str(fields.get("param_id", ""))] = int(fields.get("param_type", 0))
 
@@ -106,11 +112,14 @@ class VehicleClient:
     def snapshot(
         self, parameters: Mapping[str, float] | None = None, fence_items: int | None = None
     ) -> Snapshot:
-        """What it has told so far."""
+        """What it has told so far; of its filter's measurements the median of the last ones."""
+        messages = dict(self.messages)
+        if self._filter:
+            messages[FILTER_STATUS[self.flavour]] = usual(self._filter)
         return Snapshot(
             flavour=self.flavour,
             kind=self.kind,
-            messages=dict(self.messages),
+            messages=messages,
             texts=tuple(self.texts),
             parameters=parameters or {},
             fence_items=fence_items,
@@ -143,6 +152,18 @@ class VehicleClient:
             return int(json.loads(ack.fields_json)["result"])
         except (MavlinkDirectError, ValueError, KeyError):
             return None
+
+    async def require_answers(self) -> None:
+        """See that it answers, before something is asked that would be waited for long.
+
+        Raises:
+            VehicleTimeout: it is heard, and doesn't.
+        """
+        version = float(definition("AUTOPILOT_VERSION").message_id)
+        if not self._answers:
+            self._answers = await self.command(dialect.MAV_CMD_REQUEST_MESSAGE, version) is not None
+        if not self._answers:
+            raise VehicleTimeout(f"vehicle {self.system_id} is heard, but does not answer")
 
     async def ask_for(self, names: Sequence[str], rate_hz: float = 2.0) -> None:
         """Have messages streamed that are not (ArduPilot sends only what it was asked for)."""

@@ -11,14 +11,14 @@ from mavsdk.plugins.mission_raw import MissionRawError
 
 from autopilot_bridge.links import Address
 from autopilot_bridge.mavlink import dialect, enum_name
-from missions.errors import MissionError
+from missions.errors import MissionError, VehicleTimeout
 from missions.preflight.finding import Finding, ok, problem, warning
 from missions.preflight.health import PREARM_BIT, health_findings
 from missions.preflight.lost_link import lost_link_words
 from missions.preflight.settings import fence, settings_findings
 from missions.preflight.snapshot import Snapshot
 from missions.vehicle_client.client import WANTED, VehicleClient, open_client
-from missions.vehicle_client.listening import LinkQuality, listen
+from missions.vehicle_client.listening import SIGNED, LinkQuality, listen
 from missions.vehicle_client.parameters import read_all
 
 _LISTEN_S: Final = 3.0
@@ -49,6 +49,12 @@ async def examine(
     async with open_client(address, timeout_s=timeout_s, system_id=system_id) as client:
         findings = [_who(client)]
         wanted = WANTED.get(client.flavour, WANTED["px4"])
+        try:
+            await client.require_answers()
+        except VehicleTimeout as error:
+            why = SIGNED if quality.signed else "does the link carry both ways?"
+            await client.wait_for(*wanted, timeout_s=_WAIT_S)
+            return [*findings, *health_findings(client.snapshot()), problem("link", str(error), why)]
         await client.ask_for(wanted)
         await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the reasons are told again
         missing = await client.wait_for(*wanted, timeout_s=_WAIT_S)

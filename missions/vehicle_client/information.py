@@ -16,7 +16,8 @@ async def information(client: VehicleClient) -> dict[str, Any]:
     """Everything that `flightstack vehicle info` tells, as plain values; what is not known is None."""
     wanted = WANTED.get(client.flavour, WANTED["px4"])
     await client.ask_for(wanted)
-    await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, float(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION))
+    version = float(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+    answer = await client.command(dialect.MAV_CMD_REQUEST_MESSAGE, version)
     await client.wait_for("AUTOPILOT_VERSION", *wanted, timeout_s=_WAIT_S)
     heartbeat = client.messages["HEARTBEAT"]
     snapshot = client.snapshot()
@@ -25,6 +26,7 @@ async def information(client: VehicleClient) -> dict[str, Any]:
         "type": _name("MAV_TYPE", int(heartbeat["type"])),
         "kind": None if client.kind is None else str(client.kind),
         "system_id": client.system_id,
+        "answers": answer is not None,
         "components": [
             {"id": component, "name": _component(component)}
             for component in await client.system.component_ids()

@@ -16,6 +16,13 @@ _LOOK_S = 0.02
 _GCS_HEARTBEAT_S = 1.0
 
 
+SIGNED = (
+    "it signs what it says, and may believe nobody without its key; this command can't sign: use a link that "
+    "takes unsigned frames (serial, USB), or clear the key"
+)
+"""Why a vehicle that is heard does not answer."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkQuality:
     """What came in over a while.
@@ -26,6 +33,7 @@ class LinkQuality:
         bytes_total, bytes_junk: received, and of those what was no frame.
         rates_hz: of the autopilot's messages by name.
         components: (system, component) heard.
+        signed: whether the autopilot signs what it says.
     """
 
     seconds: float
@@ -35,6 +43,7 @@ class LinkQuality:
     bytes_junk: int
     rates_hz: Mapping[str, float]
     components: tuple[tuple[int, int], ...]
+    signed: bool = False
 
     @property
     def loss(self) -> float:
@@ -74,7 +83,7 @@ async def listen(address: Address, seconds: float, system_id: int | None = None)
     counts: dict[tuple[int, int], Counter[int]] = {}
     last: dict[tuple[int, int], int] = {}
     lost: Counter[tuple[int, int]] = Counter()
-    total, started_s, beat_s = 0, loop.time(), 0.0
+    total, started_s, beat_s, signed = 0, loop.time(), 0.0, False
     heartbeat = dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_GCS, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
     )
@@ -92,6 +101,7 @@ async def listen(address: Address, seconds: float, system_id: int | None = None)
                         if gap < 128:  # a larger one is a frame that came late
                             lost[who] += gap
                     last[who] = frame.sequence
+                    signed |= frame.signed and frame.component_id == 1
                     counts.setdefault(who, Counter())[frame.message_id] += 1
             await asyncio.sleep(_LOOK_S)
     finally:
@@ -107,4 +117,5 @@ async def listen(address: Address, seconds: float, system_id: int | None = None)
         bytes_junk=parser.counters.bytes_junk,
         rates_hz={DEFINITIONS[k].name: n / seconds for k, n in sorted(own.items())},
         components=tuple(sorted(counts)),
+        signed=signed,
     )

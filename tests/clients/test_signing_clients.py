@@ -228,3 +228,22 @@ def test_our_mission_flies_signed(tmp_path: Path, key_file: Path) -> None:
             )
             assert done.returncode == code, done.stderr
             assert told in done.stdout + done.stderr
+
+
+@pytest.mark.slow
+def test_who_has_no_key_is_told_what_may_be_missing(key_file: Path, tmp_path: Path) -> None:
+    """Everything is heard and nothing answered, and that takes no minutes to be said."""
+    port, doctors_port = free_port(), free_port()
+    links = [f"udpout:127.0.0.1:{number}" for number in (port, doctors_port)]
+    commands = (
+        ("fly", "lissajous", "--connect", f"udpin:127.0.0.1:{port}", "--out", str(tmp_path / "run")),
+        ("vehicle", "params", "list", "--connect", f"udpin:127.0.0.1:{doctors_port}"),
+        ("vehicle", "doctor", "--connect", f"udpin:127.0.0.1:{doctors_port}"),
+    )
+    with running_sitl("px4", links, speedup=5.0, options=["--signing-key", str(key_file)]):
+        for words in commands:
+            run = [sys.executable, "-m", "missions", *words]
+            done = subprocess.run(run, capture_output=True, text=True, timeout=WALL_DEADLINE_S, check=False)
+            said = done.stdout + done.stderr
+            assert done.returncode == 1, said
+            assert "signs what it says" in said
