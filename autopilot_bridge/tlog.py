@@ -39,20 +39,18 @@ class TlogWriter:
         path: the file; it must not exist.
 
     Attributes:
-        records: how many were written; those of packets count when they are handed over.
+        records: how many were written.
 
     Raises:
         TlogError: the file exists or can't be created.
     """
 
-    __slots__ = ("_buffer", "_file", "_flushed_us", "_kept", "_packets", "_times_us", "path", "records")
+    __slots__ = ("_buffer", "_file", "_flushed_us", "_kept", "path", "records")
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         self.records = 0
         self._buffer = bytearray()
-        self._times_us: list[int] = []  # packets that are not taken apart yet, newer than the buffer
-        self._packets: list[bytes] = []
         self._kept = 0  # bytes
         self._flushed_us = 0
         try:
@@ -74,33 +72,9 @@ class TlogWriter:
         Raises:
             TlogError: the log is closed, or the disk is full.
         """
-        if self._packets:  # they come first
-            self.write_packet(time_us, frame)
-            return
         self._buffer += _pack_time(time_us) + frame
         self.records += 1
         self._kept += len(frame)
-        if self._kept >= FLUSH_BYTES or not 0 <= time_us - self._flushed_us < FLUSH_INTERVAL_US:
-            self._flushed_us = time_us
-            self.flush()
-
-    def write_packet(self, time_us: int, packet: bytes) -> None:
-        """Append the frames of a packet that a channel of ours has sent.
-
-        They are told apart when they are handed over, by their lengths only; what comes from elsewhere goes
-        through a parser first.
-
-        Args:
-            time_us: microseconds of the Unix epoch.
-            packet: one or more frames, one behind the other.
-
-        Raises:
-            TlogError: a packet since the last flush does not end with a frame (those before it are written),
-                the log is closed, or the disk is full.
-        """
-        self._times_us.append(time_us)
-        self._packets.append(packet)
-        self._kept += len(packet)
         if self._kept >= FLUSH_BYTES or not 0 <= time_us - self._flushed_us < FLUSH_INTERVAL_US:
             self._flushed_us = time_us
             self.flush()
@@ -109,11 +83,10 @@ class TlogWriter:
         """Hand everything to the operating system.
 
         Raises:
-            TlogError: a packet does not end with a frame, the log is closed, or the disk is full.
+            TlogError: the log is closed, or the disk is full.
         """
         if self._file is None:
             raise TlogError(f"{self.path} is closed; open a new log")
-        wrong = self._take_apart() if self._packets else ""
         try:
             while self._buffer:
                 written = self._file.write(self._buffer)
@@ -121,19 +94,6 @@ class TlogWriter:
         except OSError as error:
             raise TlogError(f"can't write {self.path}: {error.strerror}; check the disk") from error
         self._kept = 0
-        if wrong:
-            raise TlogError(wrong)
-
-    def _take_apart(self) -> str:
-        """Turn the packets into records; what is wrong with them."""
-        from autopilot_bridge.packet_records import packet_records  # brings a compiler
-
-        data, count, wrong = packet_records(self._times_us, self._packets)
-        self._times_us.clear()
-        self._packets.clear()
-        self._buffer += data
-        self.records += count
-        return wrong
 
     def close(self) -> None:
         """Write what is left and close; a second time does nothing."""

@@ -22,8 +22,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, team
-from autopilot_bridge.tlog import TlogWriter
+from autopilot_bridge.sitl import PacketLog, Sitl, SitlConfiguration, SitlVehicle, team
 from flightsim.airframe import AirframeKind, load_airframe
 
 PHYSICS_RATE_HZ = 250
@@ -65,7 +64,7 @@ class Flight:
                 vehicles=team(vehicles, model=model, flavour=flavour, parameters=parameters), seed=1
             )
         )
-        self.log = TlogWriter(log)
+        self.log = PacketLog(log)
         self.links = self.sitl.record(self.log)
 
     def take_off(self) -> None:

@@ -216,6 +216,7 @@ def sitl(
     from autopilot_bridge.clock.pacing import wall_time_s
     from autopilot_bridge.sitl import (
         PaceReport,
+        PacketLog,
         Sitl,
         SitlConfiguration,
         SitlServer,
@@ -224,7 +225,6 @@ def sitl(
         team,
     )
     from autopilot_bridge.sitl.configuration import HOMES
-    from autopilot_bridge.tlog import TlogWriter
     from flightsim.environment import Environment
     from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
@@ -270,7 +270,7 @@ def sitl(
         compile_flight_code(world.configuration.vehicles)
         server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
         pictured = start_video(world, video, pictures)
-        recorder = None if log is None else TlogWriter(log)
+        recorder = None if log is None else PacketLog(log)
         if count > 1 and ports:
             opened = server.open([()] * count, shared=ports)
         else:

@@ -7,6 +7,7 @@ from autopilot_bridge.sitl.configuration import (
     parse_home,
     team,
 )
+from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
 from autopilot_bridge.sitl.signing import SigningParameters, SigningStore, UnsignedFrom
@@ -17,6 +18,7 @@ from autopilot_bridge.sitl.warm_up import compile_flight_code
 __all__ = [
     "HOMES",
     "PaceReport",
+    "PacketLog",
     "Port",
     "SigningParameters",
     "SigningStore",

@@ -9,12 +9,12 @@ from typing import Final
 
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
 from autopilot_bridge.sitl.configuration import SitlConfiguration
+from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.shared_link import SharedLink
 from autopilot_bridge.sitl.signing import SigningParameters
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
 from autopilot_bridge.sitl.vehicle import NEVER_US, SitlVehicle
 from autopilot_bridge.storage.card import MemoryCard
-from autopilot_bridge.tlog import TlogWriter
 from flightsim.payload import GroundTargets
 from flightsim.world import World, WorldParameters
 
@@ -174,7 +174,7 @@ class Sitl:
         ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
 
-    def record(self, log: TlogWriter) -> list[MemoryLink]:
+    def record(self, log: PacketLog) -> list[MemoryLink]:
         """Log what every vehicle says on a link of its own, and the truth, stamped with the vehicles' clock.
 
         Returns:

@@ -221,9 +221,9 @@ class StreamTable:
             if due_us <= time_us:  # a stream never bursts to catch up
                 due_us = time_us + step_us
             group.due_us = due_us
-            heapreplace(
-                heap, (due_us if step_us < SLOW_US else -(-due_us // GRID_US) * GRID_US, serial, group)
-            )
+            if step_us >= SLOW_US:  # as `wake_us`
+                due_us = -(-due_us // GRID_US) * GRID_US
+            heapreplace(heap, (due_us, serial, group))
             next_us = heap[0][0]
             motion |= group.motion
             if group.message_ids:
