@@ -13,15 +13,23 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from autopilot_bridge.flavours.card_layout import CARD_LAYOUTS
+from autopilot_bridge.mavlink import Frame, decode, definition
+from autopilot_bridge.services.log_book import LogBook
+from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.folder import FolderStore
 from autopilot_bridge.tlog import TlogReader
 from tests.clients.sitl_process import SitlProcess, free_port, running_sitl
 from tests.system.logs import counts, mavutil_counts, modes
 from tests.system.runs import SHORT, Run, started, wait_until
+from tests.system.test_interruption_aircraft import fly_until
 from tests.system.test_serial_line import in_flight
 
 LONG = (*SHORT, "--periods", "20")
 SPEEDUP = 20.0
 MISSION_FAILED = 1
+POSITION, ITEM = definition("GLOBAL_POSITION_INT").message_id, definition("MISSION_ITEM_INT").message_id
 NUMBERS = {
     ("px4", "return"): 0x05040000,
     ("px4", "hold"): 0x03040000,
@@ -34,13 +42,13 @@ NUMBERS = {
 
 @contextlib.contextmanager
 def sitl_and_watcher(
-    flavour: str, folder: Path, parameters: str
+    flavour: str, folder: Path, parameters: str, *more: str
 ) -> Iterator[tuple[SitlProcess, str, "Watcher", Path]]:
     """A SITL with parameters and a log, the link for a mission, and somebody who only looks."""
     port, watched = free_port(), free_port()
     given, log = folder / "given.parm", folder / "sitl.tlog"
     given.write_text(parameters)
-    options = ["--params", str(given), "--log", str(log)]
+    options = ["--params", str(given), "--log", str(log), *more]
     links = [f"udpin:127.0.0.1:{port}", f"udpin:127.0.0.1:{watched}"]
     with running_sitl(flavour, links, speedup=SPEEDUP, options=options) as sitl:
         watcher = Watcher(flavour, watched)
@@ -62,6 +70,16 @@ class Watcher:
         message = self.link.recv_match(type="HEARTBEAT", blocking=True, timeout=0.2)
         return None if message is None or message.get_srcSystem() != 1 else message
 
+    def sets(self, name: str, value: float) -> None:
+        """Set a parameter, and see that it was taken."""
+        for _ in range(20):
+            self.link.mav.param_set_send(1, 1, name.encode(), value, 9)
+            echo = self.link.recv_match(type="PARAM_VALUE", blocking=True, timeout=1.0)
+            if echo is not None and echo.param_id == name:
+                assert echo.param_value == value
+                return
+        raise AssertionError(f"{name} is not answered")
+
     def sees(self, mode: str) -> None:
         """Wait for a mode."""
         number = NUMBERS[self.flavour, mode]
@@ -80,19 +98,58 @@ class Watcher:
         wait_until(told, 60.0)
 
 
-def check_readable(log: Path) -> None:
-    """Nothing but one torn record at the end may be lost, and pymavlink reads the same."""
+def check_readable(log: Path, *, by_others: bool = True) -> None:
+    """Nothing but one torn record at the end may be lost, and pymavlink (which is slow) reads the same."""
     reader = TlogReader(log)
     frames = list(reader)
     assert len(frames) > 500
     assert reader.counters.bytes_skipped == 0
     assert log.stat().st_size - sum(8 + len(frame.raw) for _, frame in frames) < 300
-    assert mavutil_counts(log) == counts(log)
+    if by_others:
+        assert mavutil_counts(log) == counts(log)
 
 
 def kill(run: Run) -> None:
     run.process.kill()
     run.process.communicate()
+
+
+def high_up(frame: Frame) -> bool:
+    return frame.message_id == POSITION and decode(frame).relative_alt > 3000
+
+
+def check_card(folder: Path, flavour: str, parameters: dict[str, float], items: int) -> None:
+    """The next boot finds all that was stored, and a log that ends where the process did."""
+    files = FolderStore(folder)
+    specification = VehicleSpecification(flavour=flavour)
+    card = MemoryCard(files=files, logs=True)
+    sitl = Sitl(SitlConfiguration(vehicles=(specification,)), cards=[card])
+    autopilot = sitl.vehicles[0].autopilot
+    assert {name: autopilot.parameters.get(name) for name in parameters} == parameters
+    assert len(autopilot.commander.missions.items) == items
+    (log,) = LogBook(files, CARD_LAYOUTS[flavour]).logs()
+    check_readable(folder.joinpath(*log.path), by_others=False)
+    sitl.close()
+    files.close()
+
+
+def test_mission_and_vehicle_are_killed_in_one_flight(tmp_path: Path) -> None:
+    """The vehicle returns when the mission is gone; when it is killed too, its memory card has everything."""
+    cards = tmp_path / "cards"
+    given = "NAV_DLL_ACT 2\nCOM_DL_LOSS_T 60\n"  # three seconds of the wall clock
+    with sitl_and_watcher("px4", tmp_path, given, "--storage", str(cards)) as (sitl, link, watcher, log):
+        with started(tmp_path / "run", *LONG, "--connect", link) as run:
+            fly_until(run, high_up)
+            watcher.sets("MPC_XY_CRUISE", 4.5)
+            kill(run)
+        watcher.sees("return")
+        sitl.process.kill()
+        sitl.process.wait()
+    for written in (run.log, log):
+        check_readable(written, by_others=False)
+    uploaded = {decode(f).seq for _, f in TlogReader(run.log) if f.message_id == ITEM and f.system_id == 255}
+    assert len(uploaded) > 10
+    check_card(cards / "vehicle1", "px4", {"MPC_XY_CRUISE": 4.5}, len(uploaded))
 
 
 @pytest.mark.slow
