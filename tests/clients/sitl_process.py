@@ -6,12 +6,11 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from tests.clients.tied_process import tied
+from tests.clients.forked_process import Program, flightstack
 
 START_DEADLINE_S = 240.0  # a first start compiles the flight code, on a machine that has other work too
 READY_LINE = "ready"
@@ -36,7 +35,7 @@ def free_port(kind: int = socket.SOCK_DGRAM) -> int:
 class SitlProcess:
     """A running `flightstack sitl`; `lines` is what it has printed so far."""
 
-    process: subprocess.Popen[str]
+    process: Program
     lines: list[str] = field(default_factory=list)
     started: threading.Event = field(default_factory=threading.Event)
 
@@ -54,18 +53,10 @@ def running_sitl(
     flavour: str, links: Sequence[str], *, speedup: float = 10.0, options: Sequence[str] = ()
 ) -> Iterator[SitlProcess]:
     """Start a SITL on the given links, wait until it is ready, stop it with Ctrl-C at the end."""
-    command = [sys.executable, "-m", "missions", "sitl", "--autopilot", flavour, "--speedup", str(speedup)]
+    arguments = ["sitl", "--autopilot", flavour, "--speedup", str(speedup)]
     for link in links:
-        command += ["--link", link]
-    command += options
-    process = subprocess.Popen(
-        tied(command),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        bufsize=1,
-        env={**os.environ, "PYTHONUNBUFFERED": "1"},
-    )
+        arguments += ["--link", link]
+    process = flightstack(*arguments, *options, merged=True)
     sitl = SitlProcess(process)
     reader = threading.Thread(target=sitl.read, daemon=True)
     reader.start()

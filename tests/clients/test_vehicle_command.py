@@ -1,8 +1,6 @@
 """`flightstack vehicle` as a user calls it, against a SITL of each flavour."""
 
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +14,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.parameter_files import read_untyped_parameter_file
 from autopilot_bridge.tlog import TlogReader
+from tests.clients.forked_process import flightstack_done
 from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
 
@@ -43,8 +42,7 @@ class User:
         self.script_port = script_port
 
     def run(self, *words: str) -> Said:
-        command = [sys.executable, "-m", "missions", "vehicle", *words, "--connect", self.url]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=200.0, check=False)
+        done = flightstack_done("vehicle", *words, "--connect", self.url)
         return Said(done.returncode, done.stdout, done.stderr)
 
     def json(self, *words: str) -> Any:

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.clients.forked_process import Program, flightstack
+
 DEADLINE_S = 120.0
 """Wall seconds after which something that should have happened is taken for hung; a first start compiles."""
 
@@ -23,7 +25,7 @@ SHORT = ("lissajous", "--pattern", "L1", "--size", "20", "--altitude", "6", "--n
 class Run:
     """A `flightstack fly` and its run folder."""
 
-    process: subprocess.Popen[str]
+    process: Program
     folder: Path
 
     @property
@@ -64,12 +66,20 @@ def wait_until(condition: Callable[[], object], deadline_s: float = DEADLINE_S) 
         time.sleep(0.01)
 
 
-def start(folder: Path, *arguments: str) -> Run:
-    """Start `flightstack fly` with `--out folder`."""
-    command = [sys.executable, "-m", "missions", "fly", *arguments, "--out", str(folder)]
+def start(folder: Path, *arguments: str, interpreter: bool = False) -> Run:
+    """Start `flightstack fly` with `--out folder`.
+
+    Args:
+        folder: the run's.
+        arguments: what is flown, and how.
+        interpreter: in an interpreter of its own, with a hash seed of its own, as a user's is.
+    """
+    words = ("fly", *arguments, "--out", str(folder))
+    if not interpreter:
+        return Run(flightstack(*words), folder)
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONHASHSEED"}
     process = subprocess.Popen(
-        command,
+        [sys.executable, "-m", "missions", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         stdin=subprocess.DEVNULL,
@@ -80,9 +90,9 @@ def start(folder: Path, *arguments: str) -> Run:
 
 
 @contextmanager
-def started(folder: Path, *arguments: str) -> Iterator[Run]:
+def started(folder: Path, *arguments: str, interpreter: bool = False) -> Iterator[Run]:
     """`start`, and kill the process when the test leaves it running."""
-    run = start(folder, *arguments)
+    run = start(folder, *arguments, interpreter=interpreter)
     try:
         yield run
     finally:
@@ -93,10 +103,12 @@ def started(folder: Path, *arguments: str) -> Iterator[Run]:
 
 
 def fly_all(flights: Sequence[tuple[Path, Sequence[str]]]) -> list[Run]:
-    """Fly several, two at a time; all have to exit 0."""
+    """Fly several, two at a time, each in an interpreter of its own; all have to exit 0."""
     runs: list[Run] = []
     for first in range(0, len(flights), 2):
-        pair = [start(folder, *arguments) for folder, arguments in flights[first : first + 2]]
+        pair = [
+            start(folder, *arguments, interpreter=True) for folder, arguments in flights[first : first + 2]
+        ]
         try:
             for run in pair:
                 run.finish()

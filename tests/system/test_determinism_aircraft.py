@@ -58,7 +58,7 @@ def test_a_flight_is_repeated_to_the_byte(name: str, tmp_path: Path) -> None:
     arguments = (*FLIGHTS[name], "--seed", "7", "--turbulence", "light", "--no-picture")
     with (
         started(tmp_path / "stopped", *arguments, "--speedup", "60") as stopped,
-        started(tmp_path / "free", *arguments) as free,
+        started(tmp_path / "free", *arguments, interpreter=True) as free,
     ):
         stopped.wait_for_log(IN_FLIGHT_BYTES)
         stopped.process.send_signal(signal.SIGSTOP)

@@ -7,8 +7,6 @@ import math
 import random
 import signal
 import socket
-import subprocess
-import sys
 import threading
 from pathlib import Path
 
@@ -19,8 +17,8 @@ from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.rotation import from_euler
 from estimators.logs import open_log
 from missions.cli import run_command_line
+from tests.clients.forked_process import flightstack
 
-ROOT = Path(__file__).parents[3]
 LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
 
 
@@ -296,14 +294,9 @@ def test_wrong_use(tmp_path, monkeypatch, capfd, arguments, told):
 
 def start_process(tmp_path, port, *arguments):
     """The same as a process; waits until its log has something in it."""
-    command = [sys.executable, "-m", "missions", "estimate", LEVEL, "--connect", f"udpin:127.0.0.1:{port}"]
-    process = subprocess.Popen(
-        [*command, "--out", str(tmp_path / "run"), "--no-picture", *arguments],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    link = ("--connect", f"udpin:127.0.0.1:{port}")
+    out = ("--out", str(tmp_path / "run"), "--no-picture")
+    process = flightstack("estimate", LEVEL, *link, *out, *arguments)
     log = tmp_path / "run" / "flight.tlog"
     waited = threading.Event()
     for _ in range(1200):

@@ -1,0 +1,31 @@
+"""What `flightstack` imports and compiles, done once in the server that forks it for the tests."""
+
+import gc
+import importlib
+
+import matplotlib
+
+from autopilot_bridge.sitl import VehicleSpecification, compile_flight_code
+
+matplotlib.use("Agg")
+for name in (
+    "estimators.library",
+    "estimators.replay",
+    "matplotlib.pyplot",
+    "mavsdk.asyncio",
+    "missions.cli_estimate",
+    "missions.cli_fly",
+    "missions.cli_sitl",
+    "missions.cli_vehicle",
+    "missions.embedded",
+    "missions.estimation.live",
+    "missions.library",
+    "missions.picture",
+    "missions.together",
+    "missions.vehicle_client.doctor",
+    "missions.vehicle_client.logs",
+):
+    importlib.import_module(name)
+compile_flight_code((VehicleSpecification(), VehicleSpecification(model="aerosonde")))
+gc.collect()
+gc.freeze()  # pages that the forked processes share
