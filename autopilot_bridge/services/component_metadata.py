@@ -1,7 +1,7 @@
 """Component metadata: COMPONENT_METADATA and the JSON files that it points to, served by MAVLink FTP.
 
-A general file lists the others with their checksums: parameters (from the vehicle's own table) and events.
-All are packed with xz, as PX4's are.
+A general file lists the others with their checksums: parameters (from the vehicle's own table), events and
+actuators. All are packed with xz, as PX4's are.
 
 Source: mavlink.io/en/services/component_information.html and its JSON schemas (version 1).
 """
@@ -14,6 +14,7 @@ from typing import Final
 
 from autopilot_bridge.flavours import px4_events
 from autopilot_bridge.flavours.event_kinds import definitions
+from autopilot_bridge.flavours.px4_actuators import actuator_metadata, choices
 from autopilot_bridge.mavlink.event_messages import COMPONENT_METADATA, ComponentMetadata
 from autopilot_bridge.parameters import ParameterDefinition, ParameterType
 from autopilot_bridge.services.channel import Channel
@@ -25,8 +26,10 @@ MOUNT: Final = ("etc", "extras")
 GENERAL: Final = "component_general.json.xz"
 PARAMETERS: Final = "parameters.json.xz"
 EVENTS: Final = "all_events.json.xz"
+ACTUATORS: Final = "actuators.json.xz"
 _TYPE_PARAMETER: Final = 1  # COMP_METADATA_TYPE
 _TYPE_EVENTS: Final = 4
+_TYPE_ACTUATORS: Final = 5
 _LZMA2: Final = {"id": lzma.FILTER_LZMA2, "preset": 3, "dict_size": 1 << 17}
 """The files are made in flight: a dictionary of their size takes a tenth of the time of the usual 8 MiB."""
 _TYPES: Final = {
@@ -60,8 +63,9 @@ class ComponentMetadataService(Microservice):
         parts = {
             PARAMETERS: packed(parameter_metadata(self._parameters)),
             EVENTS: packed(definitions(px4_events.NAMESPACE, px4_events.KINDS, px4_events.MODE_GROUPS)),
+            ACTUATORS: packed(actuator_metadata(self._parameters)),
         }
-        types = {_TYPE_PARAMETER: PARAMETERS, _TYPE_EVENTS: EVENTS}
+        types = {_TYPE_PARAMETER: PARAMETERS, _TYPE_EVENTS: EVENTS, _TYPE_ACTUATORS: ACTUATORS}
         general = {
             "version": 1,
             "metadataTypes": [
@@ -73,7 +77,7 @@ class ComponentMetadataService(Microservice):
 
     def store(self) -> GeneratedStore:
         """The files as a store, which makes them when it is looked at."""
-        names = (GENERAL, PARAMETERS, EVENTS)
+        names = (GENERAL, PARAMETERS, EVENTS, ACTUATORS)
         return GeneratedStore({name: self._content(name) for name in names})
 
     def _content(self, name: str) -> Callable[[Mapping[str, str]], bytes]:
@@ -110,6 +114,10 @@ def _parameter(definition: ParameterDefinition) -> dict[str, object]:
         entry["min"] = definition.minimum
     if definition.maximum is not None:
         entry["max"] = definition.maximum
+    if values := choices(definition.name):
+        entry["values"] = [
+            {"value": value, "description": description} for value, description in values.items()
+        ]
     if definition.reboot_required:
         entry["rebootRequired"] = True
     return entry

@@ -95,6 +95,9 @@ def test_component_metadata(mavsdk: Session, sitl: PluginSitl, request: pytest.F
     mavsdk.until("metadata", lambda: accepted(mavsdk, "component_metadata", "get_metadata", *wanted))
     found = mavsdk.call("component_metadata", "get_metadata", *wanted)
     assert "COM_DISARM_LAND" in found.json_metadata
+    wanted = AUTOPILOT, MetadataType.ACTUATORS
+    mavsdk.until("actuators", lambda: accepted(mavsdk, "component_metadata", "get_metadata", *wanted))
+    assert "PWM_MAIN_FUNC" in mavsdk.call("component_metadata", "get_metadata", *wanted).json_metadata
 
 
 @compatibility(feature="events")

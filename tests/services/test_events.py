@@ -128,7 +128,7 @@ def test_metadata_files_point_at_each_other() -> None:
     service = ComponentMetadataService(flavour.parameter_definitions(), lambda: 0)
     files = service.files
     general = json.loads(lzma.decompress(files[GENERAL]))
-    assert {entry["type"] for entry in general["metadataTypes"]} == {1, 4}
+    assert {entry["type"] for entry in general["metadataTypes"]} == {1, 4, 5}
     for entry in general["metadataTypes"]:
         name = entry["uri"].rpartition("/")[2]
         assert entry["uri"] == f"mftp://etc/extras/{name}"
