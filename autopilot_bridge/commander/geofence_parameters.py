@@ -1,11 +1,11 @@
 """What a pilot may tune about the geofence, in neutral names."""
 
-import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import Final
 
 from autopilot_bridge.commander.events import FailsafeAction
+from flightsim.checks import check_fields, require_finite
 
 
 class FenceType(IntFlag):
@@ -79,10 +79,7 @@ class FenceParameters:
     has_cylinder: bool = field(init=False)
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name, None)
-            if isinstance(value, float) and not math.isfinite(value):
-                raise ValueError(f"{each.name} = {value} is not a finite number")
+        check_fields(self, require_finite)
         walls = FenceType(0)
         for there, wall in (
             (self.height_max_m > 0.0, FenceType.HEIGHT_MAX),

@@ -1,11 +1,12 @@
 """What a pilot may tune in the commander, in neutral names; flavours fill it from their own parameters."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.geofence_parameters import FenceParameters
 from autopilot_bridge.commander.modes import FlightMode
+from flightsim.checks import check_fields, require_finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +78,4 @@ class CommanderParameters:
     follow_enabled: bool = True
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            unlimited = field.name == "position_accuracy_max_m" and value == math.inf
-            if isinstance(value, float) and not (math.isfinite(value) or unlimited):
-                raise ValueError(f"{field.name} = {value} is not a finite number")
+        check_fields(self, require_finite, unlimited=("position_accuracy_max_m",))

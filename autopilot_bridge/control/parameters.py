@@ -1,8 +1,10 @@
 """Gains and limits of the multicopter control laws; PX4's parameter stands beside each field."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Final
+
+from flightsim.checks import check_fields, require_not_negative, require_positive
 
 _MAY_BE_ZERO: Final = frozenset(
     {
@@ -104,15 +106,7 @@ class MulticopterParameters:
     rotor_time_constant_s: float = 0.035  # of the thrust, for the hover-thrust estimate
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not math.isfinite(value):
-                raise ValueError(f"{field.name} = {value} is not a finite number")
-            if isinstance(value, bool):
-                continue
-            if value < 0.0 or (value == 0.0 and field.name not in _MAY_BE_ZERO):
-                accepted = "zero or more" if field.name in _MAY_BE_ZERO else "more than zero"
-                raise ValueError(f"{field.name} = {value} is too small; {accepted} is accepted")
+        check_fields(self, require_positive, but=dict.fromkeys(_MAY_BE_ZERO, require_not_negative))
         for name in (
             "thrust_min",
             "thrust_max",

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+from flightsim.checks import check_fields, require_not_negative, require_positive
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AvoidanceParameters:
@@ -31,9 +33,4 @@ class AvoidanceParameters:
     deceleration_m_s2: float = 2.0
 
     def __post_init__(self) -> None:
-        for name in ("margin_m", "delay_s", "guard_rad", "timeout_s", "deceleration_m_s2"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} = {value} is not accepted: zero or more is")
-        if self.deceleration_m_s2 == 0.0:
-            raise ValueError("deceleration_m_s2 = 0.0 is not accepted: a positive number is")
+        check_fields(self, require_not_negative, but={"deceleration_m_s2": require_positive})

@@ -1,8 +1,10 @@
 """How a vehicle follows a target: PX4's FLW_TGT_*, ArduPilot's FOLL_*."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
+
+from flightsim.checks import check_fields, require_not_negative, require_positive
 
 
 class FollowHeight(IntEnum):
@@ -57,9 +59,10 @@ class FollowParameters:
     def __post_init__(self) -> None:
         if len(self.offset_m) != 3 or not all(abs(part) <= 1e4 for part in self.offset_m):
             raise ValueError(f"offset_m {self.offset_m} is not accepted: three numbers within 10 km are")
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, float) and (math.isnan(value) or value < 0.0):
-                raise ValueError(f"{field.name} = {value} is not accepted: zero or more is")
-        if self.gain_1_s == 0.0:
-            raise ValueError("gain_1_s = 0.0 is not accepted: a positive number is")
+        check_fields(
+            self,
+            require_not_negative,
+            but={"gain_1_s": require_positive},
+            unlimited=("max_distance_m",),
+            unchecked=("offset_m",),
+        )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState
 from autopilot_bridge.navigation import layout as nav_layout
+from flightsim.checks import check_fields, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,10 +26,7 @@ class LandDetectorParameters:
     low_thrust: float = 0.6  # share of hover thrust that can't carry the vehicle
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} = {value} is not positive")
+        check_fields(self, require_positive)
 
 
 class LandDetector:

@@ -1,7 +1,7 @@
 """Limits and habits of flight, in the meaning PX4 (MPC_*, RTL_*) and ArduPilot (WPNAV_*, RTL_*) share."""
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
@@ -9,14 +9,14 @@ from autopilot_bridge.flight.avoidance_parameters import AvoidanceParameters
 from autopilot_bridge.flight.follow_parameters import FollowParameters
 from autopilot_bridge.flight.precision_parameters import Precision, PrecisionParameters
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
+from flightsim.checks import check_fields, require_finite, require_not_negative, require_positive
 
-_NESTED: Final = FollowParameters | PrecisionParameters | AvoidanceParameters
 _MAY_BE_ZERO: Final = frozenset(
     {
         "spoolup_time_s",
         "takeoff_ramp_time_s",
         "return_descend_altitude_m",
-        "return_loiter_time_s",
+        "return_cone_half_angle_rad",
         "return_min_distance_m",
         "return_climb_min_m",
         "return_stays_at_m",
@@ -111,22 +111,13 @@ class FlightParameters:
     avoidance: AvoidanceParameters = field(default_factory=AvoidanceParameters)  # CP_* | AVOID_*
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            name = each.name
-            value = getattr(self, name)
-            if name in ("return_min_distance_m", "return_height_max_m") and value == math.inf:
-                continue
-            if isinstance(value, _NESTED | bool | RallyRule | IntEnum):
-                continue
-            if not math.isfinite(value):
-                raise ValueError(f"{name} = {value} is not a finite number")
-            if name == "return_loiter_time_s":
-                continue
-            if name in _MAY_BE_ZERO or name == "return_cone_half_angle_rad":
-                if value < 0.0:
-                    raise ValueError(f"{name} = {value} is negative; zero or more is accepted")
-            elif value <= 0.0:
-                raise ValueError(f"{name} = {value} is not positive")
+        zero = dict.fromkeys(_MAY_BE_ZERO, require_not_negative)
+        check_fields(
+            self,
+            require_positive,
+            but=zero | {"return_loiter_time_s": require_finite},  # negative: for ever
+            unlimited=("return_min_distance_m", "return_height_max_m"),
+        )
         if self.land_fast_altitude_m < self.land_slow_altitude_m:
             raise ValueError(
                 f"land_fast_altitude_m = {self.land_fast_altitude_m} is below "

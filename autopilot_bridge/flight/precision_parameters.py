@@ -1,8 +1,10 @@
 """Landing at a target that is seen: PX4's PLD_*, ArduPilot's PLND_*."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
+
+from flightsim.checks import check_fields, require_not_negative
 
 
 class Precision(IntEnum):
@@ -48,11 +50,5 @@ class PrecisionParameters:
     lost: TargetLost = TargetLost.SEARCH
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name == "search_m" and math.isnan(value):
-                continue
-            if isinstance(value, float) and not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{field.name} = {value} is not accepted: zero or more is")
-        if self.searches < 0:
-            raise ValueError(f"searches = {self.searches} is not accepted: zero or more is")
+        unchecked = ("search_m",) if math.isnan(self.search_m) else ()
+        check_fields(self, require_not_negative, unchecked=unchecked)

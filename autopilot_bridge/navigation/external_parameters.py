@@ -1,10 +1,8 @@
 """What the filter does with external odometry."""
 
-import math
-from dataclasses import dataclass, fields
-from typing import Final
+from dataclasses import dataclass
 
-_MAY_BE_ZERO: Final = frozenset({"delay_s"})
+from flightsim.checks import check_fields, require_not_negative, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,16 +48,16 @@ class ExternalParameters:
     timeout_s: float = 1.0
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            name, value = field.name, getattr(self, field.name)
-            if name == "offset_frd_m":
-                if not all(math.isfinite(part) and abs(part) <= 10.0 for part in value):
-                    raise ValueError(f"offset_frd_m {value} is not accepted: three numbers within 10 m are")
-            elif isinstance(value, float) and not (
-                math.isfinite(value) and (value > 0.0 or (value == 0.0 and name in _MAY_BE_ZERO))
-            ):
-                accepted = "zero or positive" if name in _MAY_BE_ZERO else "positive"
-                raise ValueError(f"{name} {value} is not accepted: it must be finite and {accepted}")
+        check_fields(
+            self,
+            require_positive,
+            but={"delay_s": require_not_negative},
+            unchecked=("offset_frd_m", "least_quality"),
+        )
+        if not all(abs(part) <= 10.0 for part in self.offset_frd_m):
+            raise ValueError(
+                f"offset_frd_m {self.offset_frd_m} is not accepted: three numbers within 10 m are"
+            )
         if not -1 <= self.least_quality <= 100:
             raise ValueError(f"least_quality {self.least_quality} is not accepted: -1 to 100 % are")
 

@@ -1,9 +1,10 @@
 """Tuning of the navigation filter."""
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
+from flightsim.checks import check_fields, require_not_negative, require_positive
 
 _MAY_BE_ZERO = frozenset(
     {
@@ -16,12 +17,6 @@ _MAY_BE_ZERO = frozenset(
         "barometer_scale_error",
         "terrain_walk_m_per_sqrt_s",
         "terrain_gradient",
-        "gps_may_repeat",
-        "use_gps",
-        "fixed_wing",
-        "use_airspeed",
-        "airspeed_checks",
-        "use_sideslip",
         "airspeed_sensor_heating_k",
         "airspeed_lag_s",
         "wind_height_scale",
@@ -209,27 +204,11 @@ class NavigationParameters:
     external: ExternalParameters = field(default_factory=ExternalParameters)
 
     def __post_init__(self) -> None:
-        for entry in fields(self):
-            value = getattr(self, entry.name)
-            if value is None or entry.name == "external":
-                continue
-            numbers = value if isinstance(value, tuple) else (value,)
-            if entry.name == "mag_ned_gauss":
-                if not all(math.isfinite(number) for number in numbers) or math.hypot(*numbers) < 0.05:
-                    raise ValueError(
-                        f"mag_ned_gauss {value} is not a field of the Earth (0.2 to 0.7 gauss), NED"
-                    )
-                continue
-            for number in numbers:
-                if (
-                    not math.isfinite(number)
-                    or number < 0.0
-                    or (number == 0.0 and entry.name not in _MAY_BE_ZERO)
-                ):
-                    accepted = "zero or positive" if entry.name in _MAY_BE_ZERO else "positive"
-                    raise ValueError(
-                        f"{entry.name} {value} is not accepted: it must be finite and {accepted}"
-                    )
+        zero = dict.fromkeys(_MAY_BE_ZERO, require_not_negative)
+        check_fields(self, require_positive, but=zero, unchecked=("mag_ned_gauss",))
+        given = self.mag_ned_gauss
+        if given is not None and not 0.05 <= math.hypot(*given) < math.inf:
+            raise ValueError(f"mag_ned_gauss {given} is not a field of the Earth (0.2 to 0.7 gauss), NED")
         if not 2025.0 <= self.magnetic_year <= 2030.0:
             raise ValueError(
                 f"magnetic_year {self.magnetic_year} is not accepted: WMM2025 covers 2025 to 2030"

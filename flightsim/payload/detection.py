@@ -7,9 +7,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.payload.checks import require_probability
+from flightsim.checks import require_not_negative, require_probability
 from flightsim.payload.targets import NO_TAG
-from flightsim.sensors.checks import require_not_negative
 
 Array = NDArray[np.float64]
 

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.checks import require_finite, require_not_negative, require_positive
 from flightsim.home import Home
-from flightsim.payload.checks import require_finite
 from flightsim.payload.magnetic_map import MagneticMap
 from flightsim.payload.main_field import MainField
-from flightsim.sensors.checks import require_not_negative, require_positive
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from flightsim.payload.checks import require_finite
-from flightsim.sensors.checks import require_not_negative, require_positive
+from flightsim.checks import require_finite, require_not_negative, require_positive
 
 State = tuple[float, float, float, float]
 """north m, east m, north m/s, east m/s"""

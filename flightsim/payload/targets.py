@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.checks import require_positive
 from flightsim.payload.target_motion import TargetMotion
-from flightsim.sensors.checks import require_positive
 
 Array = NDArray[np.float64]
 

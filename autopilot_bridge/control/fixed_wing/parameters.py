@@ -1,10 +1,11 @@
 """Gains and limits of the fixed-wing control laws; beside each field the parameters of PX4 | ArduPilot."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.control.fixed_wing.gains import gains_for
+from flightsim.checks import check_fields, require_finite, require_not_negative, require_positive
 from flightsim.flight_envelope import FlightEnvelope
 
 _ANY_SIGN: Final = frozenset(
@@ -170,16 +171,9 @@ class FixedWingParameters:
     wheel_ff: float = 0.2  # FW_WR_FF | STEER2SRV_FF
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not math.isfinite(value):
-                raise ValueError(f"{field.name} = {value} is not a finite number")
-            if isinstance(value, bool) or field.name in _ANY_SIGN:
-                continue
-            strict = field.name in _MORE_THAN_ZERO
-            if value < 0.0 or (value == 0.0 and strict):
-                accepted = "more than zero" if strict else "zero or more"
-                raise ValueError(f"{field.name} = {value} is too small; {accepted} is accepted")
+        signed = dict.fromkeys(_ANY_SIGN, require_finite)
+        positive = dict.fromkeys(_MORE_THAN_ZERO, require_positive)
+        check_fields(self, require_not_negative, but=signed | positive)
         for name in _UP_TO_ONE:
             if getattr(self, name) > 1.0:
                 raise ValueError(f"{name} = {getattr(self, name)} is not in 0..1")

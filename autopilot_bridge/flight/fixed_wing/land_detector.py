@@ -14,6 +14,7 @@ import numpy as np
 from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, LandedState
 from autopilot_bridge.navigation import layout as nav_layout
+from flightsim.checks import check_fields, require_positive
 from flightsim.kernels import kernel
 
 _IDLE_THROTTLE: Final = 0.1
@@ -38,10 +39,7 @@ class LandDetectorParameters:
     filter_time_s: float = 0.5  # of speeds and accelerations
 
     def __post_init__(self) -> None:
-        for name in self.__slots__:
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} = {value} is not positive")
+        check_fields(self, require_positive)
 
 
 @kernel

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from autopilot_bridge.control.fixed_wing.gains import gains_for
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
+from flightsim.checks import check_fields, require_finite, require_not_negative, require_positive
 
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope
@@ -37,6 +38,8 @@ _MAY_BE_ZERO: Final = frozenset(
         "landing_abort_climb_m",
         "standing_height_m",
         "brake",
+        "flaps_landing",
+        "flaps_takeoff",
         "return_climb_min_m",
         "return_cone_half_angle_rad",
         "return_min_distance_m",
@@ -219,22 +222,9 @@ class FixedWingFlightParameters:
         return cls(**values)
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            name = each.name
-            value = getattr(self, name)
-            if isinstance(value, bool | IntEnum | RallyRule):
-                continue
-            if value == math.inf and name in _MAY_BE_INFINITE:
-                continue
-            if not math.isfinite(value):
-                raise ValueError(f"{name} = {value} is not a finite number")
-            if name in _SIGNED:
-                continue
-            if name in _MAY_BE_ZERO or name.startswith("flaps"):
-                if value < 0.0:
-                    raise ValueError(f"{name} = {value} is negative; zero or more is accepted")
-            elif value <= 0.0:
-                raise ValueError(f"{name} = {value} is not positive")
+        signed = dict.fromkeys(_SIGNED, require_finite)
+        zero = dict.fromkeys(_MAY_BE_ZERO, require_not_negative)
+        check_fields(self, require_positive, but=signed | zero, unlimited=_MAY_BE_INFINITE)
         if not self.airspeed_min_m_s <= self.airspeed_trim_m_s <= self.airspeed_max_m_s:
             raise ValueError(
                 f"airspeed_trim_m_s = {self.airspeed_trim_m_s} is not between airspeed_min_m_s = "

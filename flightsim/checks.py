@@ -1,0 +1,74 @@
+"""Checks of parameters; each error names the value and what is accepted."""
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import fields
+from enum import Enum
+from types import MappingProxyType
+from typing import Any, Final
+
+Check = Callable[..., None]
+"""Looks at the numbers it is given by name, and raises a ValueError for the first that isn't accepted."""
+
+_NO_OTHERS: Final[Mapping[str, Check]] = MappingProxyType({})
+
+
+def require_finite(**values: float) -> None:
+    """Places and angles: finite numbers."""
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise ValueError(f"{name} = {value!r} is not accepted: a finite number is")
+
+
+def require_not_negative(**values: float) -> None:
+    """Noise, latency and quantum: finite and at least zero."""
+    for name, value in values.items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise ValueError(f"{name} = {value!r} is not accepted: a finite number of at least 0 is")
+
+
+def require_positive(**values: float) -> None:
+    """Time constants and ranges: finite and above zero."""
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise ValueError(f"{name} = {value!r} is not accepted: a finite number above 0 is")
+
+
+def require_probability(**values: float) -> None:
+    """Probabilities: 0 to 1."""
+    for name, value in values.items():
+        if not 0.0 <= value <= 1.0:
+            raise ValueError(f"{name} = {value!r} is not accepted: 0 to 1 is")
+
+
+def require_rate(rate_hz: int) -> None:
+    """A sampling rate is a positive whole number of hertz."""
+    if not isinstance(rate_hz, int) or rate_hz <= 0:
+        raise ValueError(f"rate_hz = {rate_hz!r} is not accepted: a positive whole number of hertz is")
+
+
+def check_fields(
+    record: Any,
+    usually: Check,
+    *,
+    but: Mapping[str, Check] = _NO_OTHERS,
+    unlimited: Collection[str] = (),
+    unchecked: Collection[str] = (),
+) -> None:
+    """Check every number among the fields of a dataclass, and in its tuples.
+
+    Args:
+        record: an instance; fields that hold anything else than numbers are passed over.
+        usually: what the numbers must be.
+        but: what some must be instead, by name.
+        unlimited: names of those that may be infinite as well.
+        unchecked: names of those that somebody else looks at.
+    """
+    for field in fields(record):
+        name = field.name
+        value = getattr(record, name, None)
+        if name in unchecked or (value == math.inf and name in unlimited):
+            continue
+        for part in value if isinstance(value, tuple) else (value,):
+            if isinstance(part, int | float) and not isinstance(part, bool | Enum):
+                but.get(name, usually)(**{name: part})
