@@ -10,6 +10,8 @@ from typing import Final
 
 import click
 
+from missions.supervision import supervised
+
 _COMMANDS: Final = {
     "fly": ("missions.cli_fly", "fly", "Fly a mission: on an embedded SITL, or on any vehicle."),
     "sitl": ("missions.cli_sitl", "sitl", "SITL for other people's clients."),
@@ -71,6 +73,10 @@ def command_line() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point: runs the command line and exits. Every error is one line on stderr."""
+    words = sys.argv[1:] if arguments is None else arguments
+    if words[:1] == ["vehicle"]:  # MAVSDK is native code
+        crashed = "the MAVSDK library crashed, and what was under way is not done; try again"
+        sys.exit(supervised(lambda: run_command_line(arguments), crashed=crashed))
     sys.exit(run_command_line(arguments))
 
 

@@ -212,7 +212,6 @@ def sitl(
     """
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
-    click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.clock.pacing import wall_time_s
     from autopilot_bridge.sitl import (
         PaceReport,
@@ -262,8 +261,10 @@ def sitl(
         )
         memory = VehicleCards(storage, count)
         click.get_current_context().call_on_close(memory.close)
+        equipment = equipped(configuration, _scenario(camera, targets, map_file, map_target))
+        click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
         world = Sitl(
-            equipped(configuration, _scenario(camera, targets, map_file, map_target)),
+            equipment,
             signing=signing,
             cards=memory.cards,
         )

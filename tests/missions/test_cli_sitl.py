@@ -59,6 +59,7 @@ def test_payload_that_can_not_be_is_refused_by_name(arguments, told):
     result = sitl(*LINK, *arguments)
     assert result.exit_code == 2
     assert told in result.output
+    assert "starting" not in result.output  # what is wrong is said at once
 
 
 def test_signature_off_the_map_is_refused_by_name(survey_map):

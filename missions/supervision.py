@@ -1,0 +1,57 @@
+"""A command whose libraries may crash, watched by the process that the user started."""
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from types import FrameType
+from typing import Final
+
+FAILED: Final = 1
+_KILLED: Final = 128
+"""Plus the signal's number: what shells make of a command that was ended by one."""
+_ASKED_TO_END: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def supervised(command: Callable[[], int], *, crashed: str) -> int:
+    """Run a command in a process of its own and give its exit code.
+
+    Call it before threads are started and libraries loaded: the process is forked.
+
+    Args:
+        command: gives its exit code.
+        crashed: what is said on stderr when the process was ended by a signal that nobody sent, in front of
+            the signal's name; the exit code is 1 then.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    child = os.fork()
+    if not child:
+        code = command()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)  # what the caller still has to do is done once, and not here
+    status = _wait(child)
+    if not os.WIFSIGNALED(status):
+        return os.waitstatus_to_exitcode(status)
+    number = os.WTERMSIG(status)
+    if number in _ASKED_TO_END:
+        return _KILLED + number
+    sys.stderr.write(f"flightstack: {crashed} ({signal.Signals(number).name})\n")
+    return FAILED
+
+
+def _wait(child: int) -> int:
+    """Wait for a process, and pass on to it what asks us to end; a terminal's Ctrl-C reaches it anyway."""
+
+    def pass_on(number: int, frame: FrameType | None) -> None:
+        os.kill(child, number)
+
+    before = {number: signal.signal(number, pass_on) for number in _ASKED_TO_END}
+    if sys.stdin is not None and sys.stdin.isatty():
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        return os.waitpid(child, 0)[1]
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
