@@ -51,6 +51,7 @@ _FLOAT64_SIZE: Final = 8
 _FOLLOW_S: Final = 10.0  # in which actuators and engines follow the commands of a start in the air
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
+_SOUND: Final = int(Motion.SOUND)
 _TOUCHED_S: Final = 10  # after touching the ground: what goes wrong then began there
 _SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand on a tail wheel
 
@@ -277,7 +278,7 @@ class Vehicle:
         self._run()
         self._steps += 1
         motion = self._observe()
-        if motion != Motion.SOUND:
+        if motion != _SOUND:
             self._end(motion, actuators)
         if self._steps % self._magnetic_steps == 0:
             self._refresh_magnetic_field()

@@ -20,6 +20,8 @@ class StickOverride:
 
     def wanted(self, mode: FlightMode, sticks: ManualInput, parameters: CommanderParameters) -> bool:
         """In flight: a pilot takes over."""
+        if not sticks.valid:
+            return False
         offboard = mode is FlightMode.OFFBOARD
         allowed = parameters.stick_override_offboard if offboard else parameters.stick_override
         if not allowed or mode in STICK_MODES:

@@ -20,12 +20,23 @@ class MemoryLink:
             gives nothing.
     """
 
-    __slots__ = ("_inbox", "_other", "_peer", "closed", "counters", "name", "on_receive")
+    __slots__ = (
+        "_bytes_dropped",
+        "_bytes_out",
+        "_dropped",
+        "_inbox",
+        "_other",
+        "_peer",
+        "_writes",
+        "closed",
+        "name",
+        "on_receive",
+    )
 
     def __init__(self, name: str, on_receive: Callable[[bytes], None] | None = None) -> None:
         self.name = name
         self.on_receive = on_receive
-        self.counters = LinkCounters()
+        self._writes = self._bytes_out = self._dropped = self._bytes_dropped = 0
         self.closed = False
         self._inbox: deque[bytes] = deque()
         self._other: MemoryLink | None = None
@@ -46,20 +57,31 @@ class MemoryLink:
         """Never."""
         return False
 
+    @property
+    def counters(self) -> LinkCounters:
+        """What passed until now: what one end sent, the other has received."""
+        other = self._other
+        return LinkCounters(
+            bytes_in=0 if other is None else other._bytes_out,
+            bytes_out=self._bytes_out,
+            reads=0 if other is None else other._writes,
+            writes=self._writes,
+            dropped=self._dropped,
+            bytes_dropped=self._bytes_dropped,
+        )
+
     def send(self, data: bytes, to: PeerId | None = None) -> None:
         """Hand bytes to the other end."""
         other = self._other
-        counters = self.counters
         if self.closed or other is None or other.closed or len(other._inbox) >= MAX_INBOX:
-            counters.dropped += 1
-            counters.bytes_dropped += len(data)
+            self._dropped += 1
+            self._bytes_dropped += len(data)
             return
-        counters.writes += 1
-        counters.bytes_out += len(data)
-        other.counters.reads += 1
-        other.counters.bytes_in += len(data)
-        if other.on_receive is not None:
-            other.on_receive(data)
+        self._writes += 1
+        self._bytes_out += len(data)
+        on_receive = other.on_receive
+        if on_receive is not None:
+            on_receive(data)
         else:
             other._inbox.append(data)
 

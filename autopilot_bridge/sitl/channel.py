@@ -125,9 +125,6 @@ class LinkChannel:
         signs = self._signs
         if signs is not None and signs.state.active:
             data = signs.sign(data)
-        self._put(data)
-
-    def _put(self, data: bytes) -> None:
         if self.line is not None:
             self.line.add(len(data))
         self.link.send(data)
