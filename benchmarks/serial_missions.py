@@ -87,7 +87,7 @@ MISSIONS = {
     "script": Flight(arguments=("SCRIPT",)),
     "orbit": Flight(
         arguments=("orbit", *ORBITED, "--duration", "120"),
-        vehicle=("--model", "aerosonde", "--camera", *ORBITED, "--wind", "4@0"),
+        vehicle=("--model", "aerosonde", "--camera", "--video", "off", *ORBITED, "--wind", "4@0"),
         unplug_after_s=200.0,
     ),
     "occupancy": Flight(

@@ -52,7 +52,10 @@ def start_video(world: "Sitl", video: str | None, pictures: Path | None) -> "Vid
         parameters = VideoParameters(host=host, port=port, any_port=False, folder=pictures)
     if parameters.port is not None and not parameters.host.startswith(("127.", "localhost")):
         click.echo(f"warning: video on {parameters.host} is open to whoever reaches it", err=True)
-    return show_cameras(world, parameters)
+    service = show_cameras(world, parameters)
+    if service is not None and parameters.port is not None:
+        service.start()
+    return service
 
 
 def _place(text: str) -> tuple[str, int]:

@@ -23,7 +23,9 @@ async def _main(control: int, listen: int) -> None:
     if listen >= 0:
         rtsp = RtspServer(studio.streams)
         server = await asyncio.start_server(rtsp.accept, sock=socket.socket(fileno=listen))
+    warming = asyncio.get_running_loop().create_task(studio.warm_up())
     await studio.serve()
+    warming.cancel()
     if server is not None:
         server.close()
 

@@ -1,4 +1,4 @@
-"""The vehicles' side of pictures: listens, starts the picture process when needed, tells it what is seen."""
+"""The vehicles' side of pictures: listens, starts the picture process, tells it what is seen."""
 
 import contextlib
 import os
@@ -185,6 +185,13 @@ class VideoService:
 
     # the shell
 
+    def start(self) -> None:
+        """Start the picture process now: the first player would wait for its imports, and on a machine where
+        no picture was made before for the compiler.
+        """
+        if self._line is None:
+            self._start()
+
     def poll(self, time_us: int) -> None:
         """Answer the picture process, and start it when somebody wants to watch."""
         if self._line is None:
@@ -214,7 +221,7 @@ class VideoService:
             self._flush()
 
     def close(self) -> None:
-        """End the picture process once it has written what it was told to write."""
+        """End the picture process, where pictures are kept once it has written what it was told to write."""
         if self._listener is not None:
             self._listener.close()
             self._listener = None
@@ -227,7 +234,7 @@ class VideoService:
             self._line.sendall(self._outgoing)
             self._line.shutdown(socket.SHUT_WR)
         try:
-            self._process.wait(_END_S)
+            self._process.wait(_END_S if self._parameters.folder is not None else 0.0)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

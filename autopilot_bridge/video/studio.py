@@ -134,6 +134,12 @@ class Studio:
                 if stream.recording is not None:
                     stream.recording.close()
 
+    async def warm_up(self) -> None:
+        """Make a picture that nobody sees: kernels are loaded, or compiled, before the first player comes."""
+        view = await self._view(0)
+        if view is not None:
+            self.streams[0].picture(view)
+
     async def _view(self, index: int) -> CameraView | None:
         answer: asyncio.Future[CameraView | None] = asyncio.get_running_loop().create_future()
         self._questions.setdefault(index, []).append(answer)

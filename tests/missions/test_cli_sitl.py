@@ -31,8 +31,8 @@ def survey_map(tmp_path):
 def test_payload_speaks_on_the_vehicles_links_and_targets_are_in_the_log(tmp_path, survey_map):
     log = tmp_path / "carried.tlog"
     result = sitl(
-        *LINK, "--camera", "--target", "40,0", "--target", "0,60,2,90", "--map", str(survey_map),
-        "--map-target", "100,-50", "--log", str(log),
+        *LINK, "--camera", "--video", "off", "--target", "40,0", "--target", "0,60,2,90",
+        "--map", str(survey_map), "--map-target", "100,-50", "--log", str(log),
     )  # fmt: skip
     assert result.exit_code == 0, result.output
     heard = Counter((f.system_id, f.component_id, DEFINITIONS[f.message_id].name) for _, f in TlogReader(log))
