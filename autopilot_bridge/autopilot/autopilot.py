@@ -164,6 +164,7 @@ class Autopilot:
             parameters=flavour.flight_parameters(self.parameters, **self._vehicle),
         )
         self.context.health = self.navigation.health
+        self.context.attitude_setpoint = self.controller.attitude_setpoint
         stores = new_stores()
         self.context.rally = stores[MissionType.RALLY]
         self.commander = Commander(

@@ -1,7 +1,8 @@
-"""Watching what the flight leans on: links to people, and GPS in the navigation filter. News, no actions."""
+"""Watching what the flight leans on: airspeed, links to people, GPS in the filter. News, no actions."""
 
 from typing import Final
 
+from autopilot_bridge.commander.airspeed import AirspeedWatch
 from autopilot_bridge.commander.events import Aid, AidChanged, Event
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.situation import Situation
@@ -14,16 +15,18 @@ _GPS_STOPPED_US: Final = 7_000_000
 class AidsWatch:
     """Tells when a link or GPS is lost, and when it is back; what never was there is not missed."""
 
-    __slots__ = ("_lost_us",)
+    __slots__ = ("_airspeed", "_lost_us")
 
     def __init__(self) -> None:
+        self._airspeed = AirspeedWatch()
         self._lost_us: dict[Aid, int | None] = {}  # None: it is there
 
     def update(
         self, situation: Situation, parameters: CommanderParameters, navigation: NavigationHealth | None
     ) -> list[Event]:
         """Look at the newest situation; what has changed."""
-        told = [
+        told: list[Event | None] = [
+            self._airspeed.update(situation.health, armed=situation.armed, time_us=situation.time_us),
             self._judge(Aid.GROUND_STATION, situation.gcs_age_s, parameters.gcs_loss_s, situation.time_us),
             self._judge(Aid.STICKS, situation.sticks_age_s, parameters.manual_loss_s, situation.time_us),
         ]

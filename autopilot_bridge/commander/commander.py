@@ -8,10 +8,10 @@ from collections.abc import Callable
 from typing import Final
 
 from autopilot_bridge.commander.aids_watch import AidsWatch
-from autopilot_bridge.commander.airspeed import AirspeedWatch
 from autopilot_bridge.commander.arming import arming_reasons, mode_obstacle
 from autopilot_bridge.commander.arming_checks import ArmingChecks
 from autopilot_bridge.commander.battery import BatteryMonitor
+from autopilot_bridge.commander.crash import CrashCheck
 from autopilot_bridge.commander.disarming import AutoDisarm
 from autopilot_bridge.commander.events import (
     Armed,
@@ -138,8 +138,8 @@ class Commander:
         self._ticks = 0
         self._disarming = AutoDisarm(policy)
         self._override = StickOverride()
-        self._airspeed = AirspeedWatch()
         self._aids = AidsWatch()
+        self._crash = CrashCheck()
         self._memory = ModeMemory(active=policy.radio_restores_mode)
         self._follower = TaskFollower(self)
 
@@ -302,13 +302,14 @@ class Commander:
             self._checks.run(self.commanded_mode, self.situation, self.parameters)
             if self.booted and self._checks.report_due(time_us):
                 self._tell_reasons(self.arming_reasons, check_only=True)
-        changed = self._airspeed.update(self.situation.health, armed=self.armed, time_us=time_us)
-        if changed is not None:
-            self.emit(changed)
         self._events.extend(self._aids.update(self.situation, self.parameters, self.context.health))
         told = self.failsafes.update(self.situation, self.parameters)
         self._events.extend(told)
         self._select()
+        crash = self._crash.update(self.situation, self.context) if self.parameters.crash_check else None
+        if crash is not None:
+            self.emit(crash)
+            self._disarm(DisarmReason.FAILSAFE)
         restored = self._memory.recall(told)
         if restored is not None and self.armed:
             self.change_mode(restored)

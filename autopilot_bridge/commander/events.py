@@ -253,6 +253,14 @@ class NavigationLost(Event):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Crashed(Event):
+    """The vehicle lies still, far from the attitude it should have."""
+
+    angle_error_deg: float
+    acceleration_m_s2: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AirspeedChanged(Event):
     """The airspeed sensor was given up in flight, or is used again."""
 

@@ -33,6 +33,7 @@ class CommanderParameters:
         stick_override: moved sticks take over from automatic flight (PX4 COM_RC_OVERRIDE, bit 0).
         stick_override_offboard: and from OFFBOARD (bit 1).
         stick_override_threshold: stick travel, 0..1, that counts as moved.
+        crash_check: a vehicle that has crashed is disarmed (FS_CRASH_CHECK).
         follow_enabled: the mode that follows a target may be chosen (FOLL_ENABLE).
         check_arming: False skips the arming checks that may be skipped.
     """
@@ -75,6 +76,7 @@ class CommanderParameters:
     attitude_pitch_max_rad: float = 0.0
     attitude_time_s: float = 0.3
     attitude_action: FailsafeAction = FailsafeAction.NONE
+    crash_check: bool = False
     follow_enabled: bool = True
 
     def __post_init__(self) -> None:

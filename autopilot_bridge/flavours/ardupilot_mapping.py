@@ -200,6 +200,7 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
             },
         ),
         stick_timeout_s=clamp(number(store, "RC_OVERRIDE_TIME", 3.0), 0.1, 120.0),
+        crash_check=integer(store, "FS_CRASH_CHECK", 1) != 0,
         manual_loss_s=1.0 if radio else 0.0,
         manual_loss_action=_RADIO.get(radio, FailsafeAction.LAND),
         manual_loss_exempt=_exempt(

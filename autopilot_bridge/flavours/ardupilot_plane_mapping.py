@@ -244,6 +244,7 @@ def commander_parameters(store: ParameterStore) -> CommanderParameters:
         manual_long_loss_exempt=keeps_long,
         battery_low_action=_BATTERY.get(integer(store, "BATT_FS_LOW_ACT", 0), FailsafeAction.WARN),
         battery_critical_action=_BATTERY.get(integer(store, "BATT_FS_CRT_ACT", 0), FailsafeAction.WARN),
+        crash_check=False,
         position_loss_s=_NEVER_S,  # the aircraft flies on by dead reckoning
         position_loss_action=FailsafeAction.NONE,
         fence=ardupilot_mapping.fence_parameters(store, _FENCE, backup_m=100.0),

@@ -112,6 +112,9 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
             return (Notice(Severity.NOTICE, f"{fence_names(walls)} breached"),)
         case events.FenceSwitched(walls=walls, on=on):
             return (Notice(Severity.NOTICE, f"{fence_names(walls)} auto-{'enabled' if on else 'disabled'}"),)
+        case events.Crashed(angle_error_deg=error_deg, acceleration_m_s2=acceleration):
+            text = f"Crash: Disarming: AngErr={error_deg:.0f}>30, Accel={acceleration:.1f}<3.0"
+            return (Notice(Severity.EMERGENCY, text),)
         case events.BatteryWarning():
             return battery_warning(event)
         case events.MissionItemReached(index=index):

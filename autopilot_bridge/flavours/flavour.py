@@ -75,6 +75,11 @@ class Controller(Protocol):
         ...
 
     @property
+    def attitude_setpoint(self) -> Array:
+        """q_ned_from_frd that the attitude loop follows, a view (4,)."""
+        ...
+
+    @property
     def hover_thrust(self) -> float:
         """Estimated thrust of level flight, 0..1."""
         ...

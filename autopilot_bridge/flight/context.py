@@ -147,6 +147,7 @@ class FlightContext:
         time_us: vehicle time of this update.
         dt_s: time since the previous update (the task period).
         nav: navigation state, layout `navigation.layout` (shared with the filter).
+        attitude_setpoint: q_ned_from_frd that the attitude loop follows, a view; None: nobody tells.
         health: what the filter says of its own state; None before the first solution.
         setpoint: control setpoint, layout `control.setpoint` or `control.fixed_wing_setpoint` (shared with
             the controller); tasks write it.
@@ -171,6 +172,7 @@ class FlightContext:
 
     __slots__ = (
         "armed",
+        "attitude_setpoint",
         "dt_s",
         "events",
         "frame",
@@ -205,6 +207,7 @@ class FlightContext:
         self.dt_s = 1.0 / TASK_RATE_HZ
         self.nav: Array = np.full(nav_layout.NAV_SIZE, np.nan) if nav is None else nav
         self.health: NavigationHealth | None = None
+        self.attitude_setpoint: Array | None = None
         self.parameters: FlightParameters | FixedWingFlightParameters = (
             FlightParameters() if parameters is None else parameters
         )
