@@ -1,11 +1,14 @@
 """Settings of the whole suite.
 
 Property tests draw the same examples on every run, so that no run is luckier than another. Ctrl-C works in
-the tests and the programs they start, even where the suite runs in the background of a shell.
+the tests and the programs they start, even where the suite runs in the background of a shell. Byte code is
+kept, as kernels are.
 """
 
 import os
 import signal
+import sys
+from typing import Final
 
 import pytest
 from hypothesis import settings
@@ -16,6 +19,10 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Workers and programs that are started each would compile every module they import, wherever this is set.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -31,17 +38,25 @@ def pytest_xdist_auto_num_workers() -> int:
     return (os.cpu_count() or 1) + 1
 
 
-SLOW_TO_FINISH = ("test_static_checks.py", "clients", "system", "flights")
-"""Files and folders whose tests take longest or wait most; begun first, no worker is left alone with them."""
+ORDER: Final = (
+    ("test_static_checks.py",),
+    # In a fresh clone this compiles the flight code. Meanwhile the others run what needs none of it, so that
+    # not every process compiles everything.
+    ("test_warm_up.py",),
+    ("bridge", "logs", "preflight", "storage", "vehicle_client", "test_architecture.py"),
+    # These take longest or wait most: begun early, no worker is left alone with them.
+    ("clients",),
+    ("system",),
+    ("flights",),
+)
+"""Files and folders whose tests are begun first."""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     def rank(item: pytest.Item) -> int:
-        return min(
-            (SLOW_TO_FINISH.index(part) for part in item.path.parts if part in SLOW_TO_FINISH),
-            default=len(SLOW_TO_FINISH),
-        )
+        parts = item.path.parts
+        return next((k for k, names in enumerate(ORDER) if set(names) & set(parts)), len(ORDER))
 
     items.sort(key=rank)
 

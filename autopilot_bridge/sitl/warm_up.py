@@ -7,6 +7,7 @@ flies a little of everything first. With a warm compile cache it costs a fractio
 
 import math
 from collections.abc import Iterable
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -33,6 +34,8 @@ _MODELS: Final = {AirframeKind.MULTICOPTER: "iris", AirframeKind.FIXED_WING: "ae
 def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpecification(),)) -> None:
     """Fly a throwaway vehicle of each kind through take-off, an approach, a circle, a descent and streams.
 
+    Once in a process: a kind that has flown does not fly again.
+
     Args:
         vehicles: those that are to fly; only their kinds matter.
 
@@ -40,22 +43,27 @@ def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpeci
         AirframeError: a model that can't be used.
     """
     for kind in sorted({load_airframe(vehicle.model).kind for vehicle in vehicles}):
-        specification = VehicleSpecification(model=_MODELS[kind])
-        # rough air and another's estimate of the position may come at any time of a flight
-        air = Environment.from_wind(speed_m_s=2.0, from_deg=0.0, turbulence="light")
-        sitl = Sitl(SitlConfiguration(vehicles=(specification,), environment=air))
-        link = sitl.connect(0)
-        fly = _fly_aircraft if kind is AirframeKind.FIXED_WING else _fly_multicopter
-        fly(sitl)
-        encoder = FrameEncoder(1, 191)
-        for k in range(5):
-            time_us = sitl.time_us
-            frame = encoder.encode(dialect.MAVLink_vision_position_estimate_message(time_us, *(0.0,) * 6))
-            link.send(frame)
-            packet_records([time_us], [frame])
-            _advance(sitl, 0.1 * (k + 1))
-        link.receive()
-        sitl.close()
+        _compile(kind)
+
+
+@cache
+def _compile(kind: AirframeKind) -> None:
+    specification = VehicleSpecification(model=_MODELS[kind])
+    # rough air and another's estimate of the position may come at any time of a flight
+    air = Environment.from_wind(speed_m_s=2.0, from_deg=0.0, turbulence="light")
+    sitl = Sitl(SitlConfiguration(vehicles=(specification,), environment=air))
+    link = sitl.connect(0)
+    fly = _fly_aircraft if kind is AirframeKind.FIXED_WING else _fly_multicopter
+    fly(sitl)
+    encoder = FrameEncoder(1, 191)
+    for k in range(5):
+        time_us = sitl.time_us
+        frame = encoder.encode(dialect.MAVLink_vision_position_estimate_message(time_us, *(0.0,) * 6))
+        link.send(frame)
+        packet_records([time_us], [frame])
+        _advance(sitl, 0.1 * (k + 1))
+    link.receive()
+    sitl.close()
 
 
 def _fly_multicopter(sitl: Sitl) -> None:

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification, compile_flight_code, team
+from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification, team
 from flightsim import truth as t
 from flightsim.airframe import AirframeError, AirframeKind
 
@@ -112,10 +112,6 @@ def test_a_quadrotors_motor_fails_too() -> None:
     assert inject(mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_OFF, 3) is Result.ACCEPTED
     assert [vehicle.vehicle.motor_effectiveness(k) for k in range(4)] == [1.0, 1.0, 0.0, 1.0]
     assert inject(mavlink.FAILURE_UNIT_SYSTEM_SERVO, mavlink.FAILURE_TYPE_OFF, 1) is Result.UNSUPPORTED
-
-
-def test_flight_code_is_compiled_for_the_kinds_that_fly() -> None:
-    compile_flight_code((VehicleSpecification(model="aerosonde"), VehicleSpecification(model="iris")))
 
 
 @pytest.mark.parametrize("model", ["c172x"])
