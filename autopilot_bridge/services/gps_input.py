@@ -94,13 +94,13 @@ def _gps_input(message: MavlinkMessage) -> list[float] | None:
 
     unmoved = bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ)
     no_climb = unmoved or bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT)
+    told = (message.vn, message.ve, message.vd)[: 0 if unmoved else 2 if no_climb else 3]
+    if not all(abs(part) < _MAX_SPEED_M_S for part in told):
+        return None
     return _fix(
         message,
         alt_m=0.0 if ignored & mavlink.GPS_INPUT_IGNORE_FLAG_ALT else float(message.alt),
-        velocity=(
-            *((math.nan, math.nan) if unmoved else (float(message.vn), float(message.ve))),
-            math.nan if no_climb else float(message.vd),
-        ),
+        velocity=(*told, math.nan, math.nan, math.nan)[:3],
         hdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
         vdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
         eph_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
@@ -134,8 +134,6 @@ def _fix(
     """A sample as in `flightsim.interface`; NaN: not told. None: it can't be one."""
     fix_type, satellites = int(message.fix_type), int(message.satellites_visible)
     if fix_type > _LAST_FIX_TYPE or not abs(alt_m) < _MAX_ALT_M:
-        return None
-    if any(not (math.isnan(part) or abs(part) < _MAX_SPEED_M_S) for part in velocity):
         return None
     hdop, vdop = _least(hdop, _UNKNOWN_DOP), _least(vdop, _UNKNOWN_DOP)
     values = [0.0] * i.GPS_SIZE

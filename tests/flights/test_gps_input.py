@@ -220,3 +220,36 @@ def test_gps_time_takes_out_what_the_way_differs() -> None:
     late_us = errors[20:]
     assert taker.taken == 40
     assert max(late_us) - min(late_us) < 3_000
+
+
+def test_whatever_is_sent_the_vehicle_goes_on() -> None:
+    """Extreme values of every field, in whatever mixture: nothing raises, and what is told can be packed."""
+    flight = copter(**MAV)
+    rng = np.random.Generator(np.random.PCG64(11))
+    floats = (math.nan, math.inf, -math.inf, 3.4e38, -3.4e38, 1e-40, 0.0, 1e5 - 1.0, 399.0, -399.0, 65535.0)
+    whole = {
+        "lat": 31,
+        "lon": 31,
+        "ignore_flags": 16,
+        "time_week": 16,
+        "time_week_ms": 32,
+        "fix_type": 8,
+        "satellites_visible": 8,
+    }
+    receiver = Receiver(flight)
+    for _ in range(400):
+        fix = receiver.fix()
+        for name in fix:
+            if name == "gps_id" or rng.random() < 0.6:
+                continue
+            if name in whole:
+                largest = 1 << whole[name]
+                fix[name] = int(rng.choice((0, 1, 3, largest - 1, largest // 2)))
+            elif name != "time_usec":
+                fix[name] = float(rng.choice(floats))
+        flight.send(dialect.MAVLink_gps_input_message(**fix))
+        flight.fly(0.02)
+    assert service(flight).taken > 20 and service(flight).refused > 20
+    assert np.isfinite(flight.vehicle.autopilot.navigation.state[:28]).all()
+    flight.repeat(RATE_HZ, receiver.gps_input)
+    flight.get_ready()
