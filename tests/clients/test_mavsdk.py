@@ -28,6 +28,7 @@ from mavsdk.plugins.telemetry import Telemetry
 from tests.clients.mavsdk_flying import raw_item
 from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station
 from tests.clients.sitl_process import free_port, running_sitl
+from tests.slow import slow
 
 SPEEDUP = 10.0
 
@@ -130,7 +131,7 @@ def accepted(action: Callable[[], None]) -> bool:
     return True
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", [slow("px4"), "ardupilot"])
 @pytest.mark.compatibility(
     client="MAVSDK synchronous", feature="action, offboard, mission: one flight", parameter="flavour"
 )

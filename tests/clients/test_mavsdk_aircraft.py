@@ -256,6 +256,7 @@ async def fly_arduplane(url: str) -> None:
         await pilot.lands()
 
 
+@pytest.mark.slow
 @pytest.mark.compatibility(
     client="MAVSDK asyncio", feature="action, offboard, mission: one flight", vehicle="ardupilot-plane"
 )

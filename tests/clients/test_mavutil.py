@@ -10,6 +10,7 @@ from pymavlink import mavutil
 from tests.clients.mavutil_client import Client
 from tests.clients.runway import PlanItem
 from tests.clients.sitl_process import free_port, running_sitl
+from tests.slow import slow
 
 mavlink = mavutil.mavlink
 SPEEDUP = 16.0
@@ -30,7 +31,7 @@ def set_mode(client: Client, what: str, each: Callable[[], None] | None = None) 
     client.set_mode(MODES[client.flavour][what], each)
 
 
-@pytest.fixture(params=["px4", "ardupilot"])
+@pytest.fixture
 def client(request: pytest.FixtureRequest) -> Iterator[Client]:
     port = free_port()
     with running_sitl(request.param, [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP):
@@ -62,6 +63,7 @@ def take_off(client: Client, height_m: float) -> None:
     )
 
 
+@pytest.mark.parametrize("client", ["px4", slow("ardupilot")], indirect=True)
 @pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", parameter="client")
 def test_offboard_positions_and_return(client: Client) -> None:
     take_off(client, 10.0)
@@ -75,6 +77,7 @@ def test_offboard_positions_and_return(client: Client) -> None:
     client.landed_and_disarmed()
 
 
+@pytest.mark.parametrize("client", [slow("px4"), "ardupilot"], indirect=True)
 @pytest.mark.compatibility(client="pymavlink (mavutil)", feature="mission", parameter="client")
 def test_uploaded_mission_and_landing(client: Client) -> None:
     client.ready()

@@ -173,6 +173,7 @@ def test_loiter(flying: AircraftClient) -> None:
     assert abs(after.relative_alt - before.relative_alt) < 15_000
 
 
+@pytest.mark.slow
 @pytest.mark.compatibility(
     client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="ardupilot-plane"
 )

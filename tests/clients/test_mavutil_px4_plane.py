@@ -140,6 +140,7 @@ def test_offboard_velocity_is_a_course(flying: AircraftClient) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
 def test_return(flying: AircraftClient) -> None:
     flying.set_mode("RTL")

@@ -7,6 +7,7 @@ import pytest
 
 from autopilot_bridge.mavlink import dialect
 from tests.flights.flight import FLAVOURS, Flight
+from tests.slow import slow, slow_after
 
 CRITICAL = 5
 OK, OFF, STUCK, GARBAGE, SLOW, DELAYED, INTERMITTENT = 0, 1, 2, 3, 5, 6, 7
@@ -160,7 +161,7 @@ def test_the_fence_turns_the_vehicle_back(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-@pytest.mark.parametrize("failure", [OFF, STUCK, GARBAGE])
+@pytest.mark.parametrize("failure", slow_after(1, [OFF, STUCK, GARBAGE]))
 def test_without_gps_the_vehicle_lands(flavour: str, failure: int) -> None:
     flight = hovering(flavour)
     lost_s = flight.time_s
@@ -214,8 +215,11 @@ def test_gps_recovered_px4_goes_back_to_what_it_did_ardupilot_does_not() -> None
 
 @pytest.mark.parametrize(
     ("unit", "failure"),
-    [(GPS, SLOW), (GPS, DELAYED), (GPS, INTERMITTENT), (ACCEL, SLOW), (GYRO, SLOW)]
-    + [(unit, failure) for unit in (MAG, BARO) for failure in (OFF, STUCK, GARBAGE, INTERMITTENT)],
+    [
+        *((GPS, SLOW), (GPS, INTERMITTENT), (MAG, OFF), (MAG, GARBAGE), (BARO, STUCK), (BARO, INTERMITTENT)),
+        *(slow(GPS, DELAYED), slow(ACCEL, SLOW), slow(GYRO, SLOW)),
+        *(slow(MAG, STUCK), slow(MAG, INTERMITTENT), slow(BARO, OFF), slow(BARO, GARBAGE)),
+    ],
 )
 def test_the_vehicle_holds_its_place_with_a_poor_sensor(unit: int, failure: int) -> None:
     flight = hovering("px4", height_m=6.0)

@@ -10,6 +10,7 @@ from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
 from tests.flights.aircraft import AircraftFlight
 from tests.flights.flight import FLAVOURS
+from tests.slow import slow_after
 
 WIND = Environment(wind_ned_m_s=(0.0, 4.0, 0.0), turbulence=Turbulence.LIGHT)
 OK, OFF, STUCK, WRONG = 0, 1, 2, 4
@@ -117,7 +118,7 @@ def test_arduplane_guided_attitudes_go_on_without_gps() -> None:
     flight.set_mode("guided")
 
 
-@pytest.mark.parametrize("failure", [OFF, STUCK])
+@pytest.mark.parametrize("failure", slow_after(1, [STUCK, OFF]))
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_airspeed_fails(flavour: str, failure: int) -> None:
     flight = circling(flavour, 80.0)

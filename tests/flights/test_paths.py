@@ -14,6 +14,7 @@ import pytest
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.session import RunRequest, fly
+from tests.slow import slow, slow_after
 
 LISSAJOUS = ("L1", "L2", "L3", "L4")
 IAMSAR = ("sector", "parallel-sweep", "expanding-square")
@@ -52,9 +53,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Any:
     return run
 
 
-@pytest.mark.parametrize(
-    "flights", ["still", "windy", pytest.param("still, the others", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("flights", slow_after(1, ["windy", "still", "still, the others"]))
 def test_setpoints_follow_the_curve(flown: Any, flights: str) -> None:
     air = flights.split(",")[0]
     for seed, (name, flavour) in enumerate(SETPOINT_FLIGHTS[flights], start=1):
@@ -72,7 +71,7 @@ def test_setpoints_follow_the_curve(flown: Any, flights: str) -> None:
         ("L1", "px4"),
         ("L2", "ardupilot"),
         ("sector", "ardupilot"),
-        ("parallel-sweep", "px4"),
+        slow("parallel-sweep", "px4"),
         ("expanding-square", "ardupilot"),
     ],
 )

@@ -15,6 +15,7 @@ from missions.planning.limits import FixedWingLimits
 from missions.telemetry import AirData, Attitude, Position
 from missions.vehicle import Mode, Vehicle
 from missions.vehicle.fixed_wing import Approach
+from tests.slow import slow_after
 
 HEIGHT = 80.0
 
@@ -54,7 +55,7 @@ async def watch(vehicle, seconds, look):
     return np.array(seen)
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", slow_after(1, ["px4", "ardupilot"]))
 def test_an_aircraft_is_flown_by_circles_headings_and_an_approach(flavour):
     async def script(vehicle):
         assert vehicle.kind is VehicleKind.FIXED_WING

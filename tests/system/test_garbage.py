@@ -14,6 +14,7 @@ import pytest
 from autopilot_bridge.links import open_link, parse_address
 from autopilot_bridge.mavlink import DEFINITIONS, definition, dialect
 from autopilot_bridge.sitl.channel import LinkChannel
+from tests.slow import slow_after
 from tests.system.flying import Flying
 from tests.system.hostile import commands, damaged, parameter_sets, random_bytes, valid_frames
 
@@ -229,7 +230,7 @@ TERMINATING = (
 )
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", slow_after(1, range(3)))
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_any_message_with_any_content(flavour: str, seed: int) -> None:
     """Valid frames of every message, every command and every parameter, with absurd fields, for the vehicle

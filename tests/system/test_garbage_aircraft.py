@@ -18,6 +18,7 @@ from flightsim.payload import (
     PayloadParameters,
     SurveyMagnetometerParameters,
 )
+from tests.slow import slow_after
 from tests.system.flying import Flying
 from tests.system.hostile import commands, damaged, parameter_sets, random_bytes, valid_frames
 from tests.system.test_garbage import COMMAND_INT, COMMAND_LONG, TERMINATING, check_accounts, feed, memory
@@ -144,7 +145,7 @@ def answering(flying: Flying) -> set[int]:
     return heartbeats & acks & set(ALL_PAYLOAD)
 
 
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", slow_after(1, range(2)))
 def test_any_message_with_any_content_to_the_payload(seed: int) -> None:
     """Absurd messages and commands that are whole: the aircraft flies on, and the devices stay finite."""
     flying = circling("px4" if seed else "ardupilot")

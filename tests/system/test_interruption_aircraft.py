@@ -88,6 +88,7 @@ def test_ctrl_c_on_an_aircraft_elsewhere(flavour: str, flying: int, tmp_path: Pa
     assert modes(run.log)[-1] == "return"
 
 
+@pytest.mark.slow
 def test_a_killed_flight_leaves_a_readable_log(tmp_path: Path) -> None:
     """kill -9, and a machine that loses the end of the file as well: all complete records are there."""
     with started(tmp_path / "run", *OCCUPANCY) as run:

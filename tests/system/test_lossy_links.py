@@ -19,6 +19,7 @@ from missions.connection import Connection
 from missions.errors import MissionError
 from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.vehicle import Vehicle
+from tests.slow import slow_after
 from tests.system.flying import Flying
 
 T = TypeVar("T")
@@ -74,7 +75,7 @@ def heights(items: tuple[MissionItem, ...] | list[MissionItem]) -> list[float]:
     return [item.z for item in items]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", slow_after(1, range(3)))
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_everything_is_done_over_a_poor_radio(flavour: str, seed: int) -> None:
     radio = Radio(flavour, POOR, seed)
@@ -127,7 +128,7 @@ def test_flies_by_setpoints_over_a_poor_radio(flavour: str) -> None:
     assert not radio.flying.armed
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", slow_after(2, range(6)))
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_nothing_is_done_by_half_over_a_bad_radio(flavour: str, seed: int) -> None:
     radio = Radio(flavour, BAD, 100 + seed)

@@ -10,6 +10,7 @@ from autopilot_bridge.mavlink import DEFINITIONS, decode, definition
 from autopilot_bridge.tlog import TlogReader
 from tests.clients.sitl_process import running_sitl
 from tests.serial_line import SerialLine, serial_line
+from tests.slow import slow
 from tests.system.logs import modes, records
 from tests.system.runs import SHORT, Run, started, wait_until
 
@@ -52,7 +53,7 @@ def longest_gap_s(log: Path, name: str) -> float:
     return max(b - a for a, b in itertools.pairwise(times_ms)) * 1e-3
 
 
-@pytest.mark.parametrize(("flavour", "via"), [("px4", "setpoints"), ("ardupilot", "waypoints")])
+@pytest.mark.parametrize(("flavour", "via"), [slow("px4", "setpoints"), ("ardupilot", "waypoints")])
 def test_a_mission_at_57600_baud(flavour: str, via: str, tmp_path: Path) -> None:
     """Told the true rate of the line, which at this speedup is so much higher in wall time."""
     with (

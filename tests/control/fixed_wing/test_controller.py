@@ -272,7 +272,7 @@ def test_unknown_attitude_stops_the_propeller() -> None:
 BAD = st.one_of(st.floats(allow_nan=True, allow_infinity=True), st.floats(-30.0, 30.0), st.just(math.nan))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.sampled_from([sp.RATES, sp.FLY, sp.SURFACES_DIRECT]),
     st.lists(BAD, min_size=sp.SETPOINT_SIZE, max_size=sp.SETPOINT_SIZE),

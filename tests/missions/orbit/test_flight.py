@@ -14,6 +14,7 @@ from missions.records import FlightRecords
 from missions.run import EPOCH_UNIX_US
 from missions.scenario import Scenario
 from missions.session import RunRequest, fly
+from tests.slow import slow
 
 KEYS = {"radius_mean_error_percent", "radius_std_m", "altitude_error_m", "gps_lost_at_s"}
 
@@ -48,7 +49,7 @@ def gps_times(folder, start_s, end_s):
 @pytest.mark.parametrize(
     ("autopilot", "options"),
     [
-        ("px4", {}),
+        slow("px4", {}),
         (
             "ardupilot",
             {
