@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from autopilot_bridge.errors import BridgeError
+from autopilot_bridge.errors import BridgeError, TlogError
 from missions.cli_signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli_storage import VehicleCards, storage_option
 from missions.cli_types import SLOWEST, FiniteRange
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from autopilot_bridge.sitl import Port
 
 _LOG_RATE_HZ = 4
+_FAILED = 1
 _LOGGER = 255, 190  # MAV_COMP_ID_MISSIONPLANNER of a ground station
 
 
@@ -205,10 +206,12 @@ def sitl(
     log: str | None,
     no_wait: bool,
     duration: float | None,
-) -> None:
+) -> int:
     """SITL for other people's clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
 
     Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
+
+    Exit codes: 0 stopped, 1 the log could not be written to its end, 2 usage.
     """
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
@@ -234,6 +237,12 @@ def sitl(
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         stop.append(number)
+
+    no_log: list[str] = []
+
+    def log_ended(why: str) -> None:
+        no_log.append(why)
+        click.echo(f"flightstack: {why}; the log ends here, the vehicles fly on", err=True)
 
     try:
         ports = _ports(links, gcs_links)
@@ -277,7 +286,7 @@ def sitl(
         else:
             opened = server.open([ports] if ports else None)
         if recorder is not None:
-            for listener in world.record(recorder):
+            for listener in world.record(recorder, log_ended):
                 if autopilot == "ardupilot":  # which sends what it is asked for only
                     listener.send(_request_streams())
     except (ValueError, OSError, BridgeError) as error:
@@ -312,8 +321,13 @@ def sitl(
         if pictured is not None:
             pictured.close()
         if recorder is not None:
-            recorder.close()
+            try:
+                recorder.close()
+            except TlogError as error:
+                if not no_log:
+                    log_ended(str(error))
         for number, handler in before.items():
             signal.signal(number, handler)
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")
+    return _FAILED if no_log else 0

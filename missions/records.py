@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import DEFINITIONS, definition
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from estimators.logs.columns import record_dtype
@@ -92,10 +93,16 @@ class FlightRecorder:
         log: an open log.
         epoch_us: Unix time of vehicle time 0 (embedded flights), or None to stamp with `unix_time_us`.
         unix_time_us: wall clock for flights of vehicles elsewhere.
+
+    Attributes:
+        records: of all frames.
+        failure: why the log takes no more; it ends there, and what is recorded goes on without it. "" while
+            all is well.
     """
 
     def __init__(self, log: TlogWriter, *, epoch_us: int | None, unix_time_us: UnixTime) -> None:
         self.records = FlightRecords()
+        self.failure = ""
         self._log = log
         self._epoch_us = epoch_us
         self._unix_time_us = unix_time_us
@@ -103,9 +110,27 @@ class FlightRecorder:
     def record(self, frame: bytes, time_us: int) -> None:
         """Log one frame that passed at vehicle time `time_us`."""
         stamp = self._unix_time_us() if self._epoch_us is None else self._epoch_us + time_us
-        self._log.write(stamp, frame)
+        if not self.failure:
+            try:
+                self._log.write(stamp, frame)
+            except TlogError as error:
+                self.failure = str(error)
         self.records.add(frame)
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
         """Log one frame of truth."""
         self.record(frame, time_us)
+
+    def flush(self) -> None:
+        """Hand everything to the operating system, so that `failure` says how the log is now."""
+        self._try(self._log.flush)
+
+    def close(self) -> None:
+        """Close the log."""
+        self._try(self._log.close)
+
+    def _try(self, write: Callable[[], None]) -> None:
+        try:
+            write()
+        except TlogError as error:
+            self.failure = self.failure or str(error)

@@ -168,7 +168,12 @@ def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
     text = json.dumps(_finite(summary), indent=2, allow_nan=False) + "\n"
     path = folder / SUMMARY_NAME
     with path.open("x", encoding="utf-8") as file:
-        file.write(text)
+        try:
+            file.write(text)
+            file.flush()
+        except OSError:
+            path.unlink()
+            raise
     return path
 
 

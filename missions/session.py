@@ -36,7 +36,7 @@ from missions.run import (
     versions,
     write_summary,
 )
-from missions.signing import client_signing
+from missions.signing import client_signing, key_missing
 from missions.together import together
 from missions.vehicle.vehicle import Vehicle
 
@@ -73,6 +73,7 @@ class Flight:
 
     Attributes:
         vehicles: as soon as they are made.
+        recorder: of all that is sent and heard.
         started_wall_s: wall clock when the run began.
         started_us: vehicle time when the run began: boot of an embedded one, else when it was first heard.
     """
@@ -82,6 +83,18 @@ class Flight:
         self.clock: Clock | None = None
         self.started_wall_s = wall_time_s()
         self.started_us = 0
+        self.recorder: FlightRecorder | None = None
+
+    def require_log(self) -> None:
+        """See that what was heard so far is in the log.
+
+        Raises:
+            MissionError: the disk does not take it.
+        """
+        if self.recorder is not None:
+            self.recorder.flush()
+            if self.recorder.failure:
+                raise MissionError(f"{self.recorder.failure}; nothing was flown")
 
 
 ProgressListener = Callable[[Flight], None]
@@ -121,17 +134,20 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     flight = Flight()
     outcome, reason = COMPLETED, ""
     try:
-        with TlogWriter(folder / LOG_NAME) as log:
-            recorder = FlightRecorder(log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
-            heard_by = recorder if estimators is None else estimators.around(recorder)
-            stage.on_truth(heard_by.record_truth)
-            try:
-                run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
-            except KeyboardInterrupt:
-                outcome, reason = INTERRUPTED, INTERRUPTED
-            except (MissionError, PlanError, BridgeError) as error:
-                notes = (*getattr(error, "__notes__", ()), *_key_missing(request, flight))
-                outcome, reason = FAILED, "; ".join((str(error), *notes))
+        log = TlogWriter(folder / LOG_NAME)
+        recorder = FlightRecorder(log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
+        flight.recorder = recorder
+        heard_by = recorder if estimators is None else estimators.around(recorder)
+        stage.on_truth(heard_by.record_truth)
+        try:
+            run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
+        except KeyboardInterrupt:
+            outcome, reason = INTERRUPTED, INTERRUPTED
+        except (MissionError, PlanError, BridgeError) as error:
+            notes = (*getattr(error, "__notes__", ()), *key_missing(request, flight.vehicles))
+            outcome, reason = FAILED, "; ".join((str(error), *notes))
+        finally:
+            recorder.close()
     finally:
         stage.close()
         stage.loop.close()
@@ -141,15 +157,21 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
         reason = _missed_check(request, blocks)
+        if recorder.failure:
+            reason = "; ".join(filter(None, (reason, f"{recorder.failure}; it was flown on without a log")))
         outcome = FAILED if reason else COMPLETED
     elif outcome == INTERRUPTED and how_left(blocks):
         reason = f"{INTERRUPTED}; {how_left(blocks)}"
     summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
     if estimators is not None:
         summary["estimator"] = estimators.report(folder, picture=request.picture, wall_time_s=wall_s).summary
-    write_summary(folder, summary)
-    if request.picture and debriefing.flights:
-        mission.draw(folder / PICTURE_NAME, _title(mission, debriefing, summary), debriefing)
+    try:
+        write_summary(folder, summary)
+        if request.picture and debriefing.flights:
+            mission.draw(folder / PICTURE_NAME, _title(mission, debriefing, summary), debriefing)
+    except OSError as error:
+        missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
+        outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
     return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
 
 
@@ -201,6 +223,7 @@ async def _fly(
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
             await together([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])
+            flight.require_log()
             await _fly_all(mission, flight.vehicles, request)
         finally:
             for vehicle in flight.vehicles:
@@ -209,18 +232,6 @@ async def _fly(
                 flight.started_us = flight.vehicles[0].first_heard_us
             reporter.cancel()
             await asyncio.gather(reporter, return_exceptions=True)
-
-
-def _key_missing(request: RunRequest, flight: "Flight") -> list[str]:
-    """What keeps a vehicle that signs from answering anybody without its key, when that is what happened."""
-    if not request.connect or request.signing_key is not None:
-        return []
-    return [
-        f"vehicle {vehicle.system_id} signs what it says, and has answered nothing: is its key missing "
-        "(--signing-key FILE)?"
-        for vehicle in flight.vehicles
-        if vehicle.signs and not vehicle.answered
-    ]
 
 
 async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:

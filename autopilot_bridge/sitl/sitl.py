@@ -7,6 +7,7 @@ links have brought is handed to the autopilots.
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
 from autopilot_bridge.sitl.configuration import SitlConfiguration
 from autopilot_bridge.sitl.packet_log import PacketLog
@@ -174,17 +175,34 @@ class Sitl:
         ours.on_receive = lambda data: vehicle.take(channel, channel.parse(data))
         return theirs
 
-    def record(self, log: PacketLog) -> list[MemoryLink]:
+    def record(self, log: PacketLog, on_failure: Callable[[str], None] | None = None) -> list[MemoryLink]:
         """Log what every vehicle says on a link of its own, and the truth, stamped with the vehicles' clock.
+
+        Args:
+            on_failure: told once, why, when the log takes no more: it ends there, and the vehicles fly on.
+                None: the step raises that TlogError.
 
         Returns:
             The client's ends of those links, by which the vehicles can be spoken to.
         """
         epoch_us = self.configuration.unix_epoch_us
         links = [self.connect(index) for index in range(len(self.vehicles))]
+        failed = False
+
+        def keep(time_us: int, packet: bytes) -> None:
+            nonlocal failed
+            if not failed:
+                try:
+                    log.write_packet(epoch_us + time_us, packet)
+                except TlogError as error:
+                    if on_failure is None:
+                        raise
+                    failed = True
+                    on_failure(str(error))
+
         for link in links:
-            link.on_receive = lambda packet: log.write_packet(epoch_us + self._time_us, packet)
-        self.on_truth(lambda time_us, frame: log.write(epoch_us + time_us, frame))
+            link.on_receive = lambda packet: keep(self._time_us, packet)
+        self.on_truth(keep)
         return links
 
     def on_truth(self, listener: TruthListener) -> None:

@@ -106,26 +106,6 @@ class LiveProgress:
     lacking: Sequence[str]
 
 
-class _Recorder:
-    """A recorder that a full disk ends in good order.
-
-    Attributes:
-        failure: why the log could not be written; nothing more is recorded then. "" while all is well.
-    """
-
-    def __init__(self, recorder: FlightRecorder) -> None:
-        self.failure = ""
-        self._record = recorder.record
-
-    def record(self, frame: bytes, time_us: int) -> None:
-        """Record a good frame."""
-        if not self.failure:
-            try:
-                self._record(frame, time_us)
-            except TlogError as error:
-                self.failure = str(error)
-
-
 class _Process:
     """One run on an open link."""
 
@@ -134,7 +114,7 @@ class _Process:
         self._link = link
         self._fleet = fleet
         self._clock = TelemetryClock()
-        recorder = _Recorder(FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us))
+        recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
         self._recorder = recorder
         self._publisher = Publisher(self._say)
         self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None)

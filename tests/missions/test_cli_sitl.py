@@ -5,7 +5,9 @@ from collections import Counter
 import pytest
 from click.testing import CliRunner
 
+from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import DEFINITIONS
+from autopilot_bridge.sitl import PacketLog
 from autopilot_bridge.tlog import TlogReader
 from flightsim.home import Home
 from flightsim.payload import SyntheticMapParameters, synthetic_map
@@ -66,6 +68,24 @@ def test_signature_off_the_map_is_refused_by_name(survey_map):
     result = sitl(*LINK, "--map", str(survey_map), "--map-target", "9000,0")
     assert result.exit_code == 2
     assert "target 1 at north 9000 m, east 0 m is outside the magnetic map" in result.output
+
+
+def test_a_full_disk_ends_the_log_and_not_the_flight(tmp_path, monkeypatch):
+    flush = PacketLog.flush
+
+    def filling(log):
+        if log.records > 500:
+            raise TlogError(f"can't write {log.path}: No space left on device; check the disk")
+        flush(log)
+
+    monkeypatch.setattr(PacketLog, "flush", filling)
+    log = tmp_path / "said.tlog"
+    words = ["--speedup", "0", *LINK, "--duration", "6", "--log", str(log)]
+    result = CliRunner().invoke(command, words, standalone_mode=False)
+    assert result.return_value == 1
+    assert result.output.count("check the disk; the log ends here, the vehicles fly on") == 1
+    assert "stopped at 6.0 s" in result.output
+    assert len(list(TlogReader(log))) > 500
 
 
 @pytest.mark.parametrize("autopilot", ["px4", "ardupilot"])

@@ -1,14 +1,12 @@
 """A mission without the key of a vehicle that signs: what it can tell of that."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState
 from missions.errors import VehicleTimeout
 from missions.options import FlightOptions
 from missions.request import RunRequest
-from missions.session import _key_missing
+from missions.signing import key_missing
 
 KEY = SigningKey.from_passphrase("theirs")
 
@@ -39,7 +37,7 @@ def test_a_vehicle_that_signs_and_answers_nothing_may_want_its_key(flown, answer
         except VehicleTimeout:
             assert not answers
         request = RunRequest(options=FlightOptions(), connect=("udpin:127.0.0.1:1",))
-        return _key_missing(request, SimpleNamespace(vehicles=[vehicle]))
+        return key_missing(request, [vehicle])
 
     told = flown(script, ready=False, setup=sign)
     assert len(told) == (not answers)
@@ -49,6 +47,6 @@ def test_a_vehicle_that_signs_and_answers_nothing_may_want_its_key(flown, answer
 def test_a_vehicle_that_does_not_sign_wants_none(flown):
     async def script(vehicle, autopilot):
         request = RunRequest(options=FlightOptions(), connect=("udpin:127.0.0.1:1",))
-        return _key_missing(request, SimpleNamespace(vehicles=[vehicle]))
+        return key_missing(request, [vehicle])
 
     assert flown(script) == []

@@ -1,5 +1,6 @@
 """Whole runs against scripted autopilots: folder, log, summary, picture, outcomes; and the command line."""
 
+import errno
 import json
 import os
 import signal
@@ -14,7 +15,8 @@ import pytest
 from click.testing import CliRunner
 from pymavlink import mavutil
 
-from autopilot_bridge.errors import BridgeError
+from autopilot_bridge.errors import BridgeError, TlogError
+from autopilot_bridge.tlog import TlogReader, TlogWriter
 from missions import cli, cli_fly
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
@@ -245,6 +247,47 @@ def test_a_log_that_cannot_be_opened_leaves_no_link_open(embedded, tmp_path, mon
         fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert embedded[0].loop.is_closed()
     assert embedded[0].closed
+
+
+class FillingDisk(TlogWriter):
+    """A log on a disk that has room for so many bytes."""
+
+    room = 0
+
+    def flush(self):
+        if self.path.stat().st_size + len(self._buffer) > self.room:
+            raise TlogError(f"can't write {self.path}: No space left on device; check the disk")
+        super().flush()
+
+
+def test_a_disk_that_fills_up_in_flight_ends_the_log_and_not_the_flight(embedded, tmp_path, monkeypatch):
+    monkeypatch.setattr("missions.session.TlogWriter", FillingDisk)
+    monkeypatch.setattr(FillingDisk, "room", 100_000)
+    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    assert result.outcome == "failed"
+    assert "No space left on device; check the disk; it was flown on without a log" in result.reason
+    (vehicle,) = result.summary["vehicles"]
+    assert vehicle["phases"][-1]["name"] == "return" and vehicle["waypoints"]["passed"] > 0
+    assert not embedded[0].autopilots[0].armed
+    assert len(list(TlogReader(tmp_path / "run" / "flight.tlog"))) > 1000
+
+
+def test_nothing_is_flown_on_a_full_disk(embedded, tmp_path, monkeypatch):
+    monkeypatch.setattr("missions.session.TlogWriter", FillingDisk)
+    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    assert result.outcome == "failed"
+    assert "No space left on device; check the disk; nothing was flown" in result.reason
+    assert all(phase["name"] != "takeoff" for phase in result.summary["vehicles"][0]["phases"])
+
+
+def test_a_summary_that_finds_no_room_is_told(embedded, tmp_path, monkeypatch):
+    def full(folder, summary):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("missions.session.write_summary", full)
+    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    assert result.outcome == "failed"
+    assert "No space left on device; check the disk" in result.reason
 
 
 # command line
