@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
-
-COMMAND_PARAMETERS: Final = 4
 
 
 class MissionType(IntEnum):

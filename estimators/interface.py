@@ -57,7 +57,6 @@ class Need:
         purpose: what for, for the text that tells that it is missing: "angular rate and specific force".
         wanted_rate_hz: what to ask a live autopilot for; `rate_hz` if less.
         optional: works without.
-        per_vehicle: every vehicle must have it (estimators of a team).
     """
 
     messages: tuple[str, ...]
@@ -65,7 +64,6 @@ class Need:
     purpose: str
     wanted_rate_hz: float = 0.0
     optional: bool = False
-    per_vehicle: bool = True
 
     def __post_init__(self) -> None:
         if not self.messages:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.air_aiding import AirAiding
 from autopilot_bridge.navigation.alignment import tilt_from_accel
 from autopilot_bridge.navigation.clocks import Clocks
@@ -55,6 +56,7 @@ class Aiding:
         "_health",
         "_height",
         "_parameters",
+        "_parts",
         "_readings",
         "_report_every",
         "_slow_every",
@@ -83,35 +85,23 @@ class Aiding:
         self._report_every = max(1, parameters.covariance_rate_hz // _REPORT_RATE_HZ)
         self._clocks = Clocks()
         self._contradictions = Contradictions()
-        self._standby = Standby(solution, health, self._clocks)
-        self._terrain = TerrainEstimator(parameters)
-        self._heading = HeadingAiding(
-            parameters, readings=readings, solution=solution, health=health, clocks=self._clocks
-        )
-        self._height = HeightAiding(
-            parameters,
-            readings=readings,
-            solution=solution,
-            health=health,
-            clocks=self._clocks,
-            contradictions=self._contradictions,
-            terrain=self._terrain,
-        )
-        self._gps = GpsAiding(
-            parameters,
+        self._standby = Standby(solution, self._clocks)
+        self._parts = parts = AidingParts(
             readings=readings,
             solution=solution,
             health=health,
             clocks=self._clocks,
             contradictions=self._contradictions,
             standby=self._standby,
-            heading=self._heading,
-            height=self._height,
         )
+        self._terrain = TerrainEstimator(parameters)
+        self._heading = HeadingAiding(parameters, parts)
+        self._height = HeightAiding(parameters, parts, terrain=self._terrain)
+        self._gps = GpsAiding(parameters, parts, heading=self._heading, height=self._height)
         self.external: ExternalAiding | None = None
         self.air: AirAiding | None = None
         if parameters.fixed_wing:
-            self.air = AirAiding(parameters, readings=readings, solution=solution, health=health)
+            self.air = AirAiding(parameters, parts)
         self.restart()
 
     @property
@@ -153,13 +143,7 @@ class Aiding:
     def take_external(self, sample: ExternalSample) -> None:
         """External odometry, for the next update."""
         if self.external is None:
-            self.external = ExternalAiding(
-                self._parameters.external,
-                solution=self._solution,
-                standby=self._standby,
-                health=self._health,
-                clocks=self._clocks,
-            )
+            self.external = ExternalAiding(self._parameters.external, self._parts)
         self.external.take(sample)
 
     def _tune(self) -> None:

@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import air_fusion as a
 from autopilot_bridge.navigation import covariance as cov
-from autopilot_bridge.navigation.health import NavigationHealth
+from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.layout import AIRSPEED_M_S, AIRSPEED_TRUE_M_S, WIND_NED_M_S
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.pitot import AirspeedCheck, GustVariance, Pitot
-from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import ACCEL, GRAVITY, WIND, X_POS, X_VEL, X_WIND
 from autopilot_bridge.navigation.sustained_turn import SustainedTurn
-from flightsim.interface import SensorReadings
 
 Array = NDArray[np.float64]
 
@@ -71,20 +69,12 @@ class AirAiding:
         "wind_us",
     )
 
-    def __init__(
-        self,
-        parameters: NavigationParameters,
-        *,
-        readings: SensorReadings,
-        solution: Solution,
-        health: NavigationHealth,
-    ) -> None:
+    def __init__(self, parameters: NavigationParameters, parts: AidingParts) -> None:
         self._parameters = parameters
-        self._solution = solution
-        self._health = health
-        self._pitot = Pitot(parameters, readings=readings)
+        self._solution, self._health = parts.solution, parts.health
+        self._pitot = Pitot(parameters, readings=parts.readings)
         self._check = AirspeedCheck()
-        self._turn = SustainedTurn(parameters, solution=solution)
+        self._turn = SustainedTurn(parameters, solution=parts.solution)
         self._airspeed_gusts = GustVariance()
         self._sideslip_gusts = GustVariance()
         self._air: Array = np.zeros(a.AIR_SIZE)
@@ -270,7 +260,6 @@ class AirAiding:
                 self.wind_us = time_us
         self._fused_us = time_us
         health.airspeed_test_ratio = float(air[a.AIRSPEED_RATIO]) if judged else 0.0
-        health.sideslip_test_ratio = float(air[a.SIDESLIP_RATIO]) if todo & a.HAS_SIDESLIP else 0.0
 
     def write(self, state: Array, interval_s: float) -> None:
         """Wind and airspeed into the navigation state; `interval_s` since the last time."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import external_fusion as e
-from autopilot_bridge.navigation.clocks import Clocks
+from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.external import (
     POSITION_M,
     Q_LOCAL_FROM_FRD,
@@ -27,8 +27,7 @@ from autopilot_bridge.navigation.external import (
 from autopilot_bridge.navigation.external_heading import ExternalHeading
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.navigation.health import NavigationHealth
-from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
-from autopilot_bridge.navigation.standby import Standby
+from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S
 from autopilot_bridge.navigation.states import GYRO, HISTORY_Q, X_GYRO_BIAS
 from autopilot_bridge.rotation import yaw_of
 
@@ -78,27 +77,17 @@ class ExternalAiding:
         "heading",
     )
 
-    def __init__(
-        self,
-        parameters: ExternalParameters,
-        *,
-        solution: Solution,
-        standby: Standby,
-        health: NavigationHealth,
-        clocks: Clocks,
-    ) -> None:
+    def __init__(self, parameters: ExternalParameters, parts: AidingParts) -> None:
         self._parameters = parameters
-        self._solution = solution
-        self._standby = standby
-        self._health = health
-        self._clocks = clocks
+        self._solution, self._health, self._clocks = parts.solution, parts.health, parts.clocks
+        self._standby = parts.standby
         self._queue: deque[ExternalSample] = deque(maxlen=_QUEUE)
         self._obs: Array = np.zeros(e.EXT_SIZE)
         self._offset: Array = np.zeros(3)
         self._mapped: Array = np.zeros(3)
         self._gap: Array = np.zeros(3)
         self.counts = ExternalCounts()
-        self.heading = ExternalHeading(solution=solution, health=health, obs=self._obs)
+        self.heading = ExternalHeading(solution=parts.solution, health=parts.health, obs=self._obs)
         self.restart()
 
     def restart(self) -> None:
@@ -319,8 +308,6 @@ class ExternalAiding:
             solution.change_velocity(north, east, sigma_m_s=UNKNOWN_VELOCITY_M_S)
             self._standby.release()
             self._clocks.horizontal_aid_us = time_us
-            self._health.velocity_resets += 1
-            self._health.velocity_reset_ne_m_s = (north, east)
         return e.EXT_HAS_VEL
 
     def _note(self, has: int, accepted: int, time_us: int) -> None:

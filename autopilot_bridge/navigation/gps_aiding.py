@@ -6,16 +6,13 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import fusion as f
-from autopilot_bridge.navigation.clocks import Clocks
-from autopilot_bridge.navigation.contradictions import Contradictions
+from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.gps_quality import GpsQuality
 from autopilot_bridge.navigation.heading_aiding import HeadingAiding
-from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.height_aiding import HeightAiding
 from autopilot_bridge.navigation.parameters import NavigationParameters
-from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S, Solution
-from autopilot_bridge.navigation.standby import Standby
-from autopilot_bridge.navigation.states import X_POS, X_VEL
+from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S
+from autopilot_bridge.navigation.states import X_POS
 from flightsim.interface import (
     GPS_ALT_M,
     GPS_EPH_M,
@@ -24,7 +21,6 @@ from flightsim.interface import (
     GPS_LON_DEG,
     GPS_SPEED_ACCURACY_M_S,
     GPS_VEL_NED_M_S,
-    SensorReadings,
 )
 
 Array = NDArray[np.float64]
@@ -48,7 +44,7 @@ class GpsAiding:
         "_health",
         "_height",
         "_parameters",
-        "_readings",
+        "_reading",
         "_solution",
         "_standby",
         "frame",
@@ -58,23 +54,15 @@ class GpsAiding:
     def __init__(
         self,
         parameters: NavigationParameters,
+        parts: AidingParts,
         *,
-        readings: SensorReadings,
-        solution: Solution,
-        health: NavigationHealth,
-        clocks: Clocks,
-        contradictions: Contradictions,
-        standby: Standby,
         heading: HeadingAiding,
         height: HeightAiding,
     ) -> None:
         self._parameters = parameters
-        self._readings = readings
-        self._solution = solution
-        self._health = health
-        self._clocks = clocks
-        self._contradictions = contradictions
-        self._standby = standby
+        self._reading = parts.readings.gps
+        self._solution, self._health, self._clocks = parts.solution, parts.health, parts.clocks
+        self._contradictions, self._standby = parts.contradictions, parts.standby
         self._heading = heading
         self._height = height
         self.quality = GpsQuality(parameters)
@@ -100,7 +88,7 @@ class GpsAiding:
     def prepare(self, time_us: int) -> int:
         """Write the newest fix into `obs`, and go over to it where that is due; its row of the history, -1:
         it is not to be used."""
-        reading, solution = self._readings.gps, self._solution
+        reading, solution = self._reading, self._solution
         values, p = reading.values, self._parameters
         usable = self.quality.judge(values, reading.time_us, time_us)
         row = solution.row_at(reading.time_us, time_us)
@@ -124,7 +112,7 @@ class GpsAiding:
             self._contradictions.note(time_us)
             self._reset(row, time_us)
         self._height.follow_gps(row, time_us)
-        self._before_rejoining = solution.core[X_VEL : X_POS + 2].copy() if rejoins else None
+        self._before_rejoining = solution.core[X_POS : X_POS + 2].copy() if rejoins else None
         return row
 
     def note(self, time_us: int, row: int, accepted: int, *, at_rest: bool) -> None:
@@ -147,7 +135,7 @@ class GpsAiding:
         ):
             self._reset(row, time_us)
         if self._before_rejoining is not None:
-            self._rejoined(self._solution.core[X_VEL : X_POS + 2] - self._before_rejoining)
+            self._rejoined(self._solution.core[X_POS : X_POS + 2] - self._before_rejoining)
             self._before_rejoining = None
 
     def _write(self, values: Array, delay_s: float, row: int) -> None:
@@ -183,13 +171,9 @@ class GpsAiding:
         clocks.horizontal_aid_us = clocks.gps_position_us = clocks.gps_velocity_us = time_us
         health.position_resets += 1
         health.position_reset_ne_m = (float(step[0]), float(step[1]))
-        health.velocity_resets += 1
-        health.velocity_reset_ne_m_s = (float(change[0]), float(change[1]))
 
     def _rejoined(self, jump: Array) -> None:
-        """The first fix after dead reckoning has moved velocity and position by what had built up."""
+        """The first fix after dead reckoning has moved the position by what had built up."""
         health = self._health
-        health.velocity_resets += 1
-        health.velocity_reset_ne_m_s = (float(jump[0]), float(jump[1]))
         health.position_resets += 1
-        health.position_reset_ne_m = (float(jump[3]), float(jump[4]))
+        health.position_reset_ne_m = (float(jump[0]), float(jump[1]))

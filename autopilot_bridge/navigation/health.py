@@ -38,14 +38,14 @@ class NavigationHealth:
         wind_valid: the wind in the navigation state is known to some use.
         wind_variance_m2_s2: of the wind to the north and to the east; NaN where none is estimated.
         velocity_test_ratio, position_horizontal_test_ratio, position_vertical_test_ratio,
-            magnetometer_test_ratio, height_above_ground_test_ratio, airspeed_test_ratio, sideslip_test_ratio:
+            magnetometer_test_ratio, height_above_ground_test_ratio, airspeed_test_ratio:
             as above; 0 when unused.
         position_horizontal_accuracy_m, position_vertical_accuracy_m, velocity_accuracy_m_s: 1-sigma, NaN
             before initialisation.
         attitude_accuracy_rad: 1-sigma of (tilt, yaw).
         time_since_gps_us: since a GPS sample was last fused; -1 when none ever was.
-        position_resets, velocity_resets, height_resets, yaw_resets: how often the estimate has jumped.
-        position_reset_ne_m, velocity_reset_ne_m_s, height_reset_down_m, yaw_reset_rad: size of the newest
+        position_resets, height_resets, yaw_resets: how often the estimate has jumped.
+        position_reset_ne_m, height_reset_down_m, yaw_reset_rad: size of the newest
             jump (new minus old): north and east, down, clockwise.
         filter_resets: restarts after the estimate had become unusable.
     """
@@ -86,13 +86,10 @@ class NavigationHealth:
         "predicted_position_horizontal_relative",
         "rangefinder_in_use",
         "sideslip_in_use",
-        "sideslip_test_ratio",
         "time_since_gps_us",
         "uninitialised",
         "velocity_accuracy_m_s",
         "velocity_horizontal",
-        "velocity_reset_ne_m_s",
-        "velocity_resets",
         "velocity_test_ratio",
         "velocity_vertical",
         "wind_dead_reckoning",
@@ -106,19 +103,12 @@ class NavigationHealth:
     def __init__(self) -> None:
         self.filter_resets = 0
         self.position_resets = 0
-        self.velocity_resets = 0
         self.height_resets = 0
         self.yaw_resets = 0
         self.position_reset_ne_m = (0.0, 0.0)
-        self.velocity_reset_ne_m_s = (0.0, 0.0)
         self.height_reset_down_m = 0.0
         self.yaw_reset_rad = 0.0
         self.clear()
-
-    @property
-    def position_horizontal_1sigma_m(self) -> float:
-        """The accuracy that is compared with COM_POS_FS_EPH: `position_horizontal_accuracy_m`."""
-        return self.position_horizontal_accuracy_m
 
     def clear(self) -> None:
         """Back to uninitialised. Reset counters go on, so that readers notice."""
@@ -157,7 +147,6 @@ class NavigationHealth:
         self.magnetometer_test_ratio = 0.0
         self.height_above_ground_test_ratio = 0.0
         self.airspeed_test_ratio = 0.0
-        self.sideslip_test_ratio = 0.0
         self.position_horizontal_accuracy_m = math.nan
         self.position_vertical_accuracy_m = math.nan
         self.velocity_accuracy_m_s = math.nan

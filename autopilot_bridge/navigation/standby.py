@@ -9,7 +9,6 @@ from typing import Final
 
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.clocks import Clocks
-from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import (
@@ -36,7 +35,6 @@ class Standby:
     __slots__ = (
         "_adrift",
         "_clocks",
-        "_health",
         "_rested",
         "_solution",
         "_turn_rad_s",
@@ -44,9 +42,8 @@ class Standby:
         "held",
     )
 
-    def __init__(self, solution: Solution, health: NavigationHealth, clocks: Clocks) -> None:
+    def __init__(self, solution: Solution, clocks: Clocks) -> None:
         self._solution = solution
-        self._health = health
         self._clocks = clocks
         self.restart()
 
@@ -147,5 +144,3 @@ class Standby:
         if self._clocks.horizontal_aid_us >= 0:
             north, east = float(core[X_VEL]), float(core[X_VEL + 1])
             solution.change_velocity(-north, -east, sigma_m_s=_HELD_VELOCITY_M_S)
-            self._health.velocity_resets += 1
-            self._health.velocity_reset_ne_m_s = (-north, -east)

@@ -154,9 +154,6 @@ class CommandHandlers(ABC):
         self.table: Mapping[int, Handler] = {
             mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: self.return_to_launch,
             mavlink.MAV_CMD_NAV_LAND: self.land,
-            mavlink.MAV_CMD_DO_SET_ROI: self.accept,
-            mavlink.MAV_CMD_DO_SET_ROI_LOCATION: self.accept,
-            mavlink.MAV_CMD_DO_SET_ROI_NONE: self.accept,
             mavlink.MAV_CMD_SET_MESSAGE_INTERVAL: self.set_message_interval,
             mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: self.get_message_interval,
             mavlink.MAV_CMD_REQUEST_MESSAGE: self.request_message,
@@ -181,10 +178,6 @@ class CommandHandlers(ABC):
         return result
 
     # shared handlers
-
-    def accept(self, command: Command, source: Source) -> Result:
-        """Taken, and nothing to do."""
-        return Result.ACCEPTED
 
     def silence(self, command: Command, source: Source) -> None:
         """No acknowledgement at all, as the firmware was seen to do."""

@@ -20,7 +20,7 @@ class TelemetryView:
     """Snapshot of one autopilot's state for the message builders, made once per step and only when asked for.
 
     Attributes (of `refreshed()`): attitude `q` (w, x, y, z), `rates` rad/s, `roll`, `pitch`, `yaw` rad; `pos`
-    and `vel` NED m, m/s; `acc` NED m/s^2; `heading_cdeg`; and, when the filter has an origin, `lat_e7`,
+    and `vel` NED m, m/s; `acc` NED m/s^2; and, when the filter has an origin, `lat_e7`,
     `lon_e7`, `alt_amsl_m`, `alt_relative_m` (to home). `time_us` and `time_ms` are always those of the step.
     """
 
@@ -32,7 +32,6 @@ class TelemetryView:
         "alt_relative_m",
         "context",
         "has_global",
-        "heading_cdeg",
         "heading_deg",
         "lat_e7",
         "lon_e7",
@@ -83,7 +82,6 @@ class TelemetryView:
         self.acc = state[nav.ACC_NED_M_S2]
         self.roll, self.pitch, self.yaw = state[nav.EULER_RAD]
         self.heading_deg = math.degrees(self.yaw) % 360.0
-        self.heading_cdeg = round(self.heading_deg * 100.0) % 36000
         frame = self.context.frame
         self.has_global = frame is not None
         if frame is not None:

@@ -25,7 +25,6 @@ DT: Final = 0.05
 STEPS: Final = 400
 OMEGA_X: Final = 0.5 * math.pi
 DELTAS: Final = (0.5, 0.75, 1.4, 2.3, 3.0)
-EPSILONS: Final = (0.0, 0.001, 0.01, 0.1)
 SAMPLE_CELL: Final = (0.01, 1.4)
 """Epsilon and delta of the paper's figures 6 and 7."""
 

@@ -58,7 +58,6 @@ class FakeAutopilot:
         self.setpoint_us = -10_000_000
         self.setpoints = []
         self.items, self.current, self.speed = [], 0, 5.0
-        self.upload_left = 0
         self.parameters = {
             "MPC_XY_VEL_MAX": (12.0, 9),
             "MPC_ACC_HOR": (3.0, 9),
@@ -74,7 +73,6 @@ class FakeAutopilot:
         self.commands = []
         self.heartbeats_heard = 0
         self.on_truth = None
-        self.landed_us = None
 
     @property
     def kind(self):
@@ -219,7 +217,7 @@ class FakeAutopilot:
     # missions
 
     def on_mission_count(self, m):
-        self.items, self.upload_left = [None] * m.count, m.count
+        self.items = [None] * m.count
         self.send(dialect.MAVLink_mission_request_message(255, 190, 0, 0))
 
     def on_mission_item_int(self, m):

@@ -10,7 +10,7 @@ from autopilot_bridge.payload.camera_video import VideoStream
 from tests.payload.test_components import HOME, SYSTEM, World
 from tests.rotations import pitch_rad, yaw_rad
 
-START, STOP = m.MAV_CMD_IMAGE_START_CAPTURE, m.MAV_CMD_IMAGE_STOP_CAPTURE
+START = m.MAV_CMD_IMAGE_START_CAPTURE
 ACCEPTED, DENIED, FAILED = m.MAV_RESULT_ACCEPTED, m.MAV_RESULT_DENIED, m.MAV_RESULT_FAILED
 AUTOPILOT = (SYSTEM, 1)
 

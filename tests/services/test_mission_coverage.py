@@ -16,7 +16,6 @@ from flightsim.airframe import AirframeKind
 FLOWN = {each for each in Command if each <= Command.NAV_LAST}
 ACTED_ON = {Command.DO_CHANGE_SPEED, Command.DO_SET_HOME}
 PASSED_OVER = {"px4": mission_rules_px4.PASSED_OVER, "ardupilot": mission_rules_ardupilot.PASSED_OVER}
-ONLY_MULTICOPTERS = {Command.CONDITION_YAW}  # ArduPlane, too, goes on without a turn
 KINDS = {"iris": AirframeKind.MULTICOPTER, "aerosonde": AirframeKind.FIXED_WING}
 
 
