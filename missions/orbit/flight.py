@@ -2,21 +2,19 @@
 
 import asyncio
 import math
-from collections.abc import Callable
 from contextlib import suppress
 from statistics import fmean, pstdev
-from typing import Any, Final
+from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from autopilot_bridge.mavlink import decode, dialect
+from autopilot_bridge.mavlink import dialect
 from missions import telemetry
 from missions.errors import MissionError
-from missions.orbit.attitude import AttitudeSource, AutopilotAttitude
-from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
-from missions.orbit.options import WANDERING_M, AttitudeFrom, OrbitOptions
+from missions.orbit.look_out import TICK_HZ, LookOut
+from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
-from missions.orbit.tracker import TargetStatus, TargetTracker
+from missions.orbit.tracker import TargetStatus
 from missions.planning.limits import FixedWingLimits
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
@@ -25,21 +23,13 @@ from missions.vehicle.vehicle import Vehicle
 
 _GPS: Final = dialect.FAILURE_UNIT_SENSOR_GPS
 _OFF, _SOUND = dialect.FAILURE_TYPE_OFF, dialect.FAILURE_TYPE_OK
-_FIX_3D: Final = 3
-_TICK_HZ: Final = 25.0
 _GIMBAL_HZ: Final = 25.0
-_GIMBAL_LEAD_S: Final = 0.15
-_BELIEVED_TO_M: Final = 20.0  # how well a place from somebody else is known (paper: 20 m)
-_DRIFT_STD_M_S: Final = 2.0
 _ENTRY_RAD: Final = math.radians(10.0)
 _CAPTURED: Final = 0.05  # of the radius
 _CAPTURED_RAD: Final = math.radians(10.0)
 _CAPTURED_FOR_S: Final = 5.0
 _CAPTURE_LIMIT_S: Final = 240.0
 _GPS_BACK_S: Final = 12.0
-_INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
-_INERTIAL_HZ: Final = (25.0, 40.0)
-_FILTER_START_S: Final = 5.0
 
 
 class OrbitFlight:
@@ -49,17 +39,13 @@ class OrbitFlight:
         self._vehicle = vehicle
         self._options = options
         self._limits = limits
-        self._told = AutopilotAttitude()
-        filtered = options.attitude is AttitudeFrom.FILTER
-        self._filter = FilterAttitude(vehicle.system_id) if filtered else None
-        attitude: AttitudeSource = self._filter or self._told
-        self._tracker = TargetTracker(attitude)
+        self._look_out = LookOut(vehicle, options)
+        self._tracker = self._look_out.tracker
         bank_max = min(math.radians(50.0), 0.95 * limits.bank_max_rad)
         self._guidance = OrbitGuidance(
             OrbitParameters(radius_m=options.radius_m, direction=options.direction, bank_max_rad=bank_max)
         )
         self._pilot: AttitudePilot | None = None
-        self._with_gps = True
         self._captured_us: int | None = None
         self._near_us: int | None = None
         self._command: OrbitCommand | None = None
@@ -94,13 +80,13 @@ class OrbitFlight:
         vehicle.payload.set_gimbal_rate(_GIMBAL_HZ)
         pilot = self._pilot = await vehicle.prepare_piloting()
         await pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
-        stops = self._listen_to_attitude()
+        stops = self._look_out.listen_to_attitude()
         try:
-            await self._start_filter()
+            await self._look_out.start_filter()
             self._begin("takeoff")
             await vehicle.takeoff(options.own_altitude_m)
-            stops += self._listen_to_payload()
-            looking = asyncio.get_running_loop().create_task(self._keep_looking())
+            stops += self._look_out.listen_to_payload()
+            looking = asyncio.get_running_loop().create_task(self._look_out.keep_looking(pilot))
             try:
                 self._begin("transit")
                 await self._fly_to_entry(looking)
@@ -114,100 +100,6 @@ class OrbitFlight:
         self._begin("landing")
         await vehicle.land_along()
         vehicle.notes.end(self._stamp_us)
-
-    # the target
-
-    def _listen_to_payload(self) -> list[Callable[[], None]]:
-        payload, tracker = self._vehicle.payload, self._tracker
-        return [payload.on_gimbal_attitude(tracker.gimbal), payload.on_detection(tracker.detect)]
-
-    def _listen_to_attitude(self) -> list[Callable[[], None]]:
-        listen, own = self._vehicle.connection.listen, self._vehicle.system_id
-        if self._filter is not None:
-            return [listen(name, self._filter.hear) for name in sorted(self._filter.names)]
-
-        def on_attitude(frame: Any) -> None:
-            if frame.system_id == own and frame.component_id == 1:
-                attitude = telemetry.attitude(decode(frame))
-                if attitude is not None:
-                    self._told.add(attitude)
-
-        return [listen("ATTITUDE", on_attitude)]
-
-    async def _start_filter(self) -> None:
-        """Have our filter fed, where it is to be used: on the ground still, where it finds its biases."""
-        if self._filter is None:
-            return
-        vehicle = self._vehicle
-        for name in _INERTIAL:
-            for rate_hz in _INERTIAL_HZ:  # an autopilot that finds the second too fast has granted the first
-                await vehicle.set_message_rate(name, rate_hz)
-            await vehicle.clock.sleep(_FILTER_START_S)
-            if self._filter.newest is not None:
-                return
-        raise MissionError(
-            f"the attitude filter hears neither {' nor '.join(_INERTIAL)}; fly with --attitude autopilot; "
-            f"{vehicle.heard()}"
-        )
-
-    async def _keep_looking(self) -> None:
-        """Step the tracker, and keep the gimbal on the target, all the time."""
-        clock = self._vehicle.clock
-        period_us = round(1e6 / _TICK_HZ)
-        due_us = clock.time_us
-        while True:
-            self._look()
-            due_us = max(due_us + period_us, clock.time_us)
-            await clock.sleep_until(due_us)
-
-    def _look(self) -> None:
-        vehicle, tracker, pilot = self._vehicle, self._tracker, self._pilot
-        assert pilot is not None
-        height_m, airspeed_m_s = pilot.height_m, pilot.airspeed_true_m_s
-        if not (math.isfinite(height_m) and math.isfinite(airspeed_m_s)):
-            return
-        now_us = self._stamp_us
-        tracker.height(height_m - self._options.target_ground_m)
-        if self._with_gps and tracker.status is not TargetStatus.SEEN:
-            self._believe(now_us, airspeed_m_s)
-        tracker.step(now_us, airspeed_m_s, pilot.climb_m_s)
-        angles = tracker.pointing(now_us, _GIMBAL_LEAD_S)
-        if angles is not None:
-            vehicle.payload.point_gimbal(pitch_rad=angles[1], yaw_rad=angles[0])
-
-    def _believe(self, now_us: int, airspeed_m_s: float) -> None:
-        """While there is GPS and the target was not seen: where it is said to be, against the aircraft."""
-        p = self._vehicle.latest(telemetry.Position)
-        attitude = self._vehicle.latest(telemetry.Attitude)
-        if p is None or attitude is None:
-            return
-        (north_m, east_m), (vn, ve) = self._target_ne(self._now_us)
-        frame = LocalFrame(self._vehicle.home)
-        own_north_m, own_east_m, _ = frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
-        wind_n = p.vel_ned_m_s[0] - airspeed_m_s * math.cos(attitude.yaw_rad)
-        wind_e = p.vel_ned_m_s[1] - airspeed_m_s * math.sin(attitude.yaw_rad)
-        self._tracker.start(
-            now_us,
-            offset_ne_m=(north_m - own_north_m, east_m - own_east_m),
-            offset_std_m=WANDERING_M if self._options.wandering else _BELIEVED_TO_M,
-            drift_ne_m_s=(vn - wind_n, ve - wind_e),
-            drift_std_m_s=_DRIFT_STD_M_S,
-        )
-
-    def _target_ne(self, time_us: int) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Place and velocity of the target as it is believed to move, from home."""
-        o = self._options
-        if o.wandering:  # somewhere around there
-            return o.target_ne_m, (0.0, 0.0)
-        velocity = (
-            o.target_speed_m_s * math.cos(o.target_heading_rad),
-            o.target_speed_m_s * math.sin(o.target_heading_rad),
-        )
-        since_s = (time_us - self._vehicle.first_heard_us) * 1e-6
-        return (
-            o.target_ne_m[0] + since_s * velocity[0],
-            o.target_ne_m[1] + since_s * velocity[1],
-        ), velocity
 
     # the flight
 
@@ -225,7 +117,7 @@ class OrbitFlight:
             await vehicle.clock.sleep(0.1)
             self._require_flying()
             p, attitude = await vehicle.position(), self._told_attitude()
-            (target_n, target_e), _ = self._target_ne(self._now_us)
+            (target_n, target_e), _ = self._look_out.target_ne(self._now_us)
             n, e, _ = LocalFrame(home).ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
             away_m = math.hypot(n - target_n, e - target_e)
             bearing = math.atan2(e - target_e, n - target_n)
@@ -250,7 +142,7 @@ class OrbitFlight:
 
     async def _circle_for_entry(self, home: GeodeticPosition, course: float, radius_m: float) -> None:
         options = self._options
-        (target_n, target_e), _ = self._target_ne(self._now_us)
+        (target_n, target_e), _ = self._look_out.target_ne(self._now_us)
         right = course + 0.5 * math.pi
         north = target_n + options.entry_distance_m * math.cos(options.entry_bearing_rad)
         east = target_e + options.entry_distance_m * math.sin(options.entry_bearing_rad)
@@ -276,9 +168,9 @@ class OrbitFlight:
         self._require_air_data()
         try:
             await self._lose_gps()
-            self._with_gps = False
+            self._look_out.with_gps = False
             self._tracker.count_anew()  # on the way here the target may well have been out of sight
-            async with vehicle.guided(_TICK_HZ) as guided:
+            async with vehicle.guided(TICK_HZ) as guided:
                 entered_us = self._now_us
                 begun = not vehicle.adapter.roll_alone
 
@@ -300,7 +192,7 @@ class OrbitFlight:
                 back_us = self._now_us + round(_GPS_BACK_S * 1e6)
                 await guided.follow(lambda _t: self._fly_on(entered_us) if self._now_us < back_us else None)
         except BaseException:
-            if not self._with_gps:
+            if not self._look_out.with_gps:
                 with suppress(MissionError):  # what went wrong first is told
                     await self._regain_gps()
             raise
@@ -343,7 +235,8 @@ class OrbitFlight:
             raise MissionError(f"the target was {seen}; {self._vehicle.heard()}")
         # Without inertial messages nothing is seen either, and the flight ends by `lost_limit_s`; until then
         # the autopilot's roll is better than an old one.
-        filtered_rad = None if self._filter is None else self._filter.roll_rad(stamp_us)
+        own = self._look_out.filter
+        filtered_rad = None if own is None else own.roll_rad(stamp_us)
         roll_rad = attitude.roll_rad if filtered_rad is None else filtered_rad
         command = self._guidance.command(tracker.state(stamp_us), attitude.yaw_rad, roll_rad)
         self._command = command
@@ -401,7 +294,7 @@ class OrbitFlight:
 
     async def _regain_gps(self) -> None:
         """GPS on, and wait for a fix (which it may have had all the time)."""
-        vehicle, self._with_gps = self._vehicle, True
+        vehicle, self._look_out.with_gps = self._vehicle, True
         notes = vehicle.notes
         if self._radii:
             notes.marks["radius_estimate_mean_m"] = fmean(self._radii)

@@ -14,8 +14,8 @@ from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.planning.limits import FORECAST_WIND_M_S
 from missions.vehicle.adapter import Mode
-from missions.vehicle.commands import VehicleCommands
 from missions.vehicle.payload import Payload
+from missions.vehicle.store import VehicleStore
 
 if TYPE_CHECKING:
     from missions.vehicle.attitude_pilot import AttitudePilot
@@ -86,7 +86,7 @@ class Approach:
         ]
 
 
-class FixedWingFlight(VehicleCommands):
+class FixedWingFlight(VehicleStore):
     """The part of a vehicle that is for wings only; a multicopter answers with a PlanError."""
 
     runway_heading_rad: float | None = None

@@ -11,7 +11,7 @@ from missions.connection import AUTOPILOT_COMPONENT
 from missions.errors import CommandRejected, VehicleTimeout
 
 if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+    from missions.vehicle.commands import VehicleCommands
 
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
@@ -43,7 +43,7 @@ def _result_name(result: int) -> str:
 
 
 async def upload(
-    vehicle: "Vehicle",
+    vehicle: "VehicleCommands",
     items: Sequence[MissionItem],
     mission_type: MissionType = MissionType.MISSION,
     *,
@@ -70,7 +70,7 @@ async def upload(
 
 
 async def _send_plan(
-    vehicle: "Vehicle", items: Sequence[MissionItem], mission_type: MissionType, before: int
+    vehicle: "VehicleCommands", items: Sequence[MissionItem], mission_type: MissionType, before: int
 ) -> None:
     what = _NAMES[mission_type]
     names = ("MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK")
@@ -133,7 +133,11 @@ async def _send_plan(
 
 
 async def _ask(
-    vehicle: "Vehicle", message: Any, name: str, mission_type: MissionType, sequence: int | None = None
+    vehicle: "VehicleCommands",
+    message: Any,
+    name: str,
+    mission_type: MissionType,
+    sequence: int | None = None,
 ) -> Any:
     """Send a request until its answer comes."""
     with vehicle.messages(name) as replies:
@@ -153,12 +157,12 @@ async def _ask(
     raise VehicleTimeout(f"no {name} came while downloading the {_NAMES[mission_type]}; {vehicle.heard()}")
 
 
-async def _ask_count(vehicle: "Vehicle", mission_type: MissionType) -> int:
+async def _ask_count(vehicle: "VehicleCommands", mission_type: MissionType) -> int:
     message = dialect.MAVLink_mission_request_list_message(vehicle.system_id, 1, int(mission_type))
     return int((await _ask(vehicle, message, "MISSION_COUNT", mission_type)).count)
 
 
-def _end_download(vehicle: "Vehicle", mission_type: MissionType) -> None:
+def _end_download(vehicle: "VehicleCommands", mission_type: MissionType) -> None:
     vehicle.send(
         dialect.MAVLink_mission_ack_message(
             vehicle.system_id, 1, dialect.MAV_MISSION_ACCEPTED, int(mission_type)
@@ -166,7 +170,9 @@ def _end_download(vehicle: "Vehicle", mission_type: MissionType) -> None:
     )
 
 
-async def download(vehicle: "Vehicle", mission_type: MissionType = MissionType.MISSION) -> list[MissionItem]:
+async def download(
+    vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION
+) -> list[MissionItem]:
     """The whole plan the vehicle holds, as it numbers it."""
     items = []
     for k in range(await _ask_count(vehicle, mission_type)):
@@ -176,7 +182,7 @@ async def download(vehicle: "Vehicle", mission_type: MissionType = MissionType.M
     return items
 
 
-async def clear(vehicle: "Vehicle", mission_type: MissionType = MissionType.MISSION) -> None:
+async def clear(vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION) -> None:
     """Delete the plan the vehicle holds, and see that it is gone.
 
     An acknowledgement does not tell what it is for: one of an earlier upload may come late.

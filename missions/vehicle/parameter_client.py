@@ -8,7 +8,7 @@ from autopilot_bridge.mavlink import dialect
 from missions.errors import CommandRejected, VehicleTimeout
 
 if TYPE_CHECKING:
-    from missions.vehicle.vehicle import Vehicle
+    from missions.vehicle.commands import VehicleCommands
 
 _TRIES: Final = 4
 _WAIT_S: Final = 0.8
@@ -35,7 +35,7 @@ def _name(message: Any) -> str:
     return str(message.param_id).rstrip("\0")
 
 
-async def read(vehicle: "Vehicle", name: str) -> tuple[float, int]:
+async def read(vehicle: "VehicleCommands", name: str) -> tuple[float, int]:
     """Value and MAV_PARAM_TYPE of a parameter.
 
     Raises:
@@ -59,7 +59,7 @@ async def read(vehicle: "Vehicle", name: str) -> tuple[float, int]:
     raise VehicleTimeout(f"the vehicle did not answer for parameter {name}: it may not have it")
 
 
-async def write(vehicle: "Vehicle", name: str, value: float) -> None:
+async def write(vehicle: "VehicleCommands", name: str, value: float) -> None:
     """Set a parameter and see it confirmed.
 
     Raises:

@@ -1,0 +1,136 @@
+"""The look-out of an orbit: attitude and images go to the tracker, and the gimbal stays on the target."""
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.mavlink import decode
+from missions import telemetry
+from missions.errors import MissionError
+from missions.orbit.attitude import AutopilotAttitude
+from missions.orbit.filter_attitude import FilterAttitude
+from missions.orbit.options import WANDERING_M, AttitudeFrom, OrbitOptions
+from missions.orbit.tracker import TargetStatus, TargetTracker
+from missions.vehicle.attitude_pilot import AttitudePilot
+from missions.vehicle.vehicle import Vehicle
+
+TICK_HZ: Final = 25.0
+_GIMBAL_LEAD_S: Final = 0.15
+_BELIEVED_TO_M: Final = 20.0  # how well a place from somebody else is known (paper: 20 m)
+_DRIFT_STD_M_S: Final = 2.0
+_INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
+_INERTIAL_HZ: Final = (25.0, 40.0)
+_FILTER_START_S: Final = 5.0
+
+
+class LookOut:
+    """Watches the target from one vehicle.
+
+    Attributes:
+        tracker: where the target is.
+        filter: our own attitude filter; None where the autopilot's attitude is used.
+        with_gps: the vehicle knows where it is, and so about where the target must be.
+    """
+
+    def __init__(self, vehicle: Vehicle, options: OrbitOptions) -> None:
+        self._vehicle = vehicle
+        self._options = options
+        self._told = AutopilotAttitude()
+        filtered = options.attitude is AttitudeFrom.FILTER
+        self.filter = FilterAttitude(vehicle.system_id) if filtered else None
+        self.tracker = TargetTracker(self.filter or self._told)
+        self.with_gps = True
+
+    def listen_to_payload(self) -> list[Callable[[], None]]:
+        """Detections and where the gimbal points go to the tracker; what ends that."""
+        payload, tracker = self._vehicle.payload, self.tracker
+        return [payload.on_gimbal_attitude(tracker.gimbal), payload.on_detection(tracker.detect)]
+
+    def listen_to_attitude(self) -> list[Callable[[], None]]:
+        """The attitude that is used is kept up to date; what ends that."""
+        listen, own = self._vehicle.connection.listen, self._vehicle.system_id
+        if self.filter is not None:
+            return [listen(name, self.filter.hear) for name in sorted(self.filter.names)]
+
+        def on_attitude(frame: Any) -> None:
+            if frame.system_id == own and frame.component_id == 1:
+                attitude = telemetry.attitude(decode(frame))
+                if attitude is not None:
+                    self._told.add(attitude)
+
+        return [listen("ATTITUDE", on_attitude)]
+
+    async def start_filter(self) -> None:
+        """Have our filter fed, where it is to be used: on the ground still, where it finds its biases."""
+        if self.filter is None:
+            return
+        vehicle = self._vehicle
+        for name in _INERTIAL:
+            for rate_hz in _INERTIAL_HZ:  # an autopilot that finds the second too fast has granted the first
+                await vehicle.set_message_rate(name, rate_hz)
+            await vehicle.clock.sleep(_FILTER_START_S)
+            if self.filter.newest is not None:
+                return
+        raise MissionError(
+            f"the attitude filter hears neither {' nor '.join(_INERTIAL)}; fly with --attitude autopilot; "
+            f"{vehicle.heard()}"
+        )
+
+    async def keep_looking(self, pilot: AttitudePilot) -> None:
+        """Step the tracker, and keep the gimbal on the target, all the time."""
+        clock = self._vehicle.clock
+        period_us = round(1e6 / TICK_HZ)
+        due_us = clock.time_us
+        while True:
+            self._look(pilot)
+            due_us = max(due_us + period_us, clock.time_us)
+            await clock.sleep_until(due_us)
+
+    def _look(self, pilot: AttitudePilot) -> None:
+        vehicle, tracker = self._vehicle, self.tracker
+        height_m, airspeed_m_s = pilot.height_m, pilot.airspeed_true_m_s
+        if not (math.isfinite(height_m) and math.isfinite(airspeed_m_s)):
+            return
+        now_us = vehicle.clock.stamp_us
+        tracker.height(height_m - self._options.target_ground_m)
+        if self.with_gps and tracker.status is not TargetStatus.SEEN:
+            self._believe(now_us, airspeed_m_s)
+        tracker.step(now_us, airspeed_m_s, pilot.climb_m_s)
+        angles = tracker.pointing(now_us, _GIMBAL_LEAD_S)
+        if angles is not None:
+            vehicle.payload.point_gimbal(pitch_rad=angles[1], yaw_rad=angles[0])
+
+    def _believe(self, now_us: int, airspeed_m_s: float) -> None:
+        """While there is GPS and the target was not seen: where it is said to be, against the aircraft."""
+        p = self._vehicle.latest(telemetry.Position)
+        attitude = self._vehicle.latest(telemetry.Attitude)
+        if p is None or attitude is None:
+            return
+        (north_m, east_m), (vn, ve) = self.target_ne(self._vehicle.clock.time_us)
+        frame = LocalFrame(self._vehicle.home)
+        own_north_m, own_east_m, _ = frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
+        wind_n = p.vel_ned_m_s[0] - airspeed_m_s * math.cos(attitude.yaw_rad)
+        wind_e = p.vel_ned_m_s[1] - airspeed_m_s * math.sin(attitude.yaw_rad)
+        self.tracker.start(
+            now_us,
+            offset_ne_m=(north_m - own_north_m, east_m - own_east_m),
+            offset_std_m=WANDERING_M if self._options.wandering else _BELIEVED_TO_M,
+            drift_ne_m_s=(vn - wind_n, ve - wind_e),
+            drift_std_m_s=_DRIFT_STD_M_S,
+        )
+
+    def target_ne(self, time_us: int) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Place and velocity of the target as it is believed to move, from home."""
+        o = self._options
+        if o.wandering:  # somewhere around there
+            return o.target_ne_m, (0.0, 0.0)
+        velocity = (
+            o.target_speed_m_s * math.cos(o.target_heading_rad),
+            o.target_speed_m_s * math.sin(o.target_heading_rad),
+        )
+        since_s = (time_us - self._vehicle.first_heard_us) * 1e-6
+        return (
+            o.target_ne_m[0] + since_s * velocity[0],
+            o.target_ne_m[1] + since_s * velocity[1],
+        ), velocity
