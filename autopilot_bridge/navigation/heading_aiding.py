@@ -7,14 +7,11 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.navigation import fusion as f
+from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.alignment import magnetic_heading_rad
-from autopilot_bridge.navigation.clocks import Clocks
 from autopilot_bridge.navigation.heading_check import HeadingCheck
-from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
-from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import R
-from flightsim.interface import SensorReadings
 from flightsim.magnetics import magnetic_field_ned_gauss
 
 Array = NDArray[np.float64]
@@ -29,24 +26,14 @@ class HeadingAiding:
         "_field_ned_gauss",
         "_health",
         "_parameters",
-        "_readings",
+        "_reading",
         "_solution",
     )
 
-    def __init__(
-        self,
-        parameters: NavigationParameters,
-        *,
-        readings: SensorReadings,
-        solution: Solution,
-        health: NavigationHealth,
-        clocks: Clocks,
-    ) -> None:
+    def __init__(self, parameters: NavigationParameters, parts: AidingParts) -> None:
         self._parameters = parameters
-        self._readings = readings
-        self._solution = solution
-        self._health = health
-        self._clocks = clocks
+        self._reading = parts.readings.magnetometer
+        self._solution, self._health, self._clocks = parts.solution, parts.health, parts.clocks
         self._check = HeadingCheck()
         self._field_ned_gauss: Array | None = None
         if parameters.mag_ned_gauss is not None:
@@ -109,7 +96,7 @@ class HeadingAiding:
 
     def prepare(self, time_us: int) -> int:
         """Write the newest magnetometer sample into `obs`; its row of the history, -1: not to be used."""
-        reading, solution, health = self._readings.magnetometer, self._solution, self._health
+        reading, solution, health = self._reading, self._solution, self._health
         row = solution.row_at(reading.time_us, time_us)
         norm = math.hypot(*reading.values.tolist())
         if row < 0 or not 0.05 < norm < 2.0 or self._check.magnetometer_wrong:

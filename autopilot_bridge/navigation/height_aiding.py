@@ -4,16 +4,13 @@ import math
 from typing import Final
 
 from autopilot_bridge.navigation import fusion as f
-from autopilot_bridge.navigation.clocks import Clocks
-from autopilot_bridge.navigation.contradictions import Contradictions
+from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.earth import pressure_altitude_m
-from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.pressure_scale import PressureScale
-from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import X_BARO_OFFSET, X_POS, X_VEL
 from autopilot_bridge.navigation.terrain import TerrainEstimator
-from flightsim.interface import BARO_PRESSURE_PA, SensorReadings
+from flightsim.interface import BARO_PRESSURE_PA
 
 _GAP_US: Final = 2_000_000  # silence after which a sensor's refusal is counted from the beginning
 _GPS_FRESH_US: Final = 1_000_000
@@ -30,28 +27,18 @@ class HeightAiding:
         "_health",
         "_parameters",
         "_pressure_scale",
-        "_readings",
+        "_reading",
         "_solution",
         "_terrain",
     )
 
     def __init__(
-        self,
-        parameters: NavigationParameters,
-        *,
-        readings: SensorReadings,
-        solution: Solution,
-        health: NavigationHealth,
-        clocks: Clocks,
-        contradictions: Contradictions,
-        terrain: TerrainEstimator,
+        self, parameters: NavigationParameters, parts: AidingParts, *, terrain: TerrainEstimator
     ) -> None:
         self._parameters = parameters
-        self._readings = readings
-        self._solution = solution
-        self._health = health
-        self._clocks = clocks
-        self._contradictions = contradictions
+        self._reading = parts.readings.barometer
+        self._solution, self._health, self._clocks = parts.solution, parts.health, parts.clocks
+        self._contradictions = parts.contradictions
         self._terrain = terrain
         self._pressure_scale = PressureScale()
         self.restart()
@@ -68,7 +55,7 @@ class HeightAiding:
 
     def prepare_barometer(self, time_us: int) -> int:
         """Write the newest pressure altitude into `obs`; its row of the history, -1: not to be used."""
-        reading, solution = self._readings.barometer, self._solution
+        reading, solution = self._reading, self._solution
         height = pressure_altitude_m(float(reading.values[BARO_PRESSURE_PA]))
         lag_us = round(self._parameters.barometer_lag_s * 1e6)
         row = solution.row_at(reading.time_us - lag_us, time_us)
