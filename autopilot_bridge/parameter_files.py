@@ -16,7 +16,6 @@ from autopilot_bridge.parameters import (
     MAX_NAME_LENGTH,
     ParameterDefinition,
     ParameterError,
-    ParameterStore,
 )
 
 QGC_SUFFIX: Final = ".params"
@@ -25,42 +24,12 @@ _QGC_COLUMNS: Final = 5
 _FORMS: Final = "'NAME VALUE' or QGroundControl's five columns 'vehicle component NAME VALUE type'"
 
 
-def parse_parameters(
-    text: str,
-    definitions: Iterable[ParameterDefinition],
-    *,
-    source: str = "parameters",
-    skip_unknown: bool = False,
-) -> dict[str, float]:
-    """The values in the text of a parameter file, checked against the firmware's table.
+def parse_untyped_parameters(text: str, *, source: str = "parameters") -> dict[str, float]:
+    """The values in the text of a parameter file, in either format; the vehicle checks them itself.
 
     Args:
-        text: the file's content, in either format.
-        definitions: what the vehicle knows.
+        text: the file's content.
         source: name of the file, for error messages.
-        skip_unknown: leave out names the vehicle doesn't know (a real vehicle's dump), else they are errors.
-
-    Raises:
-        ParameterError: a line is not understood, a name not known or given twice, or a value not acceptable.
-            The message gives the file, the line, the value and what is accepted.
-    """
-    store = ParameterStore(definitions)
-    values: dict[str, float] = {}
-    for where, name, value_text in _entries(text, source):
-        if skip_unknown and name not in store:
-            continue
-        try:
-            definition = store.by_index(store.index_of(name))
-            value = definition.convert(_number(value_text, definition))
-            definition.check_range(value)
-        except ParameterError as error:
-            raise ParameterError(f"{where}: {error}") from None
-        values[name] = value
-    return values
-
-
-def parse_untyped_parameters(text: str, *, source: str = "parameters") -> dict[str, float]:
-    """The values in a parameter file for a vehicle whose table is not known; the vehicle checks them itself.
 
     Raises:
         ParameterError: a line is not understood, a name is too long or given twice, a value is not a finite
@@ -79,17 +48,6 @@ def parse_untyped_parameters(text: str, *, source: str = "parameters") -> dict[s
         if not math.isfinite(values[name]):
             raise ParameterError(f"{where}: '{name} {value_text}': accepted is a finite number")
     return values
-
-
-def read_parameter_file(
-    path: Path, definitions: Iterable[ParameterDefinition], *, skip_unknown: bool = False
-) -> dict[str, float]:
-    """The values in a parameter file; see `parse_parameters`.
-
-    Raises:
-        ParameterError: the file can't be read, or what it says is not acceptable.
-    """
-    return parse_parameters(_read(path), definitions, source=str(path), skip_unknown=skip_unknown)
 
 
 def read_untyped_parameter_file(path: Path) -> dict[str, float]:
@@ -125,27 +83,6 @@ def format_qgc(
             raise ParameterError(f"no parameter {name!r}: its type for the file is not known")
         lines.append(f"{system_id}\t{component_id}\t{name}\t{_text(value)}\t{types[name]}\n")
     return "".join(lines)
-
-
-def write_parameter_file(path: Path, store: ParameterStore, *, changed_only: bool = False) -> None:
-    """Write a vehicle's parameters, in the format that the file's suffix names.
-
-    Raises:
-        ParameterError: the suffix names neither format, or the file can't be written.
-    """
-    values = store.changed() if changed_only else store.as_dict()
-    suffix = path.suffix.lower()
-    if suffix == QGC_SUFFIX:
-        text = format_qgc(values, store.definitions)
-    elif suffix in MAVPROXY_SUFFIXES:
-        text = format_mavproxy(values)
-    else:
-        accepted = ", ".join((QGC_SUFFIX, *MAVPROXY_SUFFIXES))
-        raise ParameterError(f"parameter file {path}: suffix {suffix!r}; accepted are {accepted}")
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ParameterError(f"can't write parameter file {path}: {error.strerror}") from error
 
 
 def _read(path: Path) -> str:
@@ -186,19 +123,6 @@ def _split(line: str, where: str) -> tuple[str, str] | None:
     if len(words) == 2:
         return words[0], words[1]
     raise ParameterError(f"{where}: {line.strip()!r} is not understood; accepted: {_FORMS}")
-
-
-def _number(text: str, definition: ParameterDefinition) -> float:
-    try:
-        return int(text, 0) if definition.is_integer else float(text)
-    except ValueError:
-        pass
-    try:
-        return float(text)
-    except ValueError:
-        raise ParameterError(
-            f"{definition.name} = {text}: not a number; accepted is {definition.accepted()}"
-        ) from None
 
 
 def _text(value: float) -> str:

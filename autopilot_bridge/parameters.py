@@ -244,14 +244,6 @@ class ParameterStore:
             definition.name: value for definition, value in zip(self._definitions, self._values, strict=True)
         }
 
-    def changed(self) -> dict[str, float]:
-        """Values that differ from their defaults, in listing order."""
-        return {
-            definition.name: value
-            for definition, value in zip(self._definitions, self._values, strict=True)
-            if value != definition.convert(definition.default)
-        }
-
     def _suggestion(self, name: str) -> str:
         close = get_close_matches(name.upper(), self._index, n=3, cutoff=0.6)
         return f"; did you mean {' or '.join(close)}?" if close else ""

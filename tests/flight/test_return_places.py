@@ -232,30 +232,32 @@ def test_a_return_along_the_plan(
 # aircraft
 
 
+def height_at_rally(
+    parameters: FixedWingFlightParameters, *, start_height_m: float, rally_height_m: float, after_s: float
+) -> float:
+    """Return to a rally point 600 m north of home; the height over home of the circle flown there."""
+    mass = PointMass((900.0, 400.0, -start_height_m), parameters=parameters)
+    assert mass.ctx.frame is not None
+    mass.ctx.rally = rally_at(mass.ctx.frame, (600.0, 0.0, rally_height_m))
+    mass.fly(AircraftReturnTask())
+    mass.run(after_s)
+    log = mass.run(30.0)
+    assert np.hypot(log[:, 0] - 600.0, log[:, 1]).mean() == pytest.approx(80.0, rel=0.06)
+    return -float(log[-1, 2])
+
+
 def test_an_aircraft_circles_at_its_rally_point() -> None:
     parameters = FixedWingFlightParameters(rally=PLANE, return_climbs=False, return_altitude_m=100.0)
-    mass = PointMass((900.0, 400.0, -80.0), parameters=parameters)
-    assert mass.ctx.frame is not None
-    mass.ctx.rally = rally_at(mass.ctx.frame, (600.0, 0.0, 140.0))
-    mass.fly(AircraftReturnTask())
-    mass.run(80.0)
-    log = mass.run(40.0)
-    assert np.hypot(log[:, 0] - 600.0, log[:, 1]).mean() == pytest.approx(80.0, rel=0.06)
-    assert -log[-1, 2] == pytest.approx(140.0, abs=2.0)
+    height_m = height_at_rally(parameters, start_height_m=80.0, rally_height_m=140.0, after_s=90.0)
+    assert height_m == pytest.approx(140.0, abs=2.0)
 
 
 def test_a_px4_aircraft_takes_the_rally_points_ground() -> None:
     parameters = FixedWingFlightParameters(
         return_altitude_m=100.0, return_descend_altitude_m=70.0, return_destination=ReturnDestination.HOME
     )
-    mass = PointMass((900.0, 400.0, -120.0), parameters=parameters)
-    assert mass.ctx.frame is not None
-    mass.ctx.rally = rally_at(mass.ctx.frame, (600.0, 0.0, 50.0))
-    mass.fly(AircraftReturnTask())
-    mass.run(150.0)
-    log = mass.run(30.0)
-    assert np.hypot(log[:, 0] - 600.0, log[:, 1]).mean() == pytest.approx(80.0, rel=0.06)
-    assert -log[-1, 2] == pytest.approx(120.0, abs=2.0)  # 70 m over 50 m
+    height_m = height_at_rally(parameters, start_height_m=120.0, rally_height_m=50.0, after_s=150.0)
+    assert height_m == pytest.approx(120.0, abs=2.0)  # 70 m over 50 m
 
 
 def test_an_aircraft_goes_back_along_its_plan() -> None:
