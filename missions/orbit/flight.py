@@ -130,7 +130,8 @@ class OrbitFlight:
             )
             turned = abs(math.remainder(attitude.yaw_rad - course, math.tau))
             level = abs(p.height_m - options.own_altitude_m) < 8.0
-            if turned < _ENTRY_RAD and off_m < 0.5 * radius_m + 30.0 and level:
+            there = turned < _ENTRY_RAD and off_m < 0.5 * radius_m + 30.0 and level
+            if there and self._look_out.informed:
                 reached_us.append(self._now_us)
             elif self._now_us - placed_us > 600_000_000:
                 raise MissionError(

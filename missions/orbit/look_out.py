@@ -19,6 +19,7 @@ TICK_HZ: Final = 25.0
 _GIMBAL_LEAD_S: Final = 0.15
 _BELIEVED_TO_M: Final = 20.0  # how well a place from somebody else is known (paper: 20 m)
 _DRIFT_STD_M_S: Final = 2.0
+_OLD_US: Final = 1_000_000
 _INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
 _INERTIAL_HZ: Final = (25.0, 40.0)
 _FILTER_START_S: Final = 5.0
@@ -105,7 +106,7 @@ class LookOut:
         """While there is GPS and the target was not seen: where it is said to be, against the aircraft."""
         p = self._vehicle.latest(telemetry.Position)
         attitude = self._vehicle.latest(telemetry.Attitude)
-        if p is None or attitude is None:
+        if p is None or attitude is None or not self.informed:
             return
         (north_m, east_m), (vn, ve) = self.target_ne(self._vehicle.clock.time_us)
         frame = LocalFrame(self._vehicle.home)
@@ -119,6 +120,13 @@ class LookOut:
             drift_ne_m_s=(vn - wind_n, ve - wind_e),
             drift_std_m_s=_DRIFT_STD_M_S,
         )
+
+    @property
+    def informed(self) -> bool:
+        """Whether the vehicle's position and attitude are news; a line that was out has old ones."""
+        told = (self._vehicle.latest(telemetry.Position), self._vehicle.latest(telemetry.Attitude))
+        now_us = self._vehicle.clock.stamp_us
+        return all(t is not None and now_us - t.time_us < _OLD_US for t in told)
 
     def target_ne(self, time_us: int) -> tuple[tuple[float, float], tuple[float, float]]:
         """Place and velocity of the target as it is believed to move, from home."""
