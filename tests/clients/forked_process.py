@@ -164,6 +164,7 @@ def _received(out: Any, err: Any) -> _Pipes:
 def _run(arguments: tuple[str, ...], cwd: str, environment: dict[str, str], pipes: _Pipes) -> None:
     """What the forked process does."""
     ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    threading.Thread(target=_end_with_starter, daemon=True).start()
     with open(os.devnull, "rb") as nothing:
         os.dup2(nothing.fileno(), 0)
     for end, number in ((pipes.out, 1), (pipes.err, 2)):
@@ -179,3 +180,11 @@ def _run(arguments: tuple[str, ...], cwd: str, environment: dict[str, str], pipe
     from missions.cli import main
 
     main(list(arguments))
+
+
+def _end_with_starter() -> None:
+    """The server lives as long as its forks do, so it is not the one whose end counts."""
+    starter = multiprocessing.parent_process()
+    if starter is not None:
+        starter.join()
+        os.kill(os.getpid(), signal.SIGKILL)
