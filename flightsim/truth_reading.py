@@ -1,14 +1,28 @@
 """What is read from JSBSim for the truth vector, and its conversion."""
 
 import math
+from collections.abc import Callable
 from enum import IntEnum
+from operator import call
+from struct import Struct
 from typing import Final
 
+import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.crash import DEEPEST_M, FASTEST_M_S, FASTEST_RAD_S, MOVING_M_S, NEAR_M
-from flightsim.kernels import kernel
+from flightsim.airframe import Airframe, AirframeKind
+from flightsim.crash import (
+    BREAKS_AT_M_S2,
+    DEEPEST_M,
+    FASTEST_M_S,
+    FASTEST_RAD_S,
+    MOVING_M_S,
+    NEAR_M,
+    Touches,
+)
+from flightsim.jsbsim_model import find_property
+from flightsim.kernels import bound, kernel
 from flightsim.rotations import quaternion_from_euler
 
 Array = NDArray[np.float64]
@@ -59,6 +73,8 @@ ACCEL_SCALE: Final = np.array([_FT, _FT, _FT])
 LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * 9.80665
 # Motion is read every step; the rest and the model's own properties may be slower.
 MOTION_SIZE: Final = STATE.index("atmosphere/P-psf")
+_MOTION_BYTES: Final = 8 * MOTION_SIZE
+_TOUCHED_S: Final = 10  # after touching the ground: what goes wrong then began there
 
 
 class Motion(IntEnum):
@@ -130,3 +146,92 @@ def write_truth(
     for i in range(extra.shape[0]):
         truth[extra[i]] = raw[STATE_SIZE + i] * scale[i]
     return _SOUND
+
+
+class TruthReader:
+    """Reads one JSBSim model and writes a vehicle's truth.
+
+    Args:
+        fdm: the model, loaded.
+        airframe: its description.
+        truth: (TRUTH_SIZE,), written.
+        ground_alt_m: of the level ground, above mean sea level.
+        physics_rate_hz: calls of `read` per second.
+        slow_steps: every so many steps what is not motion (air, power, ground contact) is read, from the
+            first step on.
+
+    Attributes:
+        touches: how it met the ground.
+
+    Raises:
+        AirframeError: the model lacks a property.
+    """
+
+    __slots__ = (
+        "_get_motion",
+        "_get_slow",
+        "_pack_motion",
+        "_pack_slow",
+        "_raw",
+        "_raw_view",
+        "_sink_max_m_s",
+        "_slow_phase",
+        "_slow_steps",
+        "_truth",
+        "_write",
+        "touches",
+    )
+
+    def __init__(
+        self,
+        fdm: jsbsim.FGFDMExec,
+        airframe: Airframe,
+        truth: Array,
+        *,
+        ground_alt_m: float,
+        physics_rate_hz: int,
+        slow_steps: int,
+    ) -> None:
+        fixed_wing = airframe.kind is AirframeKind.FIXED_WING
+        state = [LOAD_FACTORS.get(prop, prop) for prop in STATE] if fixed_wing else STATE
+        getters = tuple(
+            find_property(fdm, prop, needed_by="the truth vector").get_double_value
+            for prop in (*state, *(prop for _, prop in airframe.truth))
+        )
+        self._get_motion, self._get_slow = getters[:MOTION_SIZE], getters[MOTION_SIZE:]
+        self._raw = np.zeros(len(getters))
+        self._raw_view = self._raw.data
+        self._pack_motion = Struct(f"{MOTION_SIZE}d").pack_into  # faster than setting elements of an array
+        self._pack_slow = Struct(f"{len(self._get_slow)}d").pack_into
+        self._slow_steps = slow_steps
+        self._slow_phase = 1 % slow_steps  # the first step, then at the slow rate, as sensors measure
+        self._sink_max_m_s = airframe.limits.touchdown_sink_max_m_s if fixed_wing else math.inf
+        self._truth = truth
+        self._write: Callable[[], int] = bound(
+            write_truth,
+            self._raw,
+            LOAD_FACTOR_SCALE if fixed_wing else ACCEL_SCALE,
+            np.array([index for index, _ in airframe.truth], dtype=np.int64),
+            np.array(airframe.truth_scale or np.ones(len(airframe.truth)), dtype=float),
+            BREAKS_AT_M_S2 if fixed_wing else math.inf,
+            ground_alt_m,
+            truth,
+        )
+        self.touches = Touches(physics_rate_hz * _TOUCHED_S)
+
+    def read(self, step: int) -> int:
+        """Write the truth after a step, if there is any.
+
+        Args:
+            step: number of physics steps since the start.
+
+        Returns:
+            A `Motion`.
+        """
+        self._pack_motion(self._raw_view, 0, *map(call, self._get_motion))
+        if step % self._slow_steps == self._slow_phase or step == 0:
+            self._pack_slow(self._raw_view, _MOTION_BYTES, *map(call, self._get_slow))
+            sink_m_s = self.touches.observe(step, bool(self._raw[GEAR_FORCE_Z] != 0.0), self._truth)
+            motion = self._write()
+            return _BROKEN if sink_m_s > self._sink_max_m_s and motion == _SOUND else motion
+        return self._write()

@@ -1,10 +1,7 @@
 """One simulated vehicle: a JSBSim model in its air, stepped by actuator commands, writing its truth."""
 
 import math
-from collections.abc import Callable
-from operator import call
 from pathlib import Path
-from struct import Struct
 from typing import Any, Final
 
 import numpy as np
@@ -20,39 +17,25 @@ from flightsim.airframe import (
     Role,
     load_airframe,
 )
-from flightsim.crash import BREAKS_AT_M_S2, Touches, hits_ground, lay_down
-from flightsim.environment import CosineGust, Environment, Turbulence
+from flightsim.crash import hits_ground, lay_down
+from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise, set_battery
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
-from flightsim.kernels import bound
 from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
-from flightsim.truth_reading import (
-    ACCEL_SCALE,
-    GEAR_FORCE_Z,
-    LOAD_FACTOR_SCALE,
-    LOAD_FACTORS,
-    MOTION_SIZE,
-    STATE,
-    STATE_SIZE,
-    Motion,
-    write_truth,
-)
-from flightsim.turbulence import DrydenTurbulence
+from flightsim.truth_reading import Motion, TruthReader
+from flightsim.vehicle_air import VehicleAir
 
 __all__ = ["InitialState", "Vehicle", "VehicleDivergedError"]
 
 Array = NDArray[np.float64]
 
-_FT: Final = 0.3048
-_FLOAT64_SIZE: Final = 8
 _FOLLOW_S: Final = 10.0  # in which actuators and engines follow the commands of a start in the air
 _MAGNETIC_REFRESH_S: Final = 10
 _SETTLE_S: Final = 1.0
 _SOUND: Final = int(Motion.SOUND)
-_TOUCHED_S: Final = 10  # after touching the ground: what goes wrong then began there
 _SETTLE_FIXED_WING_S: Final = 4.0  # gear springs are softer, and it may stand on a tail wheel
 
 
@@ -77,29 +60,19 @@ class Vehicle:
     """
 
     __slots__ = (
+        "_air",
         "_fdm",
-        "_get_motion",
-        "_get_slow",
-        "_gusts",
         "_initial",
         "_magnetic_steps",
         "_motor_effectiveness",
-        "_pack_motion",
-        "_pack_slow",
-        "_raw",
-        "_raw_view",
+        "_read",
+        "_reader",
         "_run",
         "_seed_sequence",
         "_set_actuators",
-        "_set_gust",
-        "_sink_max_m_s",
-        "_slow_phase",
         "_slow_steps",
         "_steps",
         "_surfaces",
-        "_touches",
-        "_turbulence",
-        "_write_truth",
         "airframe",
         "crash",
         "environment",
@@ -149,23 +122,7 @@ class Vehicle:
         self.physics_rate_hz = physics_rate_hz
         self.truth: Array = np.zeros(t.TRUTH_SIZE)
         self._seed_sequence = seed_sequence
-        self._raw = np.zeros(STATE_SIZE + len(self.airframe.truth))
-        self._raw_view = self._raw.data
-        self._pack_motion = Struct(f"{MOTION_SIZE}d").pack_into  # faster than setting elements of an array
-        self._pack_slow = Struct(f"{self._raw.size - MOTION_SIZE}d").pack_into
-        airframe, fixed_wing = self.airframe, self.airframe.kind is AirframeKind.FIXED_WING
-        self._write_truth: Callable[[], int] = bound(
-            write_truth,
-            self._raw,
-            LOAD_FACTOR_SCALE if fixed_wing else ACCEL_SCALE,
-            np.array([index for index, _ in airframe.truth], dtype=np.int64),
-            np.array(airframe.truth_scale or np.ones(len(airframe.truth)), dtype=float),
-            BREAKS_AT_M_S2 if fixed_wing else math.inf,
-            float(home.alt_m),
-            self.truth,
-        )
         self._slow_steps = max(1, physics_rate_hz // (slow_rate_hz or physics_rate_hz))
-        self._slow_phase = 1 % self._slow_steps  # the first step, then at the slow rate, as sensors measure
         self._magnetic_steps = _MAGNETIC_REFRESH_S * physics_rate_hz
         self._initial = initial or InitialState()
         self.reset(self._initial)
@@ -193,31 +150,25 @@ class Vehicle:
         self._fdm = fdm
         self._run = fdm.run
         self._surfaces = FixedWingActuators(fdm, self.airframe) if fixed_wing else None
-        self._sink_max_m_s = self.airframe.limits.touchdown_sink_max_m_s if fixed_wing else math.inf
-        name = self.airframe.name
-        state = [LOAD_FACTORS.get(prop, prop) for prop in STATE] if fixed_wing else STATE
-        properties = (*state, *(prop for _, prop in self.airframe.truth))
-        getters = tuple(
-            find_property(fdm, prop, needed_by="the truth vector").get_double_value for prop in properties
+        self._reader = TruthReader(
+            fdm,
+            self.airframe,
+            self.truth,
+            ground_alt_m=float(self.home.alt_m),
+            physics_rate_hz=self.physics_rate_hz,
+            slow_steps=self._slow_steps,
         )
-        self._get_motion, self._get_slow = getters[:MOTION_SIZE], getters[MOTION_SIZE:]
+        self._read = self._reader.read
+        owner = f"vehicle '{self.airframe.name}'"
         self._set_actuators = tuple(
-            find_property(fdm, prop, needed_by=f"vehicle '{name}'").set_double_value
-            for prop in self.airframe.actuators
+            find_property(fdm, prop, needed_by=owner).set_double_value for prop in self.airframe.actuators
         )
         self._motor_effectiveness = tuple(
-            find_property(fdm, prop, needed_by=f"vehicle '{name}'") for prop in self.airframe.effectiveness
-        )
-        self._set_gust = tuple(
-            find_property(fdm, f"atmosphere/gust-{axis}-fps", needed_by="turbulence").set_double_value
-            for axis in ("north", "east", "down")
+            find_property(fdm, prop, needed_by=owner) for prop in self.airframe.effectiveness
         )
         self._steps = 0
-        self._touches = Touches(self.physics_rate_hz * _TOUCHED_S)
         self.crash: str | None = None
         self.launcher: Launcher | None = None
-        self._turbulence: DrydenTurbulence | None = None
-        self._gusts: list[CosineGust] = list(self.environment.gusts)
         initialise(fdm, self.airframe, self.home, self.environment, start, launch)
         for index, constant in self.airframe.constants:
             self.truth[index] = constant
@@ -233,15 +184,12 @@ class Vehicle:
             fdm.run()
             fdm.run()
             fdm.resume_integration()
-        if self.environment.turbulence is not Turbulence.NONE:
-            self._turbulence = DrydenTurbulence(
-                wind_at_20_ft_m_s=self.environment.turbulence.wind_at_20_ft_m_s,
-                wind_ned_m_s=self.environment.wind_ned_m_s,
-                dt_s=1.0 / self.physics_rate_hz,
-                seed_sequence=self._seed_sequence,
-            )
-        if self._observe() != Motion.SOUND:
+        self._air = VehicleAir(
+            fdm, self.environment, physics_rate_hz=self.physics_rate_hz, seed_sequence=self._seed_sequence
+        )
+        if self._read(self._steps) != _SOUND:
             raise self._diverged()
+        self._let_launcher_carry(self.launcher)
         self._refresh_magnetic_field()
 
     def step(self, actuators: Array) -> None:
@@ -257,12 +205,8 @@ class Vehicle:
         if self.crash is not None:
             self._steps += 1
             return
-        turbulence = self._turbulence
-        if turbulence is not None:
-            truth = self.truth
-            turbulence.step(truth[t.HEIGHT_ABOVE_GROUND_M], truth[t.AIRSPEED_TRUE_M_S])
-            for set_gust, value in zip(self._set_gust, turbulence.velocity_ned_m_s.tolist(), strict=True):
-                set_gust(value / _FT)
+        if self._air.stirs:
+            self._air.step(self.truth, self._steps)
         surfaces = self._surfaces
         if surfaces is None:
             for set_actuator, value in zip(self._set_actuators, actuators.tolist(), strict=False):
@@ -271,13 +215,14 @@ class Vehicle:
             surfaces.write(actuators)
             if self._steps % self._slow_steps == 0:
                 surfaces.write_slow(actuators)
-        if self._gusts:
-            self._start_due_gust()
-        if self.launcher is not None:
-            self.launcher.step()
+        launcher = self.launcher
+        if launcher is not None:
+            launcher.step()
         self._run()
         self._steps += 1
-        motion = self._observe()
+        motion = self._read(self._steps)
+        if launcher is not None:
+            self._let_launcher_carry(launcher)
         if motion != _SOUND:
             self._end(motion, actuators)
         if self._steps % self._magnetic_steps == 0:
@@ -331,20 +276,7 @@ class Vehicle:
             wind_ned_m_s: of the air over ground.
             wind_at_20_ft_m_s: intensity of Dryden turbulence that begins now, 0: none; None: as it was.
         """
-        for axis, speed in zip(("north", "east", "down"), wind_ned_m_s, strict=True):
-            self._fdm.set_property_value(f"atmosphere/wind-{axis}-fps", speed / _FT)
-        if wind_at_20_ft_m_s is None:
-            return
-        self._turbulence = None
-        for set_gust in self._set_gust:
-            set_gust(0.0)
-        if wind_at_20_ft_m_s > 0.0:
-            self._turbulence = DrydenTurbulence(
-                wind_at_20_ft_m_s=wind_at_20_ft_m_s,
-                wind_ned_m_s=wind_ned_m_s,
-                dt_s=1.0 / self.physics_rate_hz,
-                seed_sequence=self._seed_sequence,
-            )
+        self._air.set_wind(wind_ned_m_s, wind_at_20_ft_m_s=wind_at_20_ft_m_s)
 
     def _fixed_wing_actuators(self) -> FixedWingActuators:
         if self._surfaces is None:
@@ -360,6 +292,10 @@ class Vehicle:
                 f"0 to {len(self._motor_effectiveness) - 1}"
             )
         return self._motor_effectiveness[index]
+
+    def _let_launcher_carry(self, launcher: Launcher | None) -> None:
+        if launcher is not None and not launcher.released:
+            self.truth[t.ON_GROUND] = 1.0
 
     def _settle(self, duration_s: float) -> None:
         """Let it come to rest where it stands or is held."""
@@ -392,27 +328,15 @@ class Vehicle:
         hold_motion(self._fdm, False)
         initialise(self._fdm, self.airframe, self.home, self.environment, start, prepare=False)
 
-    def _observe(self) -> int:
-        """Write `truth`, if there is any; a `Motion`."""
-        raw, sink_m_s = self._raw, 0.0
-        self._pack_motion(self._raw_view, 0, *map(call, self._get_motion))
-        if self._steps % self._slow_steps == self._slow_phase or self._steps == 0:
-            self._pack_slow(self._raw_view, MOTION_SIZE * _FLOAT64_SIZE, *map(call, self._get_slow))
-            sink_m_s = self._touches.observe(self._steps, bool(raw[GEAR_FORCE_Z] != 0.0), self.truth)
-        motion = self._write_truth()
-        if self.launcher is not None and not self.launcher.released:
-            self.truth[t.ON_GROUND] = 1.0  # the launcher carries its weight
-        return Motion.BROKEN if sink_m_s > self._sink_max_m_s and motion == Motion.SOUND else motion
-
     def _end(self, motion: int, actuators: Array) -> None:
         """What can't go on: a crash, or a model that diverged."""
         ground_alt_m = self.home.alt_m
-        touched = self._touches.recent(self._steps)
+        touched = self._reader.touches.recent(self._steps)
         sound = bool(np.all(np.isfinite(actuators[: self.actuator_count])))
         broken = motion == Motion.BROKEN
         if not (sound and (broken or hits_ground(self.truth, ground_alt_m, touched=touched))):
             raise self._diverged()
-        self.crash = self._touches.words(self._steps, self.truth)
+        self.crash = self._reader.touches.words(self._steps, self.truth)
         lay_down(self.truth, ground_alt_m)
 
     def _diverged(self) -> VehicleDivergedError:
@@ -420,28 +344,6 @@ class Vehicle:
             f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
             f"({self._steps / self.physics_rate_hz:.3f} s): its motion is not possible"
         )
-
-    def _start_due_gust(self) -> None:
-        gust = self._gusts[0]
-        if self._steps < gust.start_s * self.physics_rate_hz:
-            return
-        del self._gusts[0]
-        speed = math.hypot(*gust.velocity_ned_m_s)
-        if speed == 0.0:
-            return
-        values = {
-            "startup-duration-sec": gust.rise_s,
-            "steady-duration-sec": gust.hold_s,
-            "end-duration-sec": gust.fall_s,
-            "magnitude-ft_sec": speed / _FT,
-            "frame": 3.0,  # local NED
-            "X-velocity-ft_sec": gust.velocity_ned_m_s[0],  # JSBSim takes the direction from these
-            "Y-velocity-ft_sec": gust.velocity_ned_m_s[1],
-            "Z-velocity-ft_sec": gust.velocity_ned_m_s[2],
-            "start": 1.0,
-        }
-        for name, value in values.items():
-            self._fdm.set_property_value(f"atmosphere/cosine-gust/{name}", value)
 
     def _refresh_magnetic_field(self) -> None:
         truth = self.truth

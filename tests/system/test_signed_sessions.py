@@ -11,6 +11,7 @@ from autopilot_bridge.links import Reach
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, LinkSigning, SigningKey, SigningState, decode
 from autopilot_bridge.mavlink.signing import MINUTE, Refusal
 from autopilot_bridge.sitl import (
+    PacketLog,
     SigningParameters,
     SigningStore,
     Sitl,
@@ -18,7 +19,7 @@ from autopilot_bridge.sitl import (
     UnsignedFrom,
     VehicleSpecification,
 )
-from autopilot_bridge.tlog import TlogReader, TlogWriter
+from autopilot_bridge.tlog import TlogReader
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
 from missions.vehicle import Vehicle
 from tests.system.flying import Flying, WrappedLink
@@ -288,7 +289,7 @@ def test_no_key_is_taken_while_armed() -> None:
 
 def test_keys_are_in_no_log(tmp_path: Path) -> None:
     keys = Keys(Reach.MACHINE)
-    with TlogWriter(tmp_path / "log.tlog") as log:
+    with PacketLog(tmp_path / "log.tlog") as log:
         keys.sitl.record(log)
         keys.bring(KEY.secret)
         while keys.sitl.time_us < 2_000_000:
