@@ -27,6 +27,7 @@ from tests.system.test_interruption_aircraft import fly_until
 from tests.system.test_serial_line import in_flight
 
 LONG = (*SHORT, "--periods", "20")
+SECTOR = ("sector", "--via", "waypoints", "--no-picture")
 SPEEDUP = 20.0
 MISSION_FAILED = 1
 POSITION, ITEM = definition("GLOBAL_POSITION_INT").message_id, definition("MISSION_ITEM_INT").message_id
@@ -37,6 +38,7 @@ NUMBERS = {
     ("ardupilot", "return"): 6,
     ("ardupilot", "guided"): 4,
     ("ardupilot", "land"): 9,
+    ("ardupilot", "plane returns"): 11,
 }
 
 
@@ -172,6 +174,27 @@ def test_the_mission_is_killed(
             kill(run)
         watcher.sees(failsafe)
         watcher.sees_it_disarmed()
+    check_readable(run.log)
+    check_readable(log)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("flavour", "parameters", "failsafe"),
+    [
+        ("px4", "NAV_DLL_ACT 2\nCOM_DL_LOSS_T 60\n", "return"),
+        ("ardupilot", "FS_GCS_ENABL 1\nFS_LONG_ACTN 1\nFS_LONG_TIMEOUT 60\n", "plane returns"),
+    ],
+)
+def test_the_mission_of_an_aircraft_is_killed(
+    flavour: str, parameters: str, failsafe: str, tmp_path: Path
+) -> None:
+    wings = ("--model", "aerosonde")
+    with sitl_and_watcher(flavour, tmp_path, parameters, *wings) as (_, link, watcher, log):
+        with started(tmp_path / "run", *SECTOR, "--connect", link) as run:
+            fly_until(run, high_up)
+            kill(run)
+        watcher.sees(failsafe)
     check_readable(run.log)
     check_readable(log)
 
