@@ -1,6 +1,7 @@
 """Imports point one way (DESIGN.md, section 2). Read from the sources, so that nothing need be imported."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -69,14 +70,13 @@ def imported(source, name, is_package=False):
     return found
 
 
-def modules():
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            name = module_name(path)
-            yield name, imported(path.read_text(encoding="utf-8"), name, path.name == "__init__.py")
+MODULES = {module_name(path): path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))}
 
 
-MODULES = dict(modules())
+@cache
+def imports_of(name):
+    path = MODULES[name]
+    return imported(path.read_text(encoding="utf-8"), name, path.name == "__init__.py")
 
 
 def is_embedding(name):
@@ -113,26 +113,26 @@ def complaints(name, imports):
 
 @pytest.mark.parametrize("name", sorted(MODULES))
 def test_imports_point_one_way(name):
-    assert complaints(name, MODULES[name]) == []
+    assert complaints(name, imports_of(name)) == []
 
 
 @pytest.mark.parametrize("name", sorted(name for name in MODULES if is_in(name, SANS_IO)))
 def test_cores_do_no_io(name):
-    assert sorted(item for item in MODULES[name] if is_in(item, SANS_IO_FORBIDDEN)) == []
+    assert sorted(item for item in imports_of(name) if is_in(item, SANS_IO_FORBIDDEN)) == []
 
 
 def test_only_clock_and_shells_know_the_wall_clock():
     """`time` is imported by the clock alone; what reports wall time (runners, benchmarks) asks the clock."""
     users = [
         name
-        for name, imports in MODULES.items()
-        if "time" in {item.split(".")[0] for item in imports} and not is_in(name, CLOCK_AND_LINKS)
+        for name in MODULES
+        if "time" in {item.split(".")[0] for item in imports_of(name)} and not is_in(name, CLOCK_AND_LINKS)
     ]
     assert users == []
 
 
 def test_kernels_have_the_cache_that_notices_other_modules():
-    users = [name for name, imports in MODULES.items() if "numba" in imports]
+    users = [name for name in MODULES if "numba" in imports_of(name)]
     assert users == ["flightsim.kernels"]
 
 

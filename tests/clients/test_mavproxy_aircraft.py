@@ -29,6 +29,7 @@ def plan(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.compatibility(
     client="MAVProxy", feature="arm, takeoff, guided, auto, rtl; param, wp", vehicle="ardupilot-plane"
 )

@@ -27,6 +27,7 @@ def waypoint_file(path: Path, rows: Sequence[tuple[int, int, float, float, float
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.compatibility(client="MAVProxy", feature="fence, rally", vehicle="ardupilot")
 def test_fence_and_rally_modules(tmp_path: Path) -> None:
     fence = [(3, 5001, 4.0, LAT + north, LON + east, 0.0) for north, east in CORNERS]

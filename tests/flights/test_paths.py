@@ -72,7 +72,7 @@ def test_setpoints_follow_the_curve(flown: Any, flights: str) -> None:
         ("L2", "ardupilot"),
         ("sector", "ardupilot"),
         slow("parallel-sweep", "px4"),
-        ("expanding-square", "ardupilot"),
+        slow("expanding-square", "ardupilot"),
     ],
 )
 def test_waypoints_are_passed_within_the_acceptance_radius_in_wind(

@@ -14,6 +14,7 @@ from flightsim.environment import Environment, Turbulence
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 from flightsim.world import World, WorldParameters
 from tests.navigation.bench import attitude_error
+from tests.slow import slow
 
 SEEDS = 8
 DURATION_S = 60.0
@@ -78,7 +79,7 @@ def fly(seed: int, environment: Environment) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize(
     "environment",
-    [Environment(), Environment(wind_ned_m_s=(5.0, 0.0, 0.0), turbulence=Turbulence.MODERATE)],
+    [slow(Environment()), Environment(wind_ned_m_s=(5.0, 0.0, 0.0), turbulence=Turbulence.MODERATE)],
     ids=["still", "turbulent"],
 )
 def test_consistent_and_accurate_in_flight(environment: Environment) -> None:

@@ -88,7 +88,7 @@ def damage() -> list[bytes]:
     return damaged(5, frames)
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", slow_after(1, ["ardupilot", "px4"]))
 def test_random_bytes_and_damaged_frames(flavour: str, damage: list[bytes]) -> None:
     flying = circling(flavour)
     watch = Watch(flying)
@@ -161,7 +161,7 @@ def test_any_message_with_any_content_to_the_payload(seed: int) -> None:
     assert answering(flying) == set(ALL_PAYLOAD)
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+@pytest.mark.parametrize("flavour", slow_after(1, ["px4", "ardupilot"]))
 def test_any_message_with_any_content_to_the_aircraft(flavour: str) -> None:
     """It may go anywhere and refuse anything, but nothing raises, and all actuator commands are numbers."""
     flying = circling(flavour)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.clients.sitl_process import free_port, running_sitl
+from tests.slow import slow
 from tests.system.logs import counts, mavutil_counts, modes, records
 from tests.system.runs import SHORT, Run, started, wait_until
 
@@ -38,7 +39,7 @@ def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
 
 @pytest.mark.parametrize(
     ("flavour", "on_failure", "via"),
-    [("px4", "return", "waypoints"), ("px4", "hold", "setpoints"), ("ardupilot", "land", "waypoints")],
+    [slow("px4", "return", "waypoints"), ("px4", "hold", "setpoints"), ("ardupilot", "land", "waypoints")],
 )
 def test_ctrl_c_in_an_embedded_flight(flavour: str, on_failure: str, via: str, tmp_path: Path) -> None:
     """The vehicle is told what to do, and answers, before the run ends."""

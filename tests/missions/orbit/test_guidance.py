@@ -10,6 +10,7 @@ from missions.orbit.guidance import GRAVITY_M_S2, OrbitGuidance, OrbitParameters
 from missions.orbit.relative_target import RelativeState
 from missions.orbit.tracker import TargetStatus, TargetTracker
 from tests.missions.orbit.coordinated_turn import PointMass
+from tests.slow import slow_after
 
 ENTRIES = [
     # bearing from the target, distance, heading of the nose
@@ -114,7 +115,7 @@ def fly(direction, entry, *, seconds=150.0, **world):
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("number", range(len(ENTRIES)))
+@pytest.mark.parametrize("number", slow_after(3, range(len(ENTRIES))))
 def test_the_circle_is_reached_from_everywhere_and_held(direction, number):
     """4 m/s of wind from somewhere, gusts of 0.7 m/s; every other target moves at 2 m/s."""
     wind, course = 1.3 * number, 0.7 * number
