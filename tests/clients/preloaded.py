@@ -5,7 +5,7 @@ import importlib
 
 import matplotlib
 
-from autopilot_bridge.sitl import VehicleSpecification, compile_flight_code
+from tests.compiled import compile_in_turn
 
 matplotlib.use("Agg")
 for name in (
@@ -26,6 +26,6 @@ for name in (
     "missions.vehicle_client.logs",
 ):
     importlib.import_module(name)
-compile_flight_code((VehicleSpecification(), VehicleSpecification(model="aerosonde")))
+compile_in_turn()
 gc.collect()
 gc.freeze()  # pages that the forked processes share
