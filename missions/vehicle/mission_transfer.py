@@ -17,7 +17,8 @@ _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
 _SENDINGS: Final = 3
 _STUCK_S: Final = 6.0  # PX4 gives a transfer up after 5 s
-_ERRORS_BORNE: Final = 2
+_ERRORS_BORNE: Final = 10  # an item that ArduPilot asked for eight times may come eight times
+_GIVEN_UP: Final = (dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_OPERATION_CANCELLED)
 _DO_JUMP: Final = 177
 _NAMES: Final = {
     MissionType.MISSION: "mission",
@@ -111,14 +112,14 @@ async def _send_plan(
                 if reply.type == dialect.MAV_MISSION_ERROR and all_sent and asked >= 0:
                     # "no transfer": it is over, and how it ended was lost
                     raise VehicleTimeout(f"how the vehicle took the {what} is not known; {vehicle.heard()}")
-                if reply.type == dialect.MAV_MISSION_ERROR and asked >= 0:
-                    # an item came after the vehicle had given the transfer up (PX4: nothing heard for 5 s)
+                if reply.type in _GIVEN_UP and asked >= 0:
+                    # nothing was heard for long: PX4 (5 s) says so to the next item, ArduPilot (8 s) at once
                     raise VehicleTimeout(
                         f"the vehicle gave the {what} up after {asked + 1} of {len(items)} items: "
                         f"{_result_name(reply.type)}; {vehicle.heard()}"
                     )
                 errors += 1
-                if reply.type == dialect.MAV_MISSION_ERROR and asked < 0 and errors <= _ERRORS_BORNE:
+                if reply.type in _GIVEN_UP and asked < 0 and errors <= _ERRORS_BORNE:
                     continue  # perhaps to an item of an earlier transfer that came twice
                 where = ""
                 if asked >= 0:
