@@ -10,6 +10,7 @@ from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
 from tests.flights.aircraft import AircraftFlight, Item
 from tests.flights.flight import FLAVOURS
+from tests.slow import slow_after
 
 WIND = Environment(wind_ned_m_s=(3.0, -2.0, 0.0), turbulence=Turbulence.LIGHT)
 IN_AIR, LANDING, ON_GROUND = 2, 4, 1
@@ -81,7 +82,7 @@ def test_takes_off_from_the_runway_and_circles(flavour: str) -> None:
     assert np.mean(altitudes) == pytest.approx(70.0, abs=2.0) and np.std(altitudes) < 1.5
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
 def test_circles_to_the_left(flavour: str) -> None:
     flight = AircraftFlight(flavour)
     flight.take_off(60.0)
@@ -263,7 +264,7 @@ def test_arduplane_boots_initialising() -> None:
     assert flight.result(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0) == 0
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
+@pytest.mark.parametrize("flavour", slow_after(1, FLAVOURS))
 def test_same_seed_same_bytes(flavour: str) -> None:
     def recorded() -> bytes:
         heard = bytearray()

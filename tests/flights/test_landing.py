@@ -5,7 +5,6 @@ import pytest
 from flightsim import truth as t
 from flightsim.environment import Environment
 from tests.flights.flight import Flight
-from tests.slow import slow_after
 
 
 @pytest.mark.parametrize(
@@ -39,7 +38,8 @@ def test_lands_on_its_feet_and_disarms(flavour: str, seed: int, wind_m_s: float,
     assert flight.height_m < 0.2
 
 
-@pytest.mark.parametrize("flavour", slow_after(1, ["px4", "ardupilot"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_lands_after_a_long_hover_on_a_sagging_battery(flavour: str) -> None:
     flight = Flight(flavour, seed=30)
     flight.take_off(6.0)

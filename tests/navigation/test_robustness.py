@@ -45,6 +45,7 @@ def hovering(readings: SensorReadings, rng: np.random.Generator, step: int, rate
         readings.gps.time_us = time_us - 120_000
 
 
+@pytest.mark.slow
 def test_covariance_stays_positive_definite_for_an_hour() -> None:
     """At 50 Hz physics, so that the hour has all its 180,000 updates in little time."""
     rate_hz = 50

@@ -102,12 +102,13 @@ def started(folder: Path, *arguments: str, interpreter: bool = False) -> Iterato
             run.process.communicate()
 
 
-def fly_all(flights: Sequence[tuple[Path, Sequence[str]]]) -> list[Run]:
-    """Fly several, two at a time, each in an interpreter of its own; all have to exit 0."""
+def fly_all(flights: Sequence[tuple[Path, Sequence[str]]], *, interpreter: bool = False) -> list[Run]:
+    """Fly several, two at a time (`start`); all have to exit 0."""
     runs: list[Run] = []
     for first in range(0, len(flights), 2):
         pair = [
-            start(folder, *arguments, interpreter=True) for folder, arguments in flights[first : first + 2]
+            start(folder, *arguments, interpreter=interpreter)
+            for folder, arguments in flights[first : first + 2]
         ]
         try:
             for run in pair:

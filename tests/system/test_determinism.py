@@ -25,7 +25,9 @@ CONFIGURATIONS = {
 def test_a_flight_is_repeated_to_the_byte(name: str, tmp_path: Path) -> None:
     """Twice at full speed, once paced and stopped for a second in the air."""
     arguments = (*SHORT, *CONFIGURATIONS[name], "--seed", "7")
-    first, second = fly_all([(tmp_path / "first", arguments), (tmp_path / "second", arguments)])
+    first, second = fly_all(
+        [(tmp_path / "first", arguments), (tmp_path / "second", arguments)], interpreter=True
+    )
     with started(tmp_path / "stopped", *arguments, "--speedup", "40") as stopped:
         stopped.wait_for_log(IN_FLIGHT_BYTES)
         stopped.process.send_signal(signal.SIGSTOP)
@@ -50,7 +52,8 @@ def test_a_team_is_repeated_to_the_byte_and_another_seed_is_another_flight(tmp_p
             (tmp_path / "first", (*pair, "--seed", "7")),
             (tmp_path / "second", (*pair, "--seed", "7", "--speedup", "20")),
             (tmp_path / "other", (*SHORT, "--seed", "8", *WEATHER)),
-        ]
+        ],
+        interpreter=True,
     )
     assert [vehicle["system_id"] for vehicle in first.summary["vehicles"]] == [1, 2]
     assert second.log.read_bytes() == first.log.read_bytes()

@@ -116,6 +116,7 @@ def test_a_map_of_another_place_keeps_everybody_on_the_ground(found, tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_search_that_finds_nothing_ends_in_time(found, tmp_path):
     options = replace(SMALL, vehicles=1, confirmations=50, search_time_s=60.0)
     result = fly(OccupancyMission(), request(tmp_path / "run", options))

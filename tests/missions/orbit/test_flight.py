@@ -102,6 +102,7 @@ def test_the_same_seed_flies_the_same_orbit(tmp_path):
     assert logs[0] == logs[1]
 
 
+@pytest.mark.slow
 def test_a_target_that_is_not_there_ends_the_mission_and_brings_the_aircraft_home(tmp_path, monkeypatch):
     mission = find_mission("orbit")
     monkeypatch.setattr(type(mission), "scenario", lambda self, options, setting: Scenario(camera=True))

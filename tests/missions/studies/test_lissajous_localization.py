@@ -58,6 +58,7 @@ def cells(study):
     return {(cell["epsilon"], cell["delta"]): cell for cell in cells_of(study)}
 
 
+@pytest.mark.slow
 def test_there_are_twenty_cells_beside_the_papers(cells) -> None:
     assert len(cells) == 20
     for key, cell in cells.items():
