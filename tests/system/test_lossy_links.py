@@ -195,14 +195,16 @@ class Stalled:
         self._link.send(data)
 
 
-@pytest.mark.parametrize("flavour", FLAVOURS)
-def test_an_upload_that_the_vehicle_gave_up_is_done_anew(flavour: str) -> None:
-    """PX4 gives a transfer up after 5 s, and answers the item that comes then with ERROR."""
+@pytest.mark.parametrize(("flavour", "seconds"), [("px4", 7.0), ("ardupilot", 7.0), ("ardupilot", 10.0)])
+def test_an_upload_that_the_vehicle_gave_up_is_done_anew(flavour: str, seconds: float) -> None:
+    """PX4 gives a transfer up after 5 s, and answers the item that comes then with ERROR; ArduPilot cancels
+    it after 8 s.
+    """
     flying = Flying(flavour)
     sitl = flying.sitl
 
     async def main() -> None:
-        link = Stalled(sitl.connect(0), 3, 7.0, lambda: sitl.time_us)
+        link = Stalled(sitl.connect(0), 3, seconds, lambda: sitl.time_us)
         async with Connection(link, LoopClock()) as connection:  # type: ignore[arg-type]
             vehicle = Vehicle(connection)
             await vehicle.wait_ready()
