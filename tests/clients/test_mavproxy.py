@@ -23,6 +23,7 @@ def waypoints(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.timeout(900)
 @pytest.mark.compatibility(
     client="MAVProxy", feature="arm, takeoff, guided, auto, rtl; param, wp", vehicle="ardupilot"
 )

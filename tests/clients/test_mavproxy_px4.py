@@ -35,6 +35,7 @@ def changes_mode(station: Mavproxy, name: str) -> None:
     station.types_until(f"long DO_SET_MODE 1 {main} {sub}", f"Mode {name}", 5.0)
 
 
+@pytest.mark.timeout(900)
 @pytest.mark.compatibility(
     client="MAVProxy", feature="arm, takeoff, guided, auto, rtl; param, wp", vehicle="px4"
 )
