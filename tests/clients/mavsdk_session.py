@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Final
 
-from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, worded
 
 ASYNCIO: Final = "MAVSDK asyncio"
 SYNCHRONOUS: Final = "MAVSDK synchronous"
@@ -87,6 +87,24 @@ class Session(ABC):
         deadline_s = time.monotonic() + wait_s
         while not found():
             assert time.monotonic() < deadline_s, f"{what} was not seen"
+            self.wait(0.05)
+
+    def answer(
+        self, plugin: str, method: str, found: Found, *arguments: Any, wait_s: float = WALL_DEADLINE_S
+    ) -> Any:
+        """Call until what is answered is `found`; MAVSDK's errors count as answers that are not."""
+        from mavsdk.exceptions import MavsdkError
+
+        deadline_s = time.monotonic() + wait_s
+        while True:
+            last: Any
+            try:
+                last = self.call(plugin, method, *arguments)
+                if found(last):
+                    return last
+            except MavsdkError as error:
+                last = error
+            assert time.monotonic() < deadline_s, f"{plugin}.{method} did not answer so; last: {worded(last)}"
             self.wait(0.05)
 
     @abstractmethod
@@ -223,7 +241,7 @@ class SynchronousSession(Session):
         finally:
             self._keep_callbacks(plugin)
             getattr(owner, f"unsubscribe_{stream}")(handle)
-        raise AssertionError(f"{plugin}.{stream} was not seen; last: {last}")
+        raise AssertionError(f"{plugin}.{stream} was not seen; last: {worded(last)}")
 
     def collect(self, plugin: str, method: str, *arguments: Any) -> list[Any]:
         heard: queue.SimpleQueue[Any] = queue.SimpleQueue()

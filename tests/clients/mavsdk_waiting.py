@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from enum import Enum
 from typing import Any, Final
 
 WALL_DEADLINE_S: Final = 100.0
@@ -22,6 +23,16 @@ async def ground_station(url: str) -> AsyncIterator[Any]:
         yield system
 
 
+def worded(value: Any) -> str:
+    """What MAVSDK gave, in words; some of its classes have no text of their own."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(worded, value))}]"
+    if type(value).__module__.startswith("mavsdk.") and not isinstance(value, Exception | Enum):
+        fields = ", ".join(f"{name}={worded(each)}" for name, each in vars(value).items())
+        return f"{type(value).__name__}({fields})"
+    return str(value)
+
+
 async def first(
     stream: AsyncIterator[Any], found: Callable[[Any], bool], what: str, wait_s: float = WALL_DEADLINE_S
 ) -> Any:
@@ -33,5 +44,5 @@ async def first(
                 if found(last):
                     return last
     except TimeoutError:
-        raise AssertionError(f"{what} was not seen; last: {last}") from None
+        raise AssertionError(f"{what} was not seen; last: {worded(last)}") from None
     raise AssertionError(f"the stream ended before {what}")
