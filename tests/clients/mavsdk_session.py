@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, Final
 
-from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, worded
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, transfer, worded
 
 ASYNCIO: Final = "MAVSDK asyncio"
 SYNCHRONOUS: Final = "MAVSDK synchronous"
@@ -88,6 +88,10 @@ class Session(ABC):
         while not found():
             assert time.monotonic() < deadline_s, f"{what} was not seen"
             self.wait(0.05)
+
+    def transfer(self, plugin: str, method: str, *arguments: Any) -> Any:
+        """`call` an upload or a download of a plan; begun anew when it stood still for too long."""
+        return transfer(lambda: self.call(plugin, method, *arguments))
 
     def answer(
         self, plugin: str, method: str, found: Found, *arguments: Any, wait_s: float = WALL_DEADLINE_S

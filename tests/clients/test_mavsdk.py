@@ -26,7 +26,7 @@ from mavsdk.plugins.offboard import Offboard, PositionNedYaw
 from mavsdk.plugins.telemetry import Telemetry
 
 from tests.clients.mavsdk_flying import raw_item
-from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station, transfer, transferred
 from tests.clients.sitl_process import free_port, running_sitl
 from tests.slow import slow
 
@@ -91,8 +91,8 @@ async def fly_px4(url: str) -> None:
 
         mission = MissionAsync(system)
         plan = MissionPlan(mission_items(here.latitude_deg, here.longitude_deg))
-        await mission.upload_mission(plan)
-        assert len((await mission.download_mission()).mission_items) == len(plan.mission_items)
+        await transferred(lambda: mission.upload_mission(plan))
+        assert len((await transferred(mission.download_mission)).mission_items) == len(plan.mission_items)
         await mission.start_mission()
         await first(
             mission.subscribe_mission_progress(),
@@ -170,13 +170,15 @@ def test_synchronous_interface_flies(flavour: str) -> None:
             offboard.stop()
             if flavour == "px4":
                 mission = Mission(system)
-                mission.upload_mission(MissionPlan(mission_items(here.latitude_deg, here.longitude_deg)))
+                plan = MissionPlan(mission_items(here.latitude_deg, here.longitude_deg))
+                transfer(lambda: mission.upload_mission(plan))
                 mission.start_mission()
                 until("mission end", mission.is_mission_finished)
             else:
                 raw = MissionRaw(system)  # the plain mission interface can't read ArduPilot's home item back
-                raw.upload_mission(raw_items(here.latitude_deg, here.longitude_deg))
-                assert len(raw.download_mission()) == 4
+                items = raw_items(here.latitude_deg, here.longitude_deg)
+                transfer(lambda: raw.upload_mission(items))
+                assert len(transfer(raw.download_mission)) == 4
                 raw.start_mission()
                 until("mission end", lambda: raw.mission_progress().current == 3)
             action.return_to_launch()

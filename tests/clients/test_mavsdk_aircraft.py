@@ -21,7 +21,7 @@ from mavsdk.plugins.offboard import Attitude
 from mavsdk.plugins.telemetry import FlightMode, LandedState, Position
 
 from tests.clients.mavsdk_flying import raw_item
-from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station
+from tests.clients.mavsdk_waiting import WALL_DEADLINE_S, first, ground_station, transferred
 from tests.clients.runway import Place, PlanItem, Runway
 from tests.clients.sitl_process import free_port, running_sitl
 
@@ -176,8 +176,8 @@ async def fly_waypoints(pilot: Pilot) -> None:
             for lat, lon, height_m in places
         ]
     )
-    await pilot.mission.upload_mission(plan)
-    assert len((await pilot.mission.download_mission()).mission_items) == len(places)
+    await transferred(lambda: pilot.mission.upload_mission(plan))
+    assert len((await transferred(pilot.mission.download_mission)).mission_items) == len(places)
     await pilot.mission.start_mission()
     await first(
         pilot.mission.subscribe_mission_progress(), lambda p: p.total > 0 and p.current == p.total, "end"
@@ -186,8 +186,8 @@ async def fly_waypoints(pilot: Pilot) -> None:
 
 async def land_by_mission(pilot: Pilot) -> None:
     items = pilot.runway.circuit("px4")
-    await pilot.mission_raw.upload_mission(raw(items))
-    assert len(await pilot.mission_raw.download_mission()) == len(items)
+    await transferred(lambda: pilot.mission_raw.upload_mission(raw(items)))
+    assert len(await transferred(pilot.mission_raw.download_mission)) == len(items)
     await pilot.mission_raw.start_mission()
     await pilot.flies(FlightMode.MISSION)
     await first(pilot.telemetry.subscribe_landed_state(), lambda s: s == LandedState.LANDING, "landing state")
@@ -237,8 +237,8 @@ async def fly_arduplane(url: str) -> None:
             await pilot.action.takeoff()
         await pilot.param.set_param_int("RTL_AUTOLAND", 3)
         items = pilot.runway.circuit("ardupilot")
-        await pilot.mission_raw.upload_mission(raw(items))
-        assert len(await pilot.mission_raw.download_mission()) == len(items)
+        await transferred(lambda: pilot.mission_raw.upload_mission(raw(items)))
+        assert len(await transferred(pilot.mission_raw.download_mission)) == len(items)
         await (
             pilot.arm()
         )  # before AUTO: MAVSDK leaves a mission for LOITER to arm, which ArduPlane doesn't do

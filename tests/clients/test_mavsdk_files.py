@@ -26,8 +26,10 @@ def test_geofence(mavsdk: Session) -> None:
         for north, east in ((-1, -1), (-1, 1), (1, 1), (1, -1))
     ]
     hole = Circle(Point(here.latitude_deg + 1e-3, here.longitude_deg), 20.0, FenceType.EXCLUSION)
-    mavsdk.call("geofence", "upload_geofence", GeofenceData([Polygon(corners, FenceType.INCLUSION)], [hole]))
-    fence = mavsdk.call("geofence", "download_geofence")
+    mavsdk.transfer(
+        "geofence", "upload_geofence", GeofenceData([Polygon(corners, FenceType.INCLUSION)], [hole])
+    )
+    fence = mavsdk.transfer("geofence", "download_geofence")
     assert [len(polygon.points) for polygon in fence.polygons] == [4]
     assert [circle.radius for circle in fence.circles] == [20.0]
     mavsdk.call("geofence", "clear_geofence")
@@ -53,8 +55,8 @@ def test_plan_import(mavsdk: Session, sitl: PluginSitl) -> None:
         "mission_raw", "import_qgroundcontrol_mission_from_string", PLAN.format(lat=lat, lon=lon, items=items)
     )
     assert [item.command for item in imported.mission_items][-3:] == [22, 16, 16]
-    mavsdk.call("mission_raw", "upload_mission", imported.mission_items)
-    back = mavsdk.call("mission_raw", "download_mission")
+    mavsdk.transfer("mission_raw", "upload_mission", imported.mission_items)
+    back = mavsdk.transfer("mission_raw", "download_mission")
     assert [(item.command, item.x) for item in back][-2:] == [
         (item.command, item.x) for item in imported.mission_items
     ][-2:]

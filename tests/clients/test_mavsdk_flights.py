@@ -82,12 +82,12 @@ def test_mission(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest) 
         )
         for north_m in (15.0, 30.0)
     ]
-    mavsdk.call("mission", "upload_mission", MissionPlan(items))
+    mavsdk.transfer("mission", "upload_mission", MissionPlan(items))
     if vehicle == "ardupilot":
         assert not accepted(mavsdk, "mission", "download_mission")
         not_offered(request, "MAVSDK can't read ArduPilot's home item; mission_raw can")
         return
-    assert len(mavsdk.call("mission", "download_mission").mission_items) == 2
+    assert len(mavsdk.transfer("mission", "download_mission").mission_items) == 2
     mavsdk.call("mission", "set_return_to_launch_after_mission", False)
     mavsdk.until("start", lambda: accepted(mavsdk, "mission", "start_mission"))
     mavsdk.first("mission", "mission_progress", lambda p: p.total == 2 and p.current == 1)
@@ -106,8 +106,8 @@ def test_raw_mission(mavsdk: Session, vehicle: str) -> None:
         raw_item(seq, 16, here.latitude_deg + north * DEG_PER_M, here.longitude_deg, parameters=any_heading)
         for seq, north in enumerate((0.0, 15.0, 30.0))
     ]
-    mavsdk.call("mission_raw", "upload_mission", items)
-    assert len(mavsdk.call("mission_raw", "download_mission")) == 3
+    mavsdk.transfer("mission_raw", "upload_mission", items)
+    assert len(mavsdk.transfer("mission_raw", "download_mission")) == 3
     mavsdk.until("start", lambda: accepted(mavsdk, "mission_raw", "start_mission"))
     last = items[-1].x * 1e-7
     mavsdk.first("telemetry", "position", lambda p: abs(p.latitude_deg - last) < 2.5 * DEG_PER_M)
