@@ -159,12 +159,12 @@ def test_landings(flavour: str, wind_from_deg: float) -> None:
 @pytest.mark.parametrize("wind_from_deg", [0.0, 60.0, -60.0])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_landings_in_moderate_turbulence(flavour: str, wind_from_deg: float) -> None:
-    """The worst gust at the touch is luck: one landing of four may be beyond what is asked."""
+    """The worst downdraught at the touch is luck: one landing of four may be harder than what is asked."""
     flown = [mission(Case(flavour, None, tuple(RECTANGLE), wind_from_deg, seed)) for seed in range(4)]
     away_m = [abs(figures.touch_along_m) for figures in flown]
     sinks_m_s = [figures.touch_sink_m_s for figures in flown]
-    assert np.median(away_m) < 12.0 and sorted(away_m)[-2] < 20.0, flown
-    assert np.median(sinks_m_s) < 1.6 and sorted(sinks_m_s)[-2] < 2.0, flown
+    assert np.median(away_m) < 12.0 and max(away_m) < 20.0, flown
+    assert np.median(sinks_m_s) < 1.6 and sorted(sinks_m_s)[-2] < 2.0 and max(sinks_m_s) < 2.6, flown
 
 
 def test_cold_day() -> None:

@@ -122,4 +122,5 @@ VEL_SETPOINT: Final = 49  # NED, m/s; only the vertical one is flown
 AIRSPEED_FLOOR: Final = 52  # equivalent airspeed that the least ground speed asks for, m/s
 POWERLESS: Final = 53  # 0 the throttle does its work .. 1 the energy falls at full throttle
 CLIMB_FLOWN: Final = 54  # 1.0 while pitch alone flies the vertical speed
-STATE_SIZE: Final = 55
+LIFTLESS_PITCH: Final = 55  # pitch over the path without lift, rad, low-passed: downdraughts, trim not known
+STATE_SIZE: Final = 56

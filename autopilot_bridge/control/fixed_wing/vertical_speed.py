@@ -1,8 +1,11 @@
 """Vertical speed by pitch alone, throttle given: short final and flare, where the energy control is too slow.
 
 The lift that a vertical acceleration asks for at the airspeed of this moment is flown by angle of attack, so
-that a gust along the flight path is answered before it has changed the sink. Airspeed is no concern of the
-pitch here; the task's throttle sees to it.
+that a gust along the flight path is answered before it has changed the sink. What lift there is, the
+accelerometers tell: angle of attack that the pitch over the path has and the lift has not, or the other way
+round, is a gust from below or above (or a wing that is not as believed), and the pitch makes up for it.
+Incremental inversion does the same with differences (Sieberling, Chu and Mulder 2010). Airspeed is no concern
+of the pitch here; the task's throttle sees to it.
 """
 
 import math
@@ -18,13 +21,14 @@ from flightsim.kernels import kernel
 Array = NDArray[np.float64]
 
 _NAV_VEL_DOWN: Final = 9  # navigation slots, as in navigation.layout
+_NAV_FORCE_FRD: Final = 22
 _NAV_PITCH: Final = 26
 _NAV_EAS: Final = 32
 _GAIN: Final = 1.5  # error of the vertical speed to vertical acceleration, times the pitch's time constant
 _HASTE: Final = 1.0  # the error of the pitch is added so often: it follows in half of its time constant
 _ACCELERATION_MAX: Final = 0.8  # of gravity
-_INTEGRAL_1_S: Final = 1.5  # flight-path angle missed to pitch
-_INTEGRAL_MAX_RAD: Final = 0.12
+_GUST_LAG: Final = 0.8  # over the time constant of the pitch: gusts that pass sooner are left to pass
+_GUST_MAX_RAD: Final = 0.2
 _STEEPEST_RAD: Final = math.radians(15.0)
 
 
@@ -53,12 +57,13 @@ def pitch_for_climb(
     pitch = _angle_of_attack(airspeed, load_factor, p) + path
     if s[c.CLIMB_FLOWN] == 0.0:  # from the pitch flown so far
         s[c.CLIMB_FLOWN] = 1.0
-        s[c.PITCH_INTEGRAL] = s[c.PITCH_SETPOINT] - pitch
-    step = _INTEGRAL_1_S * missing / speed * dt
-    wanted = pitch + s[c.PITCH_INTEGRAL]
-    if not ((wanted >= highest and step > 0.0) or (wanted <= lowest and step < 0.0)):
-        s[c.PITCH_INTEGRAL] += step
-    s[c.PITCH_INTEGRAL] = min(_INTEGRAL_MAX_RAD, max(-_INTEGRAL_MAX_RAD, s[c.PITCH_INTEGRAL]))
-    wanted = pitch + s[c.PITCH_INTEGRAL]
+        s[c.LIFTLESS_PITCH] = s[c.PITCH_SETPOINT] - pitch
+    felt = -nav[_NAV_FORCE_FRD + 2] / GRAVITY_M_S2
+    if math.isfinite(felt):
+        liftless = nav[_NAV_PITCH] - path - _angle_of_attack(airspeed, felt, p)
+        lag_s = _GUST_LAG * p[c.PITCH_TC]
+        s[c.LIFTLESS_PITCH] += dt / (dt + lag_s) * (liftless - s[c.LIFTLESS_PITCH])
+    s[c.LIFTLESS_PITCH] = min(_GUST_MAX_RAD, max(-_GUST_MAX_RAD, s[c.LIFTLESS_PITCH]))
+    wanted = pitch + s[c.LIFTLESS_PITCH]
     wanted += _HASTE * (wanted - nav[_NAV_PITCH])
     return min(highest, max(lowest, wanted))

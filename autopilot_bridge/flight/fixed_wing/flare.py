@@ -83,6 +83,15 @@ class Flare:
         self._height_m = 1.0
         self._sink_m_s = self._pitch_rad = 0.0
 
+    def touch_beyond_m(
+        self, state: AircraftState, height_m: float, to_go_m: float, parameters: FixedWingFlightParameters
+    ) -> float:
+        """How far beyond the place (negative: before it) the wheels touch at the firmest sink from now on."""
+        firmest_m_s = parameters.flare_sink_m_s + _FIRMEST_M_S
+        height_m = max(height_m, 0.0)
+        time_s = flare_time(height_m, height_m, firmest_m_s + _FIRMER_1_S * height_m, firmest_m_s)
+        return state.ground_speed_m_s * time_s - to_go_m
+
     def begin(
         self, state: AircraftState, height_m: float, sink_m_s: float, parameters: FixedWingFlightParameters
     ) -> None:

@@ -29,6 +29,9 @@ _LOW_M: Final = 2.0
 _SHORT_FINAL_M: Final = 12.0  # over the ground: from here on pitch flies the path, throttle the airspeed
 _MISSED_M: Final = 40.0  # beyond the place, too high: go around
 _ASIDE_M: Final = 20.0  # so far beside the runway on short final: go around
+_BEYOND_S: Final = 0.75  # of the approach's airspeed: it goes around where the touch would be beyond, ...
+_DECIDED_M: Final = 0.12  # ... above this height over the ground, ...
+_GO_AROUNDS: Final = 2  # ... so often; then it lands where it lands
 _SLOPE_GAIN: Final = 0.4
 _DIVE_FREE_M: Final = 25.0  # over the ground the nose may go down as far as anywhere; lower, ever less
 _DIVE_LOW_RAD: Final = math.radians(-1.0)
@@ -73,6 +76,7 @@ class LandTask(AircraftTask):
         "_blind",
         "_circle",
         "_flare",
+        "_go_arounds",
         "_line",
         "_path",
         "_rolled_s",
@@ -97,6 +101,7 @@ class LandTask(AircraftTask):
         self._flare = Flare()
         self._blind: DescendTask | None = None
         self._rolled_s = 0.0
+        self._go_arounds = 0
         self._abort_climb_m = math.nan
         self._touch_pitch_rad = 0.0
         self.approach: Approach | None = None
@@ -302,6 +307,12 @@ class LandTask(AircraftTask):
         to_go = math.nan
         if ctx.position_valid:
             to_go = -self._line.along_m(state)
+            beyond = self._flare.touch_beyond_m(state, height, to_go, p)
+            if beyond > _BEYOND_S * p.landing_airspeed_m_s and height > _DECIDED_M and self._may_go_around(p):
+                self._go_arounds += 1
+                self.phase = LandPhase.GO_AROUND
+                self._fly_go_around(ctx, p, approach)
+                return
         touched = self._flare.fly(ctx, state, height, to_go, p, command)
         if self._flare.aligning:
             command.steering_heading_rad = approach.course_rad
@@ -309,6 +320,10 @@ class LandTask(AircraftTask):
             self.phase = LandPhase.ROLL_OUT
             self._rolled_s = 0.0
             self._touch_pitch_rad = state.pitch_rad
+
+    def _may_go_around(self, p: FixedWingFlightParameters) -> bool:
+        """A gust that carries it too far is luck; an aircraft that floats every time has to come down."""
+        return self._go_arounds < _GO_AROUNDS and p.trim_throttle > 0.0
 
     def _bounced(self, p: FixedWingFlightParameters) -> bool:
         """In the air again: a gust or the springs have lifted it; the flare sets it down once more."""

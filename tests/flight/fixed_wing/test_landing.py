@@ -140,6 +140,41 @@ def test_beside_the_runway_on_short_final_it_goes_around() -> None:
     assert abs(along) < 15.0 and abs(right) < 3.0
 
 
+def _carried_on(rig: Aircraft, along_m: float) -> None:
+    """GPS finds itself farther along the runway."""
+    origin = rig.frame.origin
+    rig.frame = LocalFrame(replace(origin, lat_deg=origin.lat_deg - along_m / 111_195.0))
+
+
+def test_carried_too_far_in_the_flare_it_goes_around_twice_and_then_comes_down() -> None:
+    rig = flying((-3.0, 0.0))
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    for _ in range(2):
+        rig.run_until(lambda: task.phase is LandPhase.FLARE, 200.0)
+        _carried_on(rig, 60.0)
+        rig.run_until(lambda: task.phase is not LandPhase.FLARE, 3.0)
+        assert task.phase is LandPhase.GO_AROUND
+        lowest = -rig.nav[12]
+        log = rig.run(5.0)
+        assert log[:, 12].max() < -0.5 * lowest  # it doesn't touch
+    rig.run_until(lambda: task.phase is LandPhase.FLARE, 200.0)
+    _carried_on(rig, 60.0)
+    rig.run_until(lambda: task.phase is not LandPhase.FLARE, 10.0)
+    assert task.phase is LandPhase.ROLL_OUT
+
+
+def test_a_glider_comes_down_wherever_the_flare_carries_it() -> None:
+    rig = flying((-3.0, 0.0))
+    rig.ctx.parameters = replace(rig.parameters, trim_throttle=0.0)
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    rig.run_until(lambda: task.phase is LandPhase.FLARE, 60.0)
+    _carried_on(rig, 60.0)
+    rig.run_until(lambda: task.phase is not LandPhase.FLARE, 10.0)
+    assert task.phase is LandPhase.ROLL_OUT
+
+
 def test_lifted_again_after_the_touch_it_flares_once_more() -> None:
     rig = flying((-4.0, 0.0))
     rig.rangefinder = True
