@@ -31,6 +31,7 @@ _FIGURES = (
     "touch along m",
     "touch across m",
     "sink m/s",
+    "go-arounds",
 )
 
 
@@ -43,6 +44,7 @@ def _numbers(figures: MissionFigures) -> tuple[float, ...]:
         abs(figures.touch_along_m),
         abs(figures.touch_across_m),
         figures.touch_sink_m_s,
+        figures.go_arounds,
     )
 
 

@@ -24,6 +24,7 @@ _BANK_RAD = math.radians(45.0)  # limit of both flavours, on this aircraft
 _REVERSAL_S = 1.0  # from limit to limit, at the roll rate of its wings
 _SWITCH_S = 0.32 * 0.7 * 10.0  # PX4: NPFG_SW_DST_MLT, _DAMPING and _PERIOD times the ground speed
 _WP_RADIUS_M = 50.0  # ArduPlane; less for turns of less than a right angle
+_LANDS_S = 400.0  # from the first flare, two go-arounds included
 
 
 def equivalent_airspeed_m_s(flight: AircraftFlight) -> float:
@@ -118,6 +119,7 @@ class MissionFigures:
         across_m, height_m, airspeed_m_s: errors of ten a second on the settled parts of the legs.
         touch_along_m, touch_across_m: where the wheels touched, from the place to land.
         touch_sink_m_s: rate of descent then.
+        go_arounds: how often it went around before.
         lowest_airspeed_m_s: equivalent, from the take-off to the flare.
     """
 
@@ -127,6 +129,7 @@ class MissionFigures:
     touch_along_m: float = math.nan
     touch_across_m: float = math.nan
     touch_sink_m_s: float = math.nan
+    go_arounds: int = 0
     lowest_airspeed_m_s: float = math.inf
 
     def __str__(self) -> str:
@@ -187,7 +190,7 @@ def fly_plan(flight: AircraftFlight, what: Plan, *, limit_s: float = 600.0) -> M
         last[:] = north, east, float(flight.truth[t.VEL_NED_M_S][2])
         return False
 
-    for _ in range(round(60e6) // flight.sitl.step_us):  # by physics steps: the sink is gone one later
+    for _ in range(round(_LANDS_S * 1e6) // flight.sitl.step_us):  # physics steps: the sink is gone one later
         if touches():
             break
         flight.sitl.advance()
@@ -198,4 +201,5 @@ def fly_plan(flight: AircraftFlight, what: Plan, *, limit_s: float = 600.0) -> M
     figures.touch_along_m = north * math.cos(heading) + east * math.sin(heading)
     figures.touch_across_m = east * math.cos(heading) - north * math.sin(heading)
     figures.touch_sink_m_s = last[2]
+    figures.go_arounds = sum(text.startswith("Landing aborted") for _, text in flight.texts)
     return figures

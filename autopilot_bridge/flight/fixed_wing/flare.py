@@ -56,11 +56,17 @@ def flare_height(time_s: float, start_m: float, before_m_s: float, after_m_s: fl
 
 
 def power(state: AircraftState, airspeed_m_s: float, parameters: FixedWingFlightParameters) -> float:
-    """Throttle that holds an airspeed close to the ground; idle without an engine or an airspeed."""
+    """Throttle that holds an airspeed close to the ground; idle without an engine or an airspeed.
+
+    The lower of the airspeed and of what will be left of it when the gust has passed: an engine that idles
+    in a gust from ahead lets the aircraft fall when it ends.
+    """
     p = parameters
     if not (p.trim_throttle > 0.0 and state.airspeed_m_s == state.airspeed_m_s):
         return p.throttle_idle
-    missing = (airspeed_m_s - state.airspeed_m_s) / airspeed_m_s
+    lasting = state.lasting_airspeed_m_s
+    known = min(state.airspeed_m_s, lasting) if lasting == lasting else state.airspeed_m_s
+    missing = (airspeed_m_s - known) / airspeed_m_s
     return min(1.0, max(p.throttle_idle, _POWER_SHARE * p.trim_throttle + _POWER_GAIN * missing))
 
 

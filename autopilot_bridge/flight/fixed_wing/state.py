@@ -24,6 +24,8 @@ class AircraftState:
         wind_north_m_s, wind_east_m_s: 0 while not estimated, so that air and ground are one.
         ground_speed_m_s, course_rad: horizontal velocity; course is the nose's direction when (nearly) still.
         airspeed_m_s: equivalent airspeed; NaN when not known.
+        lasting_airspeed_m_s: equivalent airspeed in the wind as it is estimated, without the gust of the
+            moment; NaN when not known.
         true_airspeed_m_s: horizontal speed through the air.
         roll_rad, pitch_rad, yaw_rad: attitude.
         forward_force_m_s2: specific force along the body's x axis.
@@ -38,6 +40,7 @@ class AircraftState:
         "forward_force_m_s2",
         "ground_speed_m_s",
         "height_above_ground_m",
+        "lasting_airspeed_m_s",
         "north_m",
         "pitch_rad",
         "roll_rad",
@@ -64,11 +67,16 @@ class AircraftState:
         self.airspeed_m_s = nav[nav_layout.AIRSPEED_M_S]
         self.height_above_ground_m = nav[nav_layout.HEIGHT_ABOVE_GROUND_M]
         wind_north, wind_east = nav[_WIND], nav[_WIND + 1]
-        if wind_north != wind_north or wind_east != wind_east:
+        wind_known = wind_north == wind_north and wind_east == wind_east
+        if not wind_known:
             wind_north = wind_east = 0.0
         self.wind_north_m_s, self.wind_east_m_s = wind_north, wind_east
         self.ground_speed_m_s = math.hypot(self.vel_north_m_s, self.vel_east_m_s)
         self.true_airspeed_m_s = math.hypot(self.vel_north_m_s - wind_north, self.vel_east_m_s - wind_east)
+        self.lasting_airspeed_m_s = math.nan
+        true_m_s = nav[nav_layout.AIRSPEED_TRUE_M_S]
+        if true_m_s > _SLOW_M_S and wind_known:
+            self.lasting_airspeed_m_s = self.true_airspeed_m_s * self.airspeed_m_s / true_m_s
         self.course_rad = (
             math.atan2(self.vel_east_m_s, self.vel_north_m_s)
             if self.ground_speed_m_s > _SLOW_M_S

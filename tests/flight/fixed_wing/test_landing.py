@@ -12,7 +12,8 @@ from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.flight.context import FlightPhase, LandedState, TouchedDown
 from autopilot_bridge.flight.fixed_wing import DescendTask, FixedWingFlightParameters, LandPhase, LandTask
 from autopilot_bridge.flight.fixed_wing.approach import approach_along_leg
-from autopilot_bridge.flight.fixed_wing.flare import flare_height, flare_time
+from autopilot_bridge.flight.fixed_wing.flare import flare_height, flare_time, power
+from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.navigation import layout as n
@@ -138,6 +139,40 @@ def test_beside_the_runway_on_short_final_it_goes_around() -> None:
     assert task.phase is LandPhase.GO_AROUND
     along, right = finish(rig, task)
     assert abs(along) < 15.0 and abs(right) < 3.0
+
+
+def _in_the_flare(airspeed_m_s: float, lasting_m_s: float) -> float:
+    state = AircraftState()
+    state.airspeed_m_s, state.lasting_airspeed_m_s = airspeed_m_s, lasting_m_s
+    return power(state, 20.0, FixedWingFlightParameters())
+
+
+def test_a_gust_from_ahead_does_not_close_the_throttle_and_a_lull_opens_it() -> None:
+    steady = _in_the_flare(20.0, 20.0)
+    assert 0.0 < steady < 1.0
+    assert _in_the_flare(25.0, 20.0) == steady
+    assert _in_the_flare(18.0, 20.0) == _in_the_flare(20.0, 18.0) > steady
+    assert _in_the_flare(25.0, 25.0) == 0.0
+    assert _in_the_flare(20.0, math.nan) == steady  # no wind is known
+    assert _in_the_flare(math.nan, 20.0) == 0.0
+
+
+def test_the_airspeed_that_lasts_is_the_one_in_the_wind_as_estimated() -> None:
+    rig = flying((-6.0, 0.0))
+    state = AircraftState()
+    state.read(rig.ctx)
+    nav = rig.ctx.nav
+    assert state.lasting_airspeed_m_s == pytest.approx(
+        state.true_airspeed_m_s * nav[n.AIRSPEED_M_S] / nav[n.AIRSPEED_TRUE_M_S]
+    )
+    nav[n.AIRSPEED_M_S] *= 1.2  # a gust
+    nav[n.AIRSPEED_TRUE_M_S] *= 1.2
+    before = state.lasting_airspeed_m_s
+    state.read(rig.ctx)
+    assert state.lasting_airspeed_m_s == pytest.approx(before)
+    nav[n.WIND_NED_M_S] = math.nan
+    state.read(rig.ctx)
+    assert math.isnan(state.lasting_airspeed_m_s)
 
 
 def _carried_on(rig: Aircraft, along_m: float) -> None:
