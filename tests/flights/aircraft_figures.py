@@ -24,7 +24,7 @@ _BANK_RAD = math.radians(45.0)  # limit of both flavours, on this aircraft
 _REVERSAL_S = 1.0  # from limit to limit, at the roll rate of its wings
 _SWITCH_S = 0.32 * 0.7 * 10.0  # PX4: NPFG_SW_DST_MLT, _DAMPING and _PERIOD times the ground speed
 _WP_RADIUS_M = 50.0  # ArduPlane; less for turns of less than a right angle
-_LANDS_S = 400.0  # from the first flare, two go-arounds included
+_LANDS_S = 600.0  # from the first flare, three go-arounds included
 
 
 def equivalent_airspeed_m_s(flight: AircraftFlight) -> float:
