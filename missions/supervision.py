@@ -1,5 +1,6 @@
 """A command whose libraries may crash, watched by the process that the user started."""
 
+import contextlib
 import os
 import signal
 import sys
@@ -25,13 +26,16 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
     """
     sys.stdout.flush()
     sys.stderr.flush()
+    # What asks us to end between the fork and the handler that passes it on must not leave the child alone.
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKED_TO_END)
     child = os.fork()
     if not child:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         code = command()
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)  # what the caller still has to do is done once, and not here
-    status = _wait(child)
+    status = _wait(child, mask)
     if not os.WIFSIGNALED(status):
         return os.waitstatus_to_exitcode(status)
     number = os.WTERMSIG(status)
@@ -41,15 +45,22 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
     return FAILED
 
 
-def _wait(child: int) -> int:
-    """Wait for a process, and pass on to it what asks us to end; a terminal's Ctrl-C reaches it anyway."""
+def _wait(child: int, mask: set[signal.Signals]) -> int:
+    """Wait for a process, and pass on to it what asks us to end; a terminal's Ctrl-C reaches it anyway.
+
+    Args:
+        child: its number.
+        mask: signals that are blocked while it is waited for; what has come by now is passed on first.
+    """
 
     def pass_on(number: int, frame: FrameType | None) -> None:
-        os.kill(child, number)
+        with contextlib.suppress(ProcessLookupError):  # it has just ended by itself
+            os.kill(child, number)
 
     before = {number: signal.signal(number, pass_on) for number in _ASKED_TO_END}
     if sys.stdin is not None and sys.stdin.isatty():
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     try:
         return os.waitpid(child, 0)[1]
     finally:
