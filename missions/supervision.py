@@ -4,7 +4,7 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import FrameType
 from typing import Final
 
@@ -45,7 +45,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
     return FAILED
 
 
-def _wait(child: int, mask: set[signal.Signals]) -> int:
+def _wait(child: int, mask: Iterable[int]) -> int:
     """Wait for a process, and pass on to it what asks us to end; a terminal's Ctrl-C reaches it anyway.
 
     Args:
