@@ -15,6 +15,7 @@ from autopilot_bridge.flight.fixed_wing.descend import DescendTask
 from autopilot_bridge.flight.fixed_wing.flare import Flare
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
+from autopilot_bridge.flight.fixed_wing.power_check import PowerCheck
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 
 _ENTRY_HEIGHT_M: Final = 4.0  # the circle is left this close to its height
@@ -79,6 +80,7 @@ class LandTask(AircraftTask):
         "_go_arounds",
         "_line",
         "_path",
+        "_power",
         "_rolled_s",
         "_start",
         "_touch_pitch_rad",
@@ -100,6 +102,7 @@ class LandTask(AircraftTask):
         self._circle: Circle | None = None
         self._flare = Flare()
         self._blind: DescendTask | None = None
+        self._power = PowerCheck()
         self._rolled_s = 0.0
         self._go_arounds = 0
         self._abort_climb_m = math.nan
@@ -164,8 +167,12 @@ class LandTask(AircraftTask):
         if self.phase not in (LandPhase.APPROACH, LandPhase.FLARE):
             return False
         self._abort_climb_m = height_m
-        self.phase = LandPhase.GO_AROUND
+        self._begin_go_around()
         return True
+
+    def _begin_go_around(self) -> None:
+        self.phase = LandPhase.GO_AROUND
+        self._power.begin(self._state)
 
     def _land(self, ctx: FlightContext) -> TaskStatus:
         clear_setpoint(ctx.setpoint, sp.IDLE if ctx.armed else sp.OFF)
@@ -289,7 +296,7 @@ class LandTask(AircraftTask):
             self.phase = LandPhase.FLARE
             self._flare.begin(state, flare_height, sink, p)
         elif past_place > _MISSED_M or (height < _SHORT_FINAL_M and self._aside(ctx)):
-            self.phase = LandPhase.GO_AROUND
+            self._begin_go_around()
 
     def _aside(self, ctx: FlightContext) -> bool:
         """Too far beside the runway to land."""
@@ -310,7 +317,7 @@ class LandTask(AircraftTask):
             beyond = self._flare.touch_beyond_m(state, height, to_go, p)
             if beyond > _BEYOND_S * p.landing_airspeed_m_s and height > _DECIDED_M and self._may_go_around(p):
                 self._go_arounds += 1
-                self.phase = LandPhase.GO_AROUND
+                self._begin_go_around()
                 self._fly_go_around(ctx, p, approach)
                 return
         touched = self._flare.fly(ctx, state, height, to_go, p, command)
@@ -353,11 +360,18 @@ class LandTask(AircraftTask):
         return self._abort_climb_m if self._abort_climb_m > 0.0 else p.landing_abort_climb_m
 
     def _fly_go_around(self, ctx: FlightContext, p: FixedWingFlightParameters, approach: Approach) -> None:
-        """Straight up along the runway, then back to where the approach begins."""
+        """Straight up along the runway, then back to where the approach begins; without power down ahead."""
         state, command = self._state, self._command
+        height = self._height(p, approach.down_m)
+        if self._power.powerless(state, ctx.dt_s) and height < _SHORT_FINAL_M:
+            self._go_arounds = _GO_AROUNDS
+            self.phase = LandPhase.FLARE
+            ctx.phase = FlightPhase.LANDING
+            self._flare.begin(state, height, state.ground_speed_m_s * approach.slope, p)
+            self._fly_flare(ctx, p)
+            return
         ctx.phase = FlightPhase.CRUISE
         self._line.follow(state, self._path.of(ctx), command)
-        height = self._height(p, approach.down_m)
         self._limit_bank(p, height)
         command.flaps = p.flaps_takeoff
         command.airspeed_m_s = p.takeoff_airspeed_m_s

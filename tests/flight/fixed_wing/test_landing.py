@@ -210,6 +210,39 @@ def test_a_glider_comes_down_wherever_the_flare_carries_it() -> None:
     assert task.phase is LandPhase.ROLL_OUT
 
 
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_go_around_without_power_comes_down_straight_ahead(asked: bool) -> None:
+    rig = flying((-3.0, 0.0))
+    rig.rangefinder = True
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    rig.run_until(lambda: task.phase is LandPhase.FLARE, 60.0)
+    rig.vehicle.set_motor_effectiveness(0, 0.0)
+    if asked:
+        assert task.go_around(rig.ctx)
+    else:
+        _carried_on(rig, 60.0)
+        rig.run_until(lambda: task.phase is not LandPhase.FLARE, 3.0)
+    assert task.phase is LandPhase.GO_AROUND
+    rig.run_until(lambda: task.phase is not LandPhase.GO_AROUND, 3.0)
+    assert task.phase is LandPhase.FLARE
+    assert rig.ctx.phase is FlightPhase.LANDING
+    _, right = finish(rig, task)
+    assert abs(right) < 3.0
+    assert rig.touch_sink_m_s < 2.0
+
+
+def test_a_go_around_in_a_downdraught_keeps_climbing() -> None:
+    rig = flying((-3.0, 0.0))
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    rig.run_until(lambda: task.phase is LandPhase.FLARE, 60.0)
+    assert task.go_around(rig.ctx)
+    rig.vehicle.set_wind((-3.0, 0.0, 1.5))
+    rig.run(4.0)
+    assert task.phase is LandPhase.GO_AROUND
+
+
 def test_lifted_again_after_the_touch_it_flares_once_more() -> None:
     rig = flying((-4.0, 0.0))
     rig.rangefinder = True

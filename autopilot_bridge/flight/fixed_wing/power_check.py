@@ -1,0 +1,45 @@
+"""Whether the engine does its work: in a climb at full throttle the energy rises, or there is no power."""
+
+from typing import Final
+
+from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.navigation.earth import STANDARD_GRAVITY_M_S2
+
+_STRETCH_S: Final = 1.5  # an engine has spun up by then, and one gust doesn't outweigh it
+
+
+class PowerCheck:
+    """Looks at the energy of one stretch of the climb after the other.
+
+    Height and speed over ground count: a gust changes the airspeed at once, and these only by its force.
+    """
+
+    __slots__ = ("_left_s", "_start_m")
+
+    def __init__(self) -> None:
+        self._left_s = 0.0
+        self._start_m = 0.0
+
+    def begin(self, state: AircraftState) -> None:
+        """Full throttle from now on."""
+        self._left_s = _STRETCH_S
+        self._start_m = _energy_height_m(state)
+
+    def powerless(self, state: AircraftState, dt_s: float) -> bool:
+        """True at the end of a stretch over which the energy fell.
+
+        Args:
+            state: at the end of this update.
+            dt_s: since the update before.
+        """
+        self._left_s -= dt_s
+        if self._left_s > 0.0:
+            return False
+        fell = _energy_height_m(state) < self._start_m
+        self.begin(state)
+        return fell
+
+
+def _energy_height_m(state: AircraftState) -> float:
+    speed_squared = state.ground_speed_m_s**2 + state.vel_down_m_s**2
+    return speed_squared / (2.0 * STANDARD_GRAVITY_M_S2) - state.down_m
