@@ -1,12 +1,13 @@
 """How a vehicle is, and what keeps it from arming."""
 
 import asyncio
+from contextlib import aclosing
 from typing import Final
 
 from mavsdk.asyncio.plugins.component_metadata import ComponentMetadataAsync
 from mavsdk.asyncio.plugins.events import EventsAsync
 from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
-from mavsdk.plugins.events import EventsError
+from mavsdk.plugins.events import HealthAndArmingCheckReport
 from mavsdk.plugins.mission_raw import MissionRawError
 
 from autopilot_bridge.links import Address
@@ -24,7 +25,7 @@ from missions.vehicle_client.parameters import read_all
 _LISTEN_S: Final = 3.0
 _WAIT_S: Final = 5.0
 _TEXTS_S: Final = 1.5
-_REPORT_S: Final = 1.0
+_REPORT_S: Final = 2.0
 _REPORTS: Final = 5
 _LOSS_WARN, _LOSS_BAD = 0.02, 0.2
 _CLOCK_S: Final = 5.0
@@ -99,22 +100,28 @@ async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
     events = EventsAsync(client.system)
     await ComponentMetadataAsync(client.system).request_autopilot_component()  # gives events their names
-    for _ in range(_REPORTS):
-        await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
-        await asyncio.sleep(_REPORT_S)
-        try:
-            report = await asyncio.wait_for(events.get_health_and_arming_checks_report(), _REPORT_S)
-            break
-        except (EventsError, TimeoutError):
-            continue
-    else:
-        return []
+    telling = asyncio.create_task(_next_report(events))
+    try:
+        for _ in range(_REPORTS):
+            await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
+            if (await asyncio.wait({telling}, timeout=_REPORT_S))[0]:
+                break
+        else:
+            return []
+    finally:
+        telling.cancel()
     found = []
-    for entry in report.current_mode_intention.problems:
+    for entry in telling.result().current_mode_intention.problems:
         text = f"{entry.message} {entry.description}".strip()
         told = problem if entry.log_level <= 3 and not health & PREARM_BIT else warning
         found.append(told("arming check", text, f"look at {entry.health_component or 'it'}"))
     return found
+
+
+async def _next_report(events: EventsAsync) -> HealthAndArmingCheckReport:
+    """The next report as a whole: asked for its last one, MAVSDK may give one that is still coming in."""
+    async with aclosing(events.subscribe_health_and_arming_checks()) as reports:
+        return await anext(reports)
 
 
 def _clock(snapshot: Snapshot, unix_time_us: int, begun_s: float) -> Finding:
