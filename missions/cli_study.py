@@ -9,6 +9,7 @@ import click
 if TYPE_CHECKING:
     from missions.studies.lissajous_setting import Equations
 
+_FAILED: Final = 1
 _INTERRUPTED: Final = 130
 _BAR: Final = 40
 
@@ -107,7 +108,7 @@ def _lissajous_localization(
     bar: _Bar,
 ) -> int:
     from autopilot_bridge.clock.pacing import wall_time_s
-    from missions.run import versions, write_summary
+    from missions.run import versions, whole, write_summary
     from missions.studies.lissajous_localization import StudyRequest, compile_study, run_study, sample_run
     from missions.studies.lissajous_table import summary_of, table_of
 
@@ -123,20 +124,27 @@ def _lissajous_localization(
     bar.end()
     summary = summary_of(result, wall_time_s() - started_s)
     table = table_of(summary["cells"], equations)
-    with (folder / "table.txt").open("x", encoding="utf-8") as file:
-        file.write("\n".join(table) + "\n")
-    command = " ".join(["flightstack", *sys.argv[1:]])
-    write_summary(folder, summary | {"versions": versions(), "command": command})
-    if picture:
-        from missions.studies.lissajous_figures import draw_paths, draw_target
-
-        sample = sample_run(seed)
-        draw_paths(folder / "figure_6.png", sample)
-        draw_target(folder / "figure_7.png", sample)
     for line in table:
         click.echo(line)
+    try:
+        text = folder / "table.txt"
+        with whole(text), text.open("x", encoding="utf-8") as file:
+            file.write("\n".join(table) + "\n")
+        command = " ".join(["flightstack", *sys.argv[1:]])
+        write_summary(folder, summary | {"versions": versions(), "command": command})
+        if picture:
+            from missions.studies.lissajous_figures import draw_paths, draw_target
+
+            sample = sample_run(seed)
+            for name, draw in (("figure_6.png", draw_paths), ("figure_7.png", draw_target)):
+                with whole(folder / name):
+                    draw(folder / name, sample)
+    except OSError as error:
+        raise click.ClickException(
+            f"can't write all of {folder}: {error.strerror or error}; check the disk"
+        ) from error
     click.echo(f"run: {folder}")
     if not result.complete:
-        click.echo(f"flightstack: interrupted; what was done is in {folder}", err=True)
-        return _INTERRUPTED
+        click.echo(f"flightstack: {result.failure or 'interrupted'}; what was done is in {folder}", err=True)
+        return _FAILED if result.failure else _INTERRUPTED
     return 0

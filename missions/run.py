@@ -4,7 +4,8 @@ import json
 import math
 import platform
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -167,14 +168,21 @@ def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
     """Write `summary.json`, whole or not at all. Numbers that are not finite become null."""
     text = json.dumps(_finite(summary), indent=2, allow_nan=False) + "\n"
     path = folder / SUMMARY_NAME
-    with path.open("x", encoding="utf-8") as file:
-        try:
-            file.write(text)
-            file.flush()
-        except OSError:
-            path.unlink()
-            raise
+    with whole(path), path.open("x", encoding="utf-8") as file:
+        file.write(text)
     return path
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[None]:
+    """Leave no half of a new file that is written meanwhile, on a full disk."""
+    try:
+        yield
+    except FileExistsError:  # somebody else's, and whole
+        raise
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def _finite(value: Any) -> Any:

@@ -4,6 +4,7 @@ import contextlib
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterable
 from types import FrameType
 from typing import Final
@@ -28,14 +29,19 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
     sys.stderr.flush()
     # What asks us to end between the fork and the handler that passes it on must not leave the child alone.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKED_TO_END)
+    lifeline, held = os.pipe()
     child = os.fork()
     if not child:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        os.close(held)
+        threading.Thread(target=_end_with_parent, args=(lifeline,), daemon=True).start()
         code = command()
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)  # what the caller still has to do is done once, and not here
+    os.close(lifeline)
     status = _wait(child, mask)
+    os.close(held)
     if not os.WIFSIGNALED(status):
         return os.waitstatus_to_exitcode(status)
     number = os.WTERMSIG(status)
@@ -43,6 +49,12 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
         return _KILLED + number
     sys.stderr.write(f"flightstack: {crashed} ({signal.Signals(number).name})\n")
     return FAILED
+
+
+def _end_with_parent(lifeline: int) -> None:
+    """Nobody would hear what comes of it, or could end it, once the parent was killed."""
+    os.read(lifeline, 1)  # the end of it: nothing is ever written
+    os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _wait(child: int, mask: Iterable[int]) -> int:

@@ -16,7 +16,6 @@ from typing import Any, Final
 
 from autopilot_bridge.clock import TelemetryClock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
-from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import VEHICLE_FORMS, Link, ReplayLog, open_link, parse_address
 from autopilot_bridge.mavlink import MAVLinkMessage, SigningKey
 from autopilot_bridge.tlog import TlogWriter
@@ -55,7 +54,7 @@ class LiveRequest:
         component_id: own.
         publish: whether estimates are told on the link.
         request_rates: whether the autopilot is asked for the rates that the estimator needs.
-        silence_s: vehicle time without a word from the vehicle after which the run ends.
+        silence_s: wall time without a word from the vehicle after which the run ends.
         against: what the estimates are compared with afterwards: "autopilot", "truth" or "both".
         out: run folder; None: the next `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
@@ -109,12 +108,11 @@ class LiveProgress:
 class _Process:
     """One run on an open link."""
 
-    def __init__(self, request: LiveRequest, link: Link, fleet: Fleet, log: TlogWriter) -> None:
+    def __init__(self, request: LiveRequest, link: Link, fleet: Fleet, recorder: FlightRecorder) -> None:
         self._request = request
         self._link = link
         self._fleet = fleet
         self._clock = TelemetryClock()
-        recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
         self._recorder = recorder
         self._publisher = Publisher(self._say)
         self._tap = EstimatorTap(recorder, fleet, self._on_estimate if request.publish else None)
@@ -280,14 +278,17 @@ def estimate(
         folder = create_run_folder(request.out, fleet.name)
         begun_wall_s = wall_time_s()
         log = TlogWriter(folder / LOG_NAME)
-        with suppress(TlogError), log:  # what a full disk has refused is told as the reason
+        recorder = FlightRecorder(log, epoch_us=None, unix_time_us=unix_time_us)
+        try:
             loop = asyncio.new_event_loop()
-            process = _Process(request, link, fleet, log)
+            process = _Process(request, link, fleet, recorder)
             _end_on_signals(loop, process.stop)
             run(process.run(on_progress), loop)
+        finally:
+            recorder.close()
     finally:
         link.close()
-    reason = process.reason
+    reason = process.reason or recorder.failure  # a full disk may refuse no more than the last of the log
     interrupted = process.stopped and request.duration_s is not None
     return report(
         ReportRequest(

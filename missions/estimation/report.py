@@ -2,8 +2,8 @@
 
 import csv
 import enum
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +16,7 @@ from estimators.logs import Log, LogError, open_log
 from estimators.needs import Supply
 from estimators.replay import log_supplies, missing_of, vehicles_in
 from estimators.runner import EstimateTable, Runner
-from missions.run import SUMMARY_NAME, versions, write_summary
+from missions.run import SUMMARY_NAME, versions, whole, write_summary
 
 __all__ = [
     "COMPLETED",
@@ -161,7 +161,7 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
 def _rewrite_summary(folder: Path, summary: Mapping[str, Any]) -> None:
     """Say in the summary that something beside it is missing, if the disk takes as much."""
     path = folder / SUMMARY_NAME
-    with suppress(OSError), _whole(path):
+    with suppress(OSError), whole(path):
         path.unlink(missing_ok=True)
         write_summary(folder, summary)
 
@@ -295,27 +295,15 @@ def write_estimates(folder: Path, fleet: Fleet) -> list[Path]:
     return written
 
 
-@contextmanager
-def _whole(path: Path) -> Iterator[None]:
-    """Leave no half of a file on a full disk."""
-    try:
-        yield
-    except FileExistsError:  # somebody else's, and whole
-        raise
-    except OSError:
-        path.unlink(missing_ok=True)
-        raise
-
-
 def _write_table(folder: Path, name: str, table: EstimateTable) -> list[Path]:
     time_us, boot, subject, values = table.time_us, table.boot, table.subject, table.values
     columns = {"time_us": time_us, "boot": boot, "subject": subject}
     columns |= dict(zip(table.columns, values.T, strict=True))
     arrays = folder / f"{name}.npz"
-    with _whole(arrays), arrays.open("xb") as file:
+    with whole(arrays), arrays.open("xb") as file:
         np.savez_compressed(file, **columns)  # type: ignore[arg-type]  # names of columns, not options
     text = folder / f"{name}.csv"
-    with _whole(text), text.open("x", encoding="utf-8", newline="") as lines:
+    with whole(text), text.open("x", encoding="utf-8", newline="") as lines:
         writer = csv.writer(lines)
         writer.writerow(["time_s", "boot", "subject", *table.columns])
         for time, number, about, row in zip(

@@ -5,6 +5,7 @@ that of the runs changes any of them; all estimators of a run see the same fligh
 """
 
 from collections.abc import Callable, Sequence
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -65,12 +66,14 @@ class StudyResult:
     Attributes:
         request: as given.
         complete: whether all runs were done.
+        failure: why not, where nobody interrupted it; "".
         errors: by equations: (cells, runs, estimators), in the order of `CELLS` and of the block's columns;
             NaN: not done.
     """
 
     request: StudyRequest
     complete: bool
+    failure: str = ""
     errors: dict[Equations, Array] = field(repr=False)
 
 
@@ -90,7 +93,7 @@ def run_study(request: StudyRequest, on_progress: Callable[[float], None] | None
         request: what is asked for.
         on_progress: called with the share that is done.
 
-    An interruption (Ctrl-C) gives what is there, marked incomplete.
+    An interruption (Ctrl-C) or a worker that was killed gives what is there, marked incomplete.
     """
     chunks = [(first, min(first + _CHUNK, request.runs)) for first in range(0, request.runs, _CHUNK)]
     tasks = [
@@ -103,7 +106,7 @@ def run_study(request: StudyRequest, on_progress: Callable[[float], None] | None
         for equations in request.equations
     }
     done = 0
-    complete = False
+    complete, failure = False, ""
     try:
         for task, found in work_through(_work, tasks, request.workers):
             for equations, values in zip(request.equations, found, strict=True):
@@ -114,7 +117,9 @@ def run_study(request: StudyRequest, on_progress: Callable[[float], None] | None
         complete = True
     except KeyboardInterrupt:
         pass
-    return StudyResult(request=request, complete=complete, errors=errors)
+    except BrokenProcessPool:
+        failure = "a worker process was killed; is there memory for so many (--workers)?"
+    return StudyResult(request=request, complete=complete, failure=failure, errors=errors)
 
 
 def compile_study() -> None:

@@ -84,7 +84,8 @@ def summary_of(result: StudyResult, wall_time_s: float) -> dict[str, Any]:
     request = result.request
     return {
         "study": "lissajous-localization",
-        "outcome": "completed" if result.complete else "interrupted",
+        "outcome": "failed" if result.failure else "completed" if result.complete else "interrupted",
+        "reason": result.failure,
         "partial": not result.complete,
         "runs": request.runs,
         "seed": request.seed,

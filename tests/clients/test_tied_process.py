@@ -4,18 +4,17 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 from tests.clients.sitl_process import free_port
+from tests.clients.tied_process import alive, gone
 
 pytestmark = pytest.mark.skipif(
     not sys.platform.startswith("linux"), reason="children are tied to parents by prctl(2)"
 )
 
-DEADLINE_S = 30.0
 ROOT = Path(__file__).parents[2]
 SLEEPER = """
 import subprocess, time
@@ -32,15 +31,6 @@ with running_sitl("px4", [f"udpout:127.0.0.1:{sys.argv[1]}"]) as sitl:
 """
 
 
-def alive(pid: int) -> bool:
-    """A process is there, and no zombie that its new parent has not reaped yet."""
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return False
-    return status.rpartition(")")[2].split()[0] != "Z"
-
-
 def outlives(owner_program: str, ending: signal.Signals) -> bool:
     """Start a program that starts another, end the first by a signal: whether the other runs on."""
     command = [sys.executable, "-c", owner_program, str(free_port())]
@@ -51,10 +41,7 @@ def outlives(owner_program: str, ending: signal.Signals) -> bool:
         assert alive(child)
         os.kill(owner.pid, ending)  # neither runs a clean-up
         owner.wait()
-        deadline_s = time.monotonic() + DEADLINE_S
-        while alive(child) and time.monotonic() < deadline_s:
-            time.sleep(0.01)
-        return alive(child)
+        return not gone(child)
     finally:
         owner.kill()
         owner.communicate()

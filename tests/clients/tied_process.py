@@ -5,7 +5,9 @@ A fixture's clean-up does not run when pytest is killed, and a SITL left behind 
 
 import os
 import sys
+import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Final
 
 _TIE: Final = """
@@ -27,3 +29,22 @@ def tied(command: Sequence[str]) -> list[str]:
     if not sys.platform.startswith("linux"):
         return list(command)
     return [sys.executable, "-S", "-E", "-c", _TIE, str(os.getpid()), *command]
+
+
+def gone(pid: int, within_s: float = 60.0) -> bool:
+    """A process has ended, or does so in that time."""
+    deadline_s = time.monotonic() + within_s
+    while alive(pid):
+        if time.monotonic() > deadline_s:
+            return False
+        time.sleep(0.01)
+    return True
+
+
+def alive(pid: int) -> bool:
+    """A process is there, and no zombie that its new parent has not reaped yet."""
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text()
+    except OSError:
+        return False
+    return status.rpartition(")")[2].split()[0] != "Z"

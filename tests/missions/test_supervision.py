@@ -1,11 +1,12 @@
 """A command in a process of its own: how it ends is told, whatever ends it."""
 
-import os
 import signal
 import subprocess
 import sys
 
 import pytest
+
+from tests.clients.tied_process import gone
 
 SCRIPT = """
 import os, signal, sys, time
@@ -49,10 +50,12 @@ def test_how_it_ended_is_told(body: str, code: int, out: str, err: str) -> None:
 SLOW_TO_WATCH = "os.register_at_fork(after_in_parent=lambda: time.sleep(0.5))"
 """The child is well under way before the process that watches it does its next step."""
 SLOW_TO_NOTICE = """
-waitpid = os.waitpid
-os.waitpid = lambda *which: (waitpid(*which), print("ended", flush=True), time.sleep(0.5))[0]
+import threading
+waitpid, kill, told = os.waitpid, os.kill, threading.Event()
+os.kill = lambda *signal: (told.set(), kill(*signal))
+os.waitpid = lambda *which: (waitpid(*which), print("ended", flush=True), told.wait(60.0))[0]
 """
-"""What watches the child learns late that it has ended."""
+"""What watches the child learns that it has ended only after it was asked to end it."""
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -64,8 +67,7 @@ def test_who_asks_it_to_end_is_obeyed(number: signal.Signals, setup: str) -> Non
     process.send_signal(number)
     process.communicate(timeout=60.0)
     assert process.returncode != 0
-    with pytest.raises(ProcessLookupError):
-        os.kill(child, 0)
+    assert gone(child)
 
 
 def test_who_asks_it_to_end_when_it_has_ended_gets_its_exit_code() -> None:
@@ -75,3 +77,12 @@ def test_who_asks_it_to_end_when_it_has_ended_gets_its_exit_code() -> None:
     process.send_signal(signal.SIGTERM)
     assert process.communicate(timeout=60.0) == ("", "")
     assert process.returncode == 3
+
+
+def test_a_command_ends_with_the_process_that_watches_it() -> None:
+    process = start("print(os.getpid(), flush=True); time.sleep(600)")
+    assert process.stdout is not None
+    child = int(process.stdout.readline())
+    process.kill()
+    process.communicate(timeout=60.0)  # the child holds the other end, too
+    assert gone(child)

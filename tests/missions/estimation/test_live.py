@@ -13,8 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
 from autopilot_bridge.rotation import from_euler
+from autopilot_bridge.tlog import TlogWriter
 from estimators.logs import open_log
 from missions.cli import run_command_line
 from tests.clients.forked_process import flightstack
@@ -245,6 +247,24 @@ def test_it_can_be_silent(tmp_path, port, vehicle):
     there = vehicle(willing=False)
     assert estimate(tmp_path, port, "--duration", "6", "--no-request", "--no-publish") == 1
     assert {m.get_type() for m in there.heard} == {"HEARTBEAT"}
+
+
+class FullAtTheEnd(TlogWriter):
+    """A log on a disk that has no room for what is left to write when it is closed."""
+
+    def close(self):
+        self._buffer.clear()
+        super().close()
+        raise TlogError(f"can't write {self.path}: No space left on device; check the disk")
+
+
+def test_a_log_whose_last_part_is_refused_is_told(tmp_path, port, vehicle, capfd, monkeypatch):
+    monkeypatch.setattr("missions.estimation.live.TlogWriter", FullAtTheEnd)
+    vehicle()
+    assert estimate(tmp_path, port, "--duration", "3", "--no-picture") == 1
+    assert "No space left on device" in capfd.readouterr().err
+    summary = summary_of(tmp_path)
+    assert summary["outcome"] == "failed" and "No space left on device" in summary["reason"]
 
 
 def test_what_the_link_lacks_is_told_and_nothing_is_published(tmp_path, port, vehicle, capfd):

@@ -1,6 +1,7 @@
 """The localisation study: an independent reproduction of Table IV; the same for any number of workers."""
 
 import math
+from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from estimators.target_fusion.transform import INFORMATION, add_information, bel
 from missions.studies import lissajous_setting as setting
 from missions.studies.lissajous_localization import StudyRequest, run_study, sample_run, simulate
 from missions.studies.lissajous_setting import CELLS, PAPER, Equations, block_of
-from missions.studies.lissajous_table import cells_of, table_of
+from missions.studies.lissajous_table import cells_of, summary_of, table_of
 
 RUNS = 100
 
@@ -205,3 +206,17 @@ def test_the_sample_run_has_what_the_figures_show() -> None:
 def test_wrong_requests_are_named(wrong, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         StudyRequest(**wrong)
+
+
+def test_a_killed_worker_keeps_what_is_there(monkeypatch) -> None:
+    def two_then_none(work, tasks, _workers):
+        for task in tasks[:2]:
+            yield task, work(task)
+        raise BrokenProcessPool
+
+    monkeypatch.setattr("missions.studies.lissajous_localization.work_through", two_then_none)
+    result = run_study(StudyRequest(runs=2, workers=2, equations=(Equations.CORRECTED,)))
+    assert not result.complete and "--workers" in result.failure
+    assert sum(cell["runs"] == 2.0 for cell in cells_of(result)) == 2
+    summary = summary_of(result, 1.0)
+    assert summary["outcome"] == "failed" and summary["partial"] and summary["reason"] == result.failure
