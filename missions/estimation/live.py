@@ -182,8 +182,10 @@ class _Process:
                     if left_s <= 0.0:
                         return
                     wait_s = min(wait_s, left_s / clock.rate)
+                due_s = wall_time_s() + wait_s
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), wait_s)
+                heard_wall_s += max(0.0, wall_time_s() - due_s)  # who sleeps late hears nothing meanwhile
 
     def _vehicles(self) -> tuple[int, ...]:
         """System ids of the vehicles that count: the one asked for, the one it is for, or all of a team."""

@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as mavlink
 
+from tests.clients.mavutil_link import mavutil_link
 from tests.clients.runway import PlanItem
 
 WALL_DEADLINE_S: Final = 100.0
@@ -19,6 +19,8 @@ SETPOINTS_HZ: Final = 10.0
 """How often streamed setpoints are sent, in vehicle time."""
 POSITION_ONLY: Final = 0b110111111000
 """type_mask of position setpoints."""
+BUFFERED: Final = 50_000
+"""More messages than a socket's buffer holds: reading them ends, however fast new ones come."""
 
 Found = Callable[[Any], bool]
 Each = Callable[[], None] | None
@@ -40,7 +42,7 @@ class Client:
     def __init__(self, flavour: str, url: str, *, speedup: float, stream_hz: int = 10) -> None:
         self.flavour = flavour
         self.speedup = speedup
-        self.link: Any = mavutil.mavlink_connection(url, source_system=255, source_component=190)
+        self.link: Any = mavutil_link(url, source_system=255, source_component=190)
         self.texts: list[str] = []
         self._heartbeat_due_s = 0.0
         assert self.link.wait_heartbeat(timeout=WALL_DEADLINE_S) is not None
@@ -65,8 +67,7 @@ class Client:
             if message is None:
                 continue
             last[message.get_type()] = message
-            if message.get_type() == "STATUSTEXT":
-                self.texts.append(message.text.rstrip("\t"))  # a tab marks what an EVENT says too
+            self._note(message)
             if found(message):
                 return message
         seen = {
@@ -109,6 +110,7 @@ class Client:
     def result(self, command: int, *parameters: float, each: Each = None) -> int:
         """COMMAND_LONG, and the result that comes back; of PX4's two for a mode the later."""
         values = (*parameters, *(0.0,) * (7 - len(parameters)))
+        self._catch_up()
         self.link.mav.command_long_send(1, 1, command, 0, *values)
         return self._acknowledged(command, each)
 
@@ -119,10 +121,22 @@ class Client:
         frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT if relative else mavlink.MAV_FRAME_GLOBAL_INT
         values = (*parameters, *(0.0,) * (4 - len(parameters)))
         lat, lon, height_m = place
+        self._catch_up()
         self.link.mav.command_int_send(
             1, 1, frame, command, 0, 0, *values, round(lat * 1e7), round(lon * 1e7), height_m
         )
         return self._acknowledged(command)
+
+    def _catch_up(self) -> None:
+        """Read what has come while nobody read: the answer to what is asked now needs the room."""
+        for _ in range(BUFFERED):
+            if (message := self.link.recv_match()) is None:
+                return
+            self._note(message)
+
+    def _note(self, message: Any) -> None:
+        if message.get_type() == "STATUSTEXT":
+            self.texts.append(message.text.rstrip("\t"))  # a tab marks what an EVENT says too
 
     def _acknowledged(self, command: int, each: Each = None) -> int:
         ack = self.until(
@@ -159,6 +173,7 @@ class Client:
 
     def parameter(self, name: str) -> float:
         """Value of a parameter; PX4's integers come as bit patterns."""
+        self._catch_up()
         self.link.mav.param_request_read_send(1, 1, name.encode(), -1)
         value = self.next("PARAM_VALUE", lambda m: m.param_id == name)
         if self.flavour == "px4" and value.param_type == mavlink.MAV_PARAM_TYPE_INT32:

@@ -14,7 +14,7 @@ from tests.clients.forked_process import Program, flightstack
 
 START_DEADLINE_S = 240.0  # a first start compiles the flight code, on a machine that has other work too
 READY_LINE = "ready"
-_PORTS = range(11_000, 20_000)  # below every system's ephemeral range
+_PORTS = range(20_000, 24_900)  # not the firmwares', not MAVProxy's, below every system's ephemeral range
 _candidates = itertools.cycle((*_PORTS[os.getpid() * 37 % len(_PORTS) :], *_PORTS))
 """Every process of a test run begins elsewhere."""
 
@@ -67,7 +67,7 @@ def running_sitl(
     finally:
         process.send_signal(signal.SIGINT)
         try:
-            process.wait(10.0)
+            process.wait(60.0)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()

@@ -17,6 +17,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as mavlink
 
 from tests.clients.mavproxy_process import Mavproxy
+from tests.clients.mavutil_link import mavutil_link
 from tests.clients.sitl_process import free_port, running_sitl
 
 PASSPHRASE = "correct-horse"
@@ -42,7 +43,7 @@ class Station:
     """A ground station on mavutil."""
 
     def __init__(self, url: str, key: bytes | None = None, system_id: int = 255) -> None:
-        self.link: Any = mavutil.mavlink_connection(url, source_system=system_id, source_component=190)
+        self.link: Any = mavutil_link(url, source_system=system_id, source_component=190)
         if key is not None:
             self.link.setup_signing(key, sign_outgoing=True)
         self.sent: list[bytes] = []

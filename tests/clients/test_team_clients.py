@@ -14,6 +14,7 @@ from autopilot_bridge.links import UdpPeer
 from autopilot_bridge.sitl import Port, Sitl, SitlConfiguration, SitlServer, team
 from tests.clients.mavproxy_process import Mavproxy
 from tests.clients.mavsdk_waiting import first
+from tests.clients.mavutil_link import mavutil_link
 from tests.clients.sitl_process import free_port, running_sitl
 
 mavlink = mavutil.mavlink
@@ -26,7 +27,7 @@ class GroundStation:
     """mavutil with what a ground station of several vehicles does: heartbeats, and one target at a time."""
 
     def __init__(self, url: str) -> None:
-        self.link: Any = mavutil.mavlink_connection(url, source_system=255, source_component=190)
+        self.link: Any = mavutil_link(url, source_system=255, source_component=190)
         self._next_s = 0.0
 
     def until(self, what: str, found: Any) -> None:

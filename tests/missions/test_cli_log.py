@@ -11,6 +11,7 @@ from autopilot_bridge.mavlink import FrameParser
 from autopilot_bridge.tlog import TlogReader
 from estimators.logs import open_log
 from missions.cli import run_command_line
+from tests.clients.sitl_process import free_port
 from tests.estimators.logs.flight_log import RATE_HZ, SECONDS, write
 
 COUNT = SECONDS * RATE_HZ
@@ -106,14 +107,12 @@ def test_play_to_a_link(log, flight):
 
 def test_play_as_a_server_waits_for_a_client_and_loses_nothing(log, flight):
     """As fast as the client reads, though its window is small and it reads in bits."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port(socket.SOCK_STREAM)
     parser, heard = FrameParser(), []
 
     def listen():
         deadline = threading.Event()
-        for _ in range(500):
+        for _ in range(5000):
             with contextlib.suppress(ConnectionRefusedError):
                 client = socket.create_connection(("127.0.0.1", port))
                 break

@@ -17,6 +17,7 @@ from missions.options import FlightOptions, Via
 from missions.peers import MAX_COMPONENTS
 from missions.session import RunRequest, fly
 from missions.vehicle import Vehicle
+from tests.clients.sitl_process import free_port
 
 
 class Recording:
@@ -163,12 +164,6 @@ def test_sending_after_the_end_says_so():
     on_memory(script)
 
 
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 class Elsewhere(threading.Thread):
     """A scripted autopilot on a real link, some tens of times faster than real time.
 
@@ -195,7 +190,7 @@ class Elsewhere(threading.Thread):
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("kind", ["udp", "tcp"])
 def test_the_same_mission_flies_a_vehicle_elsewhere(make_sitl, tmp_path, kind, flavour):
-    port = free_port()
+    port = free_port(socket.SOCK_DGRAM if kind == "udp" else socket.SOCK_STREAM)
     theirs, ours = {
         "udp": (f"udpout:127.0.0.1:{port}", f"udpin:127.0.0.1:{port}"),
         "tcp": (f"tcpin:127.0.0.1:{port}", f"tcp:127.0.0.1:{port}"),

@@ -90,7 +90,7 @@ def test_a_second_ctrl_c_ends_at_once(tmp_path: Path) -> None:
     """The vehicle does not answer any more: a second Ctrl-C does not wait for it."""
     port = free_port()
     # slow enough that the log is flushed (once a second) before the attempts to make it safe end
-    with running_sitl("px4", [f"udpin:127.0.0.1:{port}"], speedup=6.0) as sitl:
+    with running_sitl("px4", [f"udpin:127.0.0.1:{port}"], speedup=2.0) as sitl:
         with started(tmp_path / "run", *LONG, "--connect", f"udpout:127.0.0.1:{port}") as run:
             fly_into(run, "mission")
             sitl.process.send_signal(signal.SIGSTOP)
