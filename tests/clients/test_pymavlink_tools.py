@@ -93,7 +93,7 @@ def test_mavparm(script: Client, tmp_path: Path) -> None:
 
 
 def _upload(script: Client, items: list[Any], kind: int) -> None:
-    """What every script does with a loader's items; anew where the vehicle gave up waiting for a busy machine."""
+    """What every script does with a loader's items; anew where the vehicle gave up on a busy machine."""
     for _ in range(UPLOADS):
         message = _uploaded(script, items, kind)
         if message.type == mavlink.MAV_MISSION_ACCEPTED:
