@@ -381,3 +381,20 @@ def test_a_killed_process_leaves_a_log_that_can_be_replayed(tmp_path, port, vehi
     assert run_command_line(["replay", str(log), "--estimator", LEVEL, "--out", str(again)]) == 0
     assert json.loads((again / "summary.json").read_text())["samples"] > 100
     assert open_log(log).source.bytes_by_kind  # and not a byte of it is torn
+
+
+def test_a_process_that_stood_still_counts_that_as_nobodys_silence(tmp_path, port, capfd, monkeypatch):
+    now_s, waits = 100.0, []
+
+    async def wait_for(awaited, timeout):
+        nonlocal now_s
+        awaited.close()
+        waits.append(timeout)
+        now_s += timeout + (3.0 if len(waits) == 2 else 0.0)  # the machine is paused once
+        raise TimeoutError
+
+    monkeypatch.setattr("missions.estimation.live.wall_time_s", lambda: now_s)
+    monkeypatch.setattr("missions.estimation.live.asyncio.wait_for", wait_for)
+    assert estimate(tmp_path, port, "--silence", "1") == 1
+    assert "no vehicle was heard" in capfd.readouterr().err
+    assert sum(waits) == pytest.approx(1.25)
