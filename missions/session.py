@@ -274,6 +274,9 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
 
         looks = [await look(vehicle, mission, own) for vehicle, own in zip(vehicles, options, strict=True)]
         await confirmed(looks, request.confirm)
+    if not mission.commands:
+        await together([mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)])
+        return
     if not mission.together:
         await together(
             [

@@ -13,6 +13,7 @@ from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition, dialect
 from missions.connection import Connection
+from missions.opening import Stage
 from missions.vehicle import Vehicle
 
 STEP_US = 20_000
@@ -432,6 +433,28 @@ class FakeSitl:
 def make_sitl():
     """Factory of fake SITLs."""
     return FakeSitl
+
+
+@pytest.fixture
+def elsewhere(monkeypatch):
+    """What `--connect` leads to: a scripted autopilot; its time is a virtual loop's."""
+    sitl = FakeSitl(truth=False)
+
+    def stage(_request):
+        return Stage(
+            loop=sitl.loop,
+            links=list(sitl.links),
+            clocks=[LoopClock() for _ in sitl.links],
+            epoch_us=None,
+            time_us=lambda: sitl.time_us,
+            on_truth=sitl.on_truth,
+            parameters=None,
+            home=None,
+            close=sitl.close,
+        )
+
+    monkeypatch.setattr("missions.session.open_vehicles", stage)
+    return sitl.autopilots[0]
 
 
 @pytest.fixture
