@@ -5,7 +5,7 @@ This is the shell around the missions: it opens things, starts the event loop, a
 
 import asyncio
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from contextlib import AsyncExitStack, suppress
+from contextlib import AsyncExitStack
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from autopilot_bridge.clock import Clock, run, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
-from autopilot_bridge.tlog import TlogWriter
+from missions.claimed_folder import claim_folder
 from missions.connection import Connection, Recorder
 from missions.errors import MissionError, PlanError
 from missions.estimation.in_flight import estimators_of
@@ -26,10 +26,7 @@ from missions.options import MissionOptions
 from missions.records import FlightRecorder, FlightRecords
 from missions.request import RunRequest
 from missions.run import (
-    LOG_NAME,
     PICTURE_NAME,
-    RUNS,
-    create_run_folder,
     how_left,
     team_figures,
     vehicle_summary,
@@ -118,24 +115,23 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
             "give --connect once for each vehicle"
         )
     estimators = estimators_of(request, mission.estimator_settings(request.options))
-    made = _missing_folders(request.out or RUNS)
-    folder = create_run_folder(request.out, mission.name)
+    claimed = claim_folder(request.out, mission.name)
+    folder = claimed.path
     stage = None
     try:
-        stage = open_vehicles(request) if request.connect else open_world(mission, request, folder)
+        stage = open_vehicles(request) if request.connect else open_world(mission, request, claimed)
         request.on_open()
         check_stage(mission, request, stage)
     except BaseException:
         if stage is not None:
             stage.close()
             stage.loop.close()
-        _forget(folder, made if request.out is not None else [folder, *made])
+        claimed.give_back()
         raise
     flight = Flight()
     outcome, reason = COMPLETED, ""
     try:
-        log = TlogWriter(folder / LOG_NAME)
-        recorder = FlightRecorder(log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
+        recorder = FlightRecorder(claimed.log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
         flight.recorder = recorder
         heard_by = recorder if estimators is None else estimators.around(recorder)
         stage.on_truth(heard_by.record_truth)
@@ -173,24 +169,6 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
         missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
         outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
     return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
-
-
-def _forget(folder: Path, made: list[Path]) -> None:
-    """Take back a run folder in which nothing was flown, with what the world has published there."""
-    for file in folder.glob("*"):
-        with suppress(OSError):
-            file.unlink()
-    for empty in made:
-        with suppress(OSError):
-            empty.rmdir()
-
-
-def _missing_folders(folder: Path) -> list[Path]:
-    """Those of a folder and the folders it is in that are not there yet, innermost first."""
-    try:
-        return [path for path in (folder, *folder.parents) if not path.exists()]
-    except OSError:  # not to be looked at: making it will say why
-        return []
 
 
 async def _fly(
