@@ -275,13 +275,9 @@ def _models(
 
 def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
     """Write the mission's file instead of flying it."""
-    from missions.errors import MissionError
     from missions.plan_files.export import export_plan
 
-    try:
-        count = export_plan(mission, request, path)
-    except MissionError as error:
-        raise click.ClickException(str(error)) from error
+    count = export_plan(mission, request, path)
     click.echo(f"{count} items: {path}")
     return 0
 
@@ -321,6 +317,7 @@ def _fly(given: dict[str, Any]) -> int:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
+    from missions.errors import MissionError
     from missions.request import REGAIN_S
     from missions.session import RunRequest as Request
     from missions.session import fly as fly_mission
@@ -369,6 +366,8 @@ def _fly(given: dict[str, Any]) -> int:
         result = fly_mission(mission, request, line if terminal else None)
     except (AddressError, BridgeError) as error:
         raise click.UsageError(str(error)) from error
+    except MissionError as error:
+        raise click.ClickException(str(error)) from error
     finally:
         line.end()
     return tell(result, mission)

@@ -49,6 +49,7 @@ def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder
 
     Raises:
         PlanError: a value that the message names, with what is accepted.
+        MissionError: the disk does not take what the world publishes.
     """
     from missions.embedded import EmbeddedConfiguration, open_embedded
 

@@ -106,6 +106,7 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
 
     Raises:
         PlanError: what was asked for can't be flown; nothing was started.
+        MissionError: the disk does not take what an embedded world publishes; nothing was started.
         BridgeError: a link can't be opened.
     """
     check_request(mission, request)
