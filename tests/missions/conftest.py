@@ -4,7 +4,10 @@ points that matter to a mission. It shares no code with the emulated autopilot.
 
 import asyncio
 import math
+import resource
 import struct
+import sys
+from contextlib import contextmanager
 
 import pytest
 
@@ -433,6 +436,23 @@ class FakeSitl:
 def make_sitl():
     """Factory of fake SITLs."""
     return FakeSitl
+
+
+@pytest.fixture
+def little_room(monkeypatch):
+    """A context in which no file of this process may get longer than so many bytes, as on a full disk."""
+
+    @contextmanager
+    def room(most):
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python puts up with half a file of its own
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+    return room
 
 
 @pytest.fixture

@@ -6,8 +6,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
+from autopilot_bridge.geodesy import GeodeticPosition
 from missions import cli
-from missions.plan_files.files import read_mission_file
+from missions.errors import PlanError
+from missions.kind import VehicleKind
+from missions.plan_files.files import read_mission_file, write_mission_file
+from tests.missions.plan_files.plans import write
 
 CONNECT = ("--connect", "udpin:127.0.0.1:1")
 ASKING = {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
@@ -71,3 +75,19 @@ def test_parameters_are_not_set_for_a_file(
     assert "leave --params out" in said and len(said.splitlines()) == 1
     assert state(flying) == before
     assert not (tmp_path / "x.plan").exists()
+
+
+@pytest.mark.parametrize("name", ["x.plan", "x.waypoints"])
+def test_half_a_file_does_not_stay_on_a_full_disk(name: str, tmp_path: Path, little_room: Any) -> None:
+    items = read_mission_file(write(tmp_path)).items
+    path = tmp_path / "there" / name
+    path.parent.mkdir()
+    home = GeodeticPosition(lat_deg=47.0, lon_deg=8.0, alt_m=400.0)
+    about: dict[str, Any] = {"firmware": "px4", "kind": VehicleKind.MULTICOPTER, "speed_m_s": 5.0}
+    with little_room(100), pytest.raises(PlanError, match=f"can't write .*{name}: File too large"):
+        write_mission_file(path, items, home, **about)
+    assert list(path.parent.iterdir()) == []
+    write_mission_file(path, items, home, **about)
+    assert len(read_mission_file(path).items) == len(items)
+    with pytest.raises(PlanError, match="is there already"):
+        write_mission_file(path, items, home, **about)
