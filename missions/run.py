@@ -4,7 +4,8 @@ import json
 import math
 import platform
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -175,6 +176,30 @@ def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
             path.unlink()
             raise
     return path
+
+
+def replace_summary(folder: Path, summary: Mapping[str, Any]) -> None:
+    """Put another summary in the place of this run's own, if the disk takes it; else there is none."""
+    path = folder / SUMMARY_NAME
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+        write_summary(folder, summary)
+
+
+def write_picture(folder: Path, draw: Callable[[Path], None]) -> None:
+    """Draw `track.png`, whole or not at all.
+
+    Raises:
+        OSError: it is there already, or the disk does not take it.
+    """
+    path = folder / PICTURE_NAME
+    try:
+        draw(path)
+    except FileExistsError:  # somebody else's, and whole
+        raise
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def _finite(value: Any) -> Any:

@@ -26,11 +26,12 @@ from missions.options import MissionOptions
 from missions.records import FlightRecorder, FlightRecords
 from missions.request import RunRequest
 from missions.run import (
-    PICTURE_NAME,
     how_left,
+    replace_summary,
     team_figures,
     vehicle_summary,
     versions,
+    write_picture,
     write_summary,
 )
 from missions.signing import client_signing, key_missing
@@ -162,13 +163,19 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
     if estimators is not None:
         summary["estimator"] = estimators.report(folder, picture=request.picture, wall_time_s=wall_s).summary
+    written = False
     try:
         write_summary(folder, summary)
+        written = True
         if request.picture and debriefing.flights:
-            mission.draw(folder / PICTURE_NAME, _title(mission, debriefing, summary), debriefing)
+            title = _title(mission, debriefing, summary)
+            write_picture(folder, lambda path: mission.draw(path, title, debriefing))
     except OSError as error:
         missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
         outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
+        summary |= {"outcome": outcome, "reason": reason}
+        if written:
+            replace_summary(folder, summary)
     return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
 
 

@@ -318,6 +318,21 @@ def test_a_summary_that_finds_no_room_is_told(embedded, tmp_path, monkeypatch):
     assert "No space left on device; check the disk" in result.reason
 
 
+def test_a_picture_that_finds_no_room_is_told_in_the_summary_too(embedded, tmp_path, monkeypatch):
+    def full(_mission, path, _title, _debriefing):
+        path.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Mission, "draw", full)
+    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    assert result.outcome == "failed"
+    assert "No space left on device; check the disk" in result.reason
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["outcome"], summary["reason"]) == (result.outcome, result.reason)
+    assert summary == result.summary
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {"flight.tlog", "summary.json"}
+
+
 # command line
 
 
