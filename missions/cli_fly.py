@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli_confirm import confirmation
-from missions.cli_fly_report import ProgressLine, tell
+from missions.cli_fly_report import KILLED, ProgressLine, tell
 from missions.cli_signing import key_from, key_option, warn_if_open
 from missions.cli_types import SECONDS, SPEEDUP
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
@@ -165,7 +165,10 @@ def _owners(option_name: str) -> list[str]:
 )
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
 @click.option(
-    "--on-failure", type=click.Choice(["return", "land", "hold"]), default="return", help="Or on Ctrl-C."
+    "--on-failure",
+    type=click.Choice(["return", "land", "hold"]),
+    default="return",
+    help="Or on Ctrl-C, SIGTERM, SIGHUP.",
 )
 @click.option(
     "--yes", is_flag=True, help="With a real vehicle: fly without asking, when nothing is found against it."
@@ -317,6 +320,7 @@ def _fly(given: dict[str, Any]) -> int:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
+    from missions.ending import signal_of
     from missions.errors import MissionError
     from missions.request import REGAIN_S
     from missions.session import RunRequest as Request
@@ -368,6 +372,9 @@ def _fly(given: dict[str, Any]) -> int:
         raise click.UsageError(str(error)) from error
     except MissionError as error:
         raise click.ClickException(str(error)) from error
+    except KeyboardInterrupt as interrupt:
+        click.echo("interrupted", err=True)
+        return KILLED + signal_of(interrupt)
     finally:
         line.end()
     return tell(result, mission)

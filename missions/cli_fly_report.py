@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -10,7 +10,9 @@ if TYPE_CHECKING:
     from missions.mission import Mission
     from missions.session import Flight, RunResult
 
-_FAILED, _INTERRUPTED = 1, 130
+_FAILED: Final = 1
+KILLED: Final = 128
+"""Plus the signal's number: how shells tell of a command that was ended by one."""
 
 
 class ProgressLine:
@@ -56,7 +58,7 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
     summary = result.summary
     if result.outcome == "interrupted":
         click.echo(f"flightstack: {result.reason}; the log is in {result.folder}", err=True)
-        return _INTERRUPTED
+        return KILLED + result.signal
     if result.outcome == "failed":
         _warn(summary)
         click.echo(f"flightstack: mission {summary['mission']} failed: {result.reason}", err=True)

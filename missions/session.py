@@ -11,11 +11,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.clock import Clock, run, unix_time_us
+from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
 from missions.claimed_folder import claim_folder
 from missions.connection import Connection, Recorder
+from missions.ending import EndingSignals, signal_of
 from missions.errors import MissionError, PlanError
 from missions.estimation.in_flight import estimators_of
 from missions.limits_before_flight import adapted, check_request, check_stage, vehicle_options
@@ -58,12 +59,14 @@ class RunResult:
         reason: why it failed; "" otherwise.
         folder: the run folder.
         summary: what `summary.json` holds.
+        signal: the signal that interrupted it; 0: none did.
     """
 
     outcome: str
     reason: str
     folder: Path
     summary: Mapping[str, Any]
+    signal: int = 0
 
 
 class Flight:
@@ -102,14 +105,22 @@ ProgressListener = Callable[[Flight], None]
 def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
     """Fly a mission and write its run folder. Blocks until all is done.
 
-    A mission that fails or is interrupted (Ctrl-C) leaves its vehicles safe, and still gives a result and a
-    whole log.
+    A mission that fails or is interrupted (Ctrl-C; in the main thread also SIGTERM and SIGHUP) leaves its
+    vehicles safe, and still gives a result and a whole log.
 
     Raises:
+        KeyboardInterrupt: it was interrupted before anything was begun, or while its results were written.
         PlanError: what was asked for can't be flown; nothing was started.
         MissionError: the disk does not take what an embedded world publishes; nothing was started.
         BridgeError: a link can't be opened.
     """
+    with EndingSignals() as ending:
+        return _fly_interruptible(mission, request, on_progress, ending)
+
+
+def _fly_interruptible(
+    mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None, ending: EndingSignals
+) -> RunResult:
     check_request(mission, request)
     if request.connect and len(request.connect) != request.options.vehicles:
         raise PlanError(
@@ -131,16 +142,16 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
         claimed.give_back()
         raise
     flight = Flight()
-    outcome, reason = COMPLETED, ""
+    outcome, reason, by_signal = COMPLETED, "", 0
     try:
         recorder = FlightRecorder(claimed.log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
         flight.recorder = recorder
         heard_by = recorder if estimators is None else estimators.around(recorder)
         stage.on_truth(heard_by.record_truth)
         try:
-            run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
-        except KeyboardInterrupt:
-            outcome, reason = INTERRUPTED, INTERRUPTED
+            ending.run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
+        except KeyboardInterrupt as interrupt:
+            outcome, reason, by_signal = INTERRUPTED, INTERRUPTED, signal_of(interrupt)
         except (MissionError, PlanError, BridgeError) as error:
             notes = (*getattr(error, "__notes__", ()), *key_missing(request, flight.vehicles))
             outcome, reason = FAILED, "; ".join((str(error), *notes))
@@ -176,7 +187,7 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
         summary |= {"outcome": outcome, "reason": reason}
         if written:
             replace_summary(folder, summary)
-    return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
+    return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary, signal=by_signal)
 
 
 async def _fly(

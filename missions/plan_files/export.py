@@ -5,6 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from missions.ending import AskedToEnd
 from missions.errors import MissionError, PlanError
 from missions.mission import Mission
 from missions.options import MissionOptions
@@ -27,8 +28,9 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
         PlanError: the mission uploads none, can't be flown, or the file can't be written; or parameters are
             to be set on a vehicle elsewhere.
         MissionError: the vehicle is not heard, or not ready.
+        KeyboardInterrupt: it was interrupted.
     """
-    from missions.session import COMPLETED, fly
+    from missions.session import COMPLETED, INTERRUPTED, fly
 
     check_suffix(path)
     if request.options.vehicles > 1:
@@ -51,6 +53,8 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
             max_error_m=None,
         )
         result = fly(exported, asked)
+    if result.outcome == INTERRUPTED:
+        raise AskedToEnd(result.signal)
     if result.outcome != COMPLETED:
         raise MissionError(result.reason)
     return exported.count
