@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli_confirm import confirmation
-from missions.cli_fly_report import KILLED, ProgressLine, tell
+from missions.cli_fly_report import KILLED, ProgressLine, leave_closed_terminal, tell
 from missions.cli_signing import key_from, key_option, warn_if_open
 from missions.cli_types import SECONDS, SPEEDUP
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
@@ -215,6 +215,7 @@ def fly(**given: Any) -> int:
     `async def fly(vehicle, options)`.
     The run folder gets flight.tlog, summary.json and track.png.
     """
+    from missions.ending import signal_of
     from missions.errors import PlanError
 
     _refuse_options_of_the_other(click.get_current_context(), connected=bool(given["connect"]))
@@ -222,6 +223,9 @@ def fly(**given: Any) -> int:
         return _fly(given)
     except PlanError as error:
         raise click.UsageError(str(error)) from error
+    except KeyboardInterrupt as interrupt:
+        click.echo("interrupted", err=True)
+        return KILLED + signal_of(interrupt)
 
 
 def _chosen(context: click.Context) -> frozenset[str]:
@@ -320,7 +324,6 @@ def _fly(given: dict[str, Any]) -> int:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
-    from missions.ending import signal_of
     from missions.errors import MissionError
     from missions.request import REGAIN_S
     from missions.session import RunRequest as Request
@@ -372,9 +375,7 @@ def _fly(given: dict[str, Any]) -> int:
         raise click.UsageError(str(error)) from error
     except MissionError as error:
         raise click.ClickException(str(error)) from error
-    except KeyboardInterrupt as interrupt:
-        click.echo("interrupted", err=True)
-        return KILLED + signal_of(interrupt)
     finally:
+        leave_closed_terminal()
         line.end()
     return tell(result, mission)

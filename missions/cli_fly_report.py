@@ -1,6 +1,7 @@
 """What `flightstack fly` shows: a line of progress on a terminal, and at the end how the run went."""
 
 import math
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,6 +14,17 @@ if TYPE_CHECKING:
 _FAILED: Final = 1
 KILLED: Final = 128
 """Plus the signal's number: how shells tell of a command that was ended by one."""
+
+
+def leave_closed_terminal() -> None:
+    """Where the terminal is gone (SIGHUP), what is left to say is said to nobody, and fails no more."""
+    for descriptor in (1, 2):
+        try:
+            os.write(descriptor, b"")
+        except OSError:
+            nobody = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nobody, descriptor)
+            os.close(nobody)
 
 
 class ProgressLine:

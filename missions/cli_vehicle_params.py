@@ -127,7 +127,7 @@ def load(file: Path, yes: bool, **given: Any) -> int:
             if not given["as_json"]:
                 _tell_differences(settable)
             noun = "parameter" if len(settable) == 1 else "parameters"
-            confirm(f"set {len(settable)} {noun} of vehicle {client.system_id}", yes)
+            await confirm(f"set {len(settable)} {noun} of vehicle {client.system_id}", yes)
         return changes, await client_parameters.load(client, settable, lambda line: None)
 
     changes, refused = with_client(given, work)

@@ -1,13 +1,17 @@
 """`flightstack vehicle`: what it does beside talking to a vehicle."""
 
+import asyncio
+import sys
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
 from missions import cli, cli_vehicle_params
+from missions.cli_vehicle_link import confirm
 
 
 def test_half_a_parameter_file_does_not_stay_on_a_full_disk(
@@ -27,3 +31,10 @@ def test_half_a_parameter_file_does_not_stay_on_a_full_disk(
     assert path.read_text() == text
     assert cli.run_command_line(words) == 2
     assert "nothing is overwritten" in capsys.readouterr().err
+
+
+def test_where_the_input_is_closed_nobody_can_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", None)
+    with pytest.raises(click.UsageError, match="delete all: not confirmed; give --yes"):
+        asyncio.run(confirm("delete all", False))
+    asyncio.run(confirm("delete all", True))
