@@ -4,6 +4,7 @@ import fcntl
 import os
 import pty
 import select
+import signal
 import subprocess
 import sys
 import termios
@@ -35,7 +36,7 @@ class Terminal:
                 stdout=line,
                 stderr=line,
                 start_new_session=True,
-                preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+                preexec_fn=_take_terminal,
             )
         finally:
             os.close(line)
@@ -78,6 +79,13 @@ class Terminal:
                 if not data:
                     break
         return len(self.seen) > before
+
+
+def _take_terminal() -> None:
+    """In the program's process: it is told when its terminal is closed, also where the tests run by nohup."""
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager

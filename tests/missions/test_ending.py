@@ -4,7 +4,7 @@ import json
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -38,14 +38,15 @@ def flown(folder: Path, on_progress: Callable[[Flight], None]) -> RunResult:
 
 
 @pytest.fixture(autouse=True)
-def handlers() -> Any:
-    """Whatever happens, they are as before."""
-    before = {number: signal.getsignal(number) for number in (*ENDING, signal.SIGINT)}
-    yield before
-    after = {number: signal.getsignal(number) for number in before}
+def handlers() -> Iterator[None]:
+    """As of a program that was started at a terminal, however the tests were started."""
+    usual = {number: signal.SIG_DFL for number in ENDING} | {signal.SIGINT: signal.default_int_handler}
+    before = {number: signal.signal(number, handler) for number, handler in usual.items()}
+    yield
+    after = {number: signal.getsignal(number) for number in usual}
     for number, handler in before.items():
         signal.signal(number, handler)
-    assert after == before
+    assert after == usual
 
 
 @pytest.mark.parametrize("number", [*ENDING, signal.SIGINT])
