@@ -1,10 +1,11 @@
 """The question before a flight with a real vehicle."""
 
-import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
+
+from missions.cli_question import ask, somebody_is_there
 
 if TYPE_CHECKING:
     from missions.preflight.before_flight import Confirm, Look
@@ -32,13 +33,13 @@ def confirmation(connections: Sequence[str], *, yes: bool, check: bool) -> "Conf
     hardware = is_hardware(connections)
     if not (hardware or check):
         return None
-    if not yes and not sys.stdin.isatty():
+    if not yes and not somebody_is_there():
         raise click.UsageError(
             f"{', '.join(connections)}: may be a real vehicle, and nobody can be asked; give --yes "
             "to fly it when nothing is found against it"
         )
 
-    def confirm(looks: "Sequence[Look]") -> bool:
+    async def confirm(looks: "Sequence[Look]") -> bool:
         for look in looks:
             click.echo(f"vehicle {look.system_id}:", err=True)
             for finding in look.findings:
@@ -48,10 +49,6 @@ def confirmation(connections: Sequence[str], *, yes: bool, check: bool) -> "Conf
             return not problems
         word = "fly anyway" if problems else "yes"
         question = f"{problems} problems. " if problems else ""
-        try:
-            answer = click.prompt(f"{question}Fly? Type {word}", default="", show_default=False, err=True)
-        except click.Abort:
-            return False
-        return bool(answer.strip().lower() == word)
+        return (await ask(f"{question}Fly? Type {word}")).lower() == word
 
     return confirm

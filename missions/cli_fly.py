@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from missions.cli_confirm import confirmation
-from missions.cli_fly_report import ProgressLine, tell
+from missions.cli_fly_report import KILLED, ProgressLine, leave_closed_terminal, tell
 from missions.cli_signing import key_from, key_option, warn_if_open
 from missions.cli_types import SECONDS, SPEEDUP
 from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
@@ -165,7 +165,10 @@ def _owners(option_name: str) -> list[str]:
 )
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
 @click.option(
-    "--on-failure", type=click.Choice(["return", "land", "hold"]), default="return", help="Or on Ctrl-C."
+    "--on-failure",
+    type=click.Choice(["return", "land", "hold"]),
+    default="return",
+    help="Or on Ctrl-C, SIGTERM, SIGHUP.",
 )
 @click.option(
     "--yes", is_flag=True, help="With a real vehicle: fly without asking, when nothing is found against it."
@@ -212,6 +215,7 @@ def fly(**given: Any) -> int:
     `async def fly(vehicle, options)`.
     The run folder gets flight.tlog, summary.json and track.png.
     """
+    from missions.ending import signal_of
     from missions.errors import PlanError
 
     _refuse_options_of_the_other(click.get_current_context(), connected=bool(given["connect"]))
@@ -219,6 +223,9 @@ def fly(**given: Any) -> int:
         return _fly(given)
     except PlanError as error:
         raise click.UsageError(str(error)) from error
+    except KeyboardInterrupt as interrupt:
+        click.echo("interrupted", err=True)
+        return KILLED + signal_of(interrupt)
 
 
 def _chosen(context: click.Context) -> frozenset[str]:
@@ -275,13 +282,9 @@ def _models(
 
 def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
     """Write the mission's file instead of flying it."""
-    from missions.errors import MissionError
     from missions.plan_files.export import export_plan
 
-    try:
-        count = export_plan(mission, request, path)
-    except MissionError as error:
-        raise click.ClickException(str(error)) from error
+    count = export_plan(mission, request, path)
     click.echo(f"{count} items: {path}")
     return 0
 
@@ -321,6 +324,7 @@ def _fly(given: dict[str, Any]) -> int:
         click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
     from autopilot_bridge.errors import AddressError, BridgeError
     from missions.connection import GROUND_STATION, ONBOARD_COMPUTER
+    from missions.errors import MissionError
     from missions.request import REGAIN_S
     from missions.session import RunRequest as Request
     from missions.session import fly as fly_mission
@@ -369,6 +373,9 @@ def _fly(given: dict[str, Any]) -> int:
         result = fly_mission(mission, request, line if terminal else None)
     except (AddressError, BridgeError) as error:
         raise click.UsageError(str(error)) from error
+    except MissionError as error:
+        raise click.ClickException(str(error)) from error
     finally:
+        leave_closed_terminal()
         line.end()
     return tell(result, mission)

@@ -1,8 +1,9 @@
 """What `flightstack fly` shows: a line of progress on a terminal, and at the end how the run went."""
 
 import math
+import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -10,7 +11,20 @@ if TYPE_CHECKING:
     from missions.mission import Mission
     from missions.session import Flight, RunResult
 
-_FAILED, _INTERRUPTED = 1, 130
+_FAILED: Final = 1
+KILLED: Final = 128
+"""Plus the signal's number: how shells tell of a command that was ended by one."""
+
+
+def leave_closed_terminal() -> None:
+    """Where the terminal is gone (SIGHUP), what is left to say is said to nobody, and fails no more."""
+    for descriptor in (1, 2):
+        try:
+            os.write(descriptor, b"")
+        except OSError:
+            nobody = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nobody, descriptor)
+            os.close(nobody)
 
 
 class ProgressLine:
@@ -56,7 +70,7 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
     summary = result.summary
     if result.outcome == "interrupted":
         click.echo(f"flightstack: {result.reason}; the log is in {result.folder}", err=True)
-        return _INTERRUPTED
+        return KILLED + result.signal
     if result.outcome == "failed":
         _warn(summary)
         click.echo(f"flightstack: mission {summary['mission']} failed: {result.reason}", err=True)

@@ -133,7 +133,7 @@ def erase(yes: bool, **given: Any) -> int:
         shelf = VehicleLogs(client)
         count = len(await shelf.entries())
         if count:
-            confirm(f"delete all logs ({count}) of vehicle {client.system_id}", yes)
+            await confirm(f"delete all logs ({count}) of vehicle {client.system_id}", yes)
             await shelf.erase()
         return count
 

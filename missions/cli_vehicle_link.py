@@ -2,12 +2,12 @@
 
 import asyncio
 import json
-import sys
 from collections.abc import Callable, Coroutine, Mapping
 from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from missions.cli_question import ask, somebody_is_there
 from missions.cli_types import FiniteRange
 
 if TYPE_CHECKING:
@@ -109,14 +109,11 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def confirm(question: str, yes: bool) -> None:
+async def confirm(question: str, yes: bool) -> None:
     """Ask for a typed yes; without a terminal, --yes must be given."""
     if yes:
         return
-    if not sys.stdin.isatty():
+    if not somebody_is_there():
         raise click.UsageError(f"{question}: not confirmed; give --yes where nobody can be asked")
-    if (
-        click.prompt(f"{question}: type yes", default="", show_default=False, err=True).strip().lower()
-        != "yes"
-    ):
+    if (await ask(f"{question}: type yes")).lower() != "yes":
         raise click.ClickException("not confirmed, nothing was done")

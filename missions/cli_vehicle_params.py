@@ -83,6 +83,8 @@ def set_(name: str, value: float, **given: Any) -> int:
 @connected
 def save(file: Path, **given: Any) -> int:
     """Save all parameters to FILE: .params (QGroundControl), .parm or .param (ArduPilot, MAVProxy)."""
+    from estimators.logs.errors import LogError
+    from estimators.logs.new_file import new_file
     from missions.vehicle_client.parameters import format_values, read_all
 
     if file.exists():
@@ -97,10 +99,10 @@ def save(file: Path, **given: Any) -> int:
 
     count, text = with_client(given, work)
     try:
-        with file.open("x", encoding="utf-8") as opened:
-            opened.write(text)
-    except OSError as error:
-        raise click.UsageError(f"{file} can't be written: {error.strerror}") from error
+        with new_file(file) as part:
+            part.write_text(text, encoding="utf-8")
+    except LogError as error:
+        raise click.UsageError(str(error)) from error
     if given["as_json"]:
         print_json({"file": str(file), "parameters": count})
     else:
@@ -125,7 +127,7 @@ def load(file: Path, yes: bool, **given: Any) -> int:
             if not given["as_json"]:
                 _tell_differences(settable)
             noun = "parameter" if len(settable) == 1 else "parameters"
-            confirm(f"set {len(settable)} {noun} of vehicle {client.system_id}", yes)
+            await confirm(f"set {len(settable)} {noun} of vehicle {client.system_id}", yes)
         return changes, await client_parameters.load(client, settable, lambda line: None)
 
     changes, refused = with_client(given, work)

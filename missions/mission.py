@@ -66,12 +66,14 @@ class Mission(Generic[AnyOptions]):
         world_defaults: the world it is flown in.
         kinds: of vehicles that can fly it, the usual one first.
         together: the vehicles of a team are flown by one `fly_team`, not each by a `fly`.
+        commands: it commands its vehicle; one that does not leaves it as it is, in the air too.
     """
 
     name: str = "mission"
     world_defaults = WorldDefaults()
     kinds: tuple[VehicleKind, ...] = (VehicleKind.MULTICOPTER, VehicleKind.FIXED_WING)
     together = False
+    commands = True
 
     def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:
         """The options as one vehicle flies them: what nobody chose suits it."""

@@ -3,11 +3,11 @@
 import asyncio
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from autopilot_bridge.clock import Clock, LoopClock, TelemetryClock
 from autopilot_bridge.geodesy import GeodeticPosition
+from missions.claimed_folder import ClaimedFolder
 from missions.errors import PlanError
 from missions.mission import Mission
 from missions.request import RunRequest
@@ -44,15 +44,17 @@ class Stage:
     close: Callable[[], None]
 
 
-def open_world(mission: Mission[Any], request: RunRequest, folder: Path) -> Stage:
+def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder) -> Stage:
     """An embedded SITL with what the mission needs in it.
 
     Raises:
         PlanError: a value that the message names, with what is accepted.
+        MissionError: the disk does not take what the world publishes.
     """
     from missions.embedded import EmbeddedConfiguration, open_embedded
 
-    scenario = mission.scenario(request.options, Setting(seed=request.seed, folder=folder))
+    scenario = mission.scenario(request.options, Setting(seed=request.seed, folder=folder.path))
+    folder.published.extend(scenario.published)
     try:
         sitl = open_embedded(
             EmbeddedConfiguration(

@@ -39,8 +39,8 @@ class RunRequest:
         max_error_m: a check: the run has failed when the path error exceeds it; None: no check.
         estimator: one to run beside the flight: its name, or the path of a user's file; None: none.
         estimator_settings: its parameters as NAME=VALUE.
-        confirm: shown what was found of the vehicles before they fly, says whether to go on; None: they are
-            not looked at.
+        confirm: shown what was found of the vehicles before they fly, says whether to go on (a coroutine
+            function); None: they are not looked at.
         on_open: called once the links are open, or the world is.
         regain_s: how long a lost link may take to come back before the mission is given up, in seconds of
             this machine's clock.

@@ -5,7 +5,7 @@ import math
 import platform
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
@@ -171,6 +171,14 @@ def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
     with whole(path), path.open("x", encoding="utf-8") as file:
         file.write(text)
     return path
+
+
+def replace_summary(folder: Path, summary: Mapping[str, Any]) -> None:
+    """Put another summary in the place of this run's own, if the disk takes it; else there is none."""
+    path = folder / SUMMARY_NAME
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
+        write_summary(folder, summary)
 
 
 @contextmanager

@@ -104,6 +104,12 @@ class Scenario:
     camera: bool = False
     survey: SurveyScenario | None = None
 
+    @property
+    def published(self) -> tuple[Path, ...]:
+        """Files that are written when the world is made."""
+        to = None if self.survey is None or self.survey.map_path is not None else self.survey.publish_to
+        return () if to is None else (to,)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:

@@ -5,17 +5,18 @@ This is the shell around the missions: it opens things, starts the event loop, a
 
 import asyncio
 from collections.abc import Callable, Coroutine, Mapping, Sequence
-from contextlib import AsyncExitStack, suppress
+from contextlib import AsyncExitStack
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.clock import Clock, run, unix_time_us
+from autopilot_bridge.clock import Clock, unix_time_us
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.errors import BridgeError
-from autopilot_bridge.tlog import TlogWriter
+from missions.claimed_folder import claim_folder
 from missions.connection import Connection, Recorder
+from missions.ending import EndingSignals, signal_of
 from missions.errors import MissionError, PlanError
 from missions.estimation.in_flight import estimators_of
 from missions.limits_before_flight import adapted, check_request, check_stage, vehicle_options
@@ -26,14 +27,13 @@ from missions.options import MissionOptions
 from missions.records import FlightRecorder, FlightRecords
 from missions.request import RunRequest
 from missions.run import (
-    LOG_NAME,
     PICTURE_NAME,
-    RUNS,
-    create_run_folder,
     how_left,
+    replace_summary,
     team_figures,
     vehicle_summary,
     versions,
+    whole,
     write_summary,
 )
 from missions.signing import client_signing, key_missing
@@ -60,12 +60,14 @@ class RunResult:
         reason: why it failed; "" otherwise.
         folder: the run folder.
         summary: what `summary.json` holds.
+        signal: the signal that interrupted it; 0: none did.
     """
 
     outcome: str
     reason: str
     folder: Path
     summary: Mapping[str, Any]
+    signal: int = 0
 
 
 class Flight:
@@ -104,13 +106,22 @@ ProgressListener = Callable[[Flight], None]
 def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
     """Fly a mission and write its run folder. Blocks until all is done.
 
-    A mission that fails or is interrupted (Ctrl-C) leaves its vehicles safe, and still gives a result and a
-    whole log.
+    A mission that fails or is interrupted (Ctrl-C; in the main thread also SIGTERM and SIGHUP) leaves its
+    vehicles safe, and still gives a result and a whole log.
 
     Raises:
+        KeyboardInterrupt: it was interrupted before anything was begun, or while its results were written.
         PlanError: what was asked for can't be flown; nothing was started.
+        MissionError: the disk does not take what an embedded world publishes; nothing was started.
         BridgeError: a link can't be opened.
     """
+    with EndingSignals() as ending:
+        return _fly_interruptible(mission, request, on_progress, ending)
+
+
+def _fly_interruptible(
+    mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None, ending: EndingSignals
+) -> RunResult:
     check_request(mission, request)
     if request.connect and len(request.connect) != request.options.vehicles:
         raise PlanError(
@@ -118,31 +129,30 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
             "give --connect once for each vehicle"
         )
     estimators = estimators_of(request, mission.estimator_settings(request.options))
-    made = _missing_folders(request.out or RUNS)
-    folder = create_run_folder(request.out, mission.name)
+    claimed = claim_folder(request.out, mission.name)
+    folder = claimed.path
     stage = None
     try:
-        stage = open_vehicles(request) if request.connect else open_world(mission, request, folder)
+        stage = open_vehicles(request) if request.connect else open_world(mission, request, claimed)
         request.on_open()
         check_stage(mission, request, stage)
     except BaseException:
         if stage is not None:
             stage.close()
             stage.loop.close()
-        _forget(folder, made if request.out is not None else [folder, *made])
+        claimed.give_back()
         raise
     flight = Flight()
-    outcome, reason = COMPLETED, ""
+    outcome, reason, by_signal = COMPLETED, "", 0
     try:
-        log = TlogWriter(folder / LOG_NAME)
-        recorder = FlightRecorder(log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
+        recorder = FlightRecorder(claimed.log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
         flight.recorder = recorder
         heard_by = recorder if estimators is None else estimators.around(recorder)
         stage.on_truth(heard_by.record_truth)
         try:
-            run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
-        except KeyboardInterrupt:
-            outcome, reason = INTERRUPTED, INTERRUPTED
+            ending.run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
+        except KeyboardInterrupt as interrupt:
+            outcome, reason, by_signal = INTERRUPTED, INTERRUPTED, signal_of(interrupt)
         except (MissionError, PlanError, BridgeError) as error:
             notes = (*getattr(error, "__notes__", ()), *key_missing(request, flight.vehicles))
             outcome, reason = FAILED, "; ".join((str(error), *notes))
@@ -165,32 +175,21 @@ def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListene
     summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
     if estimators is not None:
         summary["estimator"] = estimators.report(folder, picture=request.picture, wall_time_s=wall_s).summary
+    written = False
     try:
         write_summary(folder, summary)
+        written = True
         if request.picture and debriefing.flights:
-            mission.draw(folder / PICTURE_NAME, _title(mission, debriefing, summary), debriefing)
+            title = _title(mission, debriefing, summary)
+            with whole(folder / PICTURE_NAME):
+                mission.draw(folder / PICTURE_NAME, title, debriefing)
     except OSError as error:
         missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
         outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
-    return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary)
-
-
-def _forget(folder: Path, made: list[Path]) -> None:
-    """Take back a run folder in which nothing was flown, with what the world has published there."""
-    for file in folder.glob("*"):
-        with suppress(OSError):
-            file.unlink()
-    for empty in made:
-        with suppress(OSError):
-            empty.rmdir()
-
-
-def _missing_folders(folder: Path) -> list[Path]:
-    """Those of a folder and the folders it is in that are not there yet, innermost first."""
-    try:
-        return [path for path in (folder, *folder.parents) if not path.exists()]
-    except OSError:  # not to be looked at: making it will say why
-        return []
+        summary |= {"outcome": outcome, "reason": reason}
+        if written:
+            replace_summary(folder, summary)
+    return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary, signal=by_signal)
 
 
 async def _fly(
@@ -274,6 +273,9 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
 
         looks = [await look(vehicle, mission, own) for vehicle, own in zip(vehicles, options, strict=True)]
         await confirmed(looks, request.confirm)
+    if not mission.commands:
+        await together([mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)])
+        return
     if not mission.together:
         await together(
             [

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.sitl import SitlConfiguration
+from estimators.logs.errors import LogError
+from estimators.logs.new_file import new_file
 from flightsim.home import Home
 from flightsim.payload import (
     NO_TAG,
@@ -26,6 +28,7 @@ from flightsim.payload import (
 )
 from flightsim.payload import TargetMotion as Motion
 from flightsim.random_streams import RandomStreams
+from missions.errors import MissionError
 from missions.scenario import MAX_DISTANCE_M, Scenario, SurveyScenario, TargetMotion, TargetScenario
 
 _MAP_SPACING_M = 50.0
@@ -36,6 +39,7 @@ def equipped(world: SitlConfiguration, scenario: Scenario) -> SitlConfiguration:
 
     Raises:
         ValueError: an unusable map, or a target outside it.
+        MissionError: the disk does not take a map that is made.
     """
     payload = payload_of(scenario)
     return replace(
@@ -74,6 +78,7 @@ def magnetic_field_of(
 
     Raises:
         ValueError: an unusable map, or a target outside it.
+        MissionError: the disk does not take the map.
     """
     survey = scenario.survey
     if survey is None:
@@ -84,7 +89,7 @@ def magnetic_field_of(
     else:
         published = _made_map(survey, home, seed, decimal_year)
         if survey.publish_to is not None:
-            published.save(Path(survey.publish_to))
+            _publish(published, survey.publish_to)
     signatures = []
     if survey.target_ne_m is not None:
         signatures.append(
@@ -98,6 +103,14 @@ def magnetic_field_of(
             )
         )
     return MagneticField(published, signatures, decimal_year=decimal_year)
+
+
+def _publish(made: MagneticMap, path: Path) -> None:
+    try:
+        with new_file(path) as part:
+            made.save(part)
+    except LogError as error:
+        raise MissionError(f"{error}; nothing was flown") from error
 
 
 def _require_here(published: MagneticMap, path: Path, home: Home) -> None:

@@ -136,6 +136,7 @@ def open_embedded(configuration: EmbeddedConfiguration) -> EmbeddedSitl:
 
     Raises:
         ValueError: a value that the message names, with what is accepted.
+        MissionError: the disk does not take what the scenario publishes.
     """
     return EmbeddedSitl(configuration)
 

@@ -3,7 +3,6 @@
 import csv
 import enum
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +15,7 @@ from estimators.logs import Log, LogError, open_log
 from estimators.needs import Supply
 from estimators.replay import log_supplies, missing_of, vehicles_in
 from estimators.runner import EstimateTable, Runner
-from missions.run import SUMMARY_NAME, versions, whole, write_summary
+from missions.run import replace_summary, versions, whole, write_summary
 
 __all__ = [
     "COMPLETED",
@@ -152,18 +151,10 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
         outcome, reason = FAILED, f"can't write all of {request.folder}: {error.strerror}; check the disk"
         summary |= {"outcome": outcome, "reason": reason, "partial": True}
         if summary_file:
-            _rewrite_summary(request.folder, summary)
+            replace_summary(request.folder, summary)
     return EstimationResult(
         outcome=outcome, reason=reason, folder=request.folder, summary=summary, compared=compared
     )
-
-
-def _rewrite_summary(folder: Path, summary: Mapping[str, Any]) -> None:
-    """Say in the summary that something beside it is missing, if the disk takes as much."""
-    path = folder / SUMMARY_NAME
-    with suppress(OSError), whole(path):
-        path.unlink(missing_ok=True)
-        write_summary(folder, summary)
 
 
 def _opened(logs: Sequence[Log] | Path) -> tuple[Sequence[Log], str]:

@@ -5,6 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from missions.ending import AskedToEnd
 from missions.errors import MissionError, PlanError
 from missions.mission import Mission
 from missions.options import MissionOptions
@@ -20,23 +21,40 @@ if TYPE_CHECKING:
 def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
     """Write what a mission would upload to its vehicle; gives the number of items.
 
-    The vehicle, embedded or elsewhere, is asked for its home and its limits, and nothing else.
+    The vehicle, embedded or elsewhere, is asked for its home and its limits, and nothing else: one that flies
+    flies on.
 
     Raises:
-        PlanError: the mission uploads none, can't be flown, or the file can't be written.
+        PlanError: the mission uploads none, can't be flown, or the file can't be written; or parameters are
+            to be set on a vehicle elsewhere.
         MissionError: the vehicle is not heard, or not ready.
+        KeyboardInterrupt: it was interrupted.
     """
-    from missions.session import COMPLETED, fly
+    from missions.session import COMPLETED, INTERRUPTED, fly
 
     check_suffix(path)
     if request.options.vehicles > 1:
         raise PlanError("a mission file is for one vehicle; leave --vehicles out")
     if type(mission).plan_items is Mission.plan_items:
         raise PlanError(f"mission {mission.name} is not flown by uploaded waypoints; there is no file of it")
+    if request.connect and request.parameters:
+        raise PlanError(
+            "parameters are set before a flight, and this is none: leave --params out, or set them first "
+            "with flightstack vehicle params load"
+        )
     exported = _Exported(mission, path)
     with TemporaryDirectory() as folder:
-        asked = replace(request, out=Path(folder) / "run", picture=False, confirm=None, estimator=None)
+        asked = replace(
+            request,
+            out=Path(folder) / "run",
+            picture=False,
+            confirm=None,
+            estimator=None,
+            max_error_m=None,
+        )
         result = fly(exported, asked)
+    if result.outcome == INTERRUPTED:
+        raise AskedToEnd(result.signal)
     if result.outcome != COMPLETED:
         raise MissionError(result.reason)
     return exported.count
@@ -44,6 +62,8 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
 
 class _Exported(Mission[MissionOptions]):
     """A mission whose flight is the writing of its plan."""
+
+    commands = False
 
     def __init__(self, mission: Mission[Any], path: Path) -> None:
         self.name = mission.name

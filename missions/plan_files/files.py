@@ -42,18 +42,21 @@ def write_mission_file(
     kind: VehicleKind,
     speed_m_s: float,
 ) -> None:
-    """Write a mission in the format that the suffix names.
+    """Write a mission in the format that the suffix names, whole or not at all.
 
     Raises:
         PlanError: the suffix names none, the file is there already, or can't be written.
     """
+    from estimators.logs.errors import LogError  # what logs need is imported for writing only
+    from estimators.logs.new_file import new_file
+
     check_suffix(path)
     if path.suffix.lower() == PLAN:
         text = qgc_plan.format_plan(items, home, firmware=firmware, kind=kind, speed_m_s=speed_m_s)
     else:
         text = wpl.format_wpl(items, home)
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except OSError as error:
-        raise PlanError(f"mission file {path} can't be written: {error.strerror}") from error
+        with new_file(path) as part:
+            part.write_text(text, encoding="utf-8")
+    except LogError as error:
+        raise PlanError(f"mission file: {error}") from error

@@ -2,7 +2,7 @@
 
 import asyncio
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -51,8 +51,8 @@ class Look:
         return tuple(f for f in self.findings if f.level is Level.PROBLEM)
 
 
-Confirm = Callable[[Sequence[Look]], bool]
-"""Shown what was found, says whether to fly; may block."""
+Confirm = Callable[[Sequence[Look]], Coroutine[Any, Any, bool]]
+"""Shown what was found, says whether to fly; it waits as tasks do, so that the link is kept up meanwhile."""
 
 
 async def look(vehicle: Vehicle, mission: Mission[Any], options: MissionOptions) -> Look:
@@ -79,7 +79,7 @@ async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
     Raises:
         MissionError: it was not to be flown.
     """
-    if await asyncio.to_thread(confirm, looks):
+    if await confirm(looks):
         return
     problems = [
         f"vehicle {found.system_id}: {f.subject}: {f.text}" for found in looks for f in found.problems

@@ -4,7 +4,10 @@ points that matter to a mission. It shares no code with the emulated autopilot.
 
 import asyncio
 import math
+import resource
 import struct
+import sys
+from contextlib import contextmanager
 
 import pytest
 
@@ -13,6 +16,7 @@ from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition, dialect
 from missions.connection import Connection
+from missions.opening import Stage
 from missions.vehicle import Vehicle
 
 STEP_US = 20_000
@@ -432,6 +436,45 @@ class FakeSitl:
 def make_sitl():
     """Factory of fake SITLs."""
     return FakeSitl
+
+
+@pytest.fixture
+def little_room(monkeypatch):
+    """A context in which no file of this process may get longer than so many bytes, as on a full disk."""
+
+    @contextmanager
+    def room(most):
+        monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python puts up with half a file of its own
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, before[1]))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+    return room
+
+
+@pytest.fixture
+def elsewhere(monkeypatch):
+    """What `--connect` leads to: a scripted autopilot; its time is a virtual loop's."""
+    sitl = FakeSitl(truth=False)
+
+    def stage(_request):
+        return Stage(
+            loop=sitl.loop,
+            links=list(sitl.links),
+            clocks=[LoopClock() for _ in sitl.links],
+            epoch_us=None,
+            time_us=lambda: sitl.time_us,
+            on_truth=sitl.on_truth,
+            parameters=None,
+            home=None,
+            close=sitl.close,
+        )
+
+    monkeypatch.setattr("missions.session.open_vehicles", stage)
+    return sitl.autopilots[0]
 
 
 @pytest.fixture

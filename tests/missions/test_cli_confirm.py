@@ -1,9 +1,9 @@
 """The question before a flight with a real vehicle: when it is asked, and what the answers do."""
 
+import asyncio
 import sys
 from collections.abc import Iterator
 
-import click
 import pytest
 from click.testing import CliRunner
 
@@ -54,8 +54,8 @@ def test_options_for_real_vehicles_are_refused_without_one(option: list[str]) ->
 def test_yes_flies_only_when_nothing_is_found(capsys: pytest.CaptureFixture[str]) -> None:
     confirm = confirmation(SERIAL, yes=True, check=False)
     assert confirm is not None
-    assert confirm([FINE])
-    assert not confirm([FINE, SICK])
+    assert asyncio.run(confirm([FINE]))
+    assert not asyncio.run(confirm([FINE, SICK]))
     assert "problem  home: not set; wait" in capsys.readouterr().err
 
 
@@ -71,7 +71,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
     ("look", "answer", "flies"),
     [
         (FINE, "yes", True),
-        (FINE, "YES ", True),
+        (FINE, "YES", True),
         (FINE, "y", False),
         (FINE, "", False),
         (SICK, "yes", False),
@@ -81,5 +81,8 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
 def test_the_answer_must_be_typed_out(
     asked: Confirm, look: Look, answer: str, flies: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(click, "prompt", lambda *_, **__: answer)
-    assert asked([look]) is flies
+    async def typed(_question: str) -> str:
+        return answer
+
+    monkeypatch.setattr("missions.cli_confirm.ask", typed)
+    assert asyncio.run(asked([look])) is flies

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import types
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -238,15 +239,42 @@ def test_the_folder_of_a_run_whose_link_cannot_be_opened_is_removed_again(tmp_pa
     assert mine.exists()
 
 
-def test_a_log_that_cannot_be_opened_leaves_no_link_open(embedded, tmp_path, monkeypatch):
+def test_where_no_log_can_be_made_nothing_is_opened(embedded, tmp_path, monkeypatch):
     def full(_path):
-        raise OSError("disk full")
+        raise TlogError("disk full")
 
-    monkeypatch.setattr("missions.session.TlogWriter", full)
-    with pytest.raises(OSError, match="disk full"):
+    monkeypatch.setattr("missions.claimed_folder.TlogWriter", full)
+    with pytest.raises(TlogError, match="disk full"):
         fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
-    assert embedded[0].loop.is_closed()
-    assert embedded[0].closed
+    assert embedded == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_run_that_fails_at_once_leaves_what_is_not_its_own(embedded, tmp_path):
+    def open_badly():
+        (tmp_path / "notes.txt").write_text("mine")
+        raise PlanError("enough")
+
+    request = RunRequest(options=small(), out=tmp_path, picture=False)
+    with pytest.raises(PlanError, match="enough"):
+        fly(find_mission("lissajous"), replace(request, on_open=open_badly))
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_a_folder_is_one_run_s_from_its_beginning(embedded, tmp_path, monkeypatch):
+    request = RunRequest(options=small(), out=tmp_path, picture=False)
+    refused = []
+
+    def fly_another():
+        monkeypatch.setattr("missions.claimed_folder.create_run_folder", lambda out, name: out)  # just empty
+        with pytest.raises(PlanError, match=r"another run has begun in .*; choose another --out") as error:
+            fly(find_mission("sector"), request)
+        refused.append(error)
+
+    result = fly(find_mission("lissajous"), replace(request, on_open=fly_another))
+    assert refused
+    assert result.outcome == "completed", result.reason
+    assert {path.name for path in tmp_path.iterdir()} == {"flight.tlog", "summary.json"}
 
 
 class FillingDisk(TlogWriter):
@@ -261,7 +289,7 @@ class FillingDisk(TlogWriter):
 
 
 def test_a_disk_that_fills_up_in_flight_ends_the_log_and_not_the_flight(embedded, tmp_path, monkeypatch):
-    monkeypatch.setattr("missions.session.TlogWriter", FillingDisk)
+    monkeypatch.setattr("missions.claimed_folder.TlogWriter", FillingDisk)
     monkeypatch.setattr(FillingDisk, "room", 100_000)
     result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
@@ -273,7 +301,7 @@ def test_a_disk_that_fills_up_in_flight_ends_the_log_and_not_the_flight(embedded
 
 
 def test_nothing_is_flown_on_a_full_disk(embedded, tmp_path, monkeypatch):
-    monkeypatch.setattr("missions.session.TlogWriter", FillingDisk)
+    monkeypatch.setattr("missions.claimed_folder.TlogWriter", FillingDisk)
     result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk; nothing was flown" in result.reason
@@ -288,6 +316,21 @@ def test_a_summary_that_finds_no_room_is_told(embedded, tmp_path, monkeypatch):
     result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk" in result.reason
+
+
+def test_a_picture_that_finds_no_room_is_told_in_the_summary_too(embedded, tmp_path, monkeypatch):
+    def full(_mission, path, _title, _debriefing):
+        path.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Mission, "draw", full)
+    result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
+    assert result.outcome == "failed"
+    assert "No space left on device; check the disk" in result.reason
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["outcome"], summary["reason"]) == (result.outcome, result.reason)
+    assert summary == result.summary
+    assert {path.name for path in (tmp_path / "run").iterdir()} == {"flight.tlog", "summary.json"}
 
 
 # command line

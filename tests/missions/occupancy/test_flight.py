@@ -1,6 +1,7 @@
 """Whole searches in embedded worlds: from the ground, until the target is found, back to the ground."""
 
 import asyncio
+import errno
 import json
 import math
 from contextlib import asynccontextmanager
@@ -10,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from flightsim.payload import MagneticMap
 from missions import cli
 from missions.errors import PlanError
 from missions.occupancy.mission import MAP_NAME, OccupancyMission
@@ -210,3 +212,17 @@ def test_a_quadrotor_and_two_aircraft_search_together(tmp_path):
     assert summary["target_found"] is True
     assert summary["heading_settled_error_95_deg"] < 5.0
     assert summary["least_separation_m"] > 8.0
+
+
+def test_a_map_that_finds_no_room_is_one_line_and_nothing_stays(tmp_path, monkeypatch, capsys):
+    def full(_map, path):
+        path.write_bytes(b"PK half of a map")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(MagneticMap, "save", full)
+    code = cli.run_command_line(["fly", "occupancy", "--out", str(tmp_path / "run")])
+    said = capsys.readouterr()
+    assert (code, said.out) == (1, "")
+    assert said.err.count("\n") == 1
+    assert "magnetic_map.npz: No space left on device" in said.err
+    assert list(tmp_path.iterdir()) == []

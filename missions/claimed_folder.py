@@ -1,0 +1,76 @@
+"""The folder of a run that is to be flown: claimed by its log, and given back when nothing is flown."""
+
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from autopilot_bridge.errors import TlogError
+from autopilot_bridge.tlog import TlogWriter
+from missions.errors import PlanError
+from missions.run import LOG_NAME, RUNS, create_run_folder
+
+
+@dataclass(slots=True, kw_only=True)
+class ClaimedFolder:
+    """A run folder that no other run writes to, or takes away.
+
+    Attributes:
+        path: the folder.
+        log: the run's, open; whoever makes it has the folder.
+        published: files that the run's world puts beside it.
+        made: folders that were made for it, innermost first.
+    """
+
+    path: Path
+    log: TlogWriter
+    made: list[Path]
+    published: list[Path] = field(default_factory=list)
+
+    def give_back(self) -> None:
+        """Take away what this run has made here, and nothing else: nothing was flown."""
+        with suppress(TlogError):
+            self.log.close()
+        for file in (self.log.path, *self.published):
+            with suppress(OSError):
+                file.unlink()
+        _remove_empty(self.made)
+
+
+def claim_folder(out: Path | None, mission: str) -> ClaimedFolder:
+    """Make the folder of a new run, and its log.
+
+    Args:
+        out: the folder asked for; None: the next `runs/<mission>-<n>`.
+        mission: name of the mission.
+
+    Raises:
+        PlanError: the folder holds something, another run's log maybe, or can't be made.
+        TlogError: the log can't be made.
+    """
+    made = _missing_folders(out or RUNS)
+    path = create_run_folder(out, mission)
+    if out is None:
+        made.insert(0, path)
+    try:
+        return ClaimedFolder(path=path, log=TlogWriter(path / LOG_NAME), made=made)
+    except TlogError as error:
+        if isinstance(error.__cause__, FileExistsError):  # it was empty for two at a time
+            raise PlanError(
+                f"another run has begun in {path}, and nothing is overwritten; choose another --out"
+            ) from error
+        _remove_empty(made)
+        raise
+
+
+def _missing_folders(folder: Path) -> list[Path]:
+    """Those of a folder and the folders it is in that are not there yet, innermost first."""
+    try:
+        return [path for path in (folder, *folder.parents) if not path.exists()]
+    except OSError:  # not to be looked at: making it will say why
+        return []
+
+
+def _remove_empty(folders: list[Path]) -> None:
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()

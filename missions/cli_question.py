@@ -1,0 +1,54 @@
+"""A question to whoever sits at the terminal, asked by a task that goes on with other things meanwhile."""
+
+import asyncio
+import os
+import sys
+from contextlib import suppress
+from typing import Final
+
+import click
+
+_CHUNK_BYTES: Final = 4096
+
+
+def somebody_is_there() -> bool:
+    """Whether there is a terminal to ask at; the input may also be closed."""
+    return sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty()
+
+
+async def ask(question: str) -> str:
+    """Ask on stderr, and wait for a line from the terminal; "" when it ends or hangs up without one.
+
+    Waits as any task does, not in `input()`: Ctrl-C ends it, and what is typed afterwards answers nothing.
+    """
+    click.echo(f"{question}: ", nl=False, err=True)
+    answer = ""
+    try:
+        answer = await _line(sys.stdin.fileno())
+    finally:
+        if not answer.endswith("\n"):
+            with suppress(OSError):  # a terminal that has hung up
+                click.echo(err=True)
+    return answer.strip()
+
+
+async def _line(terminal: int) -> str:
+    loop = asyncio.get_running_loop()
+    typed = bytearray()
+    done: asyncio.Future[None] = loop.create_future()
+
+    def read() -> None:
+        try:
+            data = os.read(terminal, _CHUNK_BYTES)
+        except OSError:  # it has hung up
+            data = b""
+        typed.extend(data)
+        if not done.done() and (not data or b"\n" in typed):
+            done.set_result(None)
+
+    loop.add_reader(terminal, read)
+    try:
+        await done
+    finally:
+        loop.remove_reader(terminal)
+    return typed.decode(errors="replace")

@@ -1,0 +1,92 @@
+"""SIGTERM and SIGHUP do what Ctrl-C does: a process that is asked to end leaves its vehicles safe first.
+
+`kill`, `timeout` and service managers send SIGTERM, a terminal that is closed SIGHUP. By themselves both end
+a process where it stands, with its vehicles in the air.
+"""
+
+import asyncio
+import signal
+import threading
+from collections.abc import Coroutine
+from types import FrameType, TracebackType
+from typing import Any, Final, Self
+
+from autopilot_bridge.clock import run
+from autopilot_bridge.clock.pacing import wall_time_s
+
+_ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_SAME_S: Final = 1.0
+"""A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: that is asked once."""
+
+
+class AskedToEnd(KeyboardInterrupt):
+    """A KeyboardInterrupt that tells by which signal.
+
+    Attributes:
+        number: the signal's.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(f"ended by {signal.Signals(number).name}")
+        self.number = number
+
+
+def signal_of(interrupt: KeyboardInterrupt) -> int:
+    """The signal that has interrupted."""
+    return interrupt.number if isinstance(interrupt, AskedToEnd) else signal.SIGINT
+
+
+class EndingSignals:
+    """While it is entered, Ctrl-C, SIGTERM and SIGHUP interrupt alike.
+
+    While `run` runs, the first one cancels what is run, and one that comes later stops at once; outside of it
+    the first one does. Signals that are ignored (nohup) or have a handler already are left alone. So are all
+    of them in a thread that is not the main one: only that may be told of signals.
+    """
+
+    def __init__(self) -> None:
+        self._before: dict[signal.Signals, Any] = {}
+        self._task: asyncio.Task[Any] | None = None
+        self._number: int | None = None
+        self._asked_wall_s = 0.0
+
+    def __enter__(self) -> Self:
+        if threading.current_thread() is threading.main_thread():
+            for number in _ENDING:
+                if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+                    self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def run(self, main: Coroutine[Any, Any, None], loop: asyncio.AbstractEventLoop) -> None:
+        """Run a coroutine on a loop as `autopilot_bridge.clock.run` does.
+
+        Raises:
+            AskedToEnd: it was interrupted, and is done.
+        """
+        try:
+            run(self._interruptible(main), loop)
+        except asyncio.CancelledError:
+            if self._number is None:
+                raise
+            raise AskedToEnd(self._number) from None
+
+    async def _interruptible(self, main: Coroutine[Any, Any, None]) -> None:
+        self._task = asyncio.current_task()
+        await main
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        now_s = wall_time_s()
+        task, again = self._task, self._number is not None
+        if again and number != signal.SIGINT and now_s - self._asked_wall_s < _SAME_S:
+            return
+        self._number, self._asked_wall_s = self._number or number, now_s
+        if again or task is None or task.done():
+            raise AskedToEnd(self._number)
+        task.cancel()
+        task.get_loop().call_soon_threadsafe(lambda: None)  # which waits for something else, maybe for long

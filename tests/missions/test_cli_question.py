@@ -1,0 +1,144 @@
+"""Questions at a terminal: what is typed there, Ctrl-C, and the end of the input."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.terminal import CTRL_C, END_OF_FILE, at_terminal
+
+FLY = """
+import asyncio, sys
+from missions.cli_confirm import confirmation
+from missions.ending import EndingSignals
+from missions.errors import MissionError
+from missions.preflight.before_flight import Look, confirmed
+
+async def flight():
+    confirm = confirmation(["serial:/dev/ttyACM0:57600"], yes=False, check=False)
+    heartbeats = asyncio.create_task(count())
+    try:
+        await confirmed([Look(system_id=1, findings=())], confirm)
+        print("flown")
+    finally:
+        print("left safe")
+
+async def count():
+    while True:
+        print(".", end="", flush=True)
+        await asyncio.sleep(0.01)
+
+with EndingSignals() as ending:
+    try:
+        ending.run(flight(), asyncio.new_event_loop())
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except MissionError as error:
+        sys.exit(str(error))
+"""
+ERASE = """
+from contextlib import asynccontextmanager
+import missions.vehicle_client.client, missions.vehicle_client.logs
+from missions import cli
+
+class Client:
+    system_id = 1
+    async def require_answers(self):
+        pass
+
+@asynccontextmanager
+async def open_client(*_, **__):
+    yield Client()
+    print("client closed")
+
+class Logs:
+    def __init__(self, client):
+        pass
+    async def entries(self):
+        return [1, 2, 3]
+    async def erase(self):
+        print("they are gone")
+
+missions.vehicle_client.client.open_client = open_client
+missions.vehicle_client.logs.VehicleLogs = Logs
+cli.main(["vehicle", "logs", "erase", "--connect", "udpin:127.0.0.1:1"])
+"""
+FLY_QUESTION = "Fly? Type yes: "
+ERASE_QUESTION = "delete all logs (3) of vehicle 1: type yes: "
+
+
+@pytest.mark.parametrize(
+    ("answer", "code", "told"),
+    [
+        ("yes\n", 0, "flown"),
+        ("  Yes \r", 0, "flown"),
+        ("\n", 1, "not flown: not confirmed"),
+        ("y\n", 1, "not flown: not confirmed"),
+        (END_OF_FILE, 1, "not flown: not confirmed"),
+    ],
+)
+def test_what_is_typed_is_the_answer_and_the_link_is_kept_up_meanwhile(
+    answer: str, code: int, told: str
+) -> None:
+    with at_terminal("-c", FLY) as terminal:
+        terminal.wait_for(FLY_QUESTION)
+        terminal.wait_for("....")
+        terminal.type(answer)
+        assert terminal.wait_for_end() == code
+        assert told in terminal.seen
+        assert "left safe" in terminal.seen
+
+
+def test_ctrl_c_at_the_question_before_a_flight_ends_it() -> None:
+    with at_terminal("-c", FLY) as terminal:
+        terminal.wait_for(FLY_QUESTION)
+        terminal.type(CTRL_C)
+        assert terminal.wait_for_end() == 130
+        assert "left safe" in terminal.seen
+        assert "flown" not in terminal.seen and "Error" not in terminal.seen
+
+
+@pytest.mark.parametrize(
+    ("answer", "code", "told"),
+    [("yes\n", 0, "they are gone"), ("no\n", 1, "not confirmed, nothing was done")],
+)
+def test_a_vehicle_s_logs_are_erased_after_a_yes(answer: str, code: int, told: str) -> None:
+    pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
+    with at_terminal("-c", ERASE) as terminal:
+        terminal.wait_for(ERASE_QUESTION)
+        terminal.type(answer)
+        assert terminal.wait_for_end() == code
+        assert told in terminal.seen
+        assert ("they are gone" in terminal.seen) == (code == 0)
+
+
+def test_ctrl_c_at_a_question_about_a_vehicle_is_no_answer_and_the_end() -> None:
+    pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
+    with at_terminal("-c", ERASE) as terminal:
+        terminal.wait_for(ERASE_QUESTION)
+        terminal.type(CTRL_C)
+        terminal.type("yes\n")
+        assert terminal.wait_for_end() == 130
+        assert "interrupted" in terminal.seen
+        assert "they are gone" not in terminal.seen
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (
+            "fly lissajous --connect serial:/dev/ttyNONE:57600",
+            "may be a real vehicle, and nobody can be asked; give --yes",
+        ),
+        ("fly lissajous --connect udpin:127.0.0.1:1 --check", "nobody can be asked; give --yes"),
+    ],
+)
+def test_where_the_input_is_closed_nobody_can_be_asked(words: str, told: str) -> None:
+    done = subprocess.run(
+        ["/bin/sh", "-c", f'exec "{sys.executable}" -m missions {words} <&-'],
+        capture_output=True,
+        text=True,
+        timeout=120.0,
+    )
+    assert done.returncode == 2
+    assert told in done.stderr and done.stderr.count("\n") == 1
