@@ -1,0 +1,25 @@
+"""What a running SITL can't keep: the log."""
+
+import click
+
+
+class Losses:
+    """Tells of each on stderr when it happens. The vehicles fly on.
+
+    Attributes:
+        any: there was one; the command fails in the end.
+    """
+
+    def __init__(self) -> None:
+        self.any = False
+        self._log_ended = False
+
+    def log_ended(self, why: str) -> None:
+        """The log takes no more; told once."""
+        if not self._log_ended:
+            self._log_ended = True
+            self._tell(f"{why}; the log ends here, the vehicles fly on")
+
+    def _tell(self, text: str) -> None:
+        self.any = True
+        click.echo(f"flightstack: {text}", err=True)
