@@ -1,4 +1,4 @@
-"""What a running SITL can't keep: the log."""
+"""What a running SITL can't keep: the log, the signing keys."""
 
 import click
 
@@ -19,6 +19,10 @@ class Losses:
         if not self._log_ended:
             self._log_ended = True
             self._tell(f"{why}; the log ends here, the vehicles fly on")
+
+    def keys_not_stored(self, why: str) -> None:
+        """The store of signing keys can't be written."""
+        self._tell(f"{why}; signing keys and times are kept in memory, a restart forgets them")
 
     def _tell(self, text: str) -> None:
         self.any = True

@@ -187,7 +187,7 @@ def sitl(
 
     Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
 
-    Exit codes: 0 stopped, 1 the log could not be written to its end, 2 usage,
+    Exit codes: 0 stopped, 1 the log or the signing keys could not be written, 2 usage,
     130 interrupted while it started.
     """
     if 0.0 < speedup < SLOWEST:
@@ -213,7 +213,7 @@ def sitl(
     with EndRequests() as ending, contextlib.ExitStack() as at_end:
         try:
             ports = _ports(links, gcs_links)
-            signing = vehicle_signing(signing_key, unsigned, signing_store)
+            signing = vehicle_signing(signing_key, unsigned, signing_store, on_failure=losses.keys_not_stored)
             wind_speed_m_s, wind_from_deg = parse_wind(wind)
             place = None if home is None else parse_home(home)
             heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg

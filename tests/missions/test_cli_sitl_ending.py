@@ -1,10 +1,12 @@
 """`flightstack sitl`: asked to end while it starts or runs, and what it leaves behind when it can't start."""
 
 import os
+import shutil
 import signal
 import socket
 import tempfile
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +141,36 @@ def test_a_busy_port_leaves_no_log_in_the_way(cards: Path, tmp_path: Path) -> No
 
 
 # what can't be kept
+
+
+@pytest.fixture
+def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
+    """A key, and a calendar that goes a second at each look."""
+    path = tmp_path / "key"
+    path.write_text("pass phrase\n")
+    seconds = count(1_000_000)
+    monkeypatch.setattr("missions.signing.now", lambda: next(seconds) * 100_000)
+    return "--signing-key", str(path), "--duration", "2"
+
+
+def test_keys_that_can_not_be_stored_are_refused_at_once(key: tuple[str, ...], tmp_path: Path) -> None:
+    store = tmp_path / "nowhere" / "store"
+    done = CliRunner().invoke(command_line, [*QUICK, *key, "--signing-store", str(store)])
+    assert done.exit_code == 2
+    assert f"can't write {store}: No such file or directory" in done.output
+    assert "starting" not in done.output
+
+
+def test_keys_that_can_not_be_stored_any_more_do_not_end_the_flight(
+    key: tuple[str, ...], tmp_path: Path, in_flight: Callable[..., None]
+) -> None:
+    folder = tmp_path / "stored"
+    folder.mkdir()
+    in_flight(lambda: shutil.rmtree(folder))
+    done = sitl(*key, "--signing-store", str(folder / "store"))
+    assert done.return_value == 1 and "stopped at 2.0 s" in done.output
+    told = f"flightstack: can't write {folder / 'store'}: No such file or directory; signing keys and times"
+    assert done.output.count(told) == 1
 
 
 def test_a_log_ends_once(capsys: pytest.CaptureFixture[str]) -> None:
