@@ -1,4 +1,4 @@
-"""What a running SITL can't keep: the log, the signing keys."""
+"""What a running SITL can't keep: the log, the signing keys, pictures."""
 
 import click
 
@@ -23,6 +23,10 @@ class Losses:
     def keys_not_stored(self, why: str) -> None:
         """The store of signing keys can't be written."""
         self._tell(f"{why}; signing keys and times are kept in memory, a restart forgets them")
+
+    def picture_lost(self, why: str) -> None:
+        """A photo, or the rest of a video."""
+        self._tell(why)
 
     def _tell(self, text: str) -> None:
         self.any = True

@@ -187,7 +187,7 @@ def sitl(
 
     Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
 
-    Exit codes: 0 stopped, 1 the log or the signing keys could not be written, 2 usage,
+    Exit codes: 0 stopped, 1 the log, a picture or the signing keys could not be written, 2 usage,
     130 interrupted while it started.
     """
     if 0.0 < speedup < SLOWEST:
@@ -242,7 +242,7 @@ def sitl(
             world = Sitl(equipment, signing=signing, cards=memory.cards)
             compile_flight_code(world.configuration.vehicles)
             server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
-            pictured = start_video(world, video, pictures)
+            pictured = start_video(world, video, pictures, losses.picture_lost)
             if pictured is not None:
                 at_end.callback(pictured.close)
             if count > 1 and ports:

@@ -173,6 +173,16 @@ def test_keys_that_can_not_be_stored_any_more_do_not_end_the_flight(
     assert done.output.count(told) == 1
 
 
+def test_pictures_that_are_lost_are_told_and_the_command_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lose(world: Sitl, video: str | None, pictures: Path | None, on_loss: Callable[[str], None]) -> None:
+        on_loss("can't write photo IMG_0000.jpg: No space left on device")
+
+    monkeypatch.setattr("missions.cli_sitl.start_video", lose)
+    done = sitl("--duration", "1")
+    assert done.return_value == 1 and "stopped at 1.0 s" in done.output
+    assert "flightstack: can't write photo IMG_0000.jpg: No space left on device\n" in done.output
+
+
 def test_a_log_ends_once(capsys: pytest.CaptureFixture[str]) -> None:
     losses = Losses()
     assert not losses.any
