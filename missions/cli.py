@@ -4,7 +4,10 @@ Heavy modules (numba, JSBSim, matplotlib) are imported by the command that needs
 errors are quick.
 """
 
+import contextlib
+import errno
 import importlib
+import os
 import sys
 from typing import Final
 
@@ -35,6 +38,7 @@ _COMMANDS: Final = {
 }
 
 DONE, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
+_NOT_WRITTEN: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 
 
 class _Commands(click.Group):
@@ -56,6 +60,14 @@ class _Commands(click.Group):
         if args and args[0] not in _COMMANDS and not args[0].startswith("-"):
             raise click.UsageError(f"no command {args[0]!r}; there are {', '.join(_COMMANDS)}")
         return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run a command; who reads its output may stop when it has seen enough, which needs no words."""
+        try:
+            return super().invoke(ctx)
+        except BrokenPipeError:
+            _let_go_of_output()
+            raise click.exceptions.Exit(FAILED) from None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -99,4 +111,18 @@ def run_command_line(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         click.echo("interrupted", err=True)
         return INTERRUPTED
+    except OSError as error:
+        said = str(error)
+        if error.filename is None and error.errno in _NOT_WRITTEN:
+            _let_go_of_output()
+            said = f"can't write the output: {error.strerror}"
+        click.echo(f"flightstack: {said}", err=True)
+        return FAILED
     return result if isinstance(result, int) else DONE
+
+
+def _let_go_of_output() -> None:
+    """Forget what could not be written: the interpreter would try again as it ends, and complain."""
+    if sys.stdout is not None:
+        with contextlib.suppress(OSError), open(os.devnull, "wb") as nothing:
+            os.dup2(nothing.fileno(), sys.stdout.fileno())

@@ -103,8 +103,6 @@ def _run(work: Callable[[], None]) -> None:
         work()
     except BridgeError as error:
         raise _Failed(str(error)) from error
-    except BrokenPipeError:  # the reader of our output has seen enough
-        sys.stderr.close()
 
 
 @click.group()

@@ -1,6 +1,6 @@
 """What the commands that speak on links have in common: the option for a key, the warning without one."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,16 +41,19 @@ def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
             click.echo(f"flightstack: warning: {open_unsigned(address)}", err=True)
 
 
-def vehicle_signing(key: Path | None, unsigned: str, store: Path | None) -> "SigningParameters":
+def vehicle_signing(
+    key: Path | None, unsigned: str, store: Path | None, *, on_failure: Callable[[str], None]
+) -> "SigningParameters":
     """Signing of simulated vehicles, for clients that live in real time.
 
     Args:
         key: file with the key of all vehicles.
         unsigned: from whom unsigned frames are taken: "none", "serial", "local" or "all".
         store: file in which keys and times are kept.
+        on_failure: told why, when that file can't be written any more.
 
     Raises:
-        SigningKeyError: a file can't be read, or holds something else; the message names it.
+        SigningKeyError: a file can't be read or written, or holds something else; the message names it.
     """
     from autopilot_bridge.sitl import SigningParameters, SigningStore, UnsignedFrom
     from missions.signing import now
@@ -59,7 +62,7 @@ def vehicle_signing(key: Path | None, unsigned: str, store: Path | None) -> "Sig
         key=key_from(key),
         unsigned_from=UnsignedFrom(unsigned),
         clock=now,
-        store=None if store is None else SigningStore(store),
+        store=None if store is None else SigningStore(store, on_failure),
     )
 
 

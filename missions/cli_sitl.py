@@ -1,23 +1,24 @@
 """`flightstack sitl`: vehicles for other people's clients."""
 
-import math
-import signal
+import contextlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import click
 
 from autopilot_bridge.errors import BridgeError, TlogError
+from missions.cli_losses import Losses
+from missions.cli_scenario import scenario_of
 from missions.cli_signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli_storage import VehicleCards, storage_option
 from missions.cli_types import SLOWEST, FiniteRange
 from missions.cli_video import start_video, video_options
-from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScenario
+from missions.end_requests import EndRequests
 
 if TYPE_CHECKING:
-    from autopilot_bridge.sitl import Port
+    from autopilot_bridge.sitl import Port, Sitl
 
 _LOG_RATE_HZ = 4
 _FAILED = 1
@@ -57,51 +58,26 @@ def _request_streams() -> bytes:
     return FrameEncoder(*_LOGGER).encode(request)
 
 
-def _scenario(
-    camera: bool, targets: tuple[str, ...], map_file: str | None, map_target: str | None
-) -> Scenario:
-    """Targets and payload from the options.
+@contextlib.contextmanager
+def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iterator[None]:
+    """A new log of what the vehicles say; it ends with the context, or where it can't be written any more.
 
     Raises:
-        ValueError: a target that can't be, or one that nobody could find.
+        TlogError: the file exists or can't be made.
     """
-    if targets and not camera:
-        raise ValueError("--target is seen by cameras only; add --camera")
-    if map_target is not None and map_file is None:
-        raise ValueError("--map-target needs a --map to be in")
-    survey = None
-    if map_file is not None:
-        place = None if map_target is None else _numbers(map_target, "--map-target", (2,))
-        survey = SurveyScenario(
-            map_path=Path(map_file), target_ne_m=None if place is None else (place[0], place[1])
-        )
-    return Scenario(
-        targets=tuple(_target(text, tag) for tag, text in enumerate(targets)), camera=camera, survey=survey
-    )
+    from autopilot_bridge.sitl import PacketLog
 
-
-def _target(text: str, tag: int) -> TargetScenario:
-    numbers = _numbers(text, "--target", (2, 4))
-    speed_m_s, heading_deg = numbers[2:] or (0.0, 0.0)
-    return TargetScenario(
-        north_m=numbers[0],
-        east_m=numbers[1],
-        motion=TargetMotion.STRAIGHT if speed_m_s else TargetMotion.STATIC,
-        speed_m_s=speed_m_s,
-        course_rad=math.radians(heading_deg),
-        tag=tag,
-    )
-
-
-def _numbers(text: str, option: str, counts: tuple[int, ...]) -> list[float]:
+    recorder = PacketLog(path)
+    for listener in world.record(recorder, losses.log_ended):
+        if autopilot == "ardupilot":  # which sends what it is asked for only
+            listener.send(_request_streams())
     try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in counts or not all(math.isfinite(number) for number in numbers):
-        accepted = " or ".join(str(count) for count in counts)
-        raise ValueError(f"{option} {text!r} is not {accepted} numbers with commas, for example 500,300")
-    return numbers
+        yield
+    finally:
+        try:
+            recorder.close()
+        except TlogError as error:
+            losses.log_ended(str(error))
 
 
 @click.command()
@@ -211,14 +187,14 @@ def sitl(
 
     Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
 
-    Exit codes: 0 stopped, 1 the log could not be written to its end, 2 usage.
+    Exit codes: 0 stopped, 1 the log, a picture or the signing keys could not be written, 2 usage,
+    130 interrupted while it started.
     """
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     from autopilot_bridge.clock.pacing import wall_time_s
     from autopilot_bridge.sitl import (
         PaceReport,
-        PacketLog,
         Sitl,
         SitlConfiguration,
         SitlServer,
@@ -231,103 +207,76 @@ def sitl(
     from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
 
-    stop: list[int] = []
     models = [name for text in model for name in text.split(",") if name] or ["iris"]
     count = len(models) if count == 1 else count
+    losses = Losses()
+    with EndRequests() as ending, contextlib.ExitStack() as at_end:
+        try:
+            ports = _ports(links, gcs_links)
+            signing = vehicle_signing(signing_key, unsigned, signing_store, on_failure=losses.keys_not_stored)
+            wind_speed_m_s, wind_from_deg = parse_wind(wind)
+            place = None if home is None else parse_home(home)
+            heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
+            configuration = SitlConfiguration(
+                vehicles=team(
+                    count,
+                    model=models[0] if len(models) == 1 else models,
+                    flavour=autopilot,
+                    launch=launch,
+                    heading_deg=heading_deg,
+                    parameters={
+                        **_loss_times(autopilot, speedup),
+                        **({} if params is None else parameters_from_file(params)),
+                    },
+                ),
+                home=place,
+                environment=Environment.from_wind(
+                    speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
+                ),
+                seed=seed,
+            )
+            memory = VehicleCards(storage, count)
+            at_end.callback(memory.close)
+            equipment = equipped(configuration, scenario_of(camera, targets, map_file, map_target))
+            click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
+            world = Sitl(equipment, signing=signing, cards=memory.cards)
+            compile_flight_code(world.configuration.vehicles)
+            server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
+            pictured = start_video(world, video, pictures, losses.picture_lost)
+            if pictured is not None:
+                at_end.callback(pictured.close)
+            if count > 1 and ports:
+                opened = server.open([()] * count, shared=ports)
+            else:
+                opened = server.open([ports] if ports else None)
+            at_end.callback(world.close)
+            ending.remember()
+            if log is not None:  # made when nothing else can be refused any more
+                at_end.enter_context(_recording(world, log, autopilot, losses))
+        except (ValueError, OSError, BridgeError) as error:
+            raise click.UsageError(str(error)) from error
+        for vehicle, port, address in opened:
+            system_id = vehicle.specification.system_id
+            kind = f"{autopilot} {vehicle.specification.model}"
+            how = signed_how(signing, port.address)
+            click.echo(f"vehicle {system_id} ({kind}): {address} {port.role}{how}")
+        for named in dict.fromkeys(port.address for _, port, _ in opened):
+            warn_if_unsigned(named, signing)
+        for uri in () if pictured is None else pictured.uris:
+            click.echo(f"video: {uri}")
+        click.echo("ready, Ctrl-C ends it")
 
-    def on_signal(number: int, frame: FrameType | None) -> None:
-        stop.append(number)
+        def report(pace: PaceReport) -> None:
+            click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
 
-    no_log: list[str] = []
-
-    def log_ended(why: str) -> None:
-        no_log.append(why)
-        click.echo(f"flightstack: {why}; the log ends here, the vehicles fly on", err=True)
-
-    try:
-        ports = _ports(links, gcs_links)
-        signing = vehicle_signing(signing_key, unsigned, signing_store)
-        wind_speed_m_s, wind_from_deg = parse_wind(wind)
-        place = None if home is None else parse_home(home)
-        heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
-        configuration = SitlConfiguration(
-            vehicles=team(
-                count,
-                model=models[0] if len(models) == 1 else models,
-                flavour=autopilot,
-                launch=launch,
-                heading_deg=heading_deg,
-                parameters={
-                    **_loss_times(autopilot, speedup),
-                    **({} if params is None else parameters_from_file(params)),
-                },
-            ),
-            home=place,
-            environment=Environment.from_wind(
-                speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
-            ),
-            seed=seed,
-        )
-        memory = VehicleCards(storage, count)
-        click.get_current_context().call_on_close(memory.close)
-        equipment = equipped(configuration, _scenario(camera, targets, map_file, map_target))
-        click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
-        world = Sitl(
-            equipment,
-            signing=signing,
-            cards=memory.cards,
-        )
-        compile_flight_code(world.configuration.vehicles)
-        server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
-        pictured = start_video(world, video, pictures)
-        recorder = None if log is None else PacketLog(log)
-        if count > 1 and ports:
-            opened = server.open([()] * count, shared=ports)
-        else:
-            opened = server.open([ports] if ports else None)
-        if recorder is not None:
-            for listener in world.record(recorder, log_ended):
-                if autopilot == "ardupilot":  # which sends what it is asked for only
-                    listener.send(_request_streams())
-    except (ValueError, OSError, BridgeError) as error:
-        raise click.UsageError(str(error)) from error
-    before = {number: signal.signal(number, on_signal) for number in (signal.SIGINT, signal.SIGTERM)}
-    for vehicle, port, address in opened:
-        system_id = vehicle.specification.system_id
-        kind = f"{autopilot} {vehicle.specification.model}"
-        click.echo(f"vehicle {system_id} ({kind}): {address} {port.role}{signed_how(signing, port.address)}")
-    for named in dict.fromkeys(port.address for _, port, _ in opened):
-        warn_if_unsigned(named, signing)
-    for uri in () if pictured is None else pictured.uris:
-        click.echo(f"video: {uri}")
-    click.echo("ready, Ctrl-C ends it")
-    sys.stdout.flush()
-    waits = autopilot == "ardupilot" and not ports and not no_wait
-
-    def report(pace: PaceReport) -> None:
-        click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
-
-    try:
-        if waits:
+        if autopilot == "ardupilot" and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
-            server.wait_for_client(lambda: bool(stop))
+            server.wait_for_client(lambda: ending.asked)
         server.run(
-            lambda: bool(stop),
-            report=report if sys.stderr.isatty() else None,
+            lambda: ending.asked,
+            report=report if sys.stderr is not None and sys.stderr.isatty() else None,
             until_us=None if duration is None else round(duration * 1e6),
         )
-    finally:
-        world.close()
-        if pictured is not None:
-            pictured.close()
-        if recorder is not None:
-            try:
-                recorder.close()
-            except TlogError as error:
-                if not no_log:
-                    log_ended(str(error))
-        for number, handler in before.items():
-            signal.signal(number, handler)
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")
-    return _FAILED if no_log else 0
+    return _FAILED if losses.any else 0

@@ -26,8 +26,15 @@ def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
     )(command)
 
 
-def start_video(world: "Sitl", video: str | None, pictures: Path | None) -> "VideoService | None":
+def start_video(
+    world: "Sitl", video: str | None, pictures: Path | None, on_loss: Callable[[str], None]
+) -> "VideoService | None":
     """Serve video and keep pictures as the options say; None: there is nothing to do.
+
+    Args:
+        world: with the cameras.
+        video, pictures: as on the command line.
+        on_loss: told what could not be kept, and why.
 
     Raises:
         ValueError: an option that can't be met, or one that needs a camera.
@@ -52,7 +59,7 @@ def start_video(world: "Sitl", video: str | None, pictures: Path | None) -> "Vid
         parameters = VideoParameters(host=host, port=port, any_port=False, folder=pictures)
     if parameters.port is not None and not parameters.host.startswith(("127.", "localhost")):
         click.echo(f"warning: video on {parameters.host} is open to whoever reaches it", err=True)
-    service = show_cameras(world, parameters)
+    service = show_cameras(world, parameters, on_loss)
     if service is not None and parameters.port is not None:
         service.start()
     return service

@@ -1,8 +1,11 @@
 """What to tell a person when a link can't be opened."""
 
 import errno
+from typing import Final
 
 from autopilot_bridge.errors import LinkError
+
+_HUNG_UP: Final = "the other end hung up at once: check what listens there"
 
 
 def open_error(address: str, error: OSError) -> LinkError:
@@ -12,6 +15,8 @@ def open_error(address: str, error: OSError) -> LinkError:
         errno.EADDRNOTAVAIL: "no interface of this machine has that address: use 127.0.0.1 or 0.0.0.0",
         errno.EACCES: "not permitted: choose a port above 1023",
         errno.ECONNREFUSED: "nothing listens there: start the vehicle or the simulator first, check the port",
+        errno.ECONNRESET: _HUNG_UP,
+        errno.ENOTCONN: _HUNG_UP,
         errno.EHOSTUNREACH: "the host can't be reached: check the network",
         errno.ENETUNREACH: "the network can't be reached: check the network",
         errno.ETIMEDOUT: "no answer: check the host and the port",

@@ -156,8 +156,12 @@ class TcpClientLink:
             opened = socket.create_connection(self._peer, connect_timeout_s)
         except (OSError, UnicodeError) as error:
             raise _refused(self.description, error) from error
-        self._family, self._remote = opened.family, opened.getpeername()
-        self._stream: _Stream | None = _Stream(opened, self.counters)
+        try:
+            self._family, self._remote = opened.family, opened.getpeername()
+            self._stream: _Stream | None = _Stream(opened, self.counters)
+        except OSError as error:  # the server has reset it at once
+            opened.close()
+            raise _refused(self.description, error) from error
         self.counters.connects += 1
 
     @property

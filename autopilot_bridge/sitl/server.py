@@ -59,6 +59,7 @@ class SitlServer:
         self.sitl = sitl
         self._monotonic = monotonic
         self._speedup = speedup
+        self._first: Link | None = None  # that was opened
         self._clock = (
             None if speedup is None else RealTimeClock(speedup, monotonic=monotonic, wait=self._wait)
         )
@@ -88,13 +89,13 @@ class SitlServer:
                     default_ports(vehicle.specification.flavour, index) if ports is None else ports[index]
                 )
                 for port in chosen:
-                    link = open_link(port.address, monotonic=self._monotonic)
+                    link = self._open(port)
                     vehicle.open(
                         link, role=port.role, bytes_per_s=self._capacity(link), reach=reach_of(port.address)
                     )
                     opened.append((vehicle, port, link.description))
             for port in shared:
-                link = open_link(port.address, monotonic=self._monotonic)
+                link = self._open(port)
                 self.sitl.share(
                     link, role=port.role, bytes_per_s=self._capacity(link), reach=reach_of(port.address)
                 )
@@ -102,14 +103,26 @@ class SitlServer:
             undo.pop_all()
         return opened
 
+    def _open(self, port: Port) -> Link:
+        link = open_link(port.address, monotonic=self._monotonic)
+        if self._first is None:
+            self._first = link
+        return link
+
     def _capacity(self, link: Link) -> float | None:
         """Bytes that a link carries in a second of vehicle time: a serial line does not know of a speedup."""
         capacity: float | None = getattr(link, "bytes_per_s", None)
         return None if capacity is None or self._speedup is None else capacity / self._speedup
 
     def wait_for_client(self, stopped: Callable[[], bool]) -> bool:
-        """Wait for somebody on the first link (ArduPilot's `tcp:0:wait`); False when stopped."""
-        link = self.sitl.vehicles[0].channels[0].link
+        """Wait for somebody on the first link that was opened (ArduPilot's `tcp:0:wait`); False when stopped.
+
+        Raises:
+            ValueError: none was.
+        """
+        link = self._first
+        if link is None:
+            raise ValueError("no link is open that a client could come on; call open first")
         while not link.peers:
             if stopped():
                 return False

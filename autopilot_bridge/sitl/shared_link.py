@@ -28,6 +28,7 @@ class SharedLink:
         self._reach = reach
         self._intake: Intake[PeerId] = Intake()
         self._peers = PeerExchange(link)
+        self._known: set[PeerId] = set()  # a frame of theirs was believed
         self._loops = LoopGuard()
         self._members: dict[int, tuple[Switchboard, LinkChannel]] = {}
 
@@ -60,7 +61,9 @@ class SharedLink:
             for frame in frames
             if (members := self._believing(frame))
         ]
-        self._peers.forget({peer for peer, _ in arrived} - {peer for peer, _, _ in believed})
+        self._known.update(peer for peer, _, _ in believed)
+        self._peers.forget({peer for peer, _ in arrived} - self._known)
+        self._known.intersection_update(self.link.peers)
         for peer, frame, members in believed:
             for switchboard, channel in members:
                 switchboard.take(channel, (frame,))

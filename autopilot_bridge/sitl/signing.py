@@ -21,6 +21,7 @@ from autopilot_bridge.mavlink.signing import INTERNAL, MINUTE, RADIO, REQUIRED, 
 
 _KEY_REMOVED: Final = "Signing key removed"
 _KEY_TAKEN: Final = "Signing key set"
+_NOT_STORED: Final = ", but can't be stored"  # a restart forgets it
 _WHILE_ARMED: Final = "ERROR: Won't setup signing when armed"  # ArduPilot's words
 _NOT_TRUSTED: Final = "Signing key refused: link not trusted"
 _NOT_REMOVABLE: Final = "Signing key can't be removed"
@@ -53,28 +54,42 @@ class SigningStore:
 
     Args:
         path: the file; it need not exist.
+        on_failure: told why, when the file can't be written any more. The vehicles fly on, and what ought to
+            be there is written with the next change, if that can be.
+
+    Attributes:
+        failure: why the file is not what it ought to be; empty: it is.
 
     Raises:
-        SigningKeyError: the file is something else, or can't be read.
+        SigningKeyError: the file is something else, can't be read, or will not be writable.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, on_failure: Callable[[str], None] | None = None) -> None:
+        self.failure = ""
         self._path = path
+        self._on_failure = on_failure
         self._vehicles: dict[int, tuple[int, SigningKey | None]] = {}
-        if path.exists():
-            try:
-                for line in path.read_text(encoding="ascii").splitlines():
-                    number, timestamp, *key = line.split()
-                    self._vehicles[int(number)] = (
-                        int(timestamp),
-                        SigningKey(bytes.fromhex(key[0])) if key else None,
-                    )
-            except OSError as error:
-                raise SigningKeyError(f"can't read {path}: {error.strerror}") from error
-            except (ValueError, IndexError) as error:
-                raise SigningKeyError(
-                    f"{path} is not a store of signing keys; choose another path, which is made anew"
-                ) from error
+        try:
+            for line in path.read_text(encoding="ascii").splitlines():
+                number, timestamp, *key = line.split()
+                self._vehicles[int(number)] = (
+                    int(timestamp),
+                    SigningKey(bytes.fromhex(key[0])) if key else None,
+                )
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            raise SigningKeyError(f"can't read {path}: {error.strerror}") from error
+        except (ValueError, IndexError) as error:
+            raise SigningKeyError(
+                f"{path} is not a store of signing keys; choose another path, which is made anew"
+            ) from error
+        try:
+            self._write(replace=False)
+        except OSError as error:
+            raise SigningKeyError(
+                f"can't write {path}: {error.strerror}; choose a file in a folder that can be written"
+            ) from error
 
     def load(self, system_id: int) -> tuple[int, SigningKey | None] | None:
         """Timestamp to go on from, a minute later than any that was used, and the key; None: never stored."""
@@ -82,17 +97,31 @@ class SigningStore:
         return None if found is None else (found[0] + MINUTE, found[1])
 
     def save(self, system_id: int, state: SigningState) -> None:
-        """Store a vehicle's key and time; the file is replaced whole."""
+        """Store a vehicle's key and time; the file is replaced whole, or left as it is (`failure`)."""
         self._vehicles[system_id] = (state.timestamp, state.key)
+        before, self.failure = self.failure, ""
+        try:
+            self._write(replace=True)
+        except OSError as error:
+            self.failure = f"can't write {self._path}: {error.strerror}"
+            if not before and self._on_failure is not None:
+                self._on_failure(self.failure)
+
+    def _write(self, *, replace: bool) -> None:
+        """Write all there is beside the file, and put it into the file's place or, for a trial, away."""
         lines = [
             f"{number} {timestamp}{'' if key is None else ' ' + key.secret.hex()}\n"
             for number, (timestamp, key) in sorted(self._vehicles.items())
         ]
         beside = self._path.with_name(self._path.name + ".new")
-        descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            file.writelines(lines)
-        beside.replace(self._path)
+        try:
+            descriptor = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+            with os.fdopen(descriptor, "w", encoding="ascii") as file:
+                file.writelines(lines)
+            if replace:
+                beside.replace(self._path)
+        finally:
+            beside.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,11 +214,16 @@ class VehicleSigning:
         secret = bytes(message.secret_key)
         if any(secret):
             self.state.set_key(SigningKey(secret), message.initial_timestamp)
-            return _KEY_TAKEN
+            return _KEY_TAKEN + self._not_stored
         if not self._parameters.removable:
             return _NOT_REMOVABLE
         self.state.set_key(None)
-        return _KEY_REMOVED
+        return _KEY_REMOVED + self._not_stored
+
+    @property
+    def _not_stored(self) -> str:
+        store = self._parameters.store
+        return _NOT_STORED if store is not None and store.failure else ""
 
 
 def told(text: str) -> mavlink.MAVLink_statustext_message:

@@ -4,6 +4,7 @@ It ends when the process that started it does, however that ends.
 """
 
 import asyncio
+import contextlib
 import os
 import signal
 import socket
@@ -26,12 +27,15 @@ async def _main(control: int, listen: int) -> None:
     warming = asyncio.get_running_loop().create_task(studio.warm_up())
     await studio.serve()
     warming.cancel()
+    with contextlib.suppress(ConnectionError):  # the vehicles' process is gone
+        await writer.drain()
     if server is not None:
         server.close()
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the vehicles; their end is ours
+    for ending in (signal.SIGINT, signal.SIGHUP):  # a terminal's: for the vehicles, whose end is ours
+        signal.signal(ending, signal.SIG_IGN)
     os.nice(5)
     cv2.setNumThreads(1)
     asyncio.run(_main(int(sys.argv[1]), int(sys.argv[2])))

@@ -60,13 +60,17 @@ class RtpEncoder:
 
 
 class Recording:
-    """An MP4 file that is readable up to its last fragment whenever the process ends.
+    """An MP4 file that is readable up to its last fragment, however the process or the disk's room ends.
+
+    Attributes:
+        path: the file.
 
     Raises:
         OSError: the file can't be made, or exists.
     """
 
     def __init__(self, path: Path, *, width_px: int, height_px: int, rate_hz: float) -> None:
+        self.path = path
         path.parent.mkdir(parents=True, exist_ok=True)
         self._file = path.open("xb")
         self._container: Any = av.open(
@@ -76,19 +80,26 @@ class Recording:
         self._start_us: int | None = None
 
     def write(self, picture: Picture, *, time_us: int) -> None:
-        """Add a picture of a vehicle time; times rise."""
+        """Add a picture of a vehicle time; times rise.
+
+        Raises:
+            OSError: the file can't be written.
+        """
         if self._start_us is None:
             self._start_us = time_us
         for packet in self._stream.encode(_frame(picture, time_us - self._start_us, _MICROSECOND, False)):
             self._container.mux(packet)
 
     def close(self) -> None:
-        """Finish the file."""
-        if self._start_us is not None:
-            for packet in self._stream.encode(None):
-                self._container.mux(packet)
-        self._container.close()
-        self._file.close()
+        """Finish the file, and let go of it in any case.
+
+        Raises:
+            OSError: its end can't be written.
+        """
+        with self._file, self._container:
+            if self._start_us is not None:
+                for packet in self._stream.encode(None):
+                    self._container.mux(packet)
 
 
 def _video_stream(container: Any, width_px: int, height_px: int, rate_hz: float, unit: Fraction) -> Any:

@@ -1,6 +1,7 @@
 """Shows what the cameras of a SITL see: each camera component gets its stream, and a place for photos."""
 
 import math
+from collections.abc import Callable
 from typing import Final
 
 from autopilot_bridge.payload.camera_video import VideoStream
@@ -33,10 +34,17 @@ class CameraFolder:
         self._service.stop_recording(self._index)
 
 
-def show_cameras(sitl: Sitl, parameters: VideoParameters) -> VideoService | None:
+def show_cameras(
+    sitl: Sitl, parameters: VideoParameters, on_loss: Callable[[str], None]
+) -> VideoService | None:
     """Serve the pictures of all cameras of a world; None: there is no camera.
 
     Cameras are called "camera" and the vehicle's system id. Aircraft have a runway of 600 m through home.
+
+    Args:
+        sitl: the world.
+        parameters: how its pictures are offered.
+        on_loss: told what could not be kept, and why.
 
     Raises:
         VideoError: the port is busy, or the folder holds something already.
@@ -66,6 +74,7 @@ def show_cameras(sitl: Sitl, parameters: VideoParameters) -> VideoService | None
         ],
         scenery=_scenery(sitl),
         parameters=parameters,
+        on_loss=on_loss,
     )
     for index, (_, component) in enumerate(components):
         uri = service.uri(index)

@@ -2,6 +2,7 @@
 
 import math
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +23,20 @@ def save_photo(path: Path, picture: NDArray[np.uint8], notes: dict[str, Any]) ->
             save it with, 1 to 100.
 
     Raises:
-        OSError: the file can't be made, or exists.
+        OSError: the file exists, or can't be written; nothing is left of it then.
     """
+    encoded = BytesIO()
+    Image.fromarray(picture[:, :, ::-1]).save(
+        encoded, "JPEG", quality=int(notes["quality"]), exif=_exif(notes)
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("xb") as file:
-        Image.fromarray(picture[:, :, ::-1]).save(
-            file, "JPEG", quality=int(notes["quality"]), exif=_exif(notes)
-        )
+    file = path.open("xb")
+    try:
+        with file:
+            file.write(encoded.getbuffer())
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
 
 
 def _exif(notes: dict[str, Any]) -> Image.Exif:

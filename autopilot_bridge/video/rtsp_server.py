@@ -21,7 +21,9 @@ from autopilot_bridge.video.studio import CameraStream
 MAX_PLAYERS: Final = 32
 _FULL_BYTES: Final = 512 * 1024  # of a connection's queue: from here on packets are left out
 _METHODS: Final = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER, SET_PARAMETER"
-_SILENCE_S: Final = 90.0  # of a player that has not begun to watch
+_TIMEOUT_S: Final = 60  # as players are told, who ask for something or send RTCP twice in it
+_LOOK_S: Final = 10.0
+_SILENT_LOOKS: Final = 9  # in a row: a player that is heard on no way is gone
 
 
 class RtspServer:
@@ -43,8 +45,7 @@ class RtspServer:
         requests = RequestReader()
         try:
             while True:
-                timeout_s = None if player.playing else _SILENCE_S
-                data = await asyncio.wait_for(reader.read(65536), timeout_s)
+                data = await _said(reader, player)
                 if not data:
                     break
                 for request in requests.feed(data):
@@ -61,8 +62,45 @@ class RtspServer:
                 await writer.wait_closed()
 
 
+async def _said(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
+    """What a player says next on its connection; nothing: it has ended it.
+
+    Looks are counted, not seconds: when this process was stopped for a while, what was said meanwhile counts.
+
+    Raises:
+        TimeoutError: it is gone.
+    """
+    silent = 0
+    while player.held_by_connection or silent < _SILENT_LOOKS:
+        player.heard = False
+        try:
+            async with asyncio.timeout(_LOOK_S) as look:
+                return await reader.read(65536)
+        except TimeoutError:
+            if not look.expired():  # the operating system has given it up
+                raise
+        silent = 0 if player.heard else silent + 1
+    raise TimeoutError
+
+
+class _Ear(asyncio.DatagramProtocol):
+    """Hears a player's RTCP; the reports' contents are not used."""
+
+    def __init__(self, player: "RtspPlayer") -> None:
+        self._player = player
+
+    def datagram_received(self, data: bytes, addr: object) -> None:
+        self._player.heard = True
+
+
 class RtspPlayer:
-    """One connection's session."""
+    """One connection's session.
+
+    Attributes:
+        playing: it is sent packets.
+        lost: see `studio.Player`.
+        heard: set when something comes from it by UDP.
+    """
 
     def __init__(self, streams: Mapping[str, CameraStream], writer: asyncio.StreamWriter) -> None:
         self._streams = streams
@@ -73,6 +111,12 @@ class RtspPlayer:
         self._session = ""
         self.playing = False
         self.lost = True
+        self.heard = False
+
+    @property
+    def held_by_connection(self) -> bool:
+        """Its packets go into the connection, which breaks when nobody takes them."""
+        return self.playing and self._transport is not None and self._transport.interleaved
 
     async def answer(self, request: Request) -> bytes:
         """Do what is asked, and say so."""
@@ -140,14 +184,16 @@ class RtspPlayer:
             loop = asyncio.get_running_loop()
             for _ in range(2):
                 endpoint, _ = await loop.create_datagram_endpoint(
-                    asyncio.DatagramProtocol, local_addr=(self._address(1), 0)
+                    lambda: _Ear(self), local_addr=(self._address(1), 0)
                 )
                 self._udp.append(endpoint)
             ports = [endpoint.get_extra_info("sockname")[1] for endpoint in self._udp]
             header += f";server_port={ports[0]}-{ports[1]}"
         self._stream, self._transport = stream, transport
         self._session = self._session or secrets.token_hex(8)
-        return response(200, request, {"Transport": header, "Session": f"{self._session};timeout=60"})
+        return response(
+            200, request, {"Transport": header, "Session": f"{self._session};timeout={_TIMEOUT_S}"}
+        )
 
     def _control(self, request: Request) -> bytes:
         if self._stream is None or self._transport is None:

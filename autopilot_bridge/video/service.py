@@ -1,6 +1,5 @@
 """The vehicles' side of pictures: listens, starts the picture process, tells it what is seen."""
 
-import contextlib
 import os
 import select
 import socket
@@ -28,7 +27,8 @@ DEFAULT_PORT: Final = 8554
 _PORTS_TRIED: Final = 50
 _BACKLOG: Final = 16
 _QUEUE_BYTES: Final = 4 << 20  # photos that the picture process has not taken yet
-_END_S: Final = 30.0  # to write what was told to be written
+_END_S: Final = 30.0  # to write what was told to be written, since the last word
+_ENDED: Final = "the picture process has ended before photos or videos were written, which are lost"
 
 
 class VideoError(BridgeError):
@@ -95,18 +95,29 @@ class CameraOnShow:
 class VideoService:
     """Pictures of all cameras of a world. Call `poll` often; it costs next to nothing and never waits.
 
+    Args:
+        cameras: all.
+        scenery: of the world.
+        parameters: how their pictures are offered.
+        on_loss: told what could not be kept, and why, of photos and recordings. That comes later than the
+            camera has told its clients of a photo.
+
     Attributes:
         port: that players connect to; None: there are no streams.
-        errors: what could not be written, newest last.
-        pictures_lost: photos that were not taken by the picture process in time.
 
     Raises:
         VideoError: the port is busy, or the folder holds something already.
     """
 
     def __init__(
-        self, cameras: Sequence[CameraOnShow], *, scenery: Scenery, parameters: VideoParameters
+        self,
+        cameras: Sequence[CameraOnShow],
+        *,
+        scenery: Scenery,
+        parameters: VideoParameters,
+        on_loss: Callable[[str], None],
     ) -> None:
+        self._on_loss = on_loss
         self._cameras = tuple(cameras)
         self._parameters = parameters
         self._setup = StudioSetup(
@@ -120,13 +131,12 @@ class VideoService:
             raise VideoError(f"{folder} is there already; pictures go to a new or empty folder")
         self._listener = _listen(parameters)
         self.port = None if self._listener is None else int(self._listener.getsockname()[1])
-        self.errors: list[str] = []
-        self.pictures_lost = 0
         self._process: subprocess.Popen[bytes] | None = None
         self._line: socket.socket | None = None
         self._incoming = b""
         self._outgoing = bytearray()
         self._photos = [0] * len(self._cameras)
+        self._photos_under_way = 0
         self._videos = [0] * len(self._cameras)
         self._next_frame_us: dict[int, int] = {}
         self._untaken: set[int] = set()  # recordings with a picture under way
@@ -162,9 +172,10 @@ class VideoService:
         name = f"{self._cameras[index].name}/IMG_{self._photos[index]:04d}.jpg"
         self._photos[index] += 1
         if len(self._outgoing) > _QUEUE_BYTES:
-            self.pictures_lost += 1
+            self._on_loss(f"photo {folder / name} is not taken: too many before it are waiting")
             return ""
         view = view_to_json(self._cameras[index].camera.view(time_us))
+        self._photos_under_way += 1
         self._tell("photo", index, path=str(folder / name), view=view, notes=notes)
         return name
 
@@ -209,9 +220,8 @@ class VideoService:
             if not data:
                 self._lost()
                 return
-            *lines, self._incoming = (self._incoming + data).split(b"\n")
-            for line in lines:
-                self._answer(unpack(line), time_us)
+            for message in self._messages(data):
+                self._answer(message, time_us)
         except BlockingIOError:
             pass
         except OSError:
@@ -229,17 +239,28 @@ class VideoService:
             self.stop_recording(index)
         if self._line is None or self._process is None:
             return
-        with contextlib.suppress(OSError):
-            self._line.settimeout(_END_S)
-            self._line.sendall(self._outgoing)
-            self._line.shutdown(socket.SHUT_WR)
-        try:
-            self._process.wait(_END_S if self._parameters.folder is not None else 0.0)
-        except subprocess.TimeoutExpired:
+        if self._parameters.folder is None:
             self._process.kill()
-            self._process.wait()
+        elif not self._heard_out(self._line, self._process):
+            self._on_loss(_ENDED)
+            self._process.kill()
+        self._process.wait()
         self._line.close()
         self._line = self._process = None
+
+    def _heard_out(self, line: socket.socket, process: "subprocess.Popen[bytes]") -> bool:
+        """Let the picture process write what it was told to write; False: it did not get so far."""
+        try:
+            line.settimeout(_END_S)
+            line.sendall(self._outgoing)
+            line.shutdown(socket.SHUT_WR)
+            while data := line.recv(65536):
+                for message in self._messages(data):
+                    if "error" in message:
+                        self._on_loss(message["error"])
+            return process.wait(_END_S) == 0
+        except (OSError, subprocess.TimeoutExpired):
+            return False
 
     def _start(self) -> None:
         ours, theirs = socket.socketpair()
@@ -263,9 +284,16 @@ class VideoService:
         self._outgoing += pack({"kind": kind, "camera": index, **more})
         self._flush()
 
+    def _messages(self, data: bytes) -> list[dict[str, Any]]:
+        *lines, self._incoming = (self._incoming + data).split(b"\n")
+        return [unpack(line) for line in lines]
+
     def _answer(self, message: dict[str, Any], time_us: int) -> None:
         if "error" in message:
-            self.errors.append(message["error"])
+            self._on_loss(message["error"])
+            return
+        if "photographed" in message:
+            self._photos_under_way -= 1
             return
         if "took" in message:
             self._untaken.discard(message["took"])
@@ -292,7 +320,10 @@ class VideoService:
         if self._process is not None:
             self._process.kill()
             self._process.wait()
+        if self._photos_under_way or self._next_frame_us:
+            self._on_loss(_ENDED)
         self._line = self._process = None
+        self._photos_under_way = 0
         self._next_frame_us.clear()
         self._untaken.clear()
         self._outgoing.clear()

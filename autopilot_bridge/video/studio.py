@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, Protocol
 
@@ -131,8 +132,7 @@ class Studio:
             pass
         finally:
             for stream in self.streams:
-                if stream.recording is not None:
-                    stream.recording.close()
+                self._finish(stream)
 
     async def warm_up(self) -> None:
         """Make a picture that nobody sees: kernels are loaded, or compiled, before the first player comes."""
@@ -150,28 +150,59 @@ class Studio:
         index = message["camera"]
         stream = self.streams[index]
         view = None if message.get("view") is None else view_from_json(message["view"])
+        match message["kind"]:
+            case "view":
+                for answer in self._questions.pop(index, ()):
+                    if not answer.done():
+                        answer.set_result(view)
+            case "photo" if view is not None:
+                self._photograph(stream, view, Path(message["path"]), message["notes"])
+                self._writer.write(pack({"photographed": index}))
+            case "record":
+                self._record(stream, Path(message["path"]), message["rate_hz"])
+            case "frame" if view is not None:
+                self._film(stream, view)
+                self._writer.write(pack({"took": index}))
+            case "stop":
+                self._finish(stream)
+
+    def _photograph(self, stream: CameraStream, view: CameraView, path: Path, notes: dict[str, Any]) -> None:
         try:
-            match message["kind"]:
-                case "view":
-                    for answer in self._questions.pop(index, ()):
-                        if not answer.done():
-                            answer.set_result(view)
-                case "photo" if view is not None:
-                    save_photo(Path(message["path"]), stream.renderer.render(view), message["notes"])
-                case "record":
-                    width, height = stream.size_px
-                    stream.recording = Recording(
-                        Path(message["path"]), width_px=width, height_px=height, rate_hz=message["rate_hz"]
-                    )
-                case "frame" if view is not None:
-                    if stream.recording is not None:
-                        stream.recording.write(stream.picture(view), time_us=view.time_us)
-                    self._writer.write(pack({"took": index}))
-                case "stop" if stream.recording is not None:
-                    stream.recording.close()
-                    stream.recording = None
+            save_photo(path, stream.renderer.render(view), notes)
         except OSError as error:
-            self._writer.write(pack({"error": f"{message.get('path')}: {error}"}))
+            self._tell("photo", path, error)
+
+    def _record(self, stream: CameraStream, path: Path, rate_hz: float) -> None:
+        width, height = stream.size_px
+        try:
+            stream.recording = Recording(path, width_px=width, height_px=height, rate_hz=rate_hz)
+        except OSError as error:
+            self._tell("video", path, error)
+
+    def _film(self, stream: CameraStream, view: CameraView) -> None:
+        """Add to a recording, which ends where it can't be written."""
+        recording = stream.recording
+        if recording is None:
+            return
+        try:
+            recording.write(stream.picture(view), time_us=view.time_us)
+        except OSError as error:
+            self._tell("video", recording.path, error)
+            stream.recording = None
+            with suppress(OSError):  # told already
+                recording.close()
+
+    def _finish(self, stream: CameraStream) -> None:
+        recording, stream.recording = stream.recording, None
+        if recording is None:
+            return
+        try:
+            recording.close()
+        except OSError as error:
+            self._tell("video", recording.path, error)
+
+    def _tell(self, what: str, path: Path, error: OSError) -> None:
+        self._writer.write(pack({"error": f"can't write {what} {path}: {error.strerror or error}"}))
 
 
 async def open_line(descriptor: int) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:

@@ -5,6 +5,7 @@ import pty
 import random
 import select
 import socket
+import struct
 import tty
 
 import pytest
@@ -380,6 +381,20 @@ def test_tcp_client_reconnects():
     client.send(b"back")
     assert list(receive(server, 4).values()) == [b"back"]
     assert client.counters.connects == 2
+
+
+def test_a_server_that_hangs_up_at_once_is_told_as_one_that_can_not_be_opened(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        opened = socket.create_connection(("127.0.0.1", port))
+        accepted, _ = listener.accept()
+        accepted.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        accepted.close()  # a reset
+        assert select.select((opened,), (), (), DEADLINE_MS * 1e-3)[0]
+        monkeypatch.setattr(socket, "create_connection", lambda *_: opened)
+        with pytest.raises(LinkError, match=rf"tcp:127\.0\.0\.1:{port}.*hung up at once"):
+            TcpClientLink(TcpClient("127.0.0.1", port))
+    assert opened.fileno() == -1
 
 
 # Serial

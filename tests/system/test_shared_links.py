@@ -277,3 +277,31 @@ def test_impostors_on_a_shared_link(worlds: Callable[..., World]) -> None:
     world.on(0.5)
     assert ground.senders(HEARTBEAT)[2, 1] <= before + 1
     assert world.sitl.shared_links[0].echoes == 50
+
+
+@pytest.mark.parametrize("odd", [b"\n", b"\xfd\x09", "echo"])
+def test_a_client_is_kept_on_a_shared_link_whatever_else_it_sends(
+    odd: bytes | str, worlds: Callable[..., World]
+) -> None:
+    """A line's end, half a frame, a vehicle's frame brought back: once believed, a client is sent to."""
+    world = worlds(2)
+    ground = world.client(world.listen("udpin", shared=True), 255)
+    ground.say_hello()
+    vehicles = {(1, 1), (2, 1)}
+    world.until(lambda: vehicles <= set(ground.senders(HEARTBEAT)))
+    ground.link.send(odd if isinstance(odd, bytes) else ground.heard[0].raw)
+    world.on(0.1)
+    ground.heard.clear()
+    world.until(lambda: vehicles <= set(ground.senders(HEARTBEAT)))
+
+
+def test_strangers_on_a_shared_link_are_not_spoken_to(worlds: Callable[..., World]) -> None:
+    world = worlds(2)
+    url = world.listen("udpin", shared=True)
+    ground, stranger = world.client(url, 255), world.client(url, 66)
+    ground.say_hello()
+    stranger.link.send(b"\xfd\x09 let me in " * 20)
+    world.until(lambda: ground.senders(HEARTBEAT)[2, 1])
+    stranger.link.send(ground.heard[0].raw)
+    world.on(1.0)
+    assert stranger.heard == []

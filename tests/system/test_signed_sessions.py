@@ -324,3 +324,29 @@ def test_a_store_that_is_none_is_told(tmp_path: Path, content: str) -> None:
     path.write_text(content)
     with pytest.raises(ValueError, match="is not a store of signing keys"):
         SigningStore(path)
+
+
+def test_a_store_that_can_not_be_written_is_told_when_it_is_opened(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"can't write .*keys: No such file or directory"):
+        SigningStore(tmp_path / "nowhere" / "keys")
+    SigningStore(tmp_path / "keys")
+    assert list(tmp_path.iterdir()) == []  # trying leaves nothing
+
+
+def test_a_store_that_can_not_be_written_any_more_is_told_and_the_key_works(tmp_path: Path) -> None:
+    folder, told = tmp_path / "stored", []
+    folder.mkdir()
+    store = SigningStore(folder / "keys", told.append)
+    keys = Keys(Reach.MACHINE, store=store)
+    folder.rmdir()
+    keys.bring(KEY.secret)
+    keys.bring(OTHER_KEY.secret, signer(KEY, 1 << 46))
+    assert keys.key == OTHER_KEY
+    assert keys.texts == ["Signing key set, but can't be stored"] * 2
+    assert told == [store.failure] and "No such file or directory" in store.failure
+    folder.mkdir()
+    keys.bring(KEY.secret, signer(OTHER_KEY, 1 << 47))
+    assert keys.texts[2:] == ["Signing key set"] and not store.failure
+    stored = SigningStore(folder / "keys").load(1)
+    assert stored is not None and stored[1] == KEY
+    assert [path.name for path in folder.iterdir()] == ["keys"]

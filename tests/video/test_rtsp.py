@@ -2,11 +2,13 @@
 
 import asyncio
 import re
+import socket
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from autopilot_bridge.video import rtsp_server
 from autopilot_bridge.video.messages import CameraSetup, StudioSetup
 from autopilot_bridge.video.rtsp import RequestReader, RtspError, Transport, parse_transport, response
 from autopilot_bridge.video.rtsp_server import MAX_PLAYERS, RtspPlayer, RtspServer
@@ -127,12 +129,13 @@ class Talk:
         text = (await reader.readexactly(int(body[1]))).decode() if body else ""
         return int(head.split()[1]), head + text
 
-    async def play(self, connection) -> None:
-        transport = "RTP/AVP/TCP;unicast;interleaved=0-1"
+    async def play(self, connection, transport: str = "RTP/AVP/TCP;unicast;interleaved=0-1") -> str:
+        """What was answered about the transport."""
         status, answer = await self.ask_for(connection, "SETUP", "camera1/trackID=0", transport=transport)
         assert status == 200
         session = re.search(r"Session: (\w+)", answer)[1]
         assert (await self.ask_for(connection, "PLAY", session=session))[0] == 200
+        return answer
 
 
 async def packet(reader: asyncio.StreamReader) -> tuple[int, bytes]:
@@ -200,6 +203,62 @@ def test_too_many_players_are_turned_away():
                     await asyncio.sleep(0.01)
 
     asyncio.run(crowd())
+
+
+UDP = "RTP/AVP;unicast;client_port={port}-{port}"
+
+
+@pytest.fixture
+def short_looks(monkeypatch):
+    monkeypatch.setattr(rtsp_server, "_LOOK_S", 0.02)
+
+
+def test_a_udp_player_that_vanished_is_not_rendered_for(short_looks):
+    async def vanish() -> None:
+        async with Talk() as talk:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as media:
+                media.bind(("127.0.0.1", 0))
+                reader, _ = connection = await talk.connect()
+                await talk.play(connection, UDP.format(port=media.getsockname()[1]))
+                assert await asyncio.wait_for(reader.read(), 20.0) == b""  # parted from, after some silence
+                assert talk.stream._task is None
+
+    asyncio.run(vanish())
+
+
+@pytest.mark.parametrize("how", ["RTCP", "GET_PARAMETER"])
+def test_a_udp_player_that_is_heard_goes_on(how, short_looks):
+    async def watch() -> None:
+        async with Talk() as talk:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as media:
+                media.bind(("127.0.0.1", 0))
+                reader, _ = connection = await talk.connect()
+                answer = await talk.play(connection, UDP.format(port=media.getsockname()[1]))
+                control = int(re.search(r"server_port=\d+-(\d+)", answer)[1])
+                loop = asyncio.get_running_loop()
+                long_after_s = loop.time() + 3 * 9 * 0.02
+                while loop.time() < long_after_s:
+                    if how == "RTCP":
+                        media.sendto(RECEIVER_REPORT[4:], ("127.0.0.1", control))
+                    else:
+                        assert (await talk.ask_for(connection, "GET_PARAMETER"))[0] == 200
+                    await asyncio.sleep(0.005)
+                assert talk.stream._players and not reader.at_eof()
+
+    asyncio.run(watch())
+
+
+def test_a_player_within_its_connection_need_say_nothing(short_looks):
+    async def watch() -> None:
+        async with Talk() as talk:
+            reader, _ = connection = await talk.connect()
+            await talk.play(connection)
+            begun_s = asyncio.get_running_loop().time()
+            while asyncio.get_running_loop().time() < begun_s + 2 * 9 * 0.02:
+                await packet(reader)
+            assert talk.stream._players
+
+    asyncio.run(watch())
 
 
 class SlowWriter:

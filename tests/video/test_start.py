@@ -24,7 +24,7 @@ def test_it_is_ready_before_the_first_player_comes(monkeypatch: pytest.MonkeyPat
         return view(camera, time_us)
 
     monkeypatch.setattr(Camera, "view", counted)
-    service = show_cameras(sitl, VideoParameters(port=0))
+    service = show_cameras(sitl, VideoParameters(port=0), [].append)
     assert service is not None
     service.start()
     process = service._process

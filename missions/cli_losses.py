@@ -1,0 +1,33 @@
+"""What a running SITL can't keep: the log, the signing keys, pictures."""
+
+import click
+
+
+class Losses:
+    """Tells of each on stderr when it happens. The vehicles fly on.
+
+    Attributes:
+        any: there was one; the command fails in the end.
+    """
+
+    def __init__(self) -> None:
+        self.any = False
+        self._log_ended = False
+
+    def log_ended(self, why: str) -> None:
+        """The log takes no more; told once."""
+        if not self._log_ended:
+            self._log_ended = True
+            self._tell(f"{why}; the log ends here, the vehicles fly on")
+
+    def keys_not_stored(self, why: str) -> None:
+        """The store of signing keys can't be written."""
+        self._tell(f"{why}; signing keys and times are kept in memory, a restart forgets them")
+
+    def picture_lost(self, why: str) -> None:
+        """A photo, or the rest of a video."""
+        self._tell(why)
+
+    def _tell(self, text: str) -> None:
+        self.any = True
+        click.echo(f"flightstack: {text}", err=True)

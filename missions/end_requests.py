@@ -1,0 +1,50 @@
+"""What asks a command to end: Ctrl-C, SIGTERM, and the end of its terminal (SIGHUP)."""
+
+import signal
+from types import FrameType, TracebackType
+from typing import Any, Final
+
+_ASKING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class EndRequests:
+    """A context in which such a signal ends the command in good order.
+
+    At first it raises KeyboardInterrupt, so that a start ends wherever it is; from `remember` on it is kept
+    for whoever looks at `asked`. SIGHUP stays ignored where it is on entry (`nohup`). For the main thread.
+
+    Attributes:
+        asked: such a signal has come.
+    """
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._raises = True
+        self._before: dict[int, Any] = {}
+
+    def remember(self) -> None:
+        """Raise no more.
+
+        Raises:
+            KeyboardInterrupt: it was asked for before, where nothing can be raised (a finaliser, say).
+        """
+        self._raises = False
+        if self.asked:
+            raise KeyboardInterrupt
+
+    def __enter__(self) -> "EndRequests":
+        for number in _ASKING:
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
+                self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        again, self.asked = self.asked, True
+        if self._raises and not again:  # the second time it is on its way out
+            raise KeyboardInterrupt
