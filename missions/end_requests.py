@@ -2,9 +2,9 @@
 
 import signal
 from types import FrameType, TracebackType
-from typing import Any, Final
+from typing import Any
 
-_ASKING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+from missions.end_signals import end_signals
 
 
 class EndRequests:
@@ -33,9 +33,8 @@ class EndRequests:
             raise KeyboardInterrupt
 
     def __enter__(self) -> "EndRequests":
-        for number in _ASKING:
-            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:
-                self._before[number] = signal.signal(number, self._on_signal)
+        for number in end_signals(signal.SIGINT, signal.SIGTERM):
+            self._before[number] = signal.signal(number, self._on_signal)
         return self
 
     def __exit__(

@@ -6,15 +6,14 @@ a process where it stands, with its vehicles in the air.
 
 import asyncio
 import signal
-import threading
 from collections.abc import Coroutine
 from types import FrameType, TracebackType
 from typing import Any, Final, Self
 
 from autopilot_bridge.clock import run
 from autopilot_bridge.clock.pacing import wall_time_s
+from missions.end_signals import end_signals
 
-_ENDING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SAME_S: Final = 1.0
 """A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: that is asked once."""
 
@@ -40,8 +39,7 @@ class EndingSignals:
     """While it is entered, Ctrl-C, SIGTERM and SIGHUP interrupt alike.
 
     While `run` runs, the first one cancels what is run, and one that comes later stops at once; outside of it
-    the first one does. Signals that are ignored (nohup) or have a handler already are left alone. So are all
-    of them in a thread that is not the main one: only that may be told of signals.
+    the first one does. Which of them are left alone: `end_signals`.
     """
 
     def __init__(self) -> None:
@@ -51,10 +49,8 @@ class EndingSignals:
         self._asked_wall_s = 0.0
 
     def __enter__(self) -> Self:
-        if threading.current_thread() is threading.main_thread():
-            for number in _ENDING:
-                if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
-                    self._before[number] = signal.signal(number, self._on_signal)
+        for number in end_signals():
+            self._before[number] = signal.signal(number, self._on_signal)
         return self
 
     def __exit__(

@@ -7,7 +7,6 @@ it: the replay of that log gives the same estimates, bit for bit.
 import asyncio
 import math
 import signal
-import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
 from estimators.runner import ESTIMATOR_COMPONENTS, Runner
 from missions.connection import Connection
+from missions.end_signals import end_signals
 from missions.errors import LinkClosed
 from missions.estimation.embedded import COMPONENT_ID
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
@@ -256,7 +256,7 @@ def estimate(
 ) -> EstimationResult:
     """Run an estimator on a live link and write its run folder. Blocks until it is done.
 
-    Ctrl-C and SIGTERM end it in good order, as the end of its duration does.
+    Ctrl-C, SIGTERM and SIGHUP end it in good order, as the end of its duration does.
 
     Raises:
         EstimatorError: no such estimator or parameter; nothing was opened.
@@ -310,10 +310,6 @@ def estimate(
 
 
 def _end_on_signals(loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> None:
-    """Ctrl-C and SIGTERM end the run in good order, until the loop is closed.
-
-    Only a program's main thread may be told of signals: in another one whoever started it stops it.
-    """
-    if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, stop)
+    """Ctrl-C, SIGTERM and SIGHUP end the run in good order, until the loop is closed."""
+    for number in end_signals(signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop)
