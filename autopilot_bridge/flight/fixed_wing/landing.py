@@ -172,7 +172,7 @@ class LandTask(AircraftTask):
 
     def _begin_go_around(self) -> None:
         self.phase = LandPhase.GO_AROUND
-        self._power.begin(self._state)
+        self._power.begin()
 
     def _land(self, ctx: FlightContext) -> TaskStatus:
         clear_setpoint(ctx.setpoint, sp.IDLE if ctx.armed else sp.OFF)

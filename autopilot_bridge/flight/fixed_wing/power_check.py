@@ -1,11 +1,13 @@
 """Whether the engine does its work: in a climb at full throttle the energy rises, or there is no power."""
 
+import math
 from typing import Final
 
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.navigation.earth import STANDARD_GRAVITY_M_S2
 
-_STRETCH_S: Final = 1.5  # an engine has spun up by then, and one gust doesn't outweigh it
+_SPUN_UP_S: Final = 1.0  # an engine that idled brings nothing before
+_STRETCH_S: Final = 1.5  # one gust doesn't outweigh it
 
 
 class PowerCheck:
@@ -20,10 +22,10 @@ class PowerCheck:
         self._left_s = 0.0
         self._start_m = 0.0
 
-    def begin(self, state: AircraftState) -> None:
+    def begin(self) -> None:
         """Full throttle from now on."""
-        self._left_s = _STRETCH_S
-        self._start_m = _energy_height_m(state)
+        self._left_s = _SPUN_UP_S
+        self._start_m = -math.inf
 
     def powerless(self, state: AircraftState, dt_s: float) -> bool:
         """True at the end of a stretch over which the energy fell.
@@ -35,8 +37,9 @@ class PowerCheck:
         self._left_s -= dt_s
         if self._left_s > 0.0:
             return False
-        fell = _energy_height_m(state) < self._start_m
-        self.begin(state)
+        energy_m = _energy_height_m(state)
+        fell = energy_m < self._start_m
+        self._left_s, self._start_m = _STRETCH_S, energy_m
         return fell
 
 
