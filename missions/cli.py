@@ -79,7 +79,8 @@ class _Commands(click.Group):
 def command_line() -> None:
     """MAVLink software-in-the-loop flights: missions, SITL, logs.
 
-    Exit codes: 0 done, 1 the mission failed, 2 usage, 130 interrupted by Ctrl-C.
+    Exit codes: 0 done, 1 the mission failed, 2 usage, 130 interrupted by Ctrl-C; a flight
+    143 by SIGTERM, 129 by SIGHUP.
     """
 
 

@@ -25,8 +25,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
         crashed: what is said on stderr when the process was ended by a signal that nobody sent, in front of
             the signal's name; the exit code is 1 then.
     """
-    sys.stdout.flush()
-    sys.stderr.flush()
+    _flush()
     # What asks us to end between the fork and the handler that passes it on must not leave the child alone.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKED_TO_END)
     lifeline, held = os.pipe()
@@ -36,8 +35,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
         os.close(held)
         threading.Thread(target=_end_with_parent, args=(lifeline,), daemon=True).start()
         code = command()
-        sys.stdout.flush()
-        sys.stderr.flush()
+        _flush()
         os._exit(code)  # what the caller still has to do is done once, and not here
     os.close(lifeline)
     status = _wait(child, mask)
@@ -47,8 +45,15 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
     number = os.WTERMSIG(status)
     if number in _ASKED_TO_END:
         return _KILLED + number
-    sys.stderr.write(f"flightstack: {crashed} ({signal.Signals(number).name})\n")
+    if sys.stderr is not None:
+        sys.stderr.write(f"flightstack: {crashed} ({signal.Signals(number).name})\n")
     return FAILED
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:  # closed by whoever started us
+            stream.flush()
 
 
 def _end_with_parent(lifeline: int) -> None:

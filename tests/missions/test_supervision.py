@@ -87,3 +87,9 @@ def test_a_command_ends_with_the_process_that_watches_it() -> None:
     process.kill()
     process.communicate(timeout=60.0)  # the child holds the other end, too
     assert gone(child)
+
+
+def test_a_command_without_output_gives_its_exit_code() -> None:
+    process = start("return 3", "sys.stdout = sys.stderr = None")  # as Python finds them closed
+    assert process.communicate(timeout=60.0) == ("", "")
+    assert process.returncode == 3
