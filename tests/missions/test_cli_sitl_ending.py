@@ -33,12 +33,14 @@ def cards(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(autouse=True)
 def handlers() -> Iterator[None]:
-    """Whatever happens, signals are handled as before."""
+    """As on a terminal, though the tests are run by nohup; and whatever happens, handled as before."""
+    outside = signal.signal(signal.SIGHUP, signal.SIG_DFL)
     before = {number: signal.getsignal(number) for number in ASKING}
     yield
     after = {number: signal.getsignal(number) for number in ASKING}
     for number, handler in before.items():
         signal.signal(number, handler)
+    signal.signal(signal.SIGHUP, outside)
     assert after == before
 
 
