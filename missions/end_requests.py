@@ -1,13 +1,12 @@
 """What asks a command to end: Ctrl-C, SIGTERM, and the end of its terminal (SIGHUP)."""
 
 import signal
-from types import FrameType, TracebackType
-from typing import Any
+from types import FrameType
 
-from missions.end_signals import end_signals
+from missions.end_signals import EndSignalHandler
 
 
-class EndRequests:
+class EndRequests(EndSignalHandler):
     """A context in which such a signal ends the command in good order.
 
     At first it raises KeyboardInterrupt, so that a start ends wherever it is; from `remember` on it is kept
@@ -17,10 +16,12 @@ class EndRequests:
         asked: such a signal has come.
     """
 
+    always = (signal.SIGINT, signal.SIGTERM)
+
     def __init__(self) -> None:
+        super().__init__()
         self.asked = False
         self._raises = True
-        self._before: dict[int, Any] = {}
 
     def remember(self) -> None:
         """Raise no more.
@@ -31,17 +32,6 @@ class EndRequests:
         self._raises = False
         if self.asked:
             raise KeyboardInterrupt
-
-    def __enter__(self) -> "EndRequests":
-        for number in end_signals(signal.SIGINT, signal.SIGTERM):
-            self._before[number] = signal.signal(number, self._on_signal)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         again, self.asked = self.asked, True

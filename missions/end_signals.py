@@ -2,7 +2,9 @@
 
 import signal
 import threading
-from typing import Final
+from abc import ABC, abstractmethod
+from types import FrameType, TracebackType
+from typing import Any, ClassVar, Final, Self
 
 _ASKING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -17,3 +19,31 @@ def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:
         return ()
     theirs = (signal.SIG_DFL, signal.default_int_handler)
     return tuple(n for n in _ASKING if n in always or signal.getsignal(n) in theirs)
+
+
+class EndSignalHandler(ABC):
+    """While it is entered, these signals are its own to handle.
+
+    Attributes:
+        always: handled whatever was done with them before, see `end_signals`.
+    """
+
+    always: ClassVar[tuple[signal.Signals, ...]] = ()
+
+    def __init__(self) -> None:
+        self._before: dict[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        for number in end_signals(*self.always):
+            self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    @abstractmethod
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        """One of them has come."""

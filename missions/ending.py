@@ -7,12 +7,12 @@ a process where it stands, with its vehicles in the air.
 import asyncio
 import signal
 from collections.abc import Coroutine
-from types import FrameType, TracebackType
-from typing import Any, Final, Self
+from types import FrameType
+from typing import Any, Final
 
 from autopilot_bridge.clock import run
 from autopilot_bridge.clock.pacing import wall_time_s
-from missions.end_signals import end_signals
+from missions.end_signals import EndSignalHandler
 
 _SAME_S: Final = 1.0
 """A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: that is asked once."""
@@ -35,7 +35,7 @@ def signal_of(interrupt: KeyboardInterrupt) -> int:
     return interrupt.number if isinstance(interrupt, AskedToEnd) else signal.SIGINT
 
 
-class EndingSignals:
+class EndingSignals(EndSignalHandler):
     """While it is entered, Ctrl-C, SIGTERM and SIGHUP interrupt alike.
 
     While `run` runs, the first one cancels what is run, and one that comes later stops at once; outside of it
@@ -43,21 +43,10 @@ class EndingSignals:
     """
 
     def __init__(self) -> None:
-        self._before: dict[signal.Signals, Any] = {}
+        super().__init__()
         self._task: asyncio.Task[Any] | None = None
         self._number: int | None = None
         self._asked_wall_s = 0.0
-
-    def __enter__(self) -> Self:
-        for number in end_signals():
-            self._before[number] = signal.signal(number, self._on_signal)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
 
     def run(self, main: Coroutine[Any, Any, None], loop: asyncio.AbstractEventLoop) -> None:
         """Run a coroutine on a loop as `autopilot_bridge.clock.run` does.
