@@ -33,6 +33,16 @@ def flying(
     return rig
 
 
+def flaring(wind: tuple[float, float], *, rangefinder: bool = False) -> tuple[Aircraft, LandTask]:
+    """An aircraft that has come down along a leg, and its landing."""
+    rig = flying(wind)
+    rig.rangefinder = rangefinder
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    rig.run_until(lambda: task.phase is LandPhase.FLARE, 60.0)
+    return rig, task
+
+
 def land(rig: Aircraft, task: LandTask) -> tuple[float, float]:
     """Fly the landing; (along, right) of the place where the wheels first touched."""
     rig.fly(task)
@@ -96,10 +106,7 @@ def test_without_a_leg_it_circles_down_and_lands_against_the_wind(
 
 
 def test_go_around_climbs_comes_back_and_lands() -> None:
-    rig = flying((-3.0, 2.0))
-    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
-    rig.fly(task)
-    rig.run_until(lambda: task.phase is LandPhase.FLARE, 60.0)
+    rig, task = flaring((-3.0, 2.0))
     lowest = -rig.nav[12]
     assert task.go_around(rig.ctx)
     log = rig.run(5.0)
@@ -212,11 +219,7 @@ def test_a_glider_comes_down_wherever_the_flare_carries_it() -> None:
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_go_around_without_power_comes_down_straight_ahead(asked: bool) -> None:
-    rig = flying((-3.0, 0.0))
-    rig.rangefinder = True
-    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
-    rig.fly(task)
-    rig.run_until(lambda: task.phase is LandPhase.FLARE, 60.0)
+    rig, task = flaring((-3.0, 0.0), rangefinder=True)
     rig.vehicle.set_motor_effectiveness(0, 0.0)
     if asked:
         assert task.go_around(rig.ctx)
@@ -233,10 +236,7 @@ def test_a_go_around_without_power_comes_down_straight_ahead(asked: bool) -> Non
 
 
 def test_a_go_around_in_a_downdraught_keeps_climbing() -> None:
-    rig = flying((-3.0, 0.0))
-    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
-    rig.fly(task)
-    rig.run_until(lambda: task.phase is LandPhase.FLARE, 60.0)
+    rig, task = flaring((-3.0, 0.0))
     assert task.go_around(rig.ctx)
     rig.vehicle.set_wind((-3.0, 0.0, 1.5))
     rig.run(4.0)
