@@ -67,7 +67,7 @@ def replay(**given: Any) -> int:
     from estimators.logs import LogError
     from missions.errors import PlanError
     from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
-    from missions.estimation.report import EstimationResult, table_lines, warnings_of
+    from missions.estimation.report import EstimationResult, notes_of, table_lines, warnings_of
 
     for path in given["logs"]:
         if path.is_dir():
@@ -110,6 +110,8 @@ def replay(**given: Any) -> int:
     for line in table_lines(done):
         click.echo(line)
     for label, result in done:
+        for note in notes_of(result.summary):
+            click.echo(f"{label}: {note}")
         for warning in warnings_of(result.summary):
             click.echo(f"flightstack: {label}: {warning}", err=True)
         samples, speed = result.summary["samples"], result.summary["wall_time_s"]

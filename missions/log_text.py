@@ -49,10 +49,10 @@ def report_lines(report: LogReport) -> Iterator[str]:
             share = 100.0 * loss.lost / max(1, loss.frames + loss.lost)
             who = f"{loss.system_id}/{loss.component_id}"
             yield f"{who:>9} {loss.frames:>9} {loss.lost:>8} {share:>7.2f} {loss.late:>6}"
-    for item in report.unknown:
+    for unknown in report.unknown:
         yield (
-            f"unknown message {item.message_id} from {item.system_id}/{item.component_id}: "
-            f"{item.count} frames, {item.frame_bytes} bytes"
+            f"unknown message {unknown.message_id} from {unknown.system_id}/{unknown.component_id}: "
+            f"{unknown.count} frames, {unknown.frame_bytes} bytes"
         )
     yield ""
     yield f"{'component':>9} {'message':<32} {'count':>8} {'Hz':>8} {'gap s':>8}  instances"
