@@ -3,8 +3,8 @@
     python -m benchmarks.foreign_logs FOLDER [--csv TABLE.csv]
 
 For each log: whether it opens (or the words of the refusal), vehicle, firmware and modes, message counts
-beside those of pymavlink (`DFReader`, `mavutil`) or pyulog, time in the air, and the attitude filter's roll and
-pitch against the autopilot's (RMS, degrees).
+beside those of pymavlink (`DFReader`, `mavutil`) or pyulog, time in the air, and the attitude filter's roll
+and pitch against the autopilot's (RMS, degrees).
 """
 
 import argparse

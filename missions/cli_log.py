@@ -86,6 +86,7 @@ def _open(path: Path, dialect: str | None) -> "Log":
 
 def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
     from estimators.logs.condition import Condition
+    from estimators.logs.errors import NothingThere
     from estimators.logs.raw_records import window
 
     names = [name.strip() for group in given["types"] for name in group.split(",") if name.strip()]
@@ -108,6 +109,8 @@ def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
             several = ", ".join(map(str, boots))
             click.echo(f"the times fit to boots {several}; all count, --boot chooses one", err=True)
         return window(log, selections, given["from_s"], given["to_s"], given["boot"])
+    except NothingThere:
+        raise  # about what is in the log, not about how it was asked for
     except BridgeError as error:
         raise click.UsageError(str(error)) from error
 

@@ -1,7 +1,7 @@
 """The board's trim against the vehicle: which way the autopilot's sensors are turned in it.
 
 ArduPilot's IMU messages and logs are in the frame of the board, and its attitude is the vehicle's: between
-them stand AHRS_TRIM_X and AHRS_TRIM_Y (4.6.3: AP_AHRS, `_rotation_autopilot_body_to_vehicle_body`). PX4 1.16.1
+them stand AHRS_TRIM_X and AHRS_TRIM_Y (4.6.3: `_rotation_autopilot_body_to_vehicle_body`). PX4 1.16.1
 corrects gyros and accelerometers by SENS_BOARD_*_OFF before it publishes them.
 """
 

@@ -12,7 +12,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.logs.errors import LogError
+from estimators.logs.errors import LogError, NothingThere
 from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log_clock import LogClock, make_clock
 from estimators.logs.report import LogReport, make_report
@@ -190,7 +190,7 @@ class Log:
         if not timed.any():
             spans = [self._clock_span_us(number) for number in (range(boots) if boot is None else (boot,))]
             there = ", ".join(f"{1e-6 * first:.1f} to {1e-6 * last:.1f}" for first, last in spans)
-            raise LogError(f"{self.path} has nothing at that time; it has {there} s ({clock.text})")
+            raise NothingThere(f"{self.path} has nothing at that time; it has {there} s ({clock.text})")
         return timed[order]
 
     def boots_at(self, from_s: float | None, to_s: float | None) -> list[int]:
