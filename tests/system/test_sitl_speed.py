@@ -6,7 +6,6 @@ from autopilot_bridge.commander.verdict import Reason, Result, Verdict
 from benchmarks.sitl_speed import Flight, required
 from tests.slow import slow_after
 
-
 FLOWN = (("iris", "ardupilot"), ("aerosonde", "ardupilot"), ("iris", "px4"), ("aerosonde", "px4"))
 
 
