@@ -1,4 +1,4 @@
-"""The speed benchmark gets its vehicles into the air with both flavours; how fast they are isn't tested here."""
+"""The speed benchmark gets its vehicles of both flavours into the air; their speed is not tested."""
 
 import pytest
 
