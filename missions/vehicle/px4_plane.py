@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Px4Plane(Px4):
-    """PX4 with wings: OFFBOARD takes roll, pitch and thrust together; circles come with DO_REPOSITION."""
+    """PX4 with wings: OFFBOARD takes roll, pitch and thrust together; circles are flown by DO_ORBIT."""
 
     kind = VehicleKind.FIXED_WING
     stream_rates_hz: Mapping[str, float] = MappingProxyType({**Px4.stream_rates_hz, "VFR_HUD": 10.0})
@@ -40,11 +40,12 @@ class Px4Plane(Px4):
     ) -> None:
         if radius_m is None:
             radius_m = abs(await vehicle.parameter_or("NAV_LOITER_RAD", 80.0))
+        # PX4 1.16.1 does not read the radius of DO_REPOSITION: it circles NAV_LOITER_RAD clockwise.
+        # DO_ORBIT takes a signed radius, and an aircraft stays in Hold with it
         await vehicle.command_int(
-            dialect.MAV_CMD_DO_REPOSITION,
+            dialect.MAV_CMD_DO_ORBIT,
             dialect.MAV_FRAME_GLOBAL,
-            # the sign of the radius is the direction; the fourth is a yaw, which a fixed wing doesn't take
-            (-1.0, 1.0, radius_m if clockwise else -radius_m, math.nan),
+            (radius_m if clockwise else -radius_m, math.nan, 0.0, math.nan),
             round(place.lat_deg * 1e7),
             round(place.lon_deg * 1e7),
             place.alt_m,

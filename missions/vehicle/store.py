@@ -1,6 +1,7 @@
 """What a vehicle keeps for a mission: plans and parameters."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
@@ -8,10 +9,22 @@ from missions.errors import MissionError, VehicleTimeout
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.item_tracker import (
+    FlownOrder,
+    ItemTracker,
+    MissionModeWatch,
+    MissionStep,
+    mission_steps,
+)
+
+_ACCEPTANCE_M: Final = 2.0
+"""Radius in which a position shows that a waypoint was passed, where the waypoint names none."""
 
 
 class VehicleStore(VehicleCommands):
     """The storing half of a vehicle: plans are uploaded, followed and fetched, parameters read and set."""
+
+    _tracker: ItemTracker | None = None  # of the mission that was uploaded last
 
     # missions
 
@@ -27,6 +40,9 @@ class VehicleStore(VehicleCommands):
         )
         own = mission_transfer.renumbered(items, first)
         await mission_transfer.upload(self, [marker, *own] if first else own, before=first)
+        order = FlownOrder.of(items)
+        steps = mission_steps(items, order, home, _ACCEPTANCE_M)
+        self._tracker = ItemTracker(steps, order.again_from, first=first)
         return first
 
     async def upload_plan(self, mission_type: MissionType, items: Sequence[MissionItem]) -> None:
@@ -53,31 +69,42 @@ class VehicleStore(VehicleCommands):
     ) -> None:
         """Wait until the mission has reached item `sequence` (wire number) or gone beyond.
 
+        MISSION_ITEM_REACHED, MISSION_CURRENT and positions are evidence of it, see `ItemTracker`.
+
         Args:
             progress: called with the number of each item reached.
 
         Raises:
             MissionError: the vehicle left the mission before.
         """
-        mission_mode = self.adapter.modes[Mode.MISSION]
-        with self.messages("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT") as stream:
+        tracker = self._tracker or ItemTracker([MissionStep(index=k) for k in range(sequence + 1)])
+        mode = MissionModeWatch(self.adapter.modes[Mode.MISSION])
+        wanted = tracker.place_of(sequence - tracker.first)
+        told = 0
+
+        def there() -> bool:
+            nonlocal told
+            for index, _ in tracker.reached[told:]:
+                if progress is not None:
+                    progress(tracker.first + index)
+            told = len(tracker.reached)
+            return tracker.behind > wanted
+
+        names = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "GLOBAL_POSITION_INT", "HEARTBEAT")
+        with self.messages(*names) as stream:
             try:
                 async with self.deadline(timeout_s, f"mission item {sequence}"):
-                    async for m in stream:
-                        kind = m.get_type()
-                        if kind == "HEARTBEAT":
-                            if m.custom_mode != mission_mode:
-                                name = self.adapter.mode_name(m.custom_mode)
+                    while not there():
+                        message = await anext(stream)
+                        if message.get_type() == "HEARTBEAT":
+                            if mode.left(message.custom_mode) and not tracker.at_the_last_place:
+                                name = self.adapter.mode_name(message.custom_mode)
                                 raise MissionError(
                                     f"the vehicle left the mission for mode {name} "
                                     f"before item {sequence}; {self.heard()}"
                                 )
-                            continue
-                        done = m.seq if kind == "MISSION_ITEM_REACHED" else m.seq - 1
-                        if progress is not None:
-                            progress(done)
-                        if done >= sequence:
-                            return
+                        else:
+                            tracker.on_message(message, self.clock.stamp_us)
             except TimeoutError:
                 raise VehicleTimeout(
                     f"mission item {sequence} was not reached within {timeout_s:g} s; {self.heard()}"

@@ -385,7 +385,9 @@ class FakeAutopilot:
         elif item.command == d.MAV_CMD_NAV_LAND:
             self.mode = PX4_LAND if self.flavour == "px4" else 9
         if done:
-            if item.command != d.MAV_CMD_DO_CHANGE_SPEED:
+            # As both firmwares send it: a DO_ item's number takes the place of the one directly before it.
+            following = self.items[self.current + 1 : self.current + 2]
+            if not (following and following[0].command == d.MAV_CMD_DO_CHANGE_SPEED):
                 self.send(d.MAVLink_mission_item_reached_message(self.current))
             self.current += 1
         return wanted
