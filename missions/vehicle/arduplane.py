@@ -38,8 +38,8 @@ _NAMES: Final[Mapping[int, str]] = MappingProxyType(
     }
 )
 _TURN_EFFECT: Final = 0.85
-"""Of the acceleration of a coordinated turn, what a bank is planned to give. Between a turn without sideslip, 1,
-and the 0.7 of ArduPilot 4.6.3's built-in plane model, which slips in its turns."""
+"""Of the acceleration of a coordinated turn, what a bank is planned to give. Between 1, without sideslip, and
+the 0.7 of ArduPilot 4.6.3's built-in plane model, which slips in its turns."""
 _TAKEOFF_PITCH_DEG: Final = 12.0  # lowest pitch of a mission's takeoff
 
 
@@ -96,8 +96,8 @@ class ArduPlane(ArduCopter):
     def limits(self, parameters: Mapping[str, float]) -> Limits:
         values = {**self.limiting_parameters, **parameters}
         period_s, damping = max(1.0, values["NAVL1_PERIOD"]), max(0.1, values["NAVL1_DAMPING"])
-        # L1 demands 4 damping^2 V^2 / L1 sin(angle to the leg), with L1 = damping period V / pi. In a bend the
-        # leg has to be so far ahead of the course that this is the acceleration of the bend
+        # L1 demands 4 damping^2 V^2 / L1 sin(angle to the leg), with L1 = damping period V / pi. In a bend
+        # the leg has to be so far ahead of the course that this is the acceleration of the bend
         lead_s = period_s / (4.0 * math.pi * damping) / _TURN_EFFECT
         return FixedWingLimits(
             airspeed_min_m_s=values["AIRSPEED_MIN"],

@@ -1,8 +1,8 @@
 """Patterns by waypoints, followed by L1 guidance with the parameters that the aircraft reports.
 
 The follower here is the published law (S. Park, J. Deyst, J. How, AIAA 2004-4900) with the period and damping
-of ArduPilot's NAVL1_PERIOD and NAVL1_DAMPING. Legs are followed one by one; a leg ends within the radius of its
-waypoint.
+of ArduPilot's NAVL1_PERIOD and NAVL1_DAMPING. Legs are followed one by one; a leg ends within the radius of
+its waypoint.
 """
 
 import math
