@@ -227,8 +227,7 @@ class Commander:
         )
         if reasons:
             self._checks.reasons = reasons
-            if Reason.BOOTING not in reasons or self.policy.force_arm_skips_checks:
-                self._tell_reasons(reasons, check_only=False)
+            self._tell_reasons(reasons, check_only=False)
             return Verdict(result=self.policy.arming_denied, reasons=reasons)
         self.armed = self.context.armed = True
         self._disarming.begin(self.time_us)

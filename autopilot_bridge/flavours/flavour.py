@@ -47,6 +47,22 @@ class ModeDisplay(NamedTuple):
     thrust_setpoints: bool
 
 
+class ListedMode(NamedTuple):
+    """A mode as AVAILABLE_MODES lists it (standard modes protocol).
+
+    Attributes:
+        custom_mode: as in HEARTBEAT.
+        name: empty where `standard_mode` names it.
+        standard_mode: MAV_STANDARD_MODE; 0: the mode is the firmware's own.
+        properties: MAV_MODE_PROPERTY bits.
+    """
+
+    custom_mode: int
+    name: str
+    standard_mode: int
+    properties: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorBits:
     """SYS_STATUS bits of a healthy vehicle; broken sensors are taken out of `health`."""
@@ -147,6 +163,7 @@ class Flavour:
         custom_modes: HEARTBEAT.custom_mode of every mode this firmware knows.
         mode_names: what the firmware calls its modes in texts.
         base_mode: HEARTBEAT.base_mode.
+        listed_modes: what AVAILABLE_MODES lists, in its order; empty: the firmware has no such message.
         policy: what the commander follows.
         notices: the texts of an event; empty for events this firmware is silent about.
         banner: texts that follow a parameter list request.
@@ -202,4 +219,5 @@ class Flavour:
     heartbeat_on_mode_change: bool
     sends_events: bool
     bytewise_parameters: bool
+    listed_modes: tuple[ListedMode, ...] = ()
     gps_source: Callable[[ParameterStore], GpsSource] = own_receiver
