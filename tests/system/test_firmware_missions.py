@@ -1,7 +1,7 @@
 """The script that flies the mission set on real firmware: what it flies, its rows and its table.
 
-Where a firmware's build is named (FLIGHTSTACK_PX4, FLIGHTSTACK_ARDUCOPTER, FLIGHTSTACK_ARDUPLANE), a slow test
-flies one mission on it.
+Where a build is named (FLIGHTSTACK_PX4, FLIGHTSTACK_ARDUCOPTER, FLIGHTSTACK_ARDUPLANE), a slow test flies one
+mission on it.
 """
 
 import json
