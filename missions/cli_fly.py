@@ -38,11 +38,13 @@ _EMBEDDED_ONLY: Final = (
     "home",
     "seed",
     "wind",
+    "wind_profile",
     "turbulence",
     "speedup",
 )
 
 
+_FORECAST_HEIGHT_M: Final = 100.0  # at least; the wind of a profile grows little above it
 _CONNECTED_ONLY: Final = ("yes", "check", "regain", "signing_key")
 
 
@@ -146,8 +148,16 @@ def _owners(option_name: str) -> list[str]:
 @click.option(
     "--wind",
     metavar="SPEED[@FROM]",
-    help="Wind of the day in the embedded SITL, m/s, and degrees it comes from; turns are planned for it, "
-    "unless --expect-wind says otherwise. [default: 0; orbit: 4 from north; occupancy: 5 from west]",
+    help="Wind of the day in the embedded SITL, m/s at 10 m above ground, and degrees it comes from; turns "
+    "are planned for it, unless --expect-wind says otherwise. "
+    "[default: 0; orbit: 4 from north; occupancy: 5 from west]",
+)
+@click.option(
+    "--wind-profile",
+    type=click.Choice(["log", "power", "uniform"]),
+    default="log",
+    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere. "
+    "[default: log]",
 )
 @click.option(
     "--turbulence",
@@ -157,7 +167,8 @@ def _owners(option_name: str) -> list[str]:
 @click.option(
     "--expect-wind",
     type=float,
-    help="Forecast: wind to plan turns for, m/s. [default: --wind where it is given, else 5]",
+    help="Forecast: wind to plan turns for, m/s, at the height of the flight. [default: --wind where it is "
+    "given, as it is at 100 m or the mission's altitude, else 5]",
 )
 @click.option("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
 @click.option(
@@ -247,7 +258,7 @@ def _refuse_options_of_the_other(context: click.Context, *, connected: bool) -> 
                 f"{', '.join(given)}: for vehicles elsewhere; give --connect too, or leave it out"
             )
         return
-    given = [f"--{name}" for name in _EMBEDDED_ONLY if name in chosen]
+    given = [f"--{name.replace('_', '-')}" for name in _EMBEDDED_ONLY if name in chosen]
     if given:
         raise click.UsageError(
             f"{', '.join(given)}: of the embedded SITL only, has no effect with --connect; leave it out"
@@ -290,6 +301,7 @@ def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
 
 
 def _fly(given: dict[str, Any]) -> int:
+    from flightsim.wind_profile import WindLaw, WindProfile
     from missions.library import find_mission
     from missions.options import check_positive, parameters_from_file, parse_wind
 
@@ -312,7 +324,8 @@ def _fly(given: dict[str, Any]) -> int:
         )
     forecast_m_s = given["expect_wind"]
     if forecast_m_s is None and given["wind"] is not None:
-        forecast_m_s = wind_speed_m_s
+        profile = WindProfile(law=WindLaw(given["wind_profile"]))
+        forecast_m_s = wind_speed_m_s * profile.factor(max(options.altitude_m, _FORECAST_HEIGHT_M))
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
         raise click.UsageError(
@@ -351,6 +364,7 @@ def _fly(given: dict[str, Any]) -> int:
             speedup=given["speedup"],
             wind_speed_m_s=wind_speed_m_s,
             wind_from_deg=wind_from_deg,
+            wind_profile=given["wind_profile"],
             turbulence=given["turbulence"] or world.turbulence,
             expected_wind_m_s=forecast_m_s,
             home=given["home"] or (None if given["connect"] else world.home),
