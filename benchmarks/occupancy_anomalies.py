@@ -181,8 +181,8 @@ def main() -> None:
         flown_km = given.seeds * given.km
         flown = given.seeds * len(OFFSETS_M) * COURSES
         sys.stdout.write(
-            f"map error {np.mean(error_nt):.2f} nT (stated {np.mean(stated_nt):.2f}): {false} false anomalies "
-            f"in {flown_km:.0f} km, {false / flown_km:.3f} a km; passes that saw the target: "
+            f"map error {np.mean(error_nt):.2f} nT (stated {np.mean(stated_nt):.2f}): {false} false "
+            f"anomalies in {flown_km:.0f} km, {false / flown_km:.3f} a km; passes that saw the target: "
             + ", ".join(f"{kind} {count} of {flown}" for kind, count in by_kind.items())
             + "\n"
         )
