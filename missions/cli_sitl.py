@@ -146,7 +146,7 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
 @click.option(
     "--map-target", metavar="NORTH,EAST", help="A target's magnetic signature there, m from the map's home."
 )
-@key_option
+@key_option()
 @click.option(
     "--unsigned",
     type=click.Choice(["none", "serial", "local", "all"]),

@@ -6,7 +6,7 @@ from typing import Any, Final
 
 import click
 
-from missions.mission_command import Given, MissionCommand, option
+from missions.mission_command import Given, MissionCommand, Scope, option
 
 
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
@@ -63,7 +63,6 @@ def _place(name: str, text: str | None) -> tuple[float, float] | None:
 
 
 COMMAND: Final = MissionCommand(
-    names=("occupancy",),
     help=(
         "Search a magnetic map for a target, as a team with one occupancy map.\n\n"
         "Each vehicle carries a survey magnetometer, flies headings from cell to cell in its own layer of "
@@ -113,17 +112,33 @@ COMMAND: Final = MissionCommand(
         ),
         option(
             "--target",
+            scope=Scope.EMBEDDED,
             metavar="NORTH,EAST",
             help="Where the embedded world's target is, m. [default: drawn from --seed]",
         ),
-        option("--amplitude", type=float, default=30.0, help="Of that target's anomaly, nT."),
+        option(
+            "--amplitude",
+            scope=Scope.EMBEDDED,
+            type=float,
+            default=30.0,
+            help="Of that target's anomaly, nT.",
+        ),
         option(
             "--moment",
+            scope=Scope.EMBEDDED,
             type=float,
             help="Dipole moment of that target, A m2, along the Earth's field, in place of a Gaussian.",
         ),
-        option("--depth", type=float, default=10.0, help="Of a target with a moment, below home, m."),
-        option("--sigma", default="80x60", help="Its extent, m: one sigma along x across."),
+        option(
+            "--depth",
+            scope=Scope.EMBEDDED,
+            type=float,
+            default=10.0,
+            help="Of a target with a moment, below home, m.",
+        ),
+        option(
+            "--sigma", scope=Scope.EMBEDDED, default="80x60", help="Its extent, m: one sigma along x across."
+        ),
     ),
     build=_build,
     fields=MappingProxyType(

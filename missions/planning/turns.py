@@ -30,7 +30,7 @@ def roll_in_m(airspeed_m_s: float, limits: FixedWingLimits) -> float:
 
 def leg_needed_m(turn_rad: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
     """Length of a leg with such a corner at both its ends."""
-    radius_m = limits.turn_radius_m(airspeed_m_s)
+    radius_m = limits.path_radius_m(airspeed_m_s)
     return 2.0 * corner_reach_m(turn_rad, radius_m, roll_in_m(airspeed_m_s, limits))
 
 
@@ -56,11 +56,11 @@ def check_turns(
     Raises:
         PlanError: says how tight it is, and what to change.
     """
-    radius_m = limits.turn_radius_m(airspeed_m_s)
-    needs = (
-        f"{radius_m:.0f} m at {airspeed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind with "
-        f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter})"
-    )
+    radius_m = limits.path_radius_m(airspeed_m_s)
+    reason = f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter})"
+    if limits.guided_radius_m(airspeed_m_s) >= radius_m:
+        reason = f"its path guidance ({limits.guidance_parameter})"
+    needs = f"{radius_m:.0f} m at {airspeed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind with {reason}"
     if isinstance(curve, Polyline):
         short = _shortest_leg(curve, radius_m, roll_in_m(airspeed_m_s, limits))
         if short[0] > 1.0:

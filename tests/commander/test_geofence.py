@@ -68,6 +68,18 @@ def test_inclusions_join_or_must_all_be_kept(join: bool) -> None:
     assert broken(60.0)
 
 
+def test_nothing_is_inside_a_circle_of_no_radius() -> None:
+    parameters = FenceParameters(enabled=True, inclusions_join=True)
+
+    def broken(*items: MissionItem) -> bool:
+        return bool(Geofence(store_of(*items)).broken((0.0, 0.0, -5.0), HOME, FRAME, parameters, ALL_FENCES))
+
+    empty = circle(0.0, 0.0, 0.0)
+    assert broken(empty)
+    assert not broken(empty, *square(0.0, 0.0, 20.0))
+    assert not broken(circle(0.0, 0.0, 0.0, inside=False))
+
+
 def test_exclusions_are_kept_out_of() -> None:
     fence = Geofence(
         store_of(
