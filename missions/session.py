@@ -390,6 +390,7 @@ def _summary(
         summary["wind"] = {
             "speed_m_s": request.wind_speed_m_s,
             "from_deg": request.wind_from_deg,
+            "profile": request.wind_profile,
             "turbulence": request.turbulence,
         }
     return summary
