@@ -37,7 +37,7 @@ class FencePolygon:
 
 @dataclass(frozen=True, slots=True)
 class FenceCircle:
-    """A circle to stay in (`inclusion`), or out of."""
+    """A circle to stay in (`inclusion`), or out of. Nothing is inside of a circle of radius 0."""
 
     centre: Point
     radius_m: float
@@ -45,7 +45,7 @@ class FenceCircle:
 
     def allows(self, point: Point) -> bool:
         """A point is where this shape wants it."""
-        return (math.dist(point, self.centre) <= self.radius_m) == self.inclusion
+        return (math.dist(point, self.centre) < self.radius_m) == self.inclusion
 
 
 FenceShape = FencePolygon | FenceCircle
@@ -57,7 +57,7 @@ def fence_shapes(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[Fence
     pending: list[MissionItem] = []
     for item in items:
         if item.command in (CIRCLE_INCLUSION, CIRCLE_EXCLUSION):
-            if math.isfinite(item.param1) and item.param1 > 0.0:
+            if math.isfinite(item.param1) and item.param1 >= 0.0:
                 shapes.append(
                     FenceCircle(fence_point(item, frame), item.param1, item.command == CIRCLE_INCLUSION)
                 )

@@ -20,6 +20,7 @@ from pathlib import Path
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Verdict
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.sitl import PacketLog, Sitl, SitlConfiguration, SitlVehicle, team
@@ -53,6 +54,13 @@ def round_trip(vehicle: SitlVehicle) -> tuple[MissionItem, ...]:
     return (takeoff, *waypoints, again)
 
 
+def required(verdict: Verdict, what: str) -> None:
+    """Raise a RuntimeError with the reasons when the commander refuses a request."""
+    if not verdict.accepted:
+        reasons = ", ".join(reason.name for reason in verdict.reasons) or verdict.result.name
+        raise RuntimeError(f"the autopilot refused {what}: {reasons}")
+
+
 class Flight:
     """A team in the air with a client on each vehicle, everything logged."""
 
@@ -69,20 +77,32 @@ class Flight:
 
     def take_off(self) -> None:
         """Store a mission that goes round and round, arm, take off."""
-        commanders = [vehicle.autopilot.commander for vehicle in self.sitl.vehicles]
-        while not all(commander.armable and commander.home.position for commander in commanders):
-            self.run(1.0)
-        for vehicle, commander in zip(self.sitl.vehicles, commanders, strict=True):
+        vehicles = self.sitl.vehicles
+        commanders = [vehicle.autopilot.commander for vehicle in vehicles]
+        self._wait(lambda: all(commander.home.position for commander in commanders), "a home position")
+        for vehicle, commander in zip(vehicles, commanders, strict=True):
             commander.missions.replace(round_trip(vehicle), plan_id=1)
-            commander.set_mode(FlightMode.MISSION)
-            commander.arm()
-            commander.guidance.start_mission()
+            # ArduCopter can't be armed in AUTO; whether a vehicle can be armed depends on its mode
+            armable = FlightMode.MISSION in commander.policy.armable_modes
+            required(commander.set_mode(FlightMode.MISSION if armable else FlightMode.GUIDED), "the mode")
+        self._wait(lambda: all(commander.armable for commander in commanders), "readiness to arm")
+        for commander in commanders:
+            required(commander.arm(), "arming")
+            required(commander.guidance.start_mission(), "the start of the mission")
         self.run(40.0)
         for vehicle in self.sitl.vehicles:
             mode = vehicle.autopilot.commander.mode
             assert mode is FlightMode.MISSION and vehicle.autopilot.commander.airborne, (
                 f"vehicle {vehicle.specification.system_id} is in {mode}"
             )
+
+    def _wait(self, reached: Callable[[], bool], what: str) -> None:
+        """Advance until a condition holds; a RuntimeError after two vehicle minutes."""
+        for _ in range(120):
+            if reached():
+                return
+            self.run(1.0)
+        raise RuntimeError(f"no {what} within 120 s of vehicle time")
 
     def run(self, seconds: float) -> None:
         """Advance by vehicle seconds."""

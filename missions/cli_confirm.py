@@ -1,14 +1,17 @@
 """The question before a flight with a real vehicle."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import TYPE_CHECKING, Final
 
 import click
 
-from missions.cli_question import ask, somebody_is_there
+from missions.cli_question import YES_WORDS, ask, is_yes, somebody_is_there
 
 if TYPE_CHECKING:
     from missions.preflight.before_flight import Confirm, Look
+
+_AGAINST_ADVICE: Final = "fly anyway"
 
 
 def is_hardware(connections: Sequence[str]) -> bool:
@@ -24,8 +27,20 @@ def is_hardware(connections: Sequence[str]) -> bool:
     return any(isinstance(a, SerialPort) or reach_of(a) is Reach.NETWORK for a in addresses)
 
 
-def confirmation(connections: Sequence[str], *, yes: bool, check: bool) -> "Confirm | None":
+def confirmation(
+    connections: Sequence[str],
+    *,
+    yes: bool,
+    check: bool,
+    screen: Callable[[], AbstractContextManager[None]] = nullcontext,
+) -> "Confirm | None":
     """How the flight is confirmed; None: not asked for, on links of this machine.
+
+    Args:
+        connections: of the vehicles.
+        yes: no question is asked; it flies when nothing is found against it.
+        check: on links of this machine too.
+        screen: makes a context in which nothing else writes to the terminal.
 
     Raises:
         click.UsageError: a real vehicle, nobody to ask, and no --yes.
@@ -40,15 +55,17 @@ def confirmation(connections: Sequence[str], *, yes: bool, check: bool) -> "Conf
         )
 
     async def confirm(looks: "Sequence[Look]") -> bool:
-        for look in looks:
-            click.echo(f"vehicle {look.system_id}:", err=True)
-            for finding in look.findings:
-                click.echo(f"  {finding}", err=True)
         problems = sum(len(look.problems) for look in looks)
-        if yes:
-            return not problems
-        word = "fly anyway" if problems else "yes"
-        question = f"{problems} problems. " if problems else ""
-        return (await ask(f"{question}Fly? Type {word}")).lower() == word
+        with screen():
+            for look in looks:
+                click.echo(f"vehicle {look.system_id}:", err=True)
+                for finding in look.findings:
+                    click.echo(f"  {finding}", err=True)
+            if yes:
+                return not problems
+            if not problems:
+                return is_yes(await ask(f"Fly? Type {YES_WORDS}"))
+            count = "1 problem" if problems == 1 else f"{problems} problems"
+            return (await ask(f"{count}. Fly? Type {_AGAINST_ADVICE}")).lower() == _AGAINST_ADVICE
 
     return confirm

@@ -68,7 +68,7 @@ class _Teller:
 )  # fmt: skip
 @click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/ESTIMATOR-N]")
 @click.option("--no-picture", is_flag=True, help="Don't draw errors.png.")
-@key_option
+@key_option()
 def estimate(**given: Any) -> int:
     """Run an estimator (attitude, lissajous, target-fusion, or a Python file of your own) on a live link.
 

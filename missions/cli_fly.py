@@ -1,212 +1,130 @@
 """`flightstack fly`: a mission from one command."""
 
-import importlib
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from missions.cli_confirm import confirmation
+from missions.cli_fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
 from missions.cli_fly_report import KILLED, ProgressLine, leave_closed_terminal, tell
 from missions.cli_signing import key_from, key_option, warn_if_open
 from missions.cli_types import SECONDS, SPEEDUP
-from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
+from missions.mission_command import FlightOption, Scope
 
 if TYPE_CHECKING:
     from missions.mission import Mission
     from missions.mission_command import MissionCommand
     from missions.session import RunRequest
 
-_PATTERNS: Final = "missions.pattern_command"
-_OWN: Final = "missions.own_command"
-_FILE: Final = "missions.plan_files.command"
-_COMMANDS: Final = {
-    "lissajous": _PATTERNS,
-    "sector": _PATTERNS,
-    "parallel-sweep": _PATTERNS,
-    "expanding-square": _PATTERNS,
-    "orbit": "missions.orbit.command",
-    "occupancy": "missions.occupancy.command",
-}
-"""Where each mission declares its options."""
+_link = partial(flight_option, group="Vehicles")
+_world = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
+_elsewhere = partial(flight_option, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
+_flight = partial(flight_option, group="The flight")
+_estimator = partial(flight_option, group="An estimator beside it")
+_results = partial(flight_option, group="Results")
 
-_EMBEDDED_ONLY: Final = (
-    "autopilot",
-    "model",
-    "launch",
-    "home",
-    "seed",
-    "wind",
-    "turbulence",
-    "speedup",
-)
-
-
-_CONNECTED_ONLY: Final = ("yes", "check", "regain", "signing_key")
-
-
-def _command_of(module: str) -> "MissionCommand":
-    command: MissionCommand = importlib.import_module(module).COMMAND
-    return command
-
-
-class FlyCommand(click.Command):
-    """`fly MISSION`: the options are those of every flight, and those the mission declares."""
-
-    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        named = self._mission_named(args)
-        if named is not None:
-            other = _OWN if named.endswith(".py") else _FILE
-            ctx.meta["mission command"] = _command_of(_COMMANDS.get(named, other))
-        try:
-            return super().parse_args(ctx, args)
-        except click.NoSuchOption as error:
-            owners = _owners(error.option_name)
-            if owners and named is not None:
-                raise click.UsageError(
-                    f"{error.option_name} is for {', '.join(owners)}, not for {named}"
-                ) from None
-            raise
-
-    def _mission_named(self, args: list[str]) -> str | None:
-        """The mission among the arguments, which is no option's value."""
-        valued = {
-            name
-            for parameter in self.params
-            if isinstance(parameter, click.Option) and not parameter.is_flag
-            for name in parameter.opts
-        }
-        words = [a for a, before in zip(args, ["", *args], strict=False) if before not in valued]
-        return next((a for a in words if a in _COMMANDS or _is_file(a)), None)
-
-    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
-        declared = ctx.meta.get("mission command")
-        own = [] if declared is None else list(declared.options)
-        common = super().get_params(ctx)
-        return [common[0], *own, *common[1:]]
-
-    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        declared = ctx.meta.get("mission command")
-        if declared is None:
-            super().format_help_text(ctx, formatter)
-            return
-        formatter.write_paragraph()
-        with formatter.indentation():
-            for paragraph in declared.help.split("\n\n"):
-                formatter.write_text(paragraph)
-                formatter.write_paragraph()
-
-
-def _is_file(name: str) -> bool:
-    return name.endswith(".py") or name.lower().endswith(MISSION_FILES)
-
-
-def _owners(option_name: str) -> list[str]:
-    """The missions that have an option."""
-    return [
-        name
-        for name, module in _COMMANDS.items()
-        if any(option_name in option.opts for option in _command_of(module).options)
-    ]
+_FORECAST_HEIGHT_M: Final = 100.0  # at least; the wind of a profile grows little above it
 
 
 @click.command(cls=FlyCommand, context_settings={"show_default": True})
 @click.argument("mission")
-@click.option("--vehicles", type=click.IntRange(1, 250), help="Team size. [default: 1, or one per --connect]")
-@click.option(
-    "--connect", multiple=True, metavar="URL", help="A vehicle elsewhere: udpin:0.0.0.0:14550, serial:..."
-)
-@click.option(
+@_link("--vehicles", type=click.IntRange(1, 250), help="Team size. [default: 1, or one per --connect]")
+@_link("--connect", multiple=True, metavar="URL", help="A vehicle elsewhere: udpin:0.0.0.0:14550, serial:...")
+@_link(
     "--system-id",
     multiple=True,
     type=click.IntRange(1, 255),
     metavar="ID",
     help="Of the vehicle, where several are on its link; one for each --connect. [default: the first heard]",
 )
-@click.option(
+@_world(
     "--autopilot",
     type=click.Choice(["px4", "ardupilot"]),
-    help="Of the embedded SITL. [default: px4, or what a mission file is for]",
+    help="Its firmware's ways. [default: px4, or what a mission file is for]",
 )
-@click.option(
+@_world(
     "--model",
     multiple=True,
     metavar="NAME|PATH",
-    help="Vehicle of the embedded SITL; one for all of a team, or one for each (repeat, or A,B,C). "
+    help="Its vehicle; one for all of a team, or one for each (repeat, or A,B,C). "
     "[default: iris, or an aircraft where the mission needs one]",
 )
-@click.option(
+@_world(
     "--launch",
     type=click.Choice(["runway", "catapult", "hand"]),
     help="How aircraft get into the air. [default: as described with the model]",
 )
-@click.option("--home", help="lat,lon,alt[,heading] of the embedded SITL. [default: the firmware's own]")
-@click.option("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
-@click.option(
+@_world("--home", help="lat,lon,alt[,heading]. [default: the firmware's own]")
+@_world("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
+@_world(
     "--wind",
     metavar="SPEED[@FROM]",
-    help="Wind of the day in the embedded SITL, m/s, and degrees it comes from; turns are planned for it, "
+    help="Wind of the day, m/s at 10 m above ground, and degrees it comes from; turns are planned for it, "
     "unless --expect-wind says otherwise. [default: 0; orbit: 4 from north; occupancy: 5 from west]",
 )
-@click.option(
+@_world(
+    "--wind-profile",
+    type=click.Choice(["log", "power", "uniform"]),
+    default="log",
+    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
+)
+@_world(
     "--turbulence",
     type=click.Choice(["none", "light", "moderate", "severe"]),
     help="[default: none; orbit, occupancy: light]",
 )
-@click.option(
+@_flight(
     "--expect-wind",
     type=float,
-    help="Forecast: wind to plan turns for, m/s. [default: --wind where it is given, else 5]",
+    help="Forecast: wind to plan turns for, m/s, at the height of the flight. [default: --wind where it is "
+    "given, as it is at 100 m or the mission's altitude, else 5]",
 )
-@click.option("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
-@click.option(
-    "--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params)."
-)
-@click.option("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
-@click.option(
+@_world("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
+@_flight("--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params).")
+@_results("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
+@_flight(
     "--on-failure",
     type=click.Choice(["return", "land", "hold"]),
     default="return",
     help="Or on Ctrl-C, SIGTERM, SIGHUP.",
 )
-@click.option(
+@_elsewhere(
     "--yes", is_flag=True, help="With a real vehicle: fly without asking, when nothing is found against it."
 )
-@click.option(
+@_elsewhere(
     "--check",
     is_flag=True,
     help="Look at the vehicle and ask before the flight, on links of this machine too.",
 )
-@click.option(
+@_elsewhere(
     "--regain",
     type=SECONDS,
     help="So long a lost link may take to come back, s. [default: 60]",
 )
-@click.option(
+@_flight(
     "--max-error",
     type=float,
     metavar="M",
     help="Fail when the path error exceeds it anywhere in a pattern, m.",
 )
-@click.option(
-    "--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS."
-)
-@click.option(
+@_link("--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS.")
+@_estimator(
     "--estimator", metavar="NAME|FILE.py", help="Run beside the flight: attitude, lissajous, target-fusion."
 )
-@click.option(
+@_estimator(
     "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
 )
-@click.option(
+@_results(
     "--export-plan",
     type=click.Path(path_type=Path),
     metavar="FILE",
     help="Don't fly: write the mission that would be uploaded (.plan, .waypoints).",
 )
-@click.option("--no-picture", is_flag=True, help="Don't draw track.png.")
-@click.option("--arg", multiple=True, metavar="NAME=VALUE", help="For a mission of your own.")
-@key_option
+@_results("--no-picture", is_flag=True, help="Don't draw track.png.")
+@key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
 def fly(**given: Any) -> int:
     """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, a mission
     file (.plan, .waypoints), or a Python file of your own.
@@ -218,7 +136,7 @@ def fly(**given: Any) -> int:
     from missions.ending import signal_of
     from missions.errors import PlanError
 
-    _refuse_options_of_the_other(click.get_current_context(), connected=bool(given["connect"]))
+    refuse_idle_options(click.get_current_context(), connected=bool(given["connect"]))
     try:
         return _fly(given)
     except PlanError as error:
@@ -226,44 +144,6 @@ def fly(**given: Any) -> int:
     except KeyboardInterrupt as interrupt:
         click.echo("interrupted", err=True)
         return KILLED + signal_of(interrupt)
-
-
-def _chosen(context: click.Context) -> frozenset[str]:
-    """Options that stand on the command line."""
-    return frozenset(
-        name
-        for name in context.params
-        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
-    )
-
-
-def _refuse_options_of_the_other(context: click.Context, *, connected: bool) -> None:
-    """A vehicle elsewhere has its own wind: an option that would do nothing is not passed over in silence."""
-    chosen = _chosen(context)
-    if not connected:
-        given = [f"--{name.replace('_', '-')}" for name in _CONNECTED_ONLY if name in chosen]
-        if given:
-            raise click.UsageError(
-                f"{', '.join(given)}: for vehicles elsewhere; give --connect too, or leave it out"
-            )
-        return
-    given = [f"--{name}" for name in _EMBEDDED_ONLY if name in chosen]
-    if given:
-        raise click.UsageError(
-            f"{', '.join(given)}: of the embedded SITL only, has no effect with --connect; leave it out"
-        )
-
-
-def _arguments(pairs: tuple[str, ...]) -> dict[str, str]:
-    from missions.errors import PlanError
-
-    values = {}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        if not (name and equals):
-            raise PlanError(f"--arg {pair!r} is not NAME=VALUE")
-        values[name] = value
-    return values
 
 
 def _models(
@@ -290,6 +170,7 @@ def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
 
 
 def _fly(given: dict[str, Any]) -> int:
+    from flightsim.wind_profile import WindLaw, WindProfile
     from missions.library import find_mission
     from missions.options import check_positive, parameters_from_file, parse_wind
 
@@ -299,8 +180,7 @@ def _fly(given: dict[str, Any]) -> int:
     models = _models(given["model"], mission, given["vehicles"], len(given["connect"]))
     common = {
         "vehicles": given["vehicles"] or max(1, len(given["connect"]), len(models)),
-        "arguments": _arguments(given["arg"]),
-        "given": declared.chosen_fields(_chosen(context)),
+        "given": declared.chosen_fields(chosen_names(context)),
     }
     options = declared.build(given, common)
     world = mission.world_defaults
@@ -312,7 +192,8 @@ def _fly(given: dict[str, Any]) -> int:
         )
     forecast_m_s = given["expect_wind"]
     if forecast_m_s is None and given["wind"] is not None:
-        forecast_m_s = wind_speed_m_s
+        profile = WindProfile(law=WindLaw(given["wind_profile"]))
+        forecast_m_s = wind_speed_m_s * profile.factor(max(options.altitude_m, _FORECAST_HEIGHT_M))
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
         raise click.UsageError(
@@ -330,14 +211,16 @@ def _fly(given: dict[str, Any]) -> int:
     from missions.session import fly as fly_mission
     from missions.vehicle.adapter import Mode
 
+    line = ProgressLine()
     confirm = None
     if given["connect"]:
         try:
             if given["export_plan"] is None:
-                confirm = confirmation(given["connect"], yes=given["yes"], check=given["check"])
+                confirm = confirmation(
+                    given["connect"], yes=given["yes"], check=given["check"], screen=line.held
+                )
         except AddressError as error:
             raise click.UsageError(str(error)) from error
-    line = ProgressLine()
     try:
         key = key_from(given["signing_key"])
         request = Request(
@@ -351,6 +234,7 @@ def _fly(given: dict[str, Any]) -> int:
             speedup=given["speedup"],
             wind_speed_m_s=wind_speed_m_s,
             wind_from_deg=wind_from_deg,
+            wind_profile=given["wind_profile"],
             turbulence=given["turbulence"] or world.turbulence,
             expected_wind_m_s=forecast_m_s,
             home=given["home"] or (None if given["connect"] else world.home),

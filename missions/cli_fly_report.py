@@ -2,7 +2,9 @@
 
 import math
 import os
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -12,6 +14,8 @@ if TYPE_CHECKING:
     from missions.session import Flight, RunResult
 
 _FAILED: Final = 1
+_PACE_S: Final = 5.0
+_PACE_LEAST_S: Final = 0.5
 KILLED: Final = 128
 """Plus the signal's number: how shells tell of a command that was ended by one."""
 
@@ -28,22 +32,24 @@ def leave_closed_terminal() -> None:
 
 
 class ProgressLine:
-    """The progress line on a terminal; nothing in a pipe."""
+    """The progress line on a terminal; nothing in a pipe, and nothing while it is held."""
 
     def __init__(self) -> None:
-        self._shown = False
+        self._width = 0
+        self._held = False
         self._last_wall_s = -math.inf
+        self._pace = Pace()
 
     def __call__(self, flight: "Flight") -> None:
         from autopilot_bridge.clock.pacing import wall_time_s
         from missions.telemetry import Position
 
         now_s = wall_time_s()
-        if now_s - self._last_wall_s < 0.1 or flight.clock is None:
+        if self._held or now_s - self._last_wall_s < 0.1 or flight.clock is None:
             return
         self._last_wall_s = now_s
-        time_s = flight.clock.time_us * 1e-6
-        factor = time_s / max(now_s - flight.started_wall_s, 1e-3)
+        time_s = flight.elapsed_s
+        factor = self._pace.factor(now_s, time_s)
         heard = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
         mode, height, progress = "waiting", "", 0.0
         if heard:
@@ -53,19 +59,54 @@ class ProgressLine:
             positions = [vehicle.latest(Position) for vehicle in heard]
             height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
             progress = sum(vehicle.notes.progress for vehicle in heard) / len(heard)
-        text = f"{time_s:8.1f} s  x{factor:<6.1f} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
-        click.echo(f"\r{text:<72}", nl=False, err=True)
-        self._shown = True
+        speed = "" if factor is None else f"x{factor:.1f}"
+        text = f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
+        click.echo(f"\r{text:<{self._width}}", nl=False, err=True)
+        self._width = len(text)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """A block in which the screen belongs to something else: the line is wiped off, and not shown."""
+        if self._width:
+            click.echo(f"\r{'':<{self._width}}\r", nl=False, err=True)
+        self._width, self._held = 0, True
+        try:
+            yield
+        finally:
+            self._held = False
 
     def end(self) -> None:
         """Leave the line."""
-        if self._shown:
+        if self._width:
             click.echo("", err=True)
+            self._width = 0
+
+
+class Pace:
+    """Vehicle time against wall time over the last seconds."""
+
+    def __init__(self) -> None:
+        self._looks: deque[tuple[float, float]] = deque()
+
+    def factor(self, wall_s: float, vehicle_s: float) -> float | None:
+        """Vehicle seconds in a wall second; None while too little is known.
+
+        Args:
+            wall_s, vehicle_s: now, by both clocks. When the vehicle's time is set anew, it begins anew.
+        """
+        looks = self._looks
+        if looks and vehicle_s < looks[-1][1]:
+            looks.clear()
+        looks.append((wall_s, vehicle_s))
+        while len(looks) > 2 and wall_s - looks[1][0] >= _PACE_S:
+            looks.popleft()
+        passed_s = wall_s - looks[0][0]
+        return None if passed_s < _PACE_LEAST_S else (vehicle_s - looks[0][1]) / passed_s
 
 
 def tell(result: "RunResult", mission: "Mission[Any]") -> int:
     """Say how a run went; gives the exit code."""
-    from missions.run import POOR
+    from missions.run import POOR, wind_words
 
     summary = result.summary
     if result.outcome == "interrupted":
@@ -80,8 +121,10 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
     click.echo(
         f"{result.outcome}: {summary['mission']} with {summary['autopilot']}, "
         f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, "
-        f"{summary['speedup']:.0f} times real time"
+        f"{summary['speedup']:.3g} times real time"
     )
+    if "wind" in summary:
+        click.echo(wind_words(summary["wind"]))
     if summary["path_rms_error_m"] is not None:
         reference = summary["vehicles"][0]["error_reference"]
         click.echo(

@@ -248,7 +248,7 @@ def mutate(
     help="Log seconds per wall second, from 0.1; or max.",
 )
 @click.option("--loop", is_flag=True, help="Begin again at the end, until Ctrl-C.")
-@key_option
+@key_option()
 def play(
     path: Path,
     dialect: str | None,

@@ -9,6 +9,13 @@ from typing import Final
 import click
 
 _CHUNK_BYTES: Final = 4096
+YES_WORDS: Final = "yes (or y)"
+"""What a question that `is_yes` judges asks for."""
+
+
+def is_yes(answer: str) -> bool:
+    """Whether an answer agrees; everything else, no answer too, does not."""
+    return answer.strip().lower() in ("y", "yes")
 
 
 def somebody_is_there() -> bool:

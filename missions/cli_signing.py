@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,12 +11,16 @@ if TYPE_CHECKING:
     from autopilot_bridge.mavlink import SigningKey
     from autopilot_bridge.sitl import SigningParameters
 
-key_option = click.option(
-    "--signing-key",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="Sign with the key in it (32 bytes, 64 hex digits, or a passphrase), and believe nobody else.",
-)
+
+def key_option(**attributes: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The option for a key."""
+    return click.option(
+        "--signing-key",
+        type=click.Path(path_type=Path, dir_okay=False),
+        metavar="FILE",
+        help="Sign with the key in it (32 bytes, 64 hex digits, or a passphrase), and believe nobody else.",
+        **attributes,
+    )
 
 
 def key_from(path: Path | None) -> "SigningKey | None":

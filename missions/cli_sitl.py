@@ -110,7 +110,19 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
 @click.option("--gcs-link", "gcs_links", multiple=True, help="Link with ground-station streams.")
 @click.option("--home", help="lat,lon,alt[,heading]; default: where the firmware's own SITL stands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--wind", default="0", show_default=True, help="Speed in m/s, with @DEG where it comes from.")
+@click.option(
+    "--wind",
+    default="0",
+    show_default=True,
+    help="Speed in m/s at 10 m above ground, with @DEG where it comes from.",
+)
+@click.option(
+    "--wind-profile",
+    type=click.Choice(["log", "power", "uniform"]),
+    default="log",
+    show_default=True,
+    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
+)
 @click.option(
     "--turbulence",
     type=click.Choice(["none", "light", "moderate", "severe"]),
@@ -134,7 +146,7 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
 @click.option(
     "--map-target", metavar="NORTH,EAST", help="A target's magnetic signature there, m from the map's home."
 )
-@key_option
+@key_option()
 @click.option(
     "--unsigned",
     type=click.Choice(["none", "serial", "local", "all"]),
@@ -167,6 +179,7 @@ def sitl(
     home: str | None,
     seed: int,
     wind: str,
+    wind_profile: str,
     turbulence: str,
     camera: bool,
     targets: tuple[str, ...],
@@ -204,6 +217,7 @@ def sitl(
     )
     from autopilot_bridge.sitl.configuration import HOMES
     from flightsim.environment import Environment
+    from flightsim.wind_profile import WindLaw, WindProfile
     from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
 
@@ -231,7 +245,10 @@ def sitl(
                 ),
                 home=place,
                 environment=Environment.from_wind(
-                    speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
+                    speed_m_s=wind_speed_m_s,
+                    from_deg=wind_from_deg,
+                    profile=WindProfile(law=WindLaw(wind_profile)),
+                    turbulence=turbulence,
                 ),
                 seed=seed,
             )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from missions.cli_question import ask, somebody_is_there
+from missions.cli_question import YES_WORDS, ask, is_yes, somebody_is_there
 from missions.cli_types import FiniteRange
 
 if TYPE_CHECKING:
@@ -110,10 +110,10 @@ def _finite(value: Any) -> Any:
 
 
 async def confirm(question: str, yes: bool) -> None:
-    """Ask for a typed yes; without a terminal, --yes must be given."""
+    """Ask for a yes; without a terminal, --yes must be given."""
     if yes:
         return
     if not somebody_is_there():
         raise click.UsageError(f"{question}: not confirmed; give --yes where nobody can be asked")
-    if (await ask(f"{question}: type yes")).lower() != "yes":
+    if not is_yes(await ask(f"{question}? Type {YES_WORDS}")):
         raise click.ClickException("not confirmed, nothing was done")

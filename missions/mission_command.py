@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -13,23 +14,56 @@ Given = Mapping[str, Any]
 """Values of the command line's options by name, with _ for -."""
 
 
+MISSION_GROUP: Final = "The mission's own"
+"""Heading of a mission's own options in the help."""
+
+
+class Scope(StrEnum):
+    """Which flights an option has an effect on."""
+
+    ANY = "any"
+    EMBEDDED = "embedded"
+    CONNECTED = "connected"
+
+
+class FlightOption(click.Option):
+    """An option of `flightstack fly`.
+
+    Args:
+        group: heading under which the help lists it.
+        scope: the flights it has an effect on; it is refused for the others.
+        replaces: names of options that have no effect beside it; they are refused beside it.
+    """
+
+    def __init__(
+        self,
+        *arguments: Any,
+        group: str,
+        scope: Scope = Scope.ANY,
+        replaces: tuple[str, ...] = (),
+        **attributes: Any,
+    ) -> None:
+        super().__init__(*arguments, **attributes)
+        self.group = group
+        self.scope = scope
+        self.replaces = replaces
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionCommand:
     """A mission on the command line.
 
     Attributes:
-        names: of the missions that take these options.
         help: what `flightstack fly NAME --help` says first.
-        options: beside those of every mission.
+        options: beside those of every mission. The mission takes no others.
         build: the mission's options from what was given. `chosen` names the fields of the options that
             were; common values are passed on as they are.
         fields: which fields of the mission's options each command-line option decides on, where the names
             differ.
     """
 
-    names: tuple[str, ...]
     help: str
-    options: tuple[click.Option, ...]
+    options: tuple[FlightOption, ...]
     build: Callable[[Given, Mapping[str, Any]], "MissionOptions"]
     fields: Mapping[str, tuple[str, ...]]
 
@@ -43,6 +77,7 @@ class MissionCommand:
         return frozenset(found)
 
 
-def option(*declarations: str, **attributes: Any) -> click.Option:
+def option(*declarations: str, **attributes: Any) -> FlightOption:
     """An option of a mission, with its default shown."""
-    return click.Option(declarations, show_default=attributes.pop("show_default", True), **attributes)
+    show_default = attributes.pop("show_default", True)
+    return FlightOption(declarations, group=MISSION_GROUP, show_default=show_default, **attributes)

@@ -201,3 +201,12 @@ def _finite(value: Any) -> Any:
     if isinstance(value, Sequence) and not isinstance(value, str):
         return [_finite(entry) for entry in value]
     return value
+
+
+def wind_words(wind: Mapping[str, Any]) -> str:
+    """The wind of an embedded flight in words: `summary.json`'s `wind`."""
+    speed_m_s, turbulence = wind["speed_m_s"], wind["turbulence"]
+    steady = f"wind {speed_m_s:g} m/s from {wind['from_deg']:g} degrees" if speed_m_s else "no steady wind"
+    if turbulence == "none":
+        return steady if speed_m_s else "still air"
+    return f"{steady}, {turbulence} turbulence"

@@ -34,6 +34,7 @@ from missions.run import (
     vehicle_summary,
     versions,
     whole,
+    wind_words,
     write_summary,
 )
 from missions.signing import client_signing, key_missing
@@ -76,6 +77,7 @@ class Flight:
     Attributes:
         vehicles: as soon as they are made.
         recorder: of all that is sent and heard.
+        elsewhere: the vehicles are at the ends of links, not embedded.
         started_wall_s: wall clock when the run began.
         started_us: vehicle time when the run began: boot of an embedded one, else when it was first heard.
     """
@@ -85,7 +87,16 @@ class Flight:
         self.clock: Clock | None = None
         self.started_wall_s = wall_time_s()
         self.started_us = 0
+        self.elsewhere = False
         self.recorder: FlightRecorder | None = None
+
+    @property
+    def elapsed_s(self) -> float:
+        """Vehicle time since the run began: since boot of an embedded one, else since it was first heard."""
+        if self.clock is None:
+            return 0.0
+        begun_us = self.vehicles[0].first_heard_us if self.elsewhere else self.started_us
+        return max(0, self.clock.time_us - begun_us) * 1e-6
 
     def require_log(self) -> None:
         """See that what was heard so far is in the log.
@@ -180,9 +191,8 @@ def _fly_interruptible(
         write_summary(folder, summary)
         written = True
         if request.picture and debriefing.flights:
-            title = _title(mission, debriefing, summary)
             with whole(folder / PICTURE_NAME):
-                mission.draw(folder / PICTURE_NAME, title, debriefing)
+                mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
     except OSError as error:
         missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
         outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
@@ -217,11 +227,12 @@ async def _fly(
             await stack.enter_async_context(connection)
             flight.vehicles.append(Vehicle(connection, system_id))
         flight.clock = clock = stage.clocks[0]
+        flight.elsewhere = bool(request.connect)
         if estimators is not None:
             await stack.enter_async_context(estimators.on_board(flight.vehicles, stage.links, clock))
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
-            await together([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])
+            await together([_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles])
             flight.require_log()
             await _fly_all(mission, flight.vehicles, request)
         finally:
@@ -233,7 +244,7 @@ async def _fly(
             await asyncio.gather(reporter, return_exceptions=True)
 
 
-async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
+async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
     wanted = request.system_ids[flight.vehicles.index(vehicle)] if request.system_ids else None
     try:
         await vehicle.wait_heartbeat()
@@ -255,7 +266,7 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
     vehicle.notes.kind = str(vehicle.kind)
     if request.connect:
         await vehicle.set_parameters(request.parameters)
-    await vehicle.wait_ready()
+    await vehicle.wait_ready(leave_mission=mission.commands)
 
 
 async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest) -> None:
@@ -379,20 +390,22 @@ def _summary(
         summary["wind"] = {
             "speed_m_s": request.wind_speed_m_s,
             "from_deg": request.wind_from_deg,
+            "profile": request.wind_profile,
             "turbulence": request.turbulence,
         }
     return summary
 
 
-def _title(mission: Mission[Any], debriefing: Debriefing, summary: Mapping[str, Any]) -> str:
+def title(mission: Mission[Any], debriefing: Debriefing, summary: Mapping[str, Any]) -> str:
+    """What stands above the picture of a run: what was flown, how it went, the wind where it is known."""
     parts = [mission.title(debriefing.options), summary["autopilot"]]
     rms = summary["path_rms_error_m"]
     figures = f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.0f} s"
     if rms is not None:
         figures += f", path error {rms:.2f} m RMS, {summary['path_max_error_m']:.2f} m at most"
-    return (
-        ", ".join(parts)
-        + "\n"
-        + figures
-        + ("" if summary["outcome"] == COMPLETED else f" ({summary['outcome']})")
-    )
+    if summary["outcome"] != COMPLETED:
+        figures += f" ({summary['outcome']})"
+    lines = [", ".join(parts), figures]
+    if "wind" in summary:
+        lines.append(wind_words(summary["wind"]))
+    return "\n".join(lines)

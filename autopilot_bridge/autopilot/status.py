@@ -13,6 +13,7 @@ from autopilot_bridge.telemetry.streams import Values
 MAVLINK_VERSION: Final = 3
 PREARM_CHECK: Final = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 GEOFENCE: Final = mavlink.MAV_SYS_STATUS_GEOFENCE
+GPS: Final = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 RECEIVER: Final = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 
 
@@ -78,6 +79,7 @@ class StatusReport:
         self._flavour = flavour
         self._commander = commander
         self._bits = flavour.sensor_bits
+        self._standard_modes = {mode.custom_mode: mode.standard_mode for mode in flavour.listed_modes}
         self._boot_us = round(flavour.policy.boot_s * 1e6)
 
     def heartbeat(self) -> Values:
@@ -104,7 +106,8 @@ class StatusReport:
     def current_mode(self) -> Values:
         """CURRENT_MODE (436): what is flown and what was asked for."""
         modes = self._flavour.custom_modes
-        return (0, modes[self._commander.mode], modes[self._commander.commanded_mode])
+        flown = modes[self._commander.mode]
+        return (self._standard_modes.get(flown, 0), flown, modes[self._commander.commanded_mode])
 
     def sys_status(self) -> tuple[int, int, int]:
         """(present, enabled, health) of SYS_STATUS (1)."""
@@ -121,6 +124,8 @@ class StatusReport:
         if not (commander.armed or commander.armable):
             health &= ~PREARM_CHECK
         enabled = bits.enabled_armed if commander.armed else bits.enabled
+        if self._flavour.policy.gps_shown_when_used and not commander.situation.position:
+            present, enabled, health = (each & ~GPS for each in (present, enabled, health))
         if not self._flavour.policy.fence_in_status:
             return (present, enabled, health)
         fence, parameters = commander.fence, commander.parameters.fence
@@ -157,7 +162,7 @@ def _sensors(commander: Commander) -> tuple[tuple[int, bool], ...]:
         (mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL, health.accelerometer),
         (mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG, health.magnetometer),
         (mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE, health.barometer),
-        (mavlink.MAV_SYS_STATUS_SENSOR_GPS, health.gps and health.position),
+        (GPS, health.gps and health.position),
         (mavlink.MAV_SYS_STATUS_AHRS, health.attitude),
         (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY, charged),
         (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, health.airspeed or not health.has_airspeed),

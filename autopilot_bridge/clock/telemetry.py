@@ -15,6 +15,10 @@ _MIN_SPACING_S: Final = 0.02  # observations kept for the rate are no closer tha
 _MAX_STEP_BACK_US: Final = 1_000_000  # messages overtake each other by less; more is a new time base
 _BACKLOG_S: Final = 0.25  # wall seconds in which messages that waited for us are read
 _RATE_LIMITS: Final = (0.01, 1000.0)
+_PACED_US: Final = (
+    2_000_000.0  # vehicle time assumed between two messages; autopilots tell theirs every second
+)
+_SILENT_RATE: Final = 1.0  # at most so fast where nothing is received
 _MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are looked at again: rates change
 
 
@@ -25,8 +29,9 @@ class TelemetryClock:
     keep what they had left. From then on it never runs backwards: when the vehicle reboots, or comes back
     from a pause during which deadlines went on, time continues from where it was, and differs from what
     messages are stamped with (`stamp_us`). Messages that waited while this process was busy are no pause:
-    time stands until they have been read. When nothing is heard, time goes on at the last rate, so that
-    deadlines expire on a dead link too.
+    time stands until they have been read. Where nothing is received, time goes on at the last rate for two
+    seconds of the vehicle's time, then at no more than real time: deadlines expire on a dead link too, and a
+    simulator that is stopped for a moment costs them no more than that moment, however fast it was.
 
     Args:
         monotonic: wall clock in seconds.
@@ -77,8 +82,20 @@ class TelemetryClock:
 
     @property
     def _since_us(self) -> float:
-        """Vehicle time since the newest observation."""
-        return (self._monotonic() - self._wall_s) * 1e6 * self._rate
+        """Vehicle time since the newest observation, as it is assumed."""
+        paced_us = (self._monotonic() - self._wall_s) * 1e6 * self._rate
+        return min(paced_us, _PACED_US) + max(0.0, paced_us - _PACED_US) * self._slower_in_silence
+
+    @property
+    def _slower_in_silence(self) -> float:
+        """The rate of silence as a share of the vehicle's."""
+        return min(1.0, _SILENT_RATE / self._rate)
+
+    def wall_s_until(self, time_us: int) -> float:
+        """Wall seconds until a time comes, if nothing is received before; 0 when it has come."""
+        due_us = time_us - self._base_us
+        paced_us = min(due_us, _PACED_US) + max(0.0, due_us - _PACED_US) / self._slower_in_silence
+        return max(0.0, paced_us * 1e-6 / self._rate - self.silence_s)
 
     def observe(self, vehicle_time_us: int) -> None:
         """Take the timestamp of a message that arrived just now."""
@@ -188,8 +205,8 @@ class TelemetryClock:
             self._timer = None
         if self._deadlines:
             first_us = min(deadline.time_us for deadline in self._deadlines)
-            wait_s = max(0.0, (first_us - self.time_us) * 1e-6 / self._rate)
-            self._timer = asyncio.get_running_loop().call_later(min(wait_s, _MAX_TIMER_S), self._on_timer)
+            wait_s = min(self.wall_s_until(first_us), _MAX_TIMER_S)
+            self._timer = asyncio.get_running_loop().call_later(wait_s, self._on_timer)
 
     def _on_timer(self) -> None:
         self._timer = None

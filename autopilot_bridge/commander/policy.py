@@ -63,6 +63,8 @@ class CommanderPolicy:
         plans: how it goes through a plan.
         fence_in_status: SYS_STATUS shows the geofence (ArduPilot).
         fence_bounds_targets: a place to fly to outside the geofence is refused (not on ArduPlane).
+        gps_shown_when_used: SYS_STATUS shows the GPS only while its position may be flown by (PX4);
+            clients take the bit for the vehicle's position.
         mission_end_mode: mode after the last item of a mission, in the air; None: stays.
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
     """
@@ -112,3 +114,4 @@ class CommanderPolicy:
     plans: PlanHabits = PX4_PLANS
     fence_bounds_targets: bool = True
     fence_in_status: bool = False
+    gps_shown_when_used: bool = False

@@ -47,6 +47,22 @@ class ModeDisplay(NamedTuple):
     thrust_setpoints: bool
 
 
+class ListedMode(NamedTuple):
+    """A mode as AVAILABLE_MODES lists it (standard modes protocol).
+
+    Attributes:
+        custom_mode: as in HEARTBEAT.
+        name: empty where `standard_mode` names it.
+        standard_mode: MAV_STANDARD_MODE; 0: the mode is the firmware's own.
+        properties: MAV_MODE_PROPERTY bits.
+    """
+
+    custom_mode: int
+    name: str
+    standard_mode: int
+    properties: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorBits:
     """SYS_STATUS bits of a healthy vehicle; broken sensors are taken out of `health`."""
@@ -147,6 +163,7 @@ class Flavour:
         custom_modes: HEARTBEAT.custom_mode of every mode this firmware knows.
         mode_names: what the firmware calls its modes in texts.
         base_mode: HEARTBEAT.base_mode.
+        listed_modes: what AVAILABLE_MODES lists, in its order; empty: the firmware has no such message.
         policy: what the commander follows.
         notices: the texts of an event; empty for events this firmware is silent about.
         banner: texts that follow a parameter list request.
@@ -170,6 +187,8 @@ class Flavour:
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
         sends_events: what happens is told in EVENT messages, texts repeat them.
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
+        reboot_starts_again: a reboot starts the simulated vehicle again too, at its first place and level
+            (ArduPilot's SITL); else only the autopilot boots, as on a vehicle.
         gps_source: which receiver the first GPS is, as the parameters were at boot.
     """
 
@@ -202,4 +221,6 @@ class Flavour:
     heartbeat_on_mode_change: bool
     sends_events: bool
     bytewise_parameters: bool
+    listed_modes: tuple[ListedMode, ...] = ()
+    reboot_starts_again: bool = False
     gps_source: Callable[[ParameterStore], GpsSource] = own_receiver

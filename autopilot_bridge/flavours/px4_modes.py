@@ -4,8 +4,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
-from autopilot_bridge.flavours.flavour import ModeDisplay
+from autopilot_bridge.flavours.flavour import ListedMode, ModeDisplay
 
 MAIN_MANUAL: Final = 1
 MAIN_ALTITUDE: Final = 2
@@ -72,6 +74,40 @@ MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
         FlightMode.TERMINATION: "Termination",
     }
 )
+
+_ADVANCED: Final = mavlink.MAV_MODE_PROPERTY_ADVANCED
+_NOT_SELECTABLE: Final = mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+
+
+def _own(name: str, main: int, sub: int = 0, properties: int = _ADVANCED) -> ListedMode:
+    return ListedMode(custom_mode(main, sub), name, 0, properties)
+
+
+def _standard(standard_mode: int, main: int, sub: int = 0, properties: int = _ADVANCED) -> ListedMode:
+    return ListedMode(custom_mode(main, sub), "", standard_mode, properties)
+
+
+LISTED_MODES: Final = (
+    _own("Manual", MAIN_MANUAL),
+    _standard(mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD, MAIN_ALTITUDE, properties=0),
+    _standard(mavlink.MAV_STANDARD_MODE_POSITION_HOLD, MAIN_POSITION, properties=0),
+    _standard(mavlink.MAV_STANDARD_MODE_MISSION, MAIN_AUTO, 4),
+    _own("Hold", MAIN_AUTO, 3),
+    _standard(mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY, MAIN_AUTO, 5),
+    _own("Position Slow", MAIN_POSITION, 2),
+    _own("Acro", MAIN_ACRO),
+    _own("Termination", MAIN_TERMINATION, properties=_ADVANCED | _NOT_SELECTABLE),
+    _own("Offboard", MAIN_OFFBOARD),
+    _own("Stabilized", MAIN_STABILIZED),
+    _standard(mavlink.MAV_STANDARD_MODE_TAKEOFF, MAIN_AUTO, 2),
+    _standard(mavlink.MAV_STANDARD_MODE_LAND, MAIN_AUTO, 6),
+    _own("Follow Target", MAIN_AUTO, 8),
+    _own("Precision Landing", MAIN_AUTO, 9),
+    _standard(mavlink.MAV_STANDARD_MODE_ORBIT, MAIN_POSITION, 1),
+    _own("VTOL Takeoff", MAIN_AUTO, 10),
+    *(_own("(Mode not available)", MAIN_AUTO, sub, _NOT_SELECTABLE) for sub in range(11, 19)),
+)
+"""AVAILABLE_MODES of a multicopter, as PX4 1.16.1 sends it; the last eight are for external modes."""
 
 _AUTO_SUB_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
     {

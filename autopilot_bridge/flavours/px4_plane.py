@@ -62,6 +62,7 @@ PX4_PLANE: Final = replace(
     custom_modes=px4_plane_modes.CUSTOM_MODES,
     mode_names=px4_plane_modes.MODE_NAMES,
     base_mode=px4_plane_modes.base_mode,
+    listed_modes=px4_plane_modes.LISTED_MODES,
     policy=POLICY,
     notices=notices,
     parameter_definitions=lambda: PX4_PLANE_PARAMETERS,

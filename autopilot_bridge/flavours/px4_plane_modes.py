@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
+from pymavlink.dialects.v20 import all as mavlink
+
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flavours import px4_modes
 from autopilot_bridge.flavours.flavour import ModeDisplay
@@ -17,6 +19,14 @@ CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
 MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
     {mode: name for mode, name in px4_modes.MODE_NAMES.items() if mode not in _MULTICOPTER_ONLY}
 )
+
+LISTED_MODES: Final = tuple(
+    mode._replace(standard_mode=mavlink.MAV_STANDARD_MODE_CRUISE)
+    if mode.standard_mode == mavlink.MAV_STANDARD_MODE_POSITION_HOLD
+    else mode
+    for mode in px4_modes.LISTED_MODES
+)
+"""AVAILABLE_MODES of an aircraft, as PX4 1.16.1 was seen to send it: a multicopter's modes too."""
 
 
 def base_mode(display: ModeDisplay) -> int:

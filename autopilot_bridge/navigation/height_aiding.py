@@ -89,7 +89,6 @@ class HeightAiding:
             and time_us - clocks.gps_height_refused_us > self._parameters.gps_timeout_s * 1e6
         ):
             self._contradictions.note(time_us)
-            self._solution.forget_gps_height_error()
             self._reset_to_gps(row, time_us)
 
     def note_gps(self, time_us: int, *, accepted: bool) -> None:
@@ -104,6 +103,8 @@ class HeightAiding:
     def _reset_to_gps(self, row: int, time_us: int) -> None:
         solution, obs = self._solution, self._solution.obs
         down = float(obs[f.GPS_POS + 2] - solution.past_position(row)[2])
+        # The height takes over the error of this fix, which is as large as the receiver reports.
+        solution.forget_gps_height_error()
         solution.move_vertically(down, with_baro=self._baro_known)
         solution.change_vertical_velocity(float(obs[f.GPS_VEL + 2] - solution.past_velocity(row)[2]))
         self._clocks.gps_height_us = time_us

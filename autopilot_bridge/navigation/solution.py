@@ -51,6 +51,7 @@ UNKNOWN_POSITION_M: Final = 100.0
 UNKNOWN_VELOCITY_M_S: Final = 10.0
 UNKNOWN_VERTICAL_VELOCITY_M_S: Final = 3.0
 UNKNOWN_HEIGHT_M: Final = 50.0
+_BETTER_SOLUTION: Final = 3.0  # times better an accuracy: differential or RTK corrections have come
 
 
 class Solution:
@@ -63,6 +64,7 @@ class Solution:
     """
 
     __slots__ = (
+        "_accuracy_step",
         "_parameters",
         "core",
         "gps_error_var",
@@ -118,6 +120,7 @@ class Solution:
         self.work[:] = 0.0
         self.row = 0
         self.steps = 0
+        self._accuracy_step = 0  # when the receiver last reported its accuracy
 
     def set_latitude(self, lat_deg: float, alt_m: float) -> None:
         """Gravity and Earth's rotation of the place."""
@@ -125,13 +128,42 @@ class Solution:
         self.core[EARTH_RATE : EARTH_RATE + 3] = earth_rate_ned_rad_s(lat_deg)
 
     def set_gps_accuracy(self, eph_m: float, epv_m: float) -> None:
-        """What the receiver reports beyond its white noise is the slow error's standard deviation."""
+        """What the receiver reports beyond its white noise is the slow error's standard deviation.
+
+        A worse accuracy widens the slow error at once. A somewhat better one does so with the error's time
+        constant: reports go up and down, the atmosphere does not. An accuracy better by a factor of
+        `_BETTER_SOLUTION` means that the receiver has gone over to a better solution (RTK): the slow error
+        shrinks with it.
+        """
         p = self._parameters
-        horizontal = max(eph_m**2 - p.gps_position_noise_m[0] ** 2, p.gps_position_walk_m[0] ** 2)
-        vertical = max(epv_m**2 - p.gps_position_noise_m[1] ** 2, p.gps_position_walk_m[1] ** 2)
+        reported = (
+            max(eph_m**2 - p.gps_position_noise_m[0] ** 2, p.gps_position_walk_m[0] ** 2),
+            max(epv_m**2 - p.gps_position_noise_m[1] ** 2, p.gps_position_walk_m[1] ** 2),
+        )
+        elapsed_s = (self.steps - self._accuracy_step) * self.period_us * 1e-6
+        self._accuracy_step = self.steps
+        fade = math.exp(-2.0 * elapsed_s / p.gps_position_tau_s)
+        believed = []
+        for axes, new in zip(((0, 1), (2,)), reported, strict=True):
+            old = self.gps_error_var[axes[0]]
+            if new >= old:
+                for axis in axes:
+                    self.p[GPS_ERROR + axis, GPS_ERROR + axis] += new - old
+            elif new * _BETTER_SOLUTION**2 < old:
+                for axis in axes:
+                    self._shrink_gps_error(axis, math.sqrt(new / old))
+            else:
+                new += (old - new) * fade
+            believed.append(new)
+        horizontal, vertical = believed
         self.gps_error_var = (horizontal, horizontal, vertical)
         self.process[cov.GPS_VAR_HORIZONTAL] = horizontal
         self.process[cov.GPS_VAR_VERTICAL] = vertical
+
+    def _shrink_gps_error(self, axis: int, factor: float) -> None:
+        self.core[X_GPS_ERROR + axis] *= factor
+        self.p[GPS_ERROR + axis, :] *= factor
+        self.p[:, GPS_ERROR + axis] *= factor
 
     def row_at(self, measured_us: int, time_us: int) -> int:
         """History row of a past time; -1 when it's older than the history."""

@@ -1,15 +1,12 @@
 """AVAILABLE_MODES: what modes there are and what they are called (standard modes protocol; PX4)."""
 
 from collections.abc import Callable, Mapping
-from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flavours.flavour import Flavour
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.microservice import Microservice
-
-_NAME_BYTES: Final = 34
 
 
 class AvailableModes(Microservice):
@@ -20,10 +17,7 @@ class AvailableModes(Microservice):
     """
 
     def __init__(self, flavour: Flavour) -> None:
-        self._names = [
-            (custom_mode, flavour.mode_names.get(mode, mode.value).encode()[:_NAME_BYTES])
-            for mode, custom_mode in sorted(flavour.custom_modes.items(), key=lambda item: item[1])
-        ]
+        self._modes = flavour.listed_modes
 
     @property
     def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
@@ -31,8 +25,15 @@ class AvailableModes(Microservice):
 
     def _send(self, channel: Channel, index: float) -> None:
         """One mode by index from 1, or all of them for 0."""
-        for number, (custom_mode, name) in enumerate(self._names, start=1):
+        for number, mode in enumerate(self._modes, start=1):
             if index in (0, number):
                 channel.send(
-                    mavlink.MAVLink_available_modes_message(len(self._names), number, 0, custom_mode, 0, name)
+                    mavlink.MAVLink_available_modes_message(
+                        len(self._modes),
+                        number,
+                        mode.standard_mode,
+                        mode.custom_mode,
+                        mode.properties,
+                        mode.name.encode(),
+                    )
                 )

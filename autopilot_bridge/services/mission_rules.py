@@ -125,16 +125,23 @@ def check_special(item: MissionItem, seq: int, count: int) -> int:
     return int(ACCEPTED)
 
 
-def check_fence(item: MissionItem) -> int:
-    """One item of a fence plan."""
+def check_fence(item: MissionItem, *, empty_circles: bool = False) -> int:
+    """One item of a fence plan.
+
+    Args:
+        empty_circles: circles of radius 0 are taken (PX4); nothing is inside of them.
+    """
     if item.command not in FENCE_COMMANDS:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     if item.frame not in GEODETIC_FRAMES:
         return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
     if item.command in POLYGON_COMMANDS and not 3.0 <= item.param1 <= 65535.0:
         return int(mavlink.MAV_MISSION_INVALID_PARAM1)
-    if item.command in CIRCLE_COMMANDS and not (item.param1 > 0.0 and math.isfinite(item.param1)):
-        return int(mavlink.MAV_MISSION_INVALID_PARAM1)
+    if item.command in CIRCLE_COMMANDS:
+        radius_m = item.param1
+        positive = radius_m > 0.0 or (empty_circles and radius_m == 0.0)
+        if not (positive and math.isfinite(radius_m)):
+            return int(mavlink.MAV_MISSION_INVALID_PARAM1)
     return check_horizontal(item) or check_finite(item)
 
 

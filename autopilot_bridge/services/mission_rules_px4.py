@@ -100,7 +100,7 @@ class Px4ItemRules:
         if item.frame not in _POSITION_FRAMES and item.frame != mavlink.MAV_FRAME_MISSION:
             return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
         if mission_type is MissionType.FENCE:
-            return check_fence(item)
+            return check_fence(item, empty_circles=True)
         if mission_type is MissionType.RALLY:
             return check_rally(item)
         if item.frame == mavlink.MAV_FRAME_MISSION:

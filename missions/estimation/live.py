@@ -178,10 +178,10 @@ class _Process:
                     on_progress(self._progress(since_us))
                 wait_s = _LOOK_S
                 if request.duration_s is not None and first_us is not None:
-                    left_s = request.duration_s - since_us * 1e-6
-                    if left_s <= 0.0:
+                    end_us = first_us + round(request.duration_s * 1e6)
+                    if clock.time_us >= end_us:
                         return
-                    wait_s = min(wait_s, left_s / clock.rate)
+                    wait_s = min(wait_s, clock.wall_s_until(end_us))
                 due_s = wall_time_s() + wait_s
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), wait_s)

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import click
 
-from missions.mission_command import Given, MissionCommand, option
+from missions.mission_command import Given, MissionCommand, Scope, option
 
 
 def _degrees(name: str, value: float) -> float:
@@ -57,7 +57,6 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
 
 
 COMMAND: Final = MissionCommand(
-    names=("orbit",),
     help=(
         "Circle a target on the ground without GPS, by roll commands from what a gimballed camera sees.\n\n"
         "An aircraft takes off, flies to the entry with GPS, loses it there (MAV_CMD_INJECT_FAILURE), "
@@ -80,6 +79,7 @@ COMMAND: Final = MissionCommand(
         option("--target-heading", type=float, default=0.0, help="It moves there, degrees."),
         option(
             "--target-motion",
+            scope=Scope.EMBEDDED,
             type=click.Choice(["static", "straight", "circle", "random-walk"]),
             help="How it moves: one that wanders stays within 100 m. [default: straight on, or static]",
         ),

@@ -20,7 +20,6 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
 
 
 COMMAND: Final = MissionCommand(
-    names=("a mission file",),
     help=(
         "Fly a mission file: QGroundControl's .plan, or QGC WPL 110 (.waypoints, .txt) of Mission Planner "
         "and MAVProxy.\n\n"

@@ -57,12 +57,13 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
             f"{document.path} was planned for {document.firmware}, and is flown by {vehicle.autopilot}"
         )
     stops = scored_stops(route, with_takeoff=not wings)
+    acceptance_m = await _acceptance_m(vehicle, document, stops)
     if stops:
         notes.commanded = CommandedPath(
             origin=home,
             points_ned_m=path_ned_m(stops),
             waypoints_ned_m=np.array([stop.position_ned_m for stop in stops]),
-            acceptance_m=await _acceptance_m(vehicle, document, stops),
+            acceptance_m=acceptance_m,
         )
     notes.begin("upload", clock.stamp_us)
     vehicle.note_runway()
@@ -73,19 +74,21 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
     items = placed(document.items, home, vehicle.adapter.unset)
     first = await vehicle.upload_mission(items)
     notes.begin("takeoff", clock.stamp_us)
-    watch = MissionWatch(vehicle, document, route, stops, first)
+    watch = MissionWatch(vehicle, document, stops, first, acceptance_m)
     expected_s = route.duration_s(own_speed_m_s(document, vehicle.kind))
     tallest_m = max((-stop.position_ned_m[2] for stop in route.stops), default=0.0)
     limit_s = options.time_limit_s or 180.0 + 3.0 * max(0.0, tallest_m) + expected_s / _SLOW
     await vehicle.start_mission()
+    ended = True
     try:
-        ended = await watch.until_the_end(limit_s)
+        await watch.until_the_end(limit_s)
     except VehicleTimeout:
         if options.time_limit_s is None:
             raise
         ended = False
-    notes.begin("return", clock.stamp_us)
-    if not (ended and document.lands):
+    if notes.current != "return":
+        notes.begin("return", clock.stamp_us)
+    if not (ended and watch.lands):
         if options.then is Then.LAND:
             await (vehicle.land_along(wait=False) if wings else vehicle.land(wait=False))
         else:

@@ -14,22 +14,20 @@ from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES
 from missions.plan_files.document import (
     DO_CHANGE_SPEED,
-    DO_JUMP,
     FLOWN_TO,
     LOITERS,
     NAV_DELAY,
     NAV_LAND,
     NAV_LOITER_TIME,
     NAV_LOITER_TURNS,
-    NAV_RETURN_TO_LAUNCH,
     NAV_SPLINE_WAYPOINT,
     NAV_TAKEOFF,
     NAV_WAYPOINT,
     MissionDocument,
 )
 from missions.plan_files.validation import has_place
+from missions.vehicle.item_tracker import FlownOrder
 
-_MOST_STEPS: Final = 20_000
 _PATH_STEP_M: Final = 1.0
 _LOITER_RADIUS_M: Final = 60.0
 
@@ -101,28 +99,12 @@ def route_of(document: MissionDocument, home: GeodeticPosition) -> Route:
     """Where the mission leads from a home; jumps are followed as often as they say."""
     items = placed(document.items, home, 0.0)
     frame = LocalFrame(home)
+    order = FlownOrder.of(items)
     stops: list[Stop] = []
-    repeats: dict[int, int] = {}
     speed_m_s: float | None = None
-    index, steps, endless = 0, 0, False
-    while index < len(items):
+    for index in order.indices:
         item = items[index]
-        steps += 1
-        if steps > _MOST_STEPS:
-            endless = True
-            break
-        if item.command == NAV_RETURN_TO_LAUNCH:
-            break
-        if item.command == DO_JUMP:
-            done = repeats.get(index, 0)
-            if item.param2 < 0:
-                endless = True
-                break
-            if done < item.param2:
-                repeats[index] = done + 1
-                index = int(item.param1)
-                continue
-        elif item.command == DO_CHANGE_SPEED and item.param2 > 0.0:
+        if item.command == DO_CHANGE_SPEED and item.param2 > 0.0:
             speed_m_s = item.param2
         elif item.command == NAV_DELAY and stops:
             stops[-1] = replace(stops[-1], stay_s=stops[-1].stay_s + max(0.0, item.param1))
@@ -138,10 +120,7 @@ def route_of(document: MissionDocument, home: GeodeticPosition) -> Route:
                     stay_s=_stay_s(item, speed_m_s),
                 )
             )
-            if item.command == NAV_LAND:
-                break
-        index += 1
-    return Route(stops=tuple(stops), endless=endless)
+    return Route(stops=tuple(stops), endless=order.endless)
 
 
 def _stay_s(item: MissionItem, speed_m_s: float | None) -> float:

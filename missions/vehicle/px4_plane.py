@@ -17,12 +17,19 @@ if TYPE_CHECKING:
 
 
 class Px4Plane(Px4):
-    """PX4 with wings: OFFBOARD takes roll, pitch and thrust together; circles come with DO_REPOSITION."""
+    """PX4 with wings: OFFBOARD takes roll, pitch and thrust together; circles are flown by DO_ORBIT."""
 
     kind = VehicleKind.FIXED_WING
     stream_rates_hz: Mapping[str, float] = MappingProxyType({**Px4.stream_rates_hz, "VFR_HUD": 10.0})
     limiting_parameters: Mapping[str, float] = MappingProxyType(
-        {"FW_AIRSPD_MIN": 10.0, "FW_AIRSPD_TRIM": 15.0, "FW_AIRSPD_MAX": 20.0, "FW_R_LIM": 50.0}
+        {
+            "FW_AIRSPD_MIN": 10.0,
+            "FW_AIRSPD_TRIM": 15.0,
+            "FW_AIRSPD_MAX": 20.0,
+            "FW_R_LIM": 50.0,
+            "NPFG_PERIOD": 10.0,
+            "NPFG_DAMPING": 0.7,
+        }
     )
 
     def limits(self, parameters: Mapping[str, float]) -> Limits:
@@ -33,6 +40,8 @@ class Px4Plane(Px4):
             airspeed_max_m_s=values["FW_AIRSPD_MAX"],
             bank_max_rad=math.radians(values["FW_R_LIM"]),
             bank_parameter="FW_R_LIM",
+            guidance_s=max(0.1, values["NPFG_DAMPING"]) * max(1.0, values["NPFG_PERIOD"]) / math.pi,
+            guidance_parameter="NPFG_PERIOD",  # waypoint_lead_s is 0: it switches legs by its own distance
         )
 
     async def loiter(
@@ -40,11 +49,12 @@ class Px4Plane(Px4):
     ) -> None:
         if radius_m is None:
             radius_m = abs(await vehicle.parameter_or("NAV_LOITER_RAD", 80.0))
+        # PX4 1.16.1 does not read the radius of DO_REPOSITION: it circles NAV_LOITER_RAD clockwise.
+        # DO_ORBIT takes a signed radius, and an aircraft stays in Hold with it
         await vehicle.command_int(
-            dialect.MAV_CMD_DO_REPOSITION,
+            dialect.MAV_CMD_DO_ORBIT,
             dialect.MAV_FRAME_GLOBAL,
-            # the sign of the radius is the direction; the fourth is a yaw, which a fixed wing doesn't take
-            (-1.0, 1.0, radius_m if clockwise else -radius_m, math.nan),
+            (radius_m if clockwise else -radius_m, math.nan, 0.0, math.nan),
             round(place.lat_deg * 1e7),
             round(place.lon_deg * 1e7),
             place.alt_m,

@@ -1,24 +1,40 @@
 """What a vehicle keeps for a mission: plans and parameters."""
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
+from missions.connection import AUTOPILOT_COMPONENT
 from missions.errors import MissionError, VehicleTimeout
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.item_tracker import (
+    FlownOrder,
+    ItemTracker,
+    MissionModeWatch,
+    MissionStep,
+    mission_steps,
+)
+
+_REWINDS: Final = 4
+_REWIND_S: Final = 1.5
+_ACCEPTANCE_M: Final = 2.0
+"""Radius in which a position shows that a waypoint was passed, where the waypoint names none."""
 
 
 class VehicleStore(VehicleCommands):
     """The storing half of a vehicle: plans are uploaded, followed and fetched, parameters read and set."""
+
+    _tracker: ItemTracker | None = None  # of the mission that was uploaded last
 
     # missions
 
     async def upload_mission(self, items: Sequence[MissionItem]) -> int:
         """Upload a plan; gives the wire number of its first item (1 for ArduPilot, whose item 0 is home).
 
-        Jumps name items by their index in `items`.
+        It is flown from its first item on. Jumps name items by their index in `items`.
         """
         first = 1 if self.adapter.first_mission_item_is_home else 0
         home = self.home
@@ -27,7 +43,29 @@ class VehicleStore(VehicleCommands):
         )
         own = mission_transfer.renumbered(items, first)
         await mission_transfer.upload(self, [marker, *own] if first else own, before=first)
+        await self.rewind_mission()
+        order = FlownOrder.of(items)
+        steps = mission_steps(items, order, home, _ACCEPTANCE_M)
+        self._tracker = ItemTracker(steps, order.again_from, first=first)
         return first
+
+    async def rewind_mission(self) -> None:
+        """Have the stored mission begin at its first item: the vehicle may be at the end of its last flight.
+
+        A vehicle that does not confirm it (MISSION_CURRENT) is warned of in the notes.
+        """
+        first = 1 if self.adapter.first_mission_item_is_home else 0
+        with self.messages("MISSION_CURRENT") as stream:
+            for _ in range(_REWINDS):
+                self.send(dialect.MAVLink_mission_set_current_message(self.system_id, AUTOPILOT_COMPONENT, 0))
+                try:
+                    async with self.deadline(_REWIND_S, "the mission's first item"):
+                        while (await anext(stream)).seq > first:
+                            pass
+                        return
+                except TimeoutError:
+                    continue
+        self.notes.warn("the vehicle did not confirm (MISSION_CURRENT) that its mission begins anew")
 
     async def upload_plan(self, mission_type: MissionType, items: Sequence[MissionItem]) -> None:
         """Upload a geofence or rally points in place of those the vehicle has."""
@@ -53,31 +91,42 @@ class VehicleStore(VehicleCommands):
     ) -> None:
         """Wait until the mission has reached item `sequence` (wire number) or gone beyond.
 
+        MISSION_ITEM_REACHED, MISSION_CURRENT and positions are evidence of it, see `ItemTracker`.
+
         Args:
             progress: called with the number of each item reached.
 
         Raises:
             MissionError: the vehicle left the mission before.
         """
-        mission_mode = self.adapter.modes[Mode.MISSION]
-        with self.messages("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT") as stream:
+        tracker = self._tracker or ItemTracker([MissionStep(index=k) for k in range(sequence + 1)])
+        mode = MissionModeWatch(self.adapter.modes[Mode.MISSION])
+        wanted = tracker.place_of(sequence - tracker.first)
+        told = 0
+
+        def there() -> bool:
+            nonlocal told
+            for index, _ in tracker.reached[told:]:
+                if progress is not None:
+                    progress(tracker.first + index)
+            told = len(tracker.reached)
+            return tracker.behind > wanted
+
+        names = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "GLOBAL_POSITION_INT", "HEARTBEAT")
+        with self.messages(*names) as stream:
             try:
                 async with self.deadline(timeout_s, f"mission item {sequence}"):
-                    async for m in stream:
-                        kind = m.get_type()
-                        if kind == "HEARTBEAT":
-                            if m.custom_mode != mission_mode:
-                                name = self.adapter.mode_name(m.custom_mode)
+                    while not there():
+                        message = await anext(stream)
+                        if message.get_type() == "HEARTBEAT":
+                            if mode.left(message.custom_mode) and not tracker.at_the_last_place:
+                                name = self.adapter.mode_name(message.custom_mode)
                                 raise MissionError(
                                     f"the vehicle left the mission for mode {name} "
                                     f"before item {sequence}; {self.heard()}"
                                 )
-                            continue
-                        done = m.seq if kind == "MISSION_ITEM_REACHED" else m.seq - 1
-                        if progress is not None:
-                            progress(done)
-                        if done >= sequence:
-                            return
+                        else:
+                            tracker.on_message(message, self.clock.stamp_us)
             except TimeoutError:
                 raise VehicleTimeout(
                     f"mission item {sequence} was not reached within {timeout_s:g} s; {self.heard()}"

@@ -14,7 +14,7 @@ from missions.connection import Connection
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits, Limits
-from missions.vehicle.adapter import Mode
+from missions.vehicle.adapter import PREARM, Mode
 from missions.vehicle.commands import HEARTBEAT_AGE_US
 from missions.vehicle.fixed_wing import FixedWingFlight
 from missions.vehicle.guided import GuidedSession, SetpointSource
@@ -60,18 +60,40 @@ class Vehicle(FixedWingFlight):
             timeout_s=timeout_s,
         )
 
-    async def wait_ready(self, timeout_s: float = 90.0) -> None:
-        """Wait until the vehicle could be armed: pre-arm checks, home, navigation."""
+    async def wait_ready(self, timeout_s: float = 90.0, *, leave_mission: bool = True) -> None:
+        """Wait until the vehicle could be armed: pre-arm checks, home, navigation.
+
+        Args:
+            timeout_s: for each of its waits.
+            leave_mission: a vehicle that stands disarmed in the mode of a mission leaves it. In that mode the
+                checks may not pass: ArduPilot's plane after a landing waits for another mode or mission.
+        """
         await self.wait_heartbeat(timeout_s)
         await self.adapter.start_streams(self)
         if self.message("HOME_POSITION") is None:
             self._request_message("HOME_POSITION")
-        await self.wait_until(
-            lambda: not self.adapter.readiness(self),
-            what=lambda: "readiness to fly (missing: " + ", ".join(self.adapter.readiness(self)) + ")",
-            on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
-            timeout_s=timeout_s,
-        )
+        adapter = self.adapter
+
+        def in_mission() -> bool:
+            return leave_mission and not self.armed and self.custom_mode == adapter.modes[Mode.MISSION]
+
+        def ready() -> bool:
+            missing = adapter.readiness(self)
+            return not missing or (missing == [PREARM] and in_mission())
+
+        async def wait() -> None:
+            await self.wait_until(
+                ready,
+                what=lambda: "readiness to fly (missing: " + ", ".join(adapter.readiness(self)) + ")",
+                on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
+                timeout_s=timeout_s,
+            )
+
+        await wait()
+        if in_mission():
+            await self.set_mode(adapter.resting_mode)
+            await self.rewind_mission()
+            await wait()
 
     async def limits(self, altitude_m: float = 0.0) -> Limits:
         """What the vehicle's parameters allow a planner.

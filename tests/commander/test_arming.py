@@ -53,16 +53,18 @@ def test_px4_mission_is_armable_with_a_valid_plan() -> None:
 
 
 @pytest.mark.parametrize("forced", [False, True])
-def test_px4_booting_is_rejected_without_a_text_and_force_does_not_help(forced: bool) -> None:
+def test_px4_booting_is_rejected_with_its_reason_and_force_does_not_help(forced: bool) -> None:
     rig = Rig("px4", start_s=1.0)
     assert rig.commander.arm(forced=forced).result is Result.TEMPORARILY_REJECTED
     rig.tick()
-    assert not rig.happened(ArmingDenied)
+    (denied,) = rig.happened(ArmingDenied)
+    assert Reason.BOOTING in denied.reasons
+    assert "Preflight Fail: System is starting up" in rig.texts()
 
 
 @pytest.mark.parametrize(
     ("flavour", "ready_s", "status_before"),
-    [("px4", 4.14, SystemStatus.UNINIT), ("ardupilot", 41.5, SystemStatus.STANDBY)],
+    [("px4", 3.66, SystemStatus.UNINIT), ("ardupilot", 41.5, SystemStatus.STANDBY)],
 )
 def test_ready_after_the_boot_timeline(flavour: str, ready_s: float, status_before: SystemStatus) -> None:
     rig = Rig(flavour, start_s=ready_s - 0.5)

@@ -120,7 +120,7 @@ def test_px4_reports_the_last_item_reached_whatever_it_is() -> None:
 
 def test_home_is_set_when_the_position_is_good_and_again_at_arming() -> None:
     rig = Rig("px4", start_s=0.0)
-    rig.run(2.0)
+    rig.run(3.0)
     assert rig.commander.home.position is None
     rig.run(0.2)
     assert rig.commander.home.position is not None

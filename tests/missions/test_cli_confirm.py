@@ -72,13 +72,16 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[Confirm]:
     [
         (FINE, "yes", True),
         (FINE, "YES", True),
-        (FINE, "y", False),
+        (FINE, "y", True),
+        (FINE, "Y", True),
+        (FINE, "no", False),
         (FINE, "", False),
         (SICK, "yes", False),
+        (SICK, "y", False),
         (SICK, "fly anyway", True),
     ],
 )
-def test_the_answer_must_be_typed_out(
+def test_what_the_answers_do(
     asked: Confirm, look: Look, answer: str, flies: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def typed(_question: str) -> str:

@@ -2,14 +2,28 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
+import click
 import pytest
 from click.testing import CliRunner
 
+from autopilot_bridge.clock import Clock
 from missions.cli_fly import fly
+from missions.cli_fly_report import Pace, tell
 from missions.errors import PlanError
+from missions.library import MISSIONS
+from missions.mission import Debriefing
+from missions.mission_command import FlightOption
+from missions.options import FlightOptions
 from missions.pattern_command import ratio_of
+from missions.records import FlightRecords
 from missions.request import RunRequest
+from missions.run import wind_words
+from missions.session import Flight, RunResult
+from missions.session import title as run_title
+from missions.vehicle.vehicle import Vehicle
 
 
 @pytest.mark.parametrize(
@@ -45,10 +59,38 @@ def test_options_of_the_embedded_sitl_are_refused_with_a_vehicle_elsewhere(optio
         (["lissajous", "--connect", "udpin:127.0.0.1:0", "--system-id", "0"], "--system-id"),
         (["lissajous", "--vehicles", "2", "--separation", "1"], "layers of 1 m are too thin"),
         (["lissajous", "--max-error", "0"], "--max-error 0 is not possible"),
+        (["own.py", "--pattern", "L2"], "--pattern is for lissajous, not for own.py"),
+        (["sector", "--pattern", "L2"], "--pattern is for lissajous, not for sector"),
+        (["sector", "--ratio", "3:4"], "--ratio is for lissajous, not for sector"),
+        (["sector", "--spacing", "5"], "--spacing is for parallel-sweep, expanding-square, not for sector"),
         (
-            ["own.py", "--pattern", "L2"],
-            "--pattern is for lissajous, sector",
+            ["lissajous", "--heading", "5"],
+            "--heading is for sector, parallel-sweep, expanding-square, not for lissajous",
         ),
+        (["expanding-square", "--phase", "5"], "--phase is for lissajous, not for expanding-square"),
+        (["orbit", "--pattern", "L2"], "--pattern is for lissajous, not for orbit"),
+        (["lissajous", "--arg", "a=1"], "--arg is for a mission of your own, not for lissajous"),
+        (["own.py", "--arg", "a"], "--arg 'a' is not NAME=VALUE"),
+        (["orbit", "--then", "land"], "--then is for a mission file, not for orbit"),
+        (["lissajous", "--ratio", "3:4", "--pattern", "L2"], "--pattern: has no effect beside --ratio"),
+        (["sector", "--size", "80", "--amplitude-x", "20"], "--size: has no effect beside --amplitude-x"),
+        (
+            ["lissajous", "--search-time", "90", "--periods", "2"],
+            "--periods: has no effect beside --search-time",
+        ),
+        (
+            ["lissajous", "--via", "setpoints", "--period", "90", "--speed", "4"],
+            "--speed: has no effect beside --period",
+        ),
+        (
+            ["occupancy", "--connect", "udpin:127.0.0.1:0", "--map", "m.npz", "--amplitude", "20"],
+            "--amplitude: of the embedded SITL only",
+        ),
+        (
+            ["orbit", "--connect", "udpin:127.0.0.1:0", "--target-motion", "circle"],
+            "--target-motion: of the embedded SITL only",
+        ),
+        (["lissajous", "--check", "--yes"], "--yes, --check: for vehicles elsewhere"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(
@@ -59,7 +101,7 @@ def test_options_that_make_no_sense_are_refused(
     result = CliRunner().invoke(fly, arguments)
     assert result.exit_code == 2, result.output
     assert words in " ".join(result.output.split())
-    assert [path.name for path in tmp_path.iterdir()] == ["own.py"]
+    assert {path.name for path in tmp_path.iterdir()} <= {"own.py", "__pycache__"}
 
 
 def test_help_of_a_mission_of_ones_own_has_no_options_of_patterns() -> None:
@@ -68,6 +110,54 @@ def test_help_of_a_mission_of_ones_own_has_no_options_of_patterns() -> None:
         assert option in text
     for option in ("--pattern", "--size", "--ratio", "--periods", "--via", "--acceptance"):
         assert option not in text
+
+
+def test_help_lists_options_under_headings() -> None:
+    text = CliRunner().invoke(fly, ["lissajous", "--help"]).output
+    headings = ["The mission's own:", "Vehicles:", "The embedded SITL:", "The flight:", "Results:"]
+    places = [text.index(heading) for heading in headings]
+    assert places == sorted(places)
+    assert places[0] < text.index("--pattern") < places[1] < text.index("--connect") < places[2]
+    assert places[2] < text.index("--seed") < places[3] < text.index("--on-failure") < places[4]
+
+
+def test_each_option_of_a_flight_is_under_a_heading() -> None:
+    loose = [p.name for p in fly.params if isinstance(p, click.Option) and not isinstance(p, FlightOption)]
+    assert not loose
+
+
+def test_the_pace_on_a_link_is_that_of_the_vehicle_since_it_was_heard() -> None:
+    pace = Pace()
+    told = [pace.factor(wall_s, 0.5 * wall_s) for wall_s in (0.0, 0.3)]  # nothing heard: this machine's time
+    assert told == [None, None]
+    # the vehicle tells that it booted an hour ago: elapsed time begins anew
+    told = [pace.factor(0.5 + wall_s, 0.01 + 2.0 * wall_s) for wall_s in (0.0, 0.2, 0.6, 10.0)]
+    assert told[:2] == [None, None]
+    assert told[2:] == [pytest.approx(2.0), pytest.approx(2.0)]
+    late = [pace.factor(10.5 + wall_s, 20.0 + 5.0 * wall_s) for wall_s in (0.0, 2.0, 4.0, 6.0, 8.0)]
+    assert late[-1] == pytest.approx(5.0)  # of the last seconds, not of the whole flight
+
+
+def test_a_run_on_a_link_counts_from_the_first_heartbeat() -> None:
+    flight = Flight()
+    flight.elsewhere = True
+    assert flight.elapsed_s == 0.0
+    flight.clock = cast(Clock, SimpleNamespace(time_us=3_605_000_000))
+    flight.vehicles = [cast(Vehicle, SimpleNamespace(first_heard_us=3_600_000_000))]
+    assert flight.elapsed_s == 5.0
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "turbulence", "words"),
+    [
+        (0.0, "none", "still air"),
+        (6.0, "none", "wind 6 m/s from 270 degrees"),
+        (6.0, "moderate", "wind 6 m/s from 270 degrees, moderate turbulence"),
+        (0.0, "light", "no steady wind, light turbulence"),
+    ],
+)
+def test_the_wind_in_words(speed_m_s: float, turbulence: str, words: str) -> None:
+    assert wind_words({"speed_m_s": speed_m_s, "from_deg": 270.0, "turbulence": turbulence}) == words
 
 
 @pytest.mark.parametrize(
@@ -136,3 +226,33 @@ def test_an_error_in_a_mission_names_its_line(tmp_path: Path, monkeypatch: pytes
     Path("broken.py").write_text("async def fly(vehicle, options):\n    await vehicle.arm()\n    nope()\n")
     CliRunner().invoke(fly, ["broken.py", "--out", "run", "--no-picture"], standalone_mode=False)
     assert "line 3: NameError" in json.loads(Path("run/summary.json").read_text())["reason"]
+
+
+def flown_summary(**more: object) -> dict[str, object]:
+    return {
+        "mission": "sector",
+        "autopilot": "px4",
+        "outcome": "completed",
+        "distance_m": 466.0,
+        "sim_time_s": 139.0,
+        "speedup": 1.01,
+        "path_rms_error_m": None,
+        "vehicles": [],
+        **more,
+    }
+
+
+def test_the_wind_that_was_flown_is_in_the_last_lines_and_above_the_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wind = {"speed_m_s": 5.0, "from_deg": 270.0, "turbulence": "light"}
+    summary = flown_summary(wind=wind)
+    result = RunResult(outcome="completed", reason="", folder=tmp_path, summary=summary)
+    assert tell(result, MISSIONS["sector"]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].endswith("139.0 s, 1.01 times real time")
+    assert told[1] == "wind 5 m/s from 270 degrees, light turbulence"
+    debriefing = Debriefing(records=cast(FlightRecords, None), flights=[], options=FlightOptions())
+    title = run_title(MISSIONS["sector"], debriefing, summary)
+    assert title.splitlines()[-1] == "wind 5 m/s from 270 degrees, light turbulence"
+    assert "wind" not in run_title(MISSIONS["sector"], debriefing, flown_summary())  # elsewhere: not known

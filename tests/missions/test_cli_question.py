@@ -36,6 +36,32 @@ with EndingSignals() as ending:
     except MissionError as error:
         sys.exit(str(error))
 """
+FLY_WITH_PROGRESS = """
+import asyncio
+from types import SimpleNamespace
+from missions.cli_confirm import confirmation
+from missions.cli_fly_report import ProgressLine
+from missions.preflight.before_flight import Look, confirmed
+
+async def flight():
+    line = ProgressLine()
+    line._last_wall_s = -1e9
+    progress = asyncio.create_task(tell(line))
+    await asyncio.sleep(0.3)
+    confirm = confirmation(["serial:/dev/ttyACM0:57600"], yes=False, check=False, screen=line.held)
+    await confirmed([Look(system_id=1, findings=())], confirm)
+    await asyncio.sleep(0.3)
+    progress.cancel()
+    line.end()
+    print("flown")
+
+async def tell(line):
+    while True:
+        line(SimpleNamespace(clock=object(), vehicles=[], elapsed_s=1.0))
+        await asyncio.sleep(0.02)
+
+asyncio.run(flight())
+"""
 ERASE = """
 from contextlib import asynccontextmanager
 import missions.vehicle_client.client, missions.vehicle_client.logs
@@ -63,8 +89,8 @@ missions.vehicle_client.client.open_client = open_client
 missions.vehicle_client.logs.VehicleLogs = Logs
 cli.main(["vehicle", "logs", "erase", "--connect", "udpin:127.0.0.1:1"])
 """
-FLY_QUESTION = "Fly? Type yes: "
-ERASE_QUESTION = "delete all logs (3) of vehicle 1: type yes: "
+FLY_QUESTION = "Fly? Type yes (or y): "
+ERASE_QUESTION = "delete all logs (3) of vehicle 1? Type yes (or y): "
 
 
 @pytest.mark.parametrize(
@@ -73,7 +99,9 @@ ERASE_QUESTION = "delete all logs (3) of vehicle 1: type yes: "
         ("yes\n", 0, "flown"),
         ("  Yes \r", 0, "flown"),
         ("\n", 1, "not flown: not confirmed"),
-        ("y\n", 1, "not flown: not confirmed"),
+        ("y\n", 0, "flown"),
+        ("no\n", 1, "not flown: not confirmed"),
+        ("yse\n", 1, "not flown: not confirmed"),
         (END_OF_FILE, 1, "not flown: not confirmed"),
     ],
 )
@@ -89,6 +117,21 @@ def test_what_is_typed_is_the_answer_and_the_link_is_kept_up_meanwhile(
         assert "left safe" in terminal.seen
 
 
+def test_the_progress_line_stays_away_from_an_open_question() -> None:
+    with at_terminal("-c", FLY_WITH_PROGRESS) as terminal:
+        terminal.wait_for(FLY_QUESTION)
+        before, _, after = terminal.seen.partition(FLY_QUESTION)
+        assert "waiting" in before and before.endswith("vehicle 1:\r\n")
+        assert before.rpartition("waiting")[2].lstrip().startswith("0 %\r  ")  # wiped off
+        assert not after
+        terminal.type("y")
+        terminal.wait_for("(or y): y")  # several turns of the progress line later
+        assert terminal.seen.endswith("(or y): y")
+        terminal.type("\n")
+        assert terminal.wait_for_end() == 0
+        assert "waiting" in terminal.seen.partition("(or y): y")[2]
+
+
 def test_ctrl_c_at_the_question_before_a_flight_ends_it() -> None:
     with at_terminal("-c", FLY) as terminal:
         terminal.wait_for(FLY_QUESTION)
@@ -100,7 +143,11 @@ def test_ctrl_c_at_the_question_before_a_flight_ends_it() -> None:
 
 @pytest.mark.parametrize(
     ("answer", "code", "told"),
-    [("yes\n", 0, "they are gone"), ("no\n", 1, "not confirmed, nothing was done")],
+    [
+        ("yes\n", 0, "they are gone"),
+        ("Y\n", 0, "they are gone"),
+        ("no\n", 1, "not confirmed, nothing was done"),
+    ],
 )
 def test_a_vehicle_s_logs_are_erased_after_a_yes(answer: str, code: int, told: str) -> None:
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")

@@ -1,5 +1,6 @@
 """What a mission may ask of an aircraft, flown in the embedded SITL of both firmwares."""
 
+import asyncio
 import math
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from autopilot_bridge.clock import LoopClock, run
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect
 from missions.connection import Connection
 from missions.embedded import EmbeddedConfiguration, open_embedded
 from missions.errors import PlanError
@@ -14,7 +16,9 @@ from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits
 from missions.telemetry import AirData, Attitude, Position
 from missions.vehicle import Mode, Vehicle
+from missions.vehicle.arduplane import ArduPlane
 from missions.vehicle.fixed_wing import Approach
+from missions.vehicle.px4_plane import Px4Plane
 from tests.slow import slow_after
 
 HEIGHT = 80.0
@@ -135,3 +139,39 @@ def test_approaches_that_are_none_are_refused(values, words):
     place = GeodeticPosition(lat_deg=47.0, lon_deg=8.0, alt_m=500.0)
     with pytest.raises(PlanError, match=words):
         Approach(place=place, heading_rad=0.0, **values)
+
+
+class CommandRecorder:
+    """A vehicle of which an adapter needs no more than parameters and commands."""
+
+    def __init__(self):
+        self.sent = []
+
+    async def parameter_or(self, name, default):
+        return {"NAV_LOITER_RAD": 70.0}.get(name, default)
+
+    async def command_int(self, command, frame, params, x, y, z):
+        self.sent.append((command, frame, params, x, y, z))
+
+
+@pytest.mark.parametrize(
+    ("adapter", "radius_m", "clockwise", "command", "given"),
+    [
+        # PX4 1.16.1 reads no radius in DO_REPOSITION; in DO_ORBIT its sign is the direction
+        (Px4Plane(), 120.0, True, dialect.MAV_CMD_DO_ORBIT, {0: 120.0}),
+        (Px4Plane(), 120.0, False, dialect.MAV_CMD_DO_ORBIT, {0: -120.0}),
+        (Px4Plane(), None, False, dialect.MAV_CMD_DO_ORBIT, {0: -70.0}),
+        # ArduPlane 4.6.3 ignores a negative radius; the direction is param4
+        (ArduPlane(), 120.0, True, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 120.0, 3: 0.0}),
+        (ArduPlane(), 120.0, False, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 120.0, 3: 1.0}),
+        (ArduPlane(), None, False, dialect.MAV_CMD_DO_REPOSITION, {1: 1.0, 2: 0.0, 3: 1.0}),
+    ],
+)
+def test_a_circle_is_commanded_by_what_the_firmware_obeys(adapter, radius_m, clockwise, command, given):
+    vehicle = CommandRecorder()
+    place = GeodeticPosition(lat_deg=47.0, lon_deg=8.0, alt_m=500.0)
+    asyncio.run(adapter.loiter(vehicle, place, radius_m, clockwise))
+    [(sent, frame, params, x, y, z)] = vehicle.sent
+    assert sent == command
+    assert {k: params[k] for k in given} == given
+    assert (frame, x, y, z) == (dialect.MAV_FRAME_GLOBAL, 470000000, 80000000, 500.0)

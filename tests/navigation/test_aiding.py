@@ -6,13 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.navigation import layout
+from autopilot_bridge.navigation import states as s
 from flightsim import truth as t
+from flightsim.interface import GPS_EPH_M
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
-from flightsim.sensors.gps import RTK_FIX_AFTER_10_S, GpsParameters
+from flightsim.sensors.gps import FIX_AT_BOOT, RTK_FIX_AFTER_10_S, GpsParameters
 from flightsim.sensors.suite import SensorSuiteParameters
 from tests.navigation.bench import PARAMETERS, Bench
 from tests.navigation.kinematic_flight import HOME, Lissajous, fly
@@ -326,12 +329,52 @@ def test_a_constant_gps_offset_is_refused_and_then_accepted(flight: Array) -> No
 
 
 def test_standalone_receiver_wanders_as_much_as_it_says(flight: Array) -> None:
+    """The origin takes over the error of the first fix, and the covariance has it: over seeds, each way."""
     sensors = SensorSuiteParameters(gps=GpsParameters.standalone())
-    bench = Bench(flight, sensors=sensors).run(70.0)
-    health = bench.filter.health
-    assert health.position_horizontal_absolute and health.position_resets == 1
-    assert health.position_horizontal_accuracy_m > 1.5
-    assert bench.nees()[2] < 16.0
+    seeds = 12
+    position, down = [], []
+    for seed in range(1, seeds + 1):
+        bench = Bench(flight, sensors=sensors, seed=seed).run(70.0)
+        health = bench.filter.health
+        assert health.position_horizontal_absolute and health.position_resets == 1
+        assert health.position_horizontal_accuracy_m > 1.5 and health.position_vertical_accuracy_m > 2.0
+        position.append(bench.nees()[2])
+        down.append(bench.error()[8] ** 2 / bench.filter.covariance[s.POS + 2, s.POS + 2])
+    assert max(position) < chi2.ppf(0.9999, 3)
+    for nees, degrees in ((position, 3), (down, 1)):
+        low, high = chi2.ppf([0.025, 0.975], degrees * seeds) / seeds
+        assert low < np.mean(nees) < high
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_reported_accuracy_that_gets_worse_is_believed_at_once(flight: Array, seed: int) -> None:
+    """Corrections end: metres of slow error from one fix to the next. They don't move the position."""
+    degraded = (*FIX_AT_BOOT, replace(FIX_AT_BOOT[0], start_s=30.0, error_scale=10.0))
+    receiver = GpsParameters(
+        horizontal_noise_m=0.02,
+        vertical_noise_m=0.05,
+        horizontal_wander_m=0.2,
+        vertical_wander_m=0.3,
+        fix_timeline=degraded,
+    )
+    parameters = replace(
+        PARAMETERS, gps_required_eph_m=10.0, gps_required_epv_m=10.0, gps_required_speed_accuracy_m_s=5.0
+    )
+    bench = Bench(flight, sensors=SensorSuiteParameters(gps=receiver), parameters=parameters, seed=seed)
+    bench.run(29.5)
+    before = bench.error()[6:9]
+    bench.run(36.0)
+    assert float(bench.suite.readings.gps.values[GPS_EPH_M]) > 2.0
+    assert np.linalg.norm(bench.error()[6:9] - before) < 0.7
+
+
+def test_corrections_that_come_later_move_the_position_at_once(flight: Array) -> None:
+    corrected = (*FIX_AT_BOOT, replace(FIX_AT_BOOT[0], start_s=30.0, fix_type=6, error_scale=0.02))
+    sensors = SensorSuiteParameters(gps=GpsParameters.standalone(fix_timeline=corrected))
+    bench = Bench(flight, sensors=sensors, seed=3).run(29.5)
+    assert position_m(bench) > 3.0
+    bench.run(45.0)
+    assert position_m(bench) < 0.3 and bench.nees()[2] < chi2.ppf(0.9999, 3)
 
 
 # losing the others

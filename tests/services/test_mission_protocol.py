@@ -69,6 +69,16 @@ def test_fence_items(vehicle: Vehicle, items: list[Any], result: int) -> None:
     assert len(vehicle.stores[MissionType.FENCE].items) == (0 if result else len(items))
 
 
+def test_px4_takes_a_circle_of_no_radius(px4: Vehicle) -> None:
+    empty = item(0, 5003, frame=0, params=(0, 0, 0, 0), kind=1)
+    assert upload(px4, [empty], kind=1).type == mavlink.MAV_MISSION_ACCEPTED
+
+
+def test_ardupilot_refuses_a_circle_of_no_radius(ardupilot: Vehicle) -> None:
+    empty = item(0, 5003, frame=0, params=(0, 0, 0, 0), kind=1)
+    assert upload(ardupilot, [empty], kind=1).type == mavlink.MAV_MISSION_INVALID_PARAM1
+
+
 # --- download -----------------------------------------------------------------------------------------------
 
 

@@ -61,7 +61,7 @@ FLY = {
     "lissajous --ratio 1:1e9": ("km long", "--ratio"),
     "lissajous --phase nan": ("--phase 'nan'",),
     "lissajous --phase 1e300": ("--phase 1e+300", "3600"),
-    "lissajous --heading nan": ("--heading nan", "degrees"),
+    "lissajous --heading nan": ("--heading is for sector", "not for lissajous"),
     "sector --heading inf": ("--heading inf", "degrees"),
     "sector --periods 1.5": ("--periods 1.5", "whole passes"),
     "sector --periods 1000": ("km long", "--periods"),
@@ -97,8 +97,7 @@ FLY = {
     "lissajous --speedup nan": ("nan is not a finite number",),
     "lissajous --speedup inf": ("inf",),
     "lissajous --speedup 1e-300": ("1e-300 is not in the range",),
-    "lissajous --arg foo": ("--arg 'foo'", "NAME=VALUE"),
-    "lissajous --arg foo=1": ("--arg foo", "missions of your own"),
+    "lissajous --arg foo=1": ("--arg is for a mission of your own",),
     "lissajous --on-failure foo": ("'foo'", "'return', 'land', 'hold'"),
     "lissajous --bogus": ("--bogus",),
     "lissajous --params /nosuch.params": ("/nosuch.params can't be read", "No such file"),
@@ -216,17 +215,14 @@ def test_busy_port(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.fixture(scope="module")
 def nobody_there(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Run]:
-    """A flight that waits for a vehicle that never comes; started early, since it takes time to give up."""
+    """A flight that waits for a vehicle that never comes."""
     folder = tmp_path_factory.mktemp("nobody") / "run"
     address = f"udpin:127.0.0.1:{free_port()}"
     with started(folder, *SHORT, "--connect", address) as run:
         yield run
 
 
-@pytest.mark.usefixtures("nobody_there")
-@pytest.mark.parametrize(
-    "arguments", ["fly nosuch", "fly lissajous --altitude nan", "sitl --link foo", "swim"]
-)
+@pytest.mark.parametrize("arguments", ["fly lissajous --altitude nan", "sitl --link foo"])
 def test_as_a_process(arguments: str) -> None:
     """The same from a real process: one line, exit code 2, nothing on stdout."""
     command = [sys.executable, "-m", "missions", *arguments.split()]

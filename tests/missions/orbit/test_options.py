@@ -75,12 +75,9 @@ def test_a_target_outside_what_the_gimbal_reaches_is_refused():
         ("--entry-heading inf", "--entry-heading inf is not a direction"),
         ("--target-motion circle", "--target-motion circle needs a --target-speed"),
         ("--target-motion static --target-speed 2", "static leaves no --target-speed"),
-        (
-            "--pattern L2",
-            "--pattern is for lissajous, sector, parallel-sweep, expanding-square, not for orbit",
-        ),
+        ("--pattern L2", "--pattern is for lissajous, not for orbit"),
         ("--model iris", "choose --model aerosonde"),
-        ("--arg a=1", "--arg a"),
+        ("--arg a=1", "--arg is for a mission of your own, not for orbit"),
         ("--vehicles 3 --model aerosonde,aerosonde", "2 models for 3 vehicles"),
     ],
 )

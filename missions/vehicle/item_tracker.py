@@ -1,0 +1,315 @@
+"""How far a vehicle has come in an uploaded mission, from messages that may be lost, repeated or reordered.
+
+Sans-IO: `ItemTracker` takes what MISSION_ITEM_REACHED, MISSION_CURRENT and positions say. Each is evidence by
+itself:
+
+* MISSION_ITEM_REACHED: the item, and all before it, are done. PX4 1.16.1 and ArduPilot 4.6.3 send it for a
+  DO_ item and then not for the waypoint directly before it; PX4 repeats the newest one at 1 Hz, ten times.
+* MISSION_CURRENT: all items before the one that is flown to are done. ArduPilot adds that all are done.
+* Positions: a waypoint is done when the vehicle was within its radius and left it, or has stayed there.
+
+The place in the mission never goes back: what is older than the place is ignored.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect
+from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
+
+LAST_NAV: Final = dialect.MAV_CMD_NAV_LAST
+"""Commands up to this one are flown; those beyond it happen on the way."""
+LANDINGS: Final = frozenset((dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH))
+"""Commands that bring the vehicle to the ground, and with which a mission ends."""
+
+_TAKEOFF: Final = dialect.MAV_CMD_NAV_TAKEOFF
+_DO_JUMP: Final = dialect.MAV_CMD_DO_JUMP
+_MOST_STEPS: Final = 20_000
+_SETTLED_S: Final = 5.0
+_CLIMBED_M: Final = 1.0  # below a takeoff's altitude, where it is about to end
+_CIRCLE_M: Final = 80.0
+_NO_MISSION: Final = 0xFFFF  # MISSION_CURRENT.seq
+_HEARTBEATS_AWAY: Final = 3
+_STARTED: Final = (dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_PAUSED)
+_THROUGH: Final = frozenset((dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_SPLINE_WAYPOINT))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlownOrder:
+    """The items of a mission in the order in which they are executed; jumps are followed.
+
+    Attributes:
+        indices: of the items, without the jumps; ends with the first landing or return.
+        endless: a jump repeats for ever, or more often than 20000 items in all.
+        again_from: place in `indices` from which an endless mission repeats; None: not known.
+    """
+
+    indices: tuple[int, ...]
+    endless: bool = False
+    again_from: int | None = None
+
+    @classmethod
+    def of(cls, items: Sequence[MissionItem]) -> "FlownOrder":
+        """The order of a mission's items; DO_JUMP names its target by its index in `items`."""
+        indices: list[int] = []
+        repeats: dict[int, int] = {}
+        index = 0
+        for _ in range(_MOST_STEPS):
+            if not 0 <= index < len(items):
+                return cls(indices=tuple(indices))
+            item = items[index]
+            if item.command == _DO_JUMP:
+                done = repeats.get(index, 0)
+                if item.param2 < 0:
+                    target = int(item.param1)
+                    again = max((k for k, i in enumerate(indices) if i == target), default=None)
+                    return cls(indices=tuple(indices), endless=True, again_from=again)
+                if done < item.param2:
+                    repeats[index] = done + 1
+                    index = int(item.param1)
+                    continue
+            else:
+                indices.append(index)
+                if item.command in LANDINGS:
+                    return cls(indices=tuple(indices))
+            index += 1
+        return cls(indices=tuple(indices), endless=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MissionStep:
+    """One item at one place of the order.
+
+    Attributes:
+        index: of the item.
+        command: MAV_CMD.
+        place: where positions show that it is done; None: they don't show it.
+        radius_m: of the place; infinite: any position that is not lower than the place.
+        stay_s: within the radius, after which it counts as done; infinite: only messages tell.
+        through: it is done when the vehicle was within the radius and left it.
+    """
+
+    index: int
+    command: int = dialect.MAV_CMD_NAV_WAYPOINT
+    place: GeodeticPosition | None = None
+    radius_m: float = 0.0
+    stay_s: float = math.inf
+    through: bool = False
+
+    @property
+    def flown(self) -> bool:
+        """Whether it is flown, not done on the way."""
+        return self.command <= LAST_NAV
+
+    def contains(self, lat_deg: float, lon_deg: float, alt_m: float) -> bool:
+        """Whether a position is within the radius."""
+        if self.place is None:
+            return False
+        if math.isinf(self.radius_m):
+            return alt_m >= self.place.alt_m
+        return math.hypot(*LocalFrame(self.place).ned_from_geodetic(lat_deg, lon_deg, alt_m)) <= self.radius_m
+
+
+def mission_steps(
+    items: Sequence[MissionItem], order: FlownOrder, home: GeodeticPosition, acceptance_m: float
+) -> tuple[MissionStep, ...]:
+    """The steps of a mission, for an `ItemTracker`.
+
+    Args:
+        items: with their places set (a place of 0, 0 is none).
+        order: of the items.
+        home: heights of relative frames count from it.
+        acceptance_m: radius of a waypoint that names none, or a smaller one.
+    """
+    return tuple(_step(index, items[index], home, acceptance_m) for index in order.indices)
+
+
+def _step(index: int, item: MissionItem, home: GeodeticPosition, acceptance_m: float) -> MissionStep:
+    placed = math.isfinite(item.x + item.y + item.z) and (item.x, item.y) != (0.0, 0.0)
+    through = item.command in _THROUGH
+    if item.command == dialect.MAV_CMD_NAV_LOITER_UNLIM:  # no vehicle reports it as reached
+        radius_m, stay_s = 1.5 * abs(item.param3 or _CIRCLE_M) + 20.0, 0.0
+    elif through:
+        wait_s = item.param1 if item.param1 > 0.0 else 0.0
+        through = wait_s == 0.0
+        own_m = item.param2 if math.isfinite(item.param2) else 0.0
+        radius_m, stay_s = max(acceptance_m, own_m), wait_s + _SETTLED_S
+    elif item.command == _TAKEOFF:
+        radius_m, stay_s = math.inf, _SETTLED_S
+    else:
+        placed = False
+    if not placed or item.frame not in GLOBAL_FRAMES | RELATIVE_FRAMES:
+        return MissionStep(index=index, command=item.command)
+    alt_m = item.z if item.frame in GLOBAL_FRAMES else home.alt_m + item.z
+    if item.command == _TAKEOFF:
+        alt_m -= _CLIMBED_M
+    place = GeodeticPosition(lat_deg=item.x, lon_deg=item.y, alt_m=alt_m)
+    return MissionStep(
+        index=index, command=item.command, place=place, radius_m=radius_m, stay_s=stay_s, through=through
+    )
+
+
+class ItemTracker:
+    """Follows a mission; see the module.
+
+    Args:
+        steps: of the mission, in the order in which they are executed.
+        again_from: step from which an endless mission repeats; None: it does not.
+        first: number of item 0 on the wire.
+
+    Attributes:
+        behind: how many steps are done. It never decreases; an endless mission goes beyond its steps.
+        reached: item and time of each step that was done, in this order.
+    """
+
+    def __init__(
+        self, steps: Sequence[MissionStep], again_from: int | None = None, *, first: int = 0
+    ) -> None:
+        self.first = first
+        self.behind = 0
+        self.reached: list[tuple[int, int]] = []
+        self._steps = tuple(steps)
+        self._again_from = again_from
+        self._near_us: int | None = None
+        self._started = False
+
+    @property
+    def current(self) -> int:
+        """Item that is being flown; the last one when all are done."""
+        return self._step(min(self.behind, self._end - 1)).index if self._steps else 0
+
+    @property
+    def finished(self) -> bool:
+        """Whether all steps are done; never with an endless mission."""
+        return self._again_from is None and self.behind >= len(self._steps)
+
+    @property
+    def over(self) -> bool:
+        """Whether all is done that is flown; what only happens at the end may be left."""
+        rest = self._steps[self.behind :]
+        return self._again_from is None and not any(step.flown for step in rest)
+
+    @property
+    def coming_down(self) -> bool:
+        """Whether a landing or return at the mission's end is being flown, or done."""
+        return self.lands and self.behind >= len(self._steps) - 1
+
+    @property
+    def at_the_last_place(self) -> bool:
+        """Whether the vehicle was within the radius of the last waypoint, and nothing else is left to fly."""
+        if self._again_from is not None or self._near_us is None:
+            return False
+        rest = [step for step in self._steps[self.behind :] if step.flown and step.command not in LANDINGS]
+        return len(rest) == 1 and rest[0].through
+
+    @property
+    def lands(self) -> bool:
+        """Whether the mission ends on the ground."""
+        ends = bool(self._steps) and self._steps[-1].command in LANDINGS
+        return ends and self._again_from is None
+
+    def place_of(self, index: int) -> int:
+        """The first step of an item, or of the one after it where it has none (a jump)."""
+        return next((k for k, step in enumerate(self._steps) if step.index >= index), len(self._steps) - 1)
+
+    def on_message(self, message: Any, time_us: int) -> None:
+        """MISSION_ITEM_REACHED, MISSION_CURRENT or GLOBAL_POSITION_INT came."""
+        kind = message.get_type()
+        if kind == "MISSION_ITEM_REACHED":
+            self.on_reached(message.seq - self.first, time_us)
+        elif kind == "MISSION_CURRENT":
+            self.on_current(message.seq - self.first, time_us, message.mission_state)
+        elif kind == "GLOBAL_POSITION_INT":
+            self.on_position(message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3, time_us)
+
+    def on_reached(self, index: int, time_us: int) -> None:
+        """MISSION_ITEM_REACHED came; the index counts from 0."""
+        if self.behind and self._step(self.behind - 1).index == index:
+            return  # repeated
+        place = self._place_of(index)
+        if place is not None:
+            self._go_to(place + 1, time_us)
+
+    def on_current(self, index: int, time_us: int, state: int = 0) -> None:
+        """MISSION_CURRENT came; the index counts from 0, `state` is its MISSION_STATE (0: not known)."""
+        self._started = self._started or state in _STARTED  # before that, "complete" is of the flight before
+        if state == dialect.MISSION_STATE_COMPLETE and self._started and self._again_from is None:
+            self._go_to(len(self._steps), time_us)
+            return
+        place = self._place_of(index)
+        if place is not None:
+            self._go_to(place, time_us)
+
+    def on_position(self, lat_deg: float, lon_deg: float, alt_m: float, time_us: int) -> None:
+        """A position came."""
+        place = self.behind
+        while place < self._end and not self._step(place).flown:
+            place += 1
+        if place >= self._end:
+            return
+        step = self._step(place)
+        if step.place is None:
+            return
+        if step.contains(lat_deg, lon_deg, alt_m):
+            if self._near_us is None:
+                self._near_us = time_us
+            if time_us - self._near_us >= step.stay_s * 1e6:
+                self._go_to(place + 1, self._near_us)
+        elif self._near_us is not None:
+            near_us, self._near_us = self._near_us, None
+            if step.through:
+                self._go_to(place + 1, near_us)
+
+    @property
+    def _end(self) -> int:
+        """Beyond the steps that are looked at: an endless mission has one more round ahead."""
+        count = len(self._steps)
+        return count if self._again_from is None else max(count, self.behind) + count - self._again_from
+
+    def _step(self, place: int) -> MissionStep:
+        count = len(self._steps)
+        if place < count or self._again_from is None:
+            return self._steps[place]
+        return self._steps[self._again_from + (place - count) % (count - self._again_from)]
+
+    def _place_of(self, index: int) -> int | None:
+        """The step ahead that a message about an item is about; None: there is none, or the message is old.
+
+        Where jumps repeat an item, the message may be about a step that is done; the nearer one counts.
+        """
+        now = self.behind
+        ahead = next((k for k in range(now, self._end) if self._step(k).index == index), None)
+        if ahead is None:
+            last = max((step.index for step in self._steps), default=index)
+            beyond = self._again_from is None and last < index < _NO_MISSION - self.first
+            return len(self._steps) if beyond else None
+        oldest = max(0, now - len(self._steps))
+        done = next((k for k in range(now - 1, oldest - 1, -1) if self._step(k).index == index), None)
+        return None if done is not None and now - done <= ahead - now else ahead
+
+    def _go_to(self, place: int, time_us: int) -> None:
+        if place <= self.behind:
+            return
+        self.reached += [(self._step(k).index, time_us) for k in range(self.behind, place) if k < self._end]
+        self.behind = place
+        self._near_us = None
+
+
+class MissionModeWatch:
+    """Whether a vehicle has left the mission's mode: by three heartbeats in a row.
+
+    What explains another mode (the end of the mission) may come a moment after the first of them.
+    """
+
+    def __init__(self, mission_mode: int) -> None:
+        self._mission_mode = mission_mode
+        self._away = 0
+
+    def left(self, custom_mode: int) -> bool:
+        """A heartbeat came; whether it is the third away from the mission."""
+        self._away = 0 if custom_mode == self._mission_mode else self._away + 1
+        return self._away >= _HEARTBEATS_AWAY

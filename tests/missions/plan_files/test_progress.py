@@ -1,0 +1,90 @@
+"""Mission files on an autopilot that reports items as firmware does, over links that lose messages."""
+
+from pathlib import Path
+
+import pytest
+
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import MissionError
+from missions.plan_files.document import MissionDocument
+from missions.plan_files.flight import fly_document
+from missions.plan_files.options import FileOptions
+from tests.missions.conftest import HOME, PX4_RTL
+
+both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+LOST = {
+    "nothing": (),
+    "reached": ("MISSION_ITEM_REACHED",),
+    "current": ("MISSION_CURRENT",),
+    "both": ("MISSION_ITEM_REACHED", "MISSION_CURRENT"),
+}
+
+
+def document(*, lands: bool = True) -> MissionDocument:
+    lat, lon = HOME.lat_deg, HOME.lon_deg
+    items = [
+        MissionItem(command=22, x=lat, y=lon, z=10.0),
+        MissionItem(command=16, x=lat + 4e-4, y=lon, z=10.0),
+        MissionItem(command=178, frame=2, param1=1.0, param2=4.0, param3=-1.0),
+        MissionItem(command=16, x=lat + 4e-4, y=lon + 4e-4, z=10.0),
+        MissionItem(command=178, frame=2, param1=1.0, param2=6.0, param3=-1.0),
+        MissionItem(command=16, x=lat + 1e-4, y=lon + 4e-4, z=10.0),
+    ]
+    items += [MissionItem(command=20, frame=2)] if lands else []
+    return MissionDocument(path=Path("a.plan"), items=tuple(items))
+
+
+def fly_losing(flown, flavour, names, *, lands=True, then=None):
+    async def script(vehicle, autopilot):
+        send = autopilot.send
+        started_us = []
+
+        def lossy(message):
+            if not (started_us and message.get_type() in names):
+                send(message)
+
+        autopilot.send = lossy
+        start = vehicle.start_mission
+
+        async def start_and_lose():
+            await start()
+            started_us.append(autopilot.time_us)
+
+        vehicle.start_mission = start_and_lose
+        if then is not None:
+            then(autopilot)
+        await fly_document(vehicle, FileOptions(), document(lands=lands))
+        return vehicle.notes
+
+    return flown(script, flavour)
+
+
+@both
+@pytest.mark.parametrize("lost", LOST)
+def test_a_mission_with_do_items_is_followed_to_its_end(flown, flavour, lost) -> None:
+    notes = fly_losing(flown, flavour, LOST[lost])
+    assert [p.name for p in notes.phases][-3:] == ["takeoff", "pattern", "return"]
+    assert [index for index, _ in notes.reached][:6] == [0, 1, 2, 3, 4, 5]
+
+
+@both
+@pytest.mark.parametrize("lost", LOST)
+def test_a_mission_that_ends_in_the_air_is_followed_to_its_end(flown, flavour, lost) -> None:
+    notes = fly_losing(flown, flavour, LOST[lost], lands=False)
+    assert [index for index, _ in notes.reached] == [0, 1, 2, 3, 4, 5]
+
+
+@both
+def test_a_mission_that_is_left_on_the_way_fails(flown, flavour) -> None:
+    def leave(autopilot):
+        fly_on = autopilot._fly_mission
+
+        def until_the_second_place():
+            if autopilot.current > (4 if autopilot.flavour == "ardupilot" else 3):
+                autopilot.mode = PX4_RTL if autopilot.flavour == "px4" else 6
+            return fly_on()
+
+        autopilot._fly_mission = until_the_second_place
+
+    with pytest.raises(MissionError, match=r"left the mission for mode R\w+ at item [56] "):
+        fly_losing(flown, flavour, (), then=leave)
