@@ -276,7 +276,7 @@ def sitl(
         try:
             server.run(
                 lambda: ending.asked,
-                report=report if sys.stderr is not None and sys.stderr.isatty() else None,
+                report=report if sys.stderr.isatty() else None,
                 until_us=None if duration is None else round(duration * 1e6),
             )
         except VehicleDivergedError as error:
