@@ -88,6 +88,23 @@ def reasons_against_arming(texts: tuple[str, ...]) -> list[str]:
     return list(dict.fromkeys(t.strip() for t in texts if t.startswith(_REASONS)))
 
 
+def not_ready_because(texts: tuple[str, ...], sensors_unhealthy: int) -> str:
+    """Why the pre-arm checks are not passed: the autopilot's texts, else the sensors that are not healthy.
+
+    Args:
+        texts: what the autopilot said when it was asked.
+        sensors_unhealthy: bits of SYS_STATUS: enabled, and not healthy.
+
+    Returns:
+        Words; "" where nothing is known.
+    """
+    reasons = reasons_against_arming(texts)
+    if reasons:
+        return " / ".join(reasons)
+    unhealthy = sensors_unhealthy & ~PREARM_BIT
+    return f"not healthy: {_bit_names(unhealthy)}" if unhealthy else ""
+
+
 def arming(snapshot: Snapshot) -> Finding:
     """Whether it could be armed, and what it said if not."""
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health")

@@ -14,6 +14,7 @@ from missions.connection import Connection
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits, Limits
+from missions.preflight.health import not_ready_because
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import HEARTBEAT_AGE_US
 from missions.vehicle.fixed_wing import FixedWingFlight
@@ -21,6 +22,7 @@ from missions.vehicle.guided import GuidedSession, SetpointSource
 
 _GROUND: Final = 1
 _ACCEPTED: Final = 0
+_REASONS_S: Final = 5.0  # at the end of a wait for readiness, in which the autopilot says what is missing
 _FARTHEST_M: Final = 10_000.0  # from home; beyond, latitude and longitude are more likely mistaken
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
@@ -66,12 +68,46 @@ class Vehicle(FixedWingFlight):
         await self.adapter.start_streams(self)
         if self.message("HOME_POSITION") is None:
             self._request_message("HOME_POSITION")
+        reasons_s = min(_REASONS_S, 0.5 * timeout_s)
+        try:
+            await self._wait_readiness(timeout_s - reasons_s)
+        except VehicleTimeout:
+            await self._wait_readiness_or_reasons(timeout_s, reasons_s)
+
+    async def _wait_readiness(self, timeout_s: float) -> None:
         await self.wait_until(
             lambda: not self.adapter.readiness(self),
-            what=lambda: "readiness to fly (missing: " + ", ".join(self.adapter.readiness(self)) + ")",
+            what=lambda: f"readiness to fly ({self._missing})",
             on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
             timeout_s=timeout_s,
         )
+
+    @property
+    def _missing(self) -> str:
+        return "missing: " + ", ".join(self.adapter.readiness(self))
+
+    async def _wait_readiness_or_reasons(self, waited_s: float, reasons_s: float) -> None:
+        """Have the autopilot say what keeps it from arming, for the error, while it is waited for on.
+
+        Raises:
+            VehicleTimeout: it is not ready; says why, as far as the autopilot tells.
+        """
+        known = {id(text) for text in self.status_texts}
+        self.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
+        try:
+            await self._wait_readiness(reasons_s)
+        except VehicleTimeout:
+            status = self.message("SYS_STATUS")
+            because = not_ready_because(
+                tuple(text.text for text in self.status_texts if id(text) not in known),
+                0
+                if status is None
+                else status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health,
+            )
+            told = f"; the autopilot says: {because}" if because else ", and the autopilot does not say why"
+            raise VehicleTimeout(
+                f"no readiness to fly ({self._missing}) within {waited_s:g} s{told}; {self.heard()}"
+            ) from None
 
     async def limits(self, altitude_m: float = 0.0) -> Limits:
         """What the vehicle's parameters allow a planner.
