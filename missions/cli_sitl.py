@@ -192,7 +192,7 @@ def sitl(
     """
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
-    from autopilot_bridge.clock.pacing import wall_time_s
+    from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
     from autopilot_bridge.sitl import (
         PaceReport,
         Sitl,
@@ -235,6 +235,7 @@ def sitl(
                     speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
                 ),
                 seed=seed,
+                unix_epoch_us=unix_time_us(),  # its clients live by the calendar
             )
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)
