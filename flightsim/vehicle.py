@@ -29,6 +29,7 @@ from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.truth_reading import Motion, TruthReader
 from flightsim.vehicle_air import VehicleAir
+from flightsim.wind_profile import WindProfile
 
 __all__ = ["InitialState", "Vehicle", "VehicleDivergedError"]
 
@@ -199,7 +200,11 @@ class Vehicle:
             fdm.run()
             fdm.resume_integration()
         self._air = VehicleAir(
-            fdm, self.environment, physics_rate_hz=self.physics_rate_hz, seed_sequence=self._seed_sequence
+            fdm,
+            self.environment,
+            ground_alt_m=float(self.home.alt_m),
+            physics_rate_hz=self.physics_rate_hz,
+            seed_sequence=self._seed_sequence,
         )
         if self._read(self._steps) != _SOUND:
             raise AirframeError(
@@ -288,15 +293,21 @@ class Vehicle:
         self._fixed_wing_actuators().set_stuck(role, stuck)
 
     def set_wind(
-        self, wind_ned_m_s: tuple[float, float, float], *, wind_at_20_ft_m_s: float | None = None
+        self,
+        wind_ned_m_s: tuple[float, float, float],
+        *,
+        profile: WindProfile | None = None,
+        wind_at_20_ft_m_s: float | None = None,
     ) -> None:
         """The air moves like this around this vehicle from now on.
 
         Args:
-            wind_ned_m_s: of the air over ground.
+            wind_ned_m_s: of the air over ground, at the profile's reference height.
+            profile: horizontal wind over height; None: as it was.
             wind_at_20_ft_m_s: intensity of Dryden turbulence that begins now, 0: none; None: as it was.
         """
-        self._air.set_wind(wind_ned_m_s, wind_at_20_ft_m_s=wind_at_20_ft_m_s)
+        height_m = float(self.truth[t.ALT_M] - self.home.alt_m)
+        self._air.set_wind(wind_ned_m_s, height_m, profile=profile, wind_at_20_ft_m_s=wind_at_20_ft_m_s)
 
     def _fixed_wing_actuators(self) -> FixedWingActuators:
         if self._surfaces is None:

@@ -110,7 +110,19 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
 @click.option("--gcs-link", "gcs_links", multiple=True, help="Link with ground-station streams.")
 @click.option("--home", help="lat,lon,alt[,heading]; default: where the firmware's own SITL stands.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--wind", default="0", show_default=True, help="Speed in m/s, with @DEG where it comes from.")
+@click.option(
+    "--wind",
+    default="0",
+    show_default=True,
+    help="Speed in m/s at 10 m above ground, with @DEG where it comes from.",
+)
+@click.option(
+    "--wind-profile",
+    type=click.Choice(["log", "power", "uniform"]),
+    default="log",
+    show_default=True,
+    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
+)
 @click.option(
     "--turbulence",
     type=click.Choice(["none", "light", "moderate", "severe"]),
@@ -167,6 +179,7 @@ def sitl(
     home: str | None,
     seed: int,
     wind: str,
+    wind_profile: str,
     turbulence: str,
     camera: bool,
     targets: tuple[str, ...],
@@ -205,6 +218,7 @@ def sitl(
     from autopilot_bridge.sitl.configuration import HOMES
     from flightsim.environment import Environment
     from flightsim.vehicle import VehicleDivergedError
+    from flightsim.wind_profile import WindLaw, WindProfile
     from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
 
@@ -232,7 +246,10 @@ def sitl(
                 ),
                 home=place,
                 environment=Environment.from_wind(
-                    speed_m_s=wind_speed_m_s, from_deg=wind_from_deg, turbulence=turbulence
+                    speed_m_s=wind_speed_m_s,
+                    from_deg=wind_from_deg,
+                    profile=WindProfile(law=WindLaw(wind_profile)),
+                    turbulence=turbulence,
                 ),
                 seed=seed,
                 unix_epoch_us=unix_time_us(),  # its clients live by the calendar

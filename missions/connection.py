@@ -36,6 +36,7 @@ ONBOARD_COMPUTER: Final = (1, 191)
 
 _HEARTBEAT_PERIOD_S: Final = 1.0
 _STREAM_LIMIT: Final = 4096
+_AT_ONCE: Final = 64  # messages that are read in a row without giving other tasks a turn
 _TIMESTAMPED: Final = {2: 8, 30: 0, 31: 0, 32: 0, 33: 0}  # message id: offset of time_boot_ms in the payload
 _POLL_S: Final = 0.002  # for links without a file descriptor
 
@@ -292,6 +293,7 @@ class MessageStream:
         self._waiting: asyncio.Future[None] | None = None
         self._system_id, self._component_id = system_id, component_id
         self._stops = [connection.listen(name, self._on_frame) for name in names]
+        self._at_once = 0
         self.dropped = 0
 
     def _on_frame(self, frame: Frame) -> None:
@@ -310,7 +312,12 @@ class MessageStream:
         return self
 
     async def __anext__(self) -> Any:
+        self._at_once += 1
+        if self._queue and self._at_once >= _AT_ONCE:  # a full queue must not keep other tasks from running
+            self._at_once = 0
+            await asyncio.sleep(0)
         while not self._queue:
+            self._at_once = 0
             self._waiting = asyncio.get_running_loop().create_future()
             try:
                 await self._waiting

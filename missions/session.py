@@ -231,7 +231,7 @@ async def _fly(
             await stack.enter_async_context(estimators.on_board(flight.vehicles, stage.links, clock))
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
-            await together([_prepare(vehicle, request, flight) for vehicle in flight.vehicles])
+            await together([_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles])
             flight.require_log()
             await _fly_all(mission, flight.vehicles, request)
         finally:
@@ -243,7 +243,7 @@ async def _fly(
             await asyncio.gather(reporter, return_exceptions=True)
 
 
-async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
+async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
     wanted = request.system_ids[flight.vehicles.index(vehicle)] if request.system_ids else None
     try:
         await vehicle.wait_heartbeat()
@@ -266,7 +266,7 @@ async def _prepare(vehicle: Vehicle, request: RunRequest, flight: Flight) -> Non
     if request.connect:
         await require_key(request, vehicle)
         await vehicle.set_parameters(request.parameters)
-    await vehicle.wait_ready()
+    await vehicle.wait_ready(leave_mission=mission.commands)
 
 
 async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest) -> None:
@@ -390,6 +390,7 @@ def _summary(
         summary["wind"] = {
             "speed_m_s": request.wind_speed_m_s,
             "from_deg": request.wind_from_deg,
+            "profile": request.wind_profile,
             "turbulence": request.turbulence,
         }
     return summary

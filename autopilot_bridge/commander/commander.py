@@ -280,6 +280,7 @@ class Commander:
         if self._ticks % _SUPERVISE_EVERY == 1:
             self._supervise(time_us)
         self._take_over_by_sticks()
+        self._start_mission_by_throttle()
         self.tasks.update()
         self._follower.follow()
 
@@ -396,3 +397,9 @@ class Commander:
         """PX4 COM_RC_OVERRIDE: moved sticks end automatic flight."""
         if self.airborne and self._override.wanted(self.mode, self.context.sticks, self.parameters):
             self.set_mode(FlightMode.POSITION if self.situation.position else FlightMode.ALTITUDE)
+
+    def _start_mission_by_throttle(self) -> None:
+        """ArduCopter: armed on the ground in AUTO, the mission starts when the throttle stick is raised."""
+        raised = self.policy.mission_waits_for_start and self.situation.throttle_high
+        if raised and self.armed and self.landed and self.mode is FlightMode.MISSION:
+            self.guidance.start_mission()

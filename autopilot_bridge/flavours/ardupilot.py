@@ -154,5 +154,6 @@ ARDUPILOT: Final = Flavour(
     heartbeat_on_mode_change=True,
     sends_events=False,
     bytewise_parameters=False,
+    reboot_starts_again=True,
     gps_source=ardupilot_gps_source,
 )

@@ -13,6 +13,7 @@ from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
 from flightsim.vehicle import VehicleDivergedError
+from flightsim.wind_profile import WindLaw, WindProfile
 from missions.embedded.scenario import equipped
 from missions.errors import MissionError
 from missions.kind import VehicleKind
@@ -33,7 +34,8 @@ class EmbeddedConfiguration:
         seed: one seed makes one flight.
         physics_rate_hz: steps per second of vehicle time.
         speedup: simulated seconds per wall second at most; None: as fast as the machine can.
-        wind_speed_m_s, wind_from_deg: steady wind.
+        wind_speed_m_s, wind_from_deg: mean wind, at 10 m above ground.
+        wind_profile: law of the wind over height, a `flightsim.wind_profile.WindLaw`.
         turbulence: "none", "light", "moderate" or "severe".
         parameters: autopilot parameters that differ from the flavour's defaults.
         home: "lat,lon,alt[,heading]"; None: where the flavour's own SITL stands.
@@ -50,6 +52,7 @@ class EmbeddedConfiguration:
     speedup: float | None = None
     wind_speed_m_s: float = 0.0
     wind_from_deg: float = 0.0
+    wind_profile: str = "log"
     turbulence: str = "none"
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: str | None = None
@@ -87,6 +90,7 @@ class EmbeddedSitl:
         environment = Environment.from_wind(
             speed_m_s=configuration.wind_speed_m_s,
             from_deg=configuration.wind_from_deg,
+            profile=WindProfile(law=WindLaw(configuration.wind_profile)),
             turbulence=configuration.turbulence,
         )
         world = SitlConfiguration(

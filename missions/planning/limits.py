@@ -13,6 +13,9 @@ FORECAST_WIND_M_S: Final = 5.0
 """Wind that turns are planned for when nobody has given a forecast: a fresh day."""
 
 
+_MAY_BE_ZERO: Final = frozenset({"wind_m_s", "guidance_s", "waypoint_lead_s"})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Limits:
     """What every vehicle is bound by.
@@ -32,7 +35,7 @@ class _Limits:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, float) or (value == 0.0 and field.name == "wind_m_s"):
+            if not isinstance(value, float) or (value == 0.0 and field.name in _MAY_BE_ZERO):
                 continue
             if field.name == "air_altitude_m" and math.isfinite(value):
                 continue
@@ -117,6 +120,12 @@ class FixedWingLimits(_Limits):
         bank_parameter: what that is called there, for messages.
         wind_m_s: steady wind to plan turns for: a forecast.
         air_altitude_m: above mean sea level, where it flies: in thin air it flies faster and turns wider.
+        guidance_s: time in which its path guidance converges on a line: period times damping over pi. The
+            reference length of L1 guidance (S. Park et al., AIAA 2004-4900) is what it flies in this time.
+            0: not known, and no limit.
+        guidance_parameter: what sets it, for messages.
+        waypoint_lead_s: how long before a bend the next leg has to begin where a waypoint's own radius
+            decides that. 0: the autopilot decides it by itself.
     """
 
     altitude_min_m: float = 20.0
@@ -129,6 +138,9 @@ class FixedWingLimits(_Limits):
     bank_parameter: str = "bank limit"
     wind_m_s: float = 0.0
     air_altitude_m: float = 0.0
+    guidance_s: float = 0.0
+    guidance_parameter: str = "guidance period"
+    waypoint_lead_s: float = 0.0
 
     @property
     def kind(self) -> VehicleKind:
@@ -164,6 +176,17 @@ class FixedWingLimits(_Limits):
         """
         fastest = self.true_airspeed_m_s(airspeed_m_s) + self.wind_m_s + drift_m_s
         return TURN_MARGIN * fastest**2 / (GRAVITY_M_S2 * math.tan(self.bank_max_rad))
+
+    def guided_radius_m(self, airspeed_m_s: float) -> float:
+        """Tightest bend over ground that the autopilot's own path guidance still follows closely.
+
+        A bend much tighter than the guidance's reference length is over before the guidance has reacted.
+        """
+        return (self.true_airspeed_m_s(airspeed_m_s) + self.wind_m_s) * self.guidance_s
+
+    def path_radius_m(self, airspeed_m_s: float) -> float:
+        """Tightest bend of a path for this aircraft: what it can bank for and its guidance follows."""
+        return max(self.turn_radius_m(airspeed_m_s), self.guided_radius_m(airspeed_m_s))
 
 
 Limits = MulticopterLimits | FixedWingLimits

@@ -24,7 +24,7 @@ def curve_side_m(curve: Curve, side_m: float, airspeed_m_s: float, limits: Fixed
     """Side of a curved pattern, given one of some side: as usual, or as large as its bends need."""
     if isinstance(curve, Polyline):
         return WINGS_SIDE_M
-    needed_m = side_m * limits.turn_radius_m(airspeed_m_s) / smallest_radius_m(curve)
+    needed_m = side_m * limits.path_radius_m(airspeed_m_s) / smallest_radius_m(curve)
     return _hundreds(max(WINGS_SIDE_M, _ROOM * needed_m))
 
 

@@ -30,7 +30,7 @@ def roll_in_m(airspeed_m_s: float, limits: FixedWingLimits) -> float:
 
 def leg_needed_m(turn_rad: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
     """Length of a leg with such a corner at both its ends."""
-    radius_m = limits.turn_radius_m(airspeed_m_s)
+    radius_m = limits.path_radius_m(airspeed_m_s)
     return 2.0 * corner_reach_m(turn_rad, radius_m, roll_in_m(airspeed_m_s, limits))
 
 
@@ -39,6 +39,7 @@ def check_turns(
     airspeed_m_s: float,
     limits: FixedWingLimits,
     *,
+    radius_m: float | None = None,
     size_m: tuple[float, float] | None = None,
     spacing_m: float | None = None,
 ) -> float:
@@ -50,17 +51,19 @@ def check_turns(
         curve: to be flown.
         airspeed_m_s: equivalent.
         limits: of the aircraft.
+        radius_m: tightest turn; None: what the limits say of a path that the autopilot's guidance follows.
         size_m, spacing_m: width and height, and track spacing, that the curve was made for: a refusal then
             tells those that would do.
 
     Raises:
         PlanError: says how tight it is, and what to change.
     """
-    radius_m = limits.turn_radius_m(airspeed_m_s)
-    needs = (
-        f"{radius_m:.0f} m at {airspeed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind with "
-        f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter})"
-    )
+    if radius_m is None:
+        radius_m = limits.path_radius_m(airspeed_m_s)
+    reason = f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter})"
+    if radius_m > limits.turn_radius_m(airspeed_m_s):
+        reason = f"its path guidance ({limits.guidance_parameter})"
+    needs = f"{radius_m:.0f} m at {airspeed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind with {reason}"
     if isinstance(curve, Polyline):
         short = _shortest_leg(curve, radius_m, roll_in_m(airspeed_m_s, limits))
         if short[0] > 1.0:

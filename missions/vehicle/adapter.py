@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect
@@ -13,6 +13,10 @@ from missions.kind import VehicleKind
 if TYPE_CHECKING:
     from missions.planning.limits import Limits
     from missions.vehicle.vehicle import Vehicle
+
+
+PREARM: Final = "pre-arm checks"
+"""What `Adapter.readiness` calls the autopilot's own checks."""
 
 
 class Mode(StrEnum):
@@ -47,6 +51,7 @@ class Adapter(Protocol):
         setpoints_before_guided: setpoints must flow before the guided mode can be entered.
         first_mission_item_is_home: item 0 of a mission is home, whatever is uploaded there.
         goto_mode: the mode DO_REPOSITION puts the vehicle into.
+        resting_mode: a mode in which the vehicle may stand on the ground and be armed.
         unset: what stands in a command or item parameter that is not set.
         roll_alone: in the guided mode a roll command may leave pitch and throttle to the autopilot.
         limiting_parameters: the parameters `limits` reads.
@@ -60,6 +65,7 @@ class Adapter(Protocol):
     setpoints_before_guided: bool
     first_mission_item_is_home: bool
     goto_mode: Mode
+    resting_mode: Mode
     unset: float
     roll_alone: bool
     limiting_parameters: Mapping[str, float]
@@ -132,7 +138,7 @@ def missing_basics(vehicle: "Vehicle") -> list[str]:
     missing = []
     status = vehicle.message("SYS_STATUS")
     if status is None or not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK:
-        missing.append("pre-arm checks")
+        missing.append(PREARM)
     if vehicle.message("HOME_POSITION") is None:
         missing.append("home position")
     if vehicle.message("GLOBAL_POSITION_INT") is None:

@@ -81,6 +81,7 @@ class ArduCopter:
     setpoints_before_guided = False
     first_mission_item_is_home = True
     goto_mode = Mode.GUIDED
+    resting_mode = Mode.GUIDED
     unset = 0.0  # NaN is refused
     roll_alone = False
     limiting_parameters: Mapping[str, float] = MappingProxyType({"WPNAV_SPEED": 1000.0, "WPNAV_ACCEL": 250.0})

@@ -37,6 +37,9 @@ _NAMES: Final[Mapping[int, str]] = MappingProxyType(
         24: "Thermal",
     }
 )
+_TURN_EFFECT: Final = 0.85
+"""Of the acceleration of a coordinated turn, what a bank is planned to give. Between 1, without sideslip, and
+the 0.7 of ArduPilot 4.6.3's built-in plane model, which slips in its turns."""
 _TAKEOFF_PITCH_DEG: Final = 12.0  # lowest pitch of a mission's takeoff
 
 
@@ -67,7 +70,15 @@ class ArduPlane(ArduCopter):
     )
     roll_alone = True
     limiting_parameters: Mapping[str, float] = MappingProxyType(
-        {"AIRSPEED_MIN": 10.0, "AIRSPEED_CRUISE": 22.0, "AIRSPEED_MAX": 30.0, "ROLL_LIMIT_DEG": 65.0}
+        {
+            "AIRSPEED_MIN": 10.0,
+            "AIRSPEED_CRUISE": 22.0,
+            "AIRSPEED_MAX": 30.0,
+            "ROLL_LIMIT_DEG": 65.0,
+            "NAVL1_PERIOD": 17.0,
+            "NAVL1_DAMPING": 0.75,
+            "RLL2SRV_TCONST": 0.5,
+        }
     )
 
     def mode_name(self, custom_mode: int) -> str:
@@ -84,12 +95,19 @@ class ArduPlane(ArduCopter):
 
     def limits(self, parameters: Mapping[str, float]) -> Limits:
         values = {**self.limiting_parameters, **parameters}
+        period_s, damping = max(1.0, values["NAVL1_PERIOD"]), max(0.1, values["NAVL1_DAMPING"])
+        # L1 demands 4 damping^2 V^2 / L1 sin(angle to the leg), with L1 = damping period V / pi. In a bend
+        # the leg has to be so far ahead of the course that this is the acceleration of the bend
+        lead_s = period_s / (4.0 * math.pi * damping) / _TURN_EFFECT
         return FixedWingLimits(
             airspeed_min_m_s=values["AIRSPEED_MIN"],
             airspeed_trim_m_s=values["AIRSPEED_CRUISE"],
             airspeed_max_m_s=values["AIRSPEED_MAX"],
             bank_max_rad=math.radians(values["ROLL_LIMIT_DEG"]),
             bank_parameter="ROLL_LIMIT_DEG",
+            guidance_s=damping * period_s / math.pi,
+            guidance_parameter="NAVL1_PERIOD",
+            waypoint_lead_s=lead_s + max(0.0, values["RLL2SRV_TCONST"]),
         )
 
     async def own_acceptance_m(self, vehicle: "Vehicle") -> float:

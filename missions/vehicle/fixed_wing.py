@@ -269,6 +269,7 @@ class FixedWingFlight(VehicleStore):
             items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, frame=0, x=approach.place.lat_deg,
                                  y=approach.place.lon_deg, z=approach.place.alt_m), *items]  # fmt: skip
         await mission_transfer.upload(self._whole, items)
+        await self.rewind_mission()
         await self.set_mode(Mode.MISSION)
         if wait:
             await self.wait_disarmed(timeout_s)

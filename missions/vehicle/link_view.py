@@ -362,6 +362,7 @@ class VehicleView:
         """
         value = predicate()
         if value:
+            await asyncio.sleep(0)  # who asks over and over lets the clock go on all the same
             return value
         changed = asyncio.Event()
         stops = [self.connection.listen(name, lambda _frame: changed.set()) for name in on]

@@ -69,6 +69,7 @@ class Px4:
     setpoints_before_guided = True
     first_mission_item_is_home = False
     goto_mode = Mode.HOLD
+    resting_mode = Mode.HOLD
     unset = math.nan
     roll_alone = False
     limiting_parameters: Mapping[str, float] = MappingProxyType({"MPC_XY_VEL_MAX": 12.0, "MPC_ACC_HOR": 3.0})

@@ -22,7 +22,14 @@ class Px4Plane(Px4):
     kind = VehicleKind.FIXED_WING
     stream_rates_hz: Mapping[str, float] = MappingProxyType({**Px4.stream_rates_hz, "VFR_HUD": 10.0})
     limiting_parameters: Mapping[str, float] = MappingProxyType(
-        {"FW_AIRSPD_MIN": 10.0, "FW_AIRSPD_TRIM": 15.0, "FW_AIRSPD_MAX": 20.0, "FW_R_LIM": 50.0}
+        {
+            "FW_AIRSPD_MIN": 10.0,
+            "FW_AIRSPD_TRIM": 15.0,
+            "FW_AIRSPD_MAX": 20.0,
+            "FW_R_LIM": 50.0,
+            "NPFG_PERIOD": 10.0,
+            "NPFG_DAMPING": 0.7,
+        }
     )
 
     def limits(self, parameters: Mapping[str, float]) -> Limits:
@@ -33,6 +40,8 @@ class Px4Plane(Px4):
             airspeed_max_m_s=values["FW_AIRSPD_MAX"],
             bank_max_rad=math.radians(values["FW_R_LIM"]),
             bank_parameter="FW_R_LIM",
+            guidance_s=max(0.1, values["NPFG_DAMPING"]) * max(1.0, values["NPFG_PERIOD"]) / math.pi,
+            guidance_parameter="NPFG_PERIOD",  # waypoint_lead_s is 0: it switches legs by its own distance
         )
 
     async def loiter(

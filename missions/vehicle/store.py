@@ -5,6 +5,7 @@ from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
+from missions.connection import AUTOPILOT_COMPONENT
 from missions.errors import MissionError, VehicleTimeout
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
@@ -17,6 +18,8 @@ from missions.vehicle.item_tracker import (
     mission_steps,
 )
 
+_REWINDS: Final = 4
+_REWIND_S: Final = 1.5
 _ACCEPTANCE_M: Final = 2.0
 """Radius in which a position shows that a waypoint was passed, where the waypoint names none."""
 
@@ -31,7 +34,7 @@ class VehicleStore(VehicleCommands):
     async def upload_mission(self, items: Sequence[MissionItem]) -> int:
         """Upload a plan; gives the wire number of its first item (1 for ArduPilot, whose item 0 is home).
 
-        Jumps name items by their index in `items`.
+        It is flown from its first item on. Jumps name items by their index in `items`.
         """
         first = 1 if self.adapter.first_mission_item_is_home else 0
         home = self.home
@@ -40,10 +43,29 @@ class VehicleStore(VehicleCommands):
         )
         own = mission_transfer.renumbered(items, first)
         await mission_transfer.upload(self, [marker, *own] if first else own, before=first)
+        await self.rewind_mission()
         order = FlownOrder.of(items)
         steps = mission_steps(items, order, home, _ACCEPTANCE_M)
         self._tracker = ItemTracker(steps, order.again_from, first=first)
         return first
+
+    async def rewind_mission(self) -> None:
+        """Have the stored mission begin at its first item: the vehicle may be at the end of its last flight.
+
+        A vehicle that does not confirm it (MISSION_CURRENT) is warned of in the notes.
+        """
+        first = 1 if self.adapter.first_mission_item_is_home else 0
+        with self.messages("MISSION_CURRENT") as stream:
+            for _ in range(_REWINDS):
+                self.send(dialect.MAVLink_mission_set_current_message(self.system_id, AUTOPILOT_COMPONENT, 0))
+                try:
+                    async with self.deadline(_REWIND_S, "the mission's first item"):
+                        while (await anext(stream)).seq > first:
+                            pass
+                        return
+                except TimeoutError:
+                    continue
+        self.notes.warn("the vehicle did not confirm (MISSION_CURRENT) that its mission begins anew")
 
     async def upload_plan(self, mission_type: MissionType, items: Sequence[MissionItem]) -> None:
         """Upload a geofence or rally points in place of those the vehicle has."""

@@ -15,7 +15,7 @@ from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.preflight.health import not_ready_because
-from missions.vehicle.adapter import Mode
+from missions.vehicle.adapter import PREARM, Mode
 from missions.vehicle.commands import HEARTBEAT_AGE_US
 from missions.vehicle.fixed_wing import FixedWingFlight
 from missions.vehicle.guided import GuidedSession, SetpointSource
@@ -62,52 +62,77 @@ class Vehicle(FixedWingFlight):
             timeout_s=timeout_s,
         )
 
-    async def wait_ready(self, timeout_s: float = 90.0) -> None:
-        """Wait until the vehicle could be armed: pre-arm checks, home, navigation."""
+    async def wait_ready(self, timeout_s: float = 90.0, *, leave_mission: bool = True) -> None:
+        """Wait until the vehicle could be armed: pre-arm checks, home, navigation.
+
+        Args:
+            timeout_s: for each of its waits.
+            leave_mission: a vehicle that stands disarmed in the mode of a mission leaves it. In that mode the
+                checks may not pass: ArduPilot's plane after a landing waits for another mode or mission.
+        """
         await self.wait_heartbeat(timeout_s)
         await self.adapter.start_streams(self)
         if self.message("HOME_POSITION") is None:
             self._request_message("HOME_POSITION")
-        reasons_s = min(_REASONS_S, 0.5 * timeout_s)
-        try:
-            await self._wait_readiness(timeout_s - reasons_s)
-        except VehicleTimeout:
-            await self._wait_readiness_or_reasons(timeout_s, reasons_s)
+        adapter = self.adapter
 
-    async def _wait_readiness(self, timeout_s: float) -> None:
-        await self.wait_until(
-            lambda: not self.adapter.readiness(self),
-            what=lambda: f"readiness to fly ({self._missing})",
-            on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
-            timeout_s=timeout_s,
-        )
+        def in_mission() -> bool:
+            return leave_mission and not self.armed and self.custom_mode == adapter.modes[Mode.MISSION]
 
-    @property
-    def _missing(self) -> str:
-        return "missing: " + ", ".join(self.adapter.readiness(self))
+        def ready() -> bool:
+            missing = adapter.readiness(self)
+            return not missing or (missing == [PREARM] and in_mission())
 
-    async def _wait_readiness_or_reasons(self, waited_s: float, reasons_s: float) -> None:
-        """Have the autopilot say what keeps it from arming, for the error, while it is waited for on.
+        await self._wait_readiness(ready, timeout_s)
+        if in_mission():
+            await self.set_mode(adapter.resting_mode)
+            await self.rewind_mission()
+            await self._wait_readiness(ready, timeout_s)
+
+    async def _wait_readiness(self, ready: Callable[[], bool], timeout_s: float) -> None:
+        """Wait; for the last seconds have the autopilot run its checks, so that it says what it lacks.
 
         Raises:
             VehicleTimeout: it is not ready; says why, as far as the autopilot tells.
         """
-        known = {id(text) for text in self.status_texts}
-        self.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
-        try:
-            await self._wait_readiness(reasons_s)
-        except VehicleTimeout:
-            status = self.message("SYS_STATUS")
-            because = not_ready_because(
-                tuple(text.text for text in self.status_texts if id(text) not in known),
-                0
-                if status is None
-                else status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health,
+
+        async def wait(seconds: float) -> None:
+            await self.wait_until(
+                ready,
+                what=lambda: f"readiness to fly (missing: {', '.join(self.adapter.readiness(self))})",
+                on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
+                timeout_s=seconds,
             )
-            told = f"; the autopilot says: {because}" if because else ", and the autopilot does not say why"
+
+        reasons_s = min(_REASONS_S, 0.5 * timeout_s)
+        try:
+            await wait(timeout_s - reasons_s)
+            return
+        except VehicleTimeout:
+            known = {id(text) for text in self.status_texts}
+            self.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
+        try:
+            await wait(reasons_s)
+        except VehicleTimeout:
+            missing = self.adapter.readiness(self)
+            why = ""
+            if PREARM in missing:
+                texts = tuple(text.text for text in self.status_texts if id(text) not in known)
+                because = not_ready_because(texts, self._sensors_unhealthy)
+                why = (
+                    f"; the autopilot says: {because}" if because else ", and the autopilot does not say why"
+                )
             raise VehicleTimeout(
-                f"no readiness to fly ({self._missing}) within {waited_s:g} s{told}; {self.heard()}"
+                f"no readiness to fly (missing: {', '.join(missing)}) within {timeout_s:g} s{why}; "
+                f"{self.heard()}"
             ) from None
+
+    @property
+    def _sensors_unhealthy(self) -> int:
+        status = self.message("SYS_STATUS")
+        if status is None:
+            return 0
+        return int(status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health)
 
     async def limits(self, altitude_m: float = 0.0) -> Limits:
         """What the vehicle's parameters allow a planner.

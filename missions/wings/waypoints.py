@@ -10,6 +10,8 @@ from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import VehicleTimeout
 from missions.notes import PATTERN
 from missions.options import FlightOptions
+from missions.planning.flyable import FlyablePath
+from missions.planning.limits import FixedWingLimits
 from missions.vehicle.vehicle import Vehicle
 from missions.wings.entry import Entry
 from missions.wings.flight import PatternFlight
@@ -18,6 +20,7 @@ from missions.wings.place import PlaceOnPath
 _DEVIATION_M: Final = 1.0
 _SPACING_MIN_S: Final = 1.6
 _SPACING_MAX_M: Final = 300.0
+_TURN_IN_MAX_M: Final = 250.0  # ArduPlane takes no more than 255 from a waypoint's radius
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,17 +42,14 @@ class PatternItems:
 def mission_items(vehicle: Vehicle, flight: PatternFlight) -> PatternItems:
     """From the takeoff to the landing."""
     options = flight.options
-    waypoints = flight.path.waypoints(
-        deviation_m=_DEVIATION_M,
-        spacing_min_m=_SPACING_MIN_S * options.speed_m_s,
-        spacing_max_m=_SPACING_MAX_M,
-    )
+    waypoints = waypoints_of(flight.path, options)
+    radius_m = turn_in_m(options, flight.limits)
     items = _way_in(vehicle, flight)
     first = len(items)
-    items += [_waypoint(vehicle, options, north, east) for north, east in waypoints]
+    items += [_waypoint(vehicle, options, radius_m, north, east) for north, east in waypoints]
     last = len(items) - 1
     out, _, _ = flight.route.at(flight.route.length_m)
-    items.append(_waypoint(vehicle, options, *out))
+    items.append(_waypoint(vehicle, options, radius_m, *out))
     items += flight.approach(vehicle).items()
     return PatternItems(items=items, waypoints=list(waypoints), first=first, last=last)
 
@@ -93,6 +93,32 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     notes.end(clock.stamp_us)
 
 
+def waypoints_of(path: FlyablePath, options: FlightOptions) -> list[tuple[float, float]]:
+    """Waypoints (north, east) of a path: close together where it bends."""
+    return path.waypoints(
+        deviation_m=_DEVIATION_M,
+        spacing_min_m=_SPACING_MIN_S * options.speed_m_s,
+        spacing_max_m=_SPACING_MAX_M,
+    )
+
+
+def turn_in_m(options: FlightOptions, limits: FixedWingLimits) -> float:
+    """Distance before a waypoint at which the aircraft turns to the next leg.
+
+    Between short legs the course to follow is that of the middle of a leg: half a leg is added to the way
+    flown in the time that the guidance needs.
+
+    Args:
+        options: an acceptance radius that the user chose is kept.
+        limits: of the aircraft.
+    """
+    if options.chosen("acceptance_m") or limits.waypoint_lead_s == 0.0:
+        return options.acceptance_m
+    leg_m = _SPACING_MIN_S * options.speed_m_s
+    lead_m = limits.true_airspeed_m_s(options.speed_m_s) * limits.waypoint_lead_s
+    return min(_TURN_IN_MAX_M, max(options.acceptance_m, lead_m + 0.5 * leg_m))
+
+
 def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
     """Takeoff, airspeed, and a circle that is left along the first leg, at the pattern's height."""
     options = flight.options
@@ -119,11 +145,13 @@ def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
     ]
 
 
-def _waypoint(vehicle: Vehicle, options: FlightOptions, north_m: float, east_m: float) -> MissionItem:
+def _waypoint(
+    vehicle: Vehicle, options: FlightOptions, radius_m: float, north_m: float, east_m: float
+) -> MissionItem:
     lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(north_m, east_m, 0.0)
     return MissionItem(
         command=dialect.MAV_CMD_NAV_WAYPOINT,
-        param2=options.acceptance_m,
+        param2=radius_m,
         param4=vehicle.adapter.unset,
         x=lat,
         y=lon,

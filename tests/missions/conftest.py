@@ -72,11 +72,16 @@ class FakeAutopilot:
         }
         self.mute_commands = set()  # MAV_CMDs that are not answered
         self.refuse_modes = set()  # kinds of mode that are refused
+        self.unready_in_mission = False  # the pre-arm checks fail in the mode of a mission
         self.arm_refusals = 0
         self.mission_result = 0
         self.commands = []
         self.heartbeats_heard = 0
         self.on_truth = None
+
+    @property
+    def kinds(self):
+        return KIND[self.flavour]
 
     @property
     def kind(self):
@@ -239,6 +244,10 @@ class FakeAutopilot:
         else:
             self.send(dialect.MAVLink_mission_ack_message(255, 190, 0, 0))
 
+    def on_mission_set_current(self, m):
+        self.current = m.seq
+        self._send_stream("MISSION_CURRENT")
+
     def on_mission_clear_all(self, m):
         self.items = []
         self.send(dialect.MAVLink_mission_ack_message(255, 190, 0, 0))
@@ -267,7 +276,8 @@ class FakeAutopilot:
                 d.MAVLink_heartbeat_message(2, 12 if px4 else 3, base, self.mode, 4 if self.armed else 3, 3)
             )
         elif name == "SYS_STATUS":
-            ready = 0x10000000 if self.time_us >= self.ready_after_us else 0
+            unready = self.unready_in_mission and self.kind == "mission"
+            ready = 0x10000000 if self.time_us >= self.ready_after_us and not unready else 0
             self.send(d.MAVLink_sys_status_message(ready, ready, ready, 0, 16200, -1, 100, 0, 0, 0, 0, 0, 0))
         elif name == "GLOBAL_POSITION_INT":
             lat, lon, alt = LocalFrame(self.home).geodetic_from_ned(n, e, down)

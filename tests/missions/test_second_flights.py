@@ -1,0 +1,126 @@
+"""Several flights in one session: the vehicle stands where and as the flight before has left it."""
+
+import asyncio
+
+import pytest
+
+from autopilot_bridge.clock import LoopClock, run
+from autopilot_bridge.mission_plan import MissionItem
+from missions.connection import Connection
+from missions.embedded import EmbeddedConfiguration, open_embedded
+from missions.library import find_mission
+from missions.limits_before_flight import adapted
+from missions.options import FlightOptions, Via
+from missions.vehicle import Vehicle
+from missions.vehicle.adapter import Mode
+
+both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+
+
+def fly_in_a_row(flavour: str, model: str, flights: list[FlightOptions]) -> list[Vehicle]:
+    """Each flight by a client of its own, in one SITL."""
+    sitl = open_embedded(EmbeddedConfiguration(flavour=flavour, model=model))
+    mission = find_mission("sector")
+
+    async def one(link, options: FlightOptions) -> Vehicle:
+        async with Connection(link, LoopClock()) as connection:
+            vehicle = Vehicle(connection)
+            await vehicle.wait_ready()
+            own, _ = adapted(mission, options, await vehicle.limits(), vehicle.home.alt_m)
+            await mission.fly(vehicle, own)
+            return vehicle
+
+    async def main() -> list[Vehicle]:
+        links = [sitl.links[0], *(sitl.sitl.connect(0) for _ in flights[1:])]
+        return [await one(link, options) for link, options in zip(links, flights, strict=True)]
+
+    try:
+        return run(main(), sitl.loop)
+    finally:
+        sitl.close()
+
+
+def pattern_s(vehicle: Vehicle) -> float:
+    phase = vehicle.notes.phase("pattern")
+    return 0.0 if phase is None else (phase.end_us - phase.start_us) * 1e-6
+
+
+@both
+def test_a_multicopter_flies_its_second_mission(flavour: str) -> None:
+    options = FlightOptions(pattern="sector", width_m=30.0, height_m=30.0, via=Via.WAYPOINTS)
+    first, second = fly_in_a_row(flavour, "iris", [options, options])
+    assert pattern_s(first) > 20.0
+    assert pattern_s(second) == pytest.approx(pattern_s(first), abs=3.0)
+    assert second.notes.warnings == []
+
+
+@pytest.mark.slow
+@both
+@pytest.mark.parametrize("via", Via)
+def test_an_aircraft_flies_its_second_mission(flavour: str, via: Via) -> None:
+    options = FlightOptions(pattern="sector", via=via)
+    first, second = fly_in_a_row(flavour, "aerosonde", [options, options])
+    assert pattern_s(first) > 60.0
+    assert pattern_s(second) == pytest.approx(pattern_s(first), abs=5.0)
+
+
+@both
+def test_a_vehicle_in_the_mode_of_its_last_mission_leaves_it_before_it_is_ready(flown, flavour) -> None:
+    """ArduPlane 4.6.3 after a landing: "PreArm: In landing sequence" until mode and mission change."""
+
+    async def script(vehicle, autopilot):
+        autopilot.mode = next(m for m, n in autopilot.kinds.items() if n == "mission")
+        autopilot.items, autopilot.current = [None] * 5, 4
+        autopilot.unready_in_mission = True
+        await vehicle.wait_ready(20.0)
+        assert vehicle.custom_mode == vehicle.adapter.modes[vehicle.adapter.resting_mode]
+        return autopilot.current
+
+    assert flown(script, flavour, ready=False) == 0
+
+
+def test_one_that_only_observes_leaves_the_mode_alone(flown) -> None:
+    async def script(vehicle, autopilot):
+        await vehicle.wait_ready()
+        await vehicle.set_mode(Mode.MISSION)
+        await vehicle.wait_ready(leave_mission=False)
+        assert vehicle.custom_mode == vehicle.adapter.modes[Mode.MISSION]
+
+    flown(script)
+
+
+@both
+def test_an_uploaded_mission_begins_anew(flown, flavour) -> None:
+    async def script(vehicle, autopilot):
+        autopilot.current = 52
+        home = vehicle.home
+        items = [MissionItem(command=16, x=home.lat_deg, y=home.lon_deg, z=10.0)] * 3
+        await vehicle.upload_mission(items)
+        return autopilot.current, vehicle.notes.warnings
+
+    assert flown(script, flavour) == (0, [])
+
+
+def test_a_loop_that_never_waits_lets_time_go_on(flown) -> None:
+    """Position and messages that are there already are given at once; the world goes on all the same."""
+
+    async def script(vehicle, autopilot):
+        over = asyncio.Event()
+        asyncio.get_running_loop().call_later(0.5, over.set)
+        while not over.is_set():
+            await vehicle.position()
+
+    flown(script)
+
+
+def test_a_full_queue_gives_other_tasks_a_turn(flown) -> None:
+    async def script(vehicle, autopilot):
+        over = asyncio.Event()
+        with vehicle.messages("COMMAND_ACK") as stream:
+            autopilot.ack(400, 0)
+            asyncio.get_running_loop().call_later(0.1, over.set)
+            while not over.is_set():
+                await anext(stream)
+                autopilot.ack(400, 0)  # an answer that comes at once
+
+    flown(script)

@@ -1,0 +1,112 @@
+"""Patterns by waypoints, followed by L1 guidance with the parameters that the aircraft reports.
+
+The follower here is the published law (S. Park, J. Deyst, J. How, AIAA 2004-4900) with the period and damping
+of ArduPilot's NAVL1_PERIOD and NAVL1_DAMPING. Legs are followed one by one; a leg ends within the radius of
+its waypoint.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from missions.atmosphere import GRAVITY_M_S2
+from missions.errors import PlanError
+from missions.library import PatternMission, find_mission
+from missions.options import FlightOptions, Via
+from missions.planning.flyable import FlyablePath, flyable_path
+from missions.planning.limits import FixedWingLimits
+from missions.planning.turns import roll_in_m
+from missions.vehicle.arduplane import ArduPlane
+from missions.vehicle.px4_plane import Px4Plane
+from missions.wings.entry import with_leads
+from missions.wings.pattern import check_wings
+from missions.wings.waypoints import turn_in_m, waypoints_of
+
+STOCK_PLANE = {"AIRSPEED_CRUISE": 22.0, "ROLL_LIMIT_DEG": 65.0, "NAVL1_PERIOD": 15.0, "RLL2SRV_TCONST": 0.25}
+"""What ArduPilot 4.6.3's simulated plane reports, where it is not the firmware's default."""
+STEP_S = 0.05
+
+
+def followed(
+    route: FlyablePath, waypoints: list[tuple[float, float]], radius_m: float, turn_effect: float
+) -> np.ndarray:
+    """Track (n, 2) of an aircraft at 22 m/s whose banks give a share of a coordinated turn's acceleration."""
+    speed, period, damping, roll_s = 22.0, 15.0, 0.75, 0.4
+    length = damping * period * speed / math.pi
+    (north, east), course, _ = route.at(float(route.arc_m[0]))
+    points, bank, track, leg = [(north, east), *waypoints], 0.0, [], 1
+    while leg < len(points):
+        start, end = np.array(points[leg - 1]), np.array(points[leg])
+        along = (end - start) / np.linalg.norm(end - start)
+        place = np.array((north, east))
+        if np.linalg.norm(end - place) <= radius_m or (place - end) @ along >= 0.0:
+            leg += 1
+            continue
+        across = along[1] * (place - start)[0] - along[0] * (place - start)[1]
+        to_leg = math.asin(max(-0.7, min(0.7, across / length)))
+        angle = to_leg + math.remainder(math.atan2(along[1], along[0]) - course, math.tau)
+        push = 4.0 * damping**2 * speed**2 / length * math.sin(max(-1.5, min(1.5, angle)))
+        bank += (math.atan(push / GRAVITY_M_S2) - bank) * STEP_S / roll_s
+        course += turn_effect * GRAVITY_M_S2 * math.tan(bank) / speed * STEP_S
+        north += speed * math.cos(course) * STEP_S
+        east += speed * math.sin(course) * STEP_S
+        track.append((north, east))
+    return np.array(track)
+
+
+def planned(name: str) -> tuple[FlightOptions, FixedWingLimits, FlyablePath]:
+    mission = find_mission(name)
+    assert isinstance(mission, PatternMission)
+    limits = ArduPlane().limits(STOCK_PLANE)
+    assert isinstance(limits, FixedWingLimits)
+    options = mission.adapted(FlightOptions(), limits)
+    curve = mission.curve(options)
+    path = flyable_path(curve, check_wings(curve, options, limits), roll_in_m(options.speed_m_s, limits))
+    return options, limits, path
+
+
+@pytest.mark.parametrize("name", ["sector", "parallel-sweep", "expanding-square", "lissajous"])
+@pytest.mark.parametrize("turn_effect", [0.7, 1.0])
+def test_l1_guidance_follows_a_pattern_by_its_waypoints(name: str, turn_effect: float) -> None:
+    options, limits, path = planned(name)
+    route = with_leads(path, 27.0)
+    waypoints = [*waypoints_of(path, options), route.at(route.length_m)[0]]
+    radius_m = turn_in_m(options, limits)
+    assert radius_m <= 255.0
+    track = followed(route, waypoints, radius_m, turn_effect)
+    points = route.points_m
+    # the end of the route is left where the approach begins
+    off = np.array([np.hypot(*(points - place).T).min() for place in track[:-60:4]])
+    assert math.sqrt((off**2).mean()) < 8.0
+    assert off.max() < 22.0
+
+
+def test_a_radius_that_the_user_chose_is_kept() -> None:
+    _, limits, _ = planned("sector")
+    assert turn_in_m(FlightOptions(acceptance_m=35.0), limits) == 35.0
+
+
+def test_bends_are_no_tighter_than_the_guidance_follows() -> None:
+    slow, quick = (ArduPlane().limits({**STOCK_PLANE, "NAVL1_PERIOD": period}) for period in (25.0, 5.0))
+    assert isinstance(slow, FixedWingLimits) and isinstance(quick, FixedWingLimits)
+    assert slow.path_radius_m(22.0) == pytest.approx(22.0 * 0.75 * 25.0 / math.pi)
+    assert quick.path_radius_m(22.0) == quick.turn_radius_m(22.0)  # the bank decides
+    px4 = Px4Plane().limits({"NPFG_PERIOD": 40.0, "FW_AIRSPD_TRIM": 15.0})
+    assert isinstance(px4, FixedWingLimits)
+    assert px4.path_radius_m(15.0) == pytest.approx(15.0 * 0.7 * 40.0 / math.pi)
+    assert px4.waypoint_lead_s == 0.0  # an aircraft of PX4 1.16.1 does not read a waypoint's radius
+
+
+def test_setpoints_bend_as_tightly_as_the_aircraft_can_bank() -> None:
+    mission = find_mission("lissajous")
+    limits = ArduPlane().limits(STOCK_PLANE)
+    chosen = FlightOptions(
+        width_m=1000.0, height_m=1000.0, given=frozenset({"width_m", "height_m", "via"}), via=Via.SETPOINTS
+    )
+    options = mission.adapted(chosen, limits)
+    assert isinstance(limits, FixedWingLimits)
+    assert check_wings(mission.curve(options), options, limits) == limits.turn_radius_m(22.0)
+    with pytest.raises(PlanError, match=r"its path guidance \(NAVL1_PERIOD\)"):
+        mission.check(replace(options, via=Via.WAYPOINTS), limits)
