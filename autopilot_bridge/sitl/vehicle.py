@@ -32,6 +32,7 @@ from flightsim.sensors import (
     FIX_AFTER_10_S,
     FIX_AT_BOOT,
     RTK_FIX_AFTER_10_S,
+    GpsFixStage,
     GpsParameters,
     SensorSuite,
     SensorSuiteParameters,
@@ -223,7 +224,7 @@ class SitlVehicle:
 
 def usual_sensors(specification: VehicleSpecification, *, aircraft: bool) -> SensorSuiteParameters:
     """What a vehicle of this kind carries; its receiver starts as in the firmware's own SITL."""
-    timeline = FIX_AT_BOOT
+    timeline: tuple[GpsFixStage, ...] = FIX_AT_BOOT
     if specification.flavour == "ardupilot":
         timeline = RTK_FIX_AFTER_10_S if specification.gps == "differential" else FIX_AFTER_10_S
     fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
