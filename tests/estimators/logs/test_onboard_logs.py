@@ -298,7 +298,7 @@ def test_ulog_vehicle_modes_flights_and_date(ulg_log):
 
 
 def test_single_imus_are_turned_as_the_board_is(ulog, tmp_path):
-    """The voted IMU comes corrected from the firmware; the others are turned by 90 deg, then by 2 deg of roll."""
+    """The voted IMU comes corrected from the firmware; the others are turned, by 90 deg and 2 deg of roll."""
     ulog.parameter("SENS_BOARD_ROT", 2)
     ulog.parameter("SENS_BOARD_X_OFF", 2.0)
     log = open_log(ulog.save(tmp_path / "flight.ulg"))
