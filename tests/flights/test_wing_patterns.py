@@ -9,6 +9,7 @@ import pytest
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.session import RunRequest, fly
+from tests.slow import slow
 
 FLAVOURS = ("px4", "ardupilot")
 STILL_RMS_M = 0.6
@@ -59,9 +60,9 @@ def well_flown(flight: dict[str, Any], rms_max_m: float) -> None:
     assert seconds(flight, "return") < RETURN_MAX_S
 
 
-@pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
-def test_setpoints_follow_the_curve_in_still_air(flown: Any, flavour: str) -> None:
-    flight = flown("lissajous", flavour, None, windy=False, pattern="L2")
+@pytest.mark.parametrize(("pattern", "flavour"), [("L1", "px4"), slow("L2", "px4"), slow("L2", "ardupilot")])
+def test_setpoints_follow_the_curve_in_still_air(flown: Any, pattern: str, flavour: str) -> None:
+    flight = flown("lissajous", flavour, None, windy=False, pattern=pattern)
     well_flown(flight, STILL_RMS_M)
     assert flight["path_max_error_m"] < 3.0 * STILL_RMS_M
     assert "waypoints" not in flight  # setpoints are what an aircraft flies unless told otherwise
