@@ -269,11 +269,21 @@ def test_item_reached(px4: Vehicle, ardupilot: Vehicle) -> None:
         vehicle.tick(0.1)
         vehicle.other.take()
         vehicle.service.item_reached(1)
-        assert [message.seq for message in vehicle.channel.take()] == [1]
+        heard = vehicle.tick(0.02)
+        assert [message.seq for _, message in heard] == [1]
         heard = vehicle.tick(20.0)
         assert names([message for _, message in heard]) == ["MISSION_ITEM_REACHED"] * repeats
         assert [round(when) for when, _ in heard] == list(range(1, repeats + 1))
         assert len(vehicle.other.take()) == repeats + 1
+
+
+def test_a_waypoint_directly_before_a_do_item_is_not_reported(vehicle: Vehicle) -> None:
+    upload(vehicle, plan(4))
+    vehicle.tick(0.1)
+    vehicle.service.item_reached(1)
+    vehicle.service.item_reached(2)  # DO_CHANGE_SPEED, done at once
+    reached = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED
+    assert [m.seq for _, m in vehicle.tick(0.5) if m.get_msgId() == reached] == [2]
 
 
 def test_upload_while_the_mission_is_flown(px4: Vehicle, ardupilot: Vehicle) -> None:
