@@ -1,9 +1,14 @@
-"""What the air does: steady wind, gusts, turbulence, temperature. Parameters; `Vehicle` applies them."""
+"""What the air does: mean wind over height, gusts, turbulence, temperature.
+
+Parameters; `Vehicle` applies them.
+"""
 
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
+
+from flightsim.wind_profile import SURFACE_LAYER, WindProfile
 
 _M_S_PER_KNOT: Final = 1852.0 / 3600.0
 _MAX_WIND_M_S: Final = 60.0
@@ -72,7 +77,10 @@ class Environment:
     """The air around the vehicles.
 
     Attributes:
-        wind_ned_m_s: steady velocity of the air over ground (where it blows to).
+        wind_ned_m_s: mean velocity of the air over ground (where it blows to), at the profile's reference
+            height.
+        profile: horizontal wind over height; uniform unless another is given. The vertical part is the same
+            at all heights.
         turbulence: Dryden intensity, `Turbulence` or its name.
         gusts: discrete gusts, one after the other.
         temperature_offset_k: added to the standard atmosphere's temperature at every height.
@@ -80,6 +88,7 @@ class Environment:
     """
 
     wind_ned_m_s: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    profile: WindProfile = field(default_factory=WindProfile)
     turbulence: Turbulence = Turbulence.NONE
     gusts: tuple[CosineGust, ...] = field(default=())
     temperature_offset_k: float = 0.0
@@ -105,12 +114,19 @@ class Environment:
                 f"decimal year {self.decimal_year} is outside the magnetic model's validity, 2025.0 to 2030.0"
             )
 
+    def wind_ned_m_s_at(self, height_m: float) -> tuple[float, float, float]:
+        """Mean wind at a height above ground."""
+        north, east, down = self.wind_ned_m_s
+        factor = self.profile.factor(height_m)
+        return factor * north, factor * east, down
+
     @classmethod
     def from_wind(
         cls,
         *,
         speed_m_s: float,
         from_deg: float,
+        profile: WindProfile = SURFACE_LAYER,
         turbulence: Turbulence | str = Turbulence.NONE,
         gusts: tuple[CosineGust, ...] = (),
         temperature_offset_k: float = 0.0,
@@ -119,8 +135,10 @@ class Environment:
         """Environment with a horizontal wind as a weather report gives it.
 
         Args:
-            speed_m_s: wind speed.
+            speed_m_s: wind speed at the profile's reference height.
             from_deg: true direction the wind comes from, clockwise from north.
+            profile: wind over height; by default the logarithmic law over open ground, with the given wind
+                at 10 m.
         """
         if not 0.0 <= speed_m_s <= _MAX_WIND_M_S:
             raise ValueError(
@@ -131,6 +149,7 @@ class Environment:
         to_rad = math.radians(from_deg) + math.pi
         return cls(
             wind_ned_m_s=(speed_m_s * math.cos(to_rad), speed_m_s * math.sin(to_rad), 0.0),
+            profile=profile,
             turbulence=Turbulence(turbulence),
             gusts=gusts,
             temperature_offset_k=temperature_offset_k,

@@ -127,7 +127,7 @@ def initialise(
             raise AirframeError(
                 f"the JSBSim model has no property '{name}', which [start] of '{airframe.name}' sets"
             )
-    for axis, speed in zip(("north", "east", "down"), environment.wind_ned_m_s, strict=True):
+    for axis, speed in zip(("north", "east", "down"), environment.wind_ned_m_s_at(height_m), strict=True):
         fdm.set_property_value(f"atmosphere/wind-{axis}-fps", speed / _FT)
     rotors = [item for item in airframe.truth if t.ROTOR_RAD_S.start <= item[0] < t.ROTOR_RAD_S.stop]
     speeds = start.rotor_rad_s if isinstance(start.rotor_rad_s, tuple) else (start.rotor_rad_s,) * len(rotors)

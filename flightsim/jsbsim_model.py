@@ -18,6 +18,12 @@ LAUNCHER_FORCE: Final = "launcher"
 LAUNCHER_MOMENT: Final = "launcher-moment"
 """Names among a model's external reactions; the force in pounds, the moment in foot-pounds, body axes."""
 
+ROTARY_GUSTS: Final = tuple(f"flightsim/{rate}-gust-rad_sec" for rate in "pqr")
+"""Properties of a model with wings: rotation of the air, body axes. Aerodynamics use the rates less these.
+
+JSBSim has such rates too, but only its own turbulence can write them.
+"""
+
 _NONE: Final = 0.0
 _EULER: Final = 1.0
 _ADAMS_BASHFORTH_2: Final = 3.0
@@ -85,10 +91,12 @@ def load_fdm(
         AirframeError: JSBSim refuses the model; the message carries its reasons.
     """
     tree = _parsed(airframe)
-    outputs = [] if tree is None else tree.getroot().findall("output")
-    if tree is None or not (launcher or outputs):
+    if tree is None:
         return _load(airframe, airframe.folder, physics_rate_hz)
-    for output in outputs:  # files that some aircraft of the jsbsim package would write beside themselves
+    _add_rotary_gusts(tree.getroot())
+    for output in tree.getroot().findall(
+        "output"
+    ):  # files that some aircraft of the jsbsim package would write beside themselves
         tree.getroot().remove(output)
     if launcher:
         _add_launcher(tree.getroot())
@@ -109,16 +117,15 @@ def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsi
     fdm.set_systems_path(str(package / "systems"))
     fdm.set_dt(1.0 / physics_rate_hz)  # filters and actuators take it when they are made
     try:
-        loaded = fdm.load_model(airframe.jsbsim, False)
-    except RuntimeError as error:
+        if not fdm.load_model(airframe.jsbsim, False):
+            raise AirframeError(_refusal(airframe, messages.warnings))
+        if airframe.kind is AirframeKind.FIXED_WING:
+            # the friction of JSBSim's wheels starts from uninitialised memory, which only a reset clears
+            fdm.set_property_value("ic/h-agl-ft", 1000.0)
+            fdm.run_ic()
+            fdm.reset_to_initial_conditions(0)
+    except jsbsim.BaseError as error:
         raise AirframeError(_refusal(airframe, [*messages.warnings, str(error)])) from None
-    if not loaded:
-        raise AirframeError(_refusal(airframe, messages.warnings))
-    if airframe.kind is AirframeKind.FIXED_WING:
-        # the friction of JSBSim's wheels starts from uninitialised memory, which only a reset clears
-        fdm.set_property_value("ic/h-agl-ft", 1000.0)
-        fdm.run_ic()
-        fdm.reset_to_initial_conditions(0)
     fdm.set_dt(1.0 / physics_rate_hz)
     hold_motion(fdm, False)
     return fdm, tuple(messages.warnings)
@@ -149,6 +156,41 @@ def _add_launcher(root: ElementTree.Element) -> None:
             place = ElementTree.SubElement(element, tag, attributes)
             for axis in "xyz":
                 ElementTree.SubElement(place, axis).text = "0"
+
+
+def _add_rotary_gusts(root: ElementTree.Element) -> None:
+    """Let the aerodynamics use the rates against the air: those of the body less `ROTARY_GUSTS`.
+
+    Aerodynamics in a file of their own, and those without rates, are left as they are.
+    """
+    aerodynamics = root.find("aerodynamics")
+    if aerodynamics is None or "file" in aerodynamics.attrib:
+        return
+    renamed = {}
+    for rate in "pqr":
+        for name in (f"velocities/{rate}-aero-rad_sec", f"velocities/{rate}-rad_sec"):
+            renamed[name] = f"flightsim/{name.removeprefix('velocities/')}"
+    used = set()
+    for element in aerodynamics.iter():
+        text = (element.text or "").strip()
+        sign, name = ("-", text[1:]) if text.startswith("-") else ("", text)
+        if name in renamed:
+            element.text = f"{sign}{renamed[name]}"
+            used.add(name)
+    if not used:
+        return
+    added = []
+    for gust in ROTARY_GUSTS:
+        added.append(ElementTree.Element("property", {"value": "0"}))
+        added[-1].text = gust
+    for name in sorted(used):
+        function = ElementTree.Element("function", {"name": renamed[name]})
+        difference = ElementTree.SubElement(function, "difference")
+        gust = ROTARY_GUSTS["pqr".index(name.removeprefix("velocities/")[0])]
+        for operand in (name, gust):
+            ElementTree.SubElement(difference, "property").text = operand
+        added.append(function)
+    aerodynamics[:0] = added
 
 
 def hold_motion(fdm: jsbsim.FGFDMExec, held: bool) -> None:

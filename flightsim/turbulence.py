@@ -6,7 +6,7 @@ air. So the three velocities are made here and handed to JSBSim as its gust.
 
 Spectra (MIL-F-8785C, 3.7.2.2), L over V = T, as exactly discretised forming filters of unit white noise:
 along the wind sigma sqrt(2 T) / (1 + T s), across and vertical sigma sqrt(T) (1 + sqrt(3) T s) / (1 + T s)^2.
-Rotary gusts are left out: a rotor span of 0.75 m is small against every scale length.
+Wings get `rotary_gusts` beside it; a rotor span of 0.75 m is small against every scale length.
 """
 
 import math
@@ -101,6 +101,7 @@ class DrydenTurbulence:
 
     Attributes:
         velocity_ned_m_s: (3,) present turbulence velocity, written in place by `step`.
+        scales: (4,) present lengths and intensities, as of `low_altitude_scales`.
     """
 
     __slots__ = (
@@ -109,10 +110,10 @@ class DrydenTurbulence:
         "_dt_s",
         "_generator",
         "_next",
-        "_scales",
         "_sin_wind",
         "_state",
         "_w20_m_s",
+        "scales",
         "velocity_ned_m_s",
     )
 
@@ -140,7 +141,7 @@ class DrydenTurbulence:
         self._generator = np.random.Generator(np.random.PCG64(seed_sequence))
         self._block = np.empty((_BLOCK_STEPS, _NORMALS_PER_STEP))
         self._next = _BLOCK_STEPS
-        self._scales = np.zeros(4)
+        self.scales = np.zeros(4)
         n = self._generator.standard_normal(_STATE_SIZE)
         half, quarter = math.sqrt(0.5), 0.25 / math.sqrt(0.5)
         rest = math.sqrt(0.25 - quarter * quarter)
@@ -163,7 +164,7 @@ class DrydenTurbulence:
             self._w20_m_s,
             self._cos_wind,
             self._sin_wind,
-            self._scales,
+            self.scales,
             self.velocity_ned_m_s,
         )
         self._next += 1

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any, Final
 
+import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,7 @@ from flightsim import truth as t
 from flightsim.actuation import FixedWingActuators
 from flightsim.airframe import (
     Airframe,
+    AirframeError,
     AirframeKind,
     LaunchKind,
     LaunchParameters,
@@ -27,6 +29,7 @@ from flightsim.launcher import Launcher
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.truth_reading import Motion, TruthReader
 from flightsim.vehicle_air import VehicleAir
+from flightsim.wind_profile import WindProfile
 
 __all__ = ["InitialState", "Vehicle", "VehicleDivergedError"]
 
@@ -142,8 +145,20 @@ class Vehicle:
 
         Args:
             initial: how to start; by default as at construction.
+
+        Raises:
+            AirframeError: the model cannot be used, or its motion is not possible where it starts.
         """
-        start = initial or self._initial
+        try:
+            self._start(initial or self._initial)
+        except jsbsim.BaseError as error:
+            raise AirframeError(f"{self._unusable}: JSBSim says: {' '.join(str(error).split())}") from None
+
+    @property
+    def _unusable(self) -> str:
+        return f"vehicle '{self.airframe.name}' can't be simulated from its start"
+
+    def _start(self, start: InitialState) -> None:
         fixed_wing = self.airframe.kind is AirframeKind.FIXED_WING
         launch = _launch_parameters(self.airframe, start)
         fdm, self.load_warnings = load_fdm(self.airframe, self.physics_rate_hz, launcher=launch is not None)
@@ -185,10 +200,17 @@ class Vehicle:
             fdm.run()
             fdm.resume_integration()
         self._air = VehicleAir(
-            fdm, self.environment, physics_rate_hz=self.physics_rate_hz, seed_sequence=self._seed_sequence
+            fdm,
+            self.environment,
+            ground_alt_m=float(self.home.alt_m),
+            physics_rate_hz=self.physics_rate_hz,
+            seed_sequence=self._seed_sequence,
         )
         if self._read(self._steps) != _SOUND:
-            raise self._diverged()
+            raise AirframeError(
+                f"{self._unusable}: forces, attitude or position become infinite before the first step; "
+                f"check {self.airframe.xml_path} (mass, inertia, gear)"
+            )
         self._let_launcher_carry(self.launcher)
         self._refresh_magnetic_field()
 
@@ -218,7 +240,10 @@ class Vehicle:
         launcher = self.launcher
         if launcher is not None:
             launcher.step()
-        self._run()
+        try:
+            self._run()
+        except jsbsim.BaseError as error:
+            raise self._diverged(f"JSBSim says: {' '.join(str(error).split())}") from None
         self._steps += 1
         motion = self._read(self._steps)
         if launcher is not None:
@@ -268,15 +293,21 @@ class Vehicle:
         self._fixed_wing_actuators().set_stuck(role, stuck)
 
     def set_wind(
-        self, wind_ned_m_s: tuple[float, float, float], *, wind_at_20_ft_m_s: float | None = None
+        self,
+        wind_ned_m_s: tuple[float, float, float],
+        *,
+        profile: WindProfile | None = None,
+        wind_at_20_ft_m_s: float | None = None,
     ) -> None:
         """The air moves like this around this vehicle from now on.
 
         Args:
-            wind_ned_m_s: of the air over ground.
+            wind_ned_m_s: of the air over ground, at the profile's reference height.
+            profile: horizontal wind over height; None: as it was.
             wind_at_20_ft_m_s: intensity of Dryden turbulence that begins now, 0: none; None: as it was.
         """
-        self._air.set_wind(wind_ned_m_s, wind_at_20_ft_m_s=wind_at_20_ft_m_s)
+        height_m = float(self.truth[t.ALT_M] - self.home.alt_m)
+        self._air.set_wind(wind_ned_m_s, height_m, profile=profile, wind_at_20_ft_m_s=wind_at_20_ft_m_s)
 
     def _fixed_wing_actuators(self) -> FixedWingActuators:
         if self._surfaces is None:
@@ -339,10 +370,10 @@ class Vehicle:
         self.crash = self._reader.touches.words(self._steps, self.truth)
         lay_down(self.truth, ground_alt_m)
 
-    def _diverged(self) -> VehicleDivergedError:
+    def _diverged(self, why: str = "its motion is not possible") -> VehicleDivergedError:
         return VehicleDivergedError(
             f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
-            f"({self._steps / self.physics_rate_hz:.3f} s): its motion is not possible"
+            f"({self._steps / self.physics_rate_hz:.3f} s): {why}"
         )
 
     def _refresh_magnetic_field(self) -> None:

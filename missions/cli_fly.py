@@ -3,7 +3,7 @@
 import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -25,6 +25,8 @@ _elsewhere = partial(flight_option, group="Vehicles elsewhere (--connect)", scop
 _flight = partial(flight_option, group="The flight")
 _estimator = partial(flight_option, group="An estimator beside it")
 _results = partial(flight_option, group="Results")
+
+_FORECAST_HEIGHT_M: Final = 100.0  # at least; the wind of a profile grows little above it
 
 
 @click.command(cls=FlyCommand, context_settings={"show_default": True})
@@ -60,8 +62,14 @@ _results = partial(flight_option, group="Results")
 @_world(
     "--wind",
     metavar="SPEED[@FROM]",
-    help="Wind of the day, m/s, and degrees it comes from; turns are planned for it, "
+    help="Wind of the day, m/s at 10 m above ground, and degrees it comes from; turns are planned for it, "
     "unless --expect-wind says otherwise. [default: 0; orbit: 4 from north; occupancy: 5 from west]",
+)
+@_world(
+    "--wind-profile",
+    type=click.Choice(["log", "power", "uniform"]),
+    default="log",
+    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
 )
 @_world(
     "--turbulence",
@@ -71,7 +79,8 @@ _results = partial(flight_option, group="Results")
 @_flight(
     "--expect-wind",
     type=float,
-    help="Forecast: wind to plan turns for, m/s. [default: --wind where it is given, else 5]",
+    help="Forecast: wind to plan turns for, m/s, at the height of the flight. [default: --wind where it is "
+    "given, as it is at 100 m or the mission's altitude, else 5]",
 )
 @_world("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
 @_flight("--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params).")
@@ -161,6 +170,7 @@ def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
 
 
 def _fly(given: dict[str, Any]) -> int:
+    from flightsim.wind_profile import WindLaw, WindProfile
     from missions.library import find_mission
     from missions.options import check_positive, parameters_from_file, parse_wind
 
@@ -182,7 +192,8 @@ def _fly(given: dict[str, Any]) -> int:
         )
     forecast_m_s = given["expect_wind"]
     if forecast_m_s is None and given["wind"] is not None:
-        forecast_m_s = wind_speed_m_s
+        profile = WindProfile(law=WindLaw(given["wind_profile"]))
+        forecast_m_s = wind_speed_m_s * profile.factor(max(options.altitude_m, _FORECAST_HEIGHT_M))
     parameters = {} if given["params"] is None else parameters_from_file(given["params"])
     if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
         raise click.UsageError(
@@ -223,6 +234,7 @@ def _fly(given: dict[str, Any]) -> int:
             speedup=given["speedup"],
             wind_speed_m_s=wind_speed_m_s,
             wind_from_deg=wind_from_deg,
+            wind_profile=given["wind_profile"],
             turbulence=given["turbulence"] or world.turbulence,
             expected_wind_m_s=forecast_m_s,
             home=given["home"] or (None if given["connect"] else world.home),

@@ -65,6 +65,7 @@ def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder
                 seed=request.seed,
                 speedup=request.speedup,
                 wind_speed_m_s=request.wind_speed_m_s,
+                wind_profile=request.wind_profile,
                 wind_from_deg=request.wind_from_deg,
                 turbulence=request.turbulence,
                 parameters=request.parameters,

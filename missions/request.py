@@ -26,7 +26,8 @@ class RunRequest:
         options: what the mission is to do.
         connect: connection strings, one per vehicle; empty: an embedded SITL.
         system_ids: of the vehicles, one per connection; empty: the first heard on each.
-        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, turbulence, home: of the embedded SITL.
+        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, wind_profile, turbulence, home: of the
+            embedded SITL.
         model: its vehicle: of all of a team, or one for each.
         launch: how its aircraft get into the air: "runway", "catapult", "hand"; None: as described with them.
         expected_wind_m_s: forecast, to plan turns for; None: 5 m/s. What blows in an embedded SITL is not
@@ -58,6 +59,7 @@ class RunRequest:
     speedup: float | None = None
     wind_speed_m_s: float = 0.0
     wind_from_deg: float = 0.0
+    wind_profile: str = "log"
     turbulence: str = "none"
     expected_wind_m_s: float | None = None
     home: str | None = None

@@ -65,10 +65,11 @@ class TargetScenario:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurveyScenario:
-    """A magnetic map with a target's signature in it (seed 003: a two-dimensional Gaussian).
+    """A magnetic field with a target's signature in it, and the map that a survey has made of it.
 
     Attributes:
         map_path: the published map; None: one is made from the seed, `width_m` by `height_m` about home.
+            The true field differs from it by a survey's error.
         publish_to: where a map that is made is written, for the mission to read.
         width_m, height_m: of a map that is made, east and north.
         survey_height_m: above home, what a map that is made is valid at.
@@ -76,6 +77,8 @@ class SurveyScenario:
         amplitude_nt: its peak.
         sigma_along_m, sigma_across_m: its standard deviations.
         orientation_rad: of its long axis.
+        moment_a_m2, depth_m: the target is a dipole along the Earth's field, this far below home; None: a
+            two-dimensional Gaussian (seed 003).
     """
 
     map_path: Path | None = None
@@ -88,6 +91,8 @@ class SurveyScenario:
     sigma_along_m: float = 80.0
     sigma_across_m: float = 60.0
     orientation_rad: float = 0.0
+    moment_a_m2: float | None = None
+    depth_m: float = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

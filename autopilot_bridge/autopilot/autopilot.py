@@ -238,6 +238,7 @@ class Autopilot:
             intervals=self.intervals,
             parameters=self.parameters,
             announce=self._texts.announce,
+            banner=self._texts.banner,
             set_current_item=self.missions.set_current,
             mission_item_count=lambda: len(stores[MissionType.MISSION].items),
             inject_failure=inject_failure,
@@ -246,7 +247,7 @@ class Autopilot:
             self.parameters,
             firmware.parameters,
             self,
-            on_list=lambda channel: self._texts.banner(channel),
+            on_list=self._texts.banner,
             on_fixed=self._tell_fixed,
         )
         timed = [more for more in self._more if type(more).tick is not Microservice.tick]

@@ -32,6 +32,7 @@ from autopilot_bridge.flight.hold import IdleTask
 from autopilot_bridge.flight.offboard import OffboardKind
 from autopilot_bridge.flight.plan_reading import is_waypoint, target_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.flight.yaw import Turn
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 
@@ -135,7 +136,7 @@ class FixedWingTasks:
             radius_m = -(abs(self._context.fixed_wing.loiter_radius_m) if radius_m is None else radius_m)
         return LoiterTask(circle.centre_ned_m, radius_m, circle.speed_m_s)
 
-    def turn(self, context: FlightContext, active: FlightTask | None, yaw_rad: float) -> FlightTask | None:
+    def turn(self, context: FlightContext, active: FlightTask | None, turn: Turn) -> FlightTask | None:
         """An aircraft can't turn on the spot."""
         return None
 

@@ -13,6 +13,7 @@ from autopilot_bridge.commander.vehicle_tasks import Circle, GoAroundTask, Place
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict, failed
 from autopilot_bridge.flight.offboard import Vector
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask
+from autopilot_bridge.flight.yaw import Turn
 
 if TYPE_CHECKING:
     from autopilot_bridge.commander.commander import Commander
@@ -152,10 +153,16 @@ class Guidance:
         position_ned_m: Vector,
         *,
         yaw_rad: float = math.nan,
+        yaw_rate_rad_s: float = math.nan,
         speed_m_s: float | None = None,
     ) -> None:
         """Give the guided task (the one `guided` returned) a place to fly to."""
-        place = Place(ned_m=np.array(position_ned_m), yaw_rad=yaw_rad, speed_m_s=speed_m_s)
+        place = Place(
+            ned_m=np.array(position_ned_m),
+            yaw_rad=yaw_rad,
+            yaw_rate_rad_s=yaw_rate_rad_s,
+            speed_m_s=speed_m_s,
+        )
         self._vehicle.guide_to(self._commander.context, place)
 
     def go_to_place(self, place: Place | None) -> None:
@@ -267,13 +274,13 @@ class Guidance:
             if isinstance(task, SpeedTask):
                 task.change_speed(self._commander.context, kind, speed_m_s)
 
-    def turn(self, yaw_rad: float) -> None:
+    def turn(self, turn: Turn) -> None:
         """Point the nose somewhere, holding the place (CONDITION_YAW in GUIDED)."""
         commander = self._commander
         if not commander.airborne or commander.mode is not commander.policy.reposition_mode:
             return
         commander.context.look_at(None)
-        task = self._vehicle.turn(commander.context, commander.tasks.task, yaw_rad)
+        task = self._vehicle.turn(commander.context, commander.tasks.task, turn)
         if task is not None:
             commander.tasks.start(task)
 

@@ -28,6 +28,7 @@ from autopilot_bridge.flight.precision_land import PrecisionLandTask, landing_ta
 from autopilot_bridge.flight.return_home import ReturnTask
 from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.flight.yaw import Turn
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 
 _MANUAL: Final = {
@@ -129,7 +130,13 @@ class MulticopterTasks:
     def guide_to(self, context: FlightContext, place: Place) -> None:
         """Give the guided task a place to fly to."""
         self._target[:] = place.ned_m
-        self.guided.set_position(context, place.ned_m, yaw_rad=place.yaw_rad, speed_m_s=place.speed_m_s)
+        self.guided.set_position(
+            context,
+            place.ned_m,
+            yaw_rad=place.yaw_rad,
+            yaw_rate_rad_s=place.yaw_rate_rad_s,
+            speed_m_s=place.speed_m_s,
+        )
 
     def orbit(self, circle: Circle) -> FlightTask:
         """Circle around a place."""
@@ -141,15 +148,15 @@ class MulticopterTasks:
         yaw = OrbitYaw(circle.yaw_behaviour) if known else OrbitYaw.FRONT_TO_CENTRE
         return OrbitTask(circle.centre_ned_m, circle.radius_m, speed, yaw_behaviour=yaw)
 
-    def turn(self, context: FlightContext, active: FlightTask | None, yaw_rad: float) -> FlightTask | None:
+    def turn(self, context: FlightContext, active: FlightTask | None, turn: Turn) -> FlightTask | None:
         """Point the nose somewhere, holding the place or going on with a streamed motion."""
         guided = self.guided
         kind = guided.kind if active is guided else GuidedKind.HOLD
         if kind in (GuidedKind.VELOCITY, GuidedKind.ACCELERATION, GuidedKind.TRAJECTORY):
-            guided.set_yaw(yaw_rad)
+            guided.set_turn(turn)
             return None
         place = self._target.copy() if kind is GuidedKind.POSITION else np.full(3, math.nan)
-        return RepositionTask(place, yaw_rad=yaw_rad)
+        return RepositionTask(place, turn=turn)
 
     def ends_on_ground(self, task: FlightTask | None) -> bool:
         """Landings, returns and missions end on the ground."""

@@ -18,6 +18,7 @@ from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.context import FlightContext, LandedState
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
+from autopilot_bridge.flight.yaw import Turn
 from autopilot_bridge.mission_plan import MissionItem
 
 
@@ -28,12 +29,14 @@ class Place:
     Attributes:
         ned_m: local NED, (3,); NaN components: as it is.
         yaw_rad: heading there; NaN: free. Aircraft don't take it.
+        yaw_rate_rad_s: how the nose turns there; NaN: not given. Aircraft don't take it.
         speed_m_s: ground speed of a multicopter, equivalent airspeed of an aircraft; None: the parameter's.
         radius_m: of an aircraft's circle there, positive clockwise seen from above; None: the parameter's.
     """
 
     ned_m: NDArray[np.float64]
     yaw_rad: float = math.nan
+    yaw_rate_rad_s: float = math.nan
     speed_m_s: float | None = None
     radius_m: float | None = None
 
@@ -146,7 +149,7 @@ class VehicleTasks(Protocol):
         """Circle around a place."""
         ...
 
-    def turn(self, context: FlightContext, active: FlightTask | None, yaw_rad: float) -> FlightTask | None:
+    def turn(self, context: FlightContext, active: FlightTask | None, turn: Turn) -> FlightTask | None:
         """CONDITION_YAW: point the nose somewhere; the task for it, or None when the active one does it."""
         ...
 

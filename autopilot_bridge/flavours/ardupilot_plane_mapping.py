@@ -303,6 +303,8 @@ def flight_parameters(
     values["return_altitude_m"] = clamp(altitude_m, 5.0, 5000.0) if altitude_m >= 0.0 else 5.0
     values["return_climbs"] = altitude_m < 0.0  # -1: stays at the present height
     values["return_descend_altitude_m"] = values["return_altitude_m"]
+    least_drop_m = number(store, "GLIDE_SLOPE_MIN", 15.0)
+    values["glide_slope_min_m"] = least_drop_m if least_drop_m > 0.0 else math.inf
     values["return_loiter_time_s"] = -1.0
     values["return_cone_half_angle_rad"] = 0.0
     radius_m = clamp(number(store, "RTL_RADIUS", 0.0), -1e4, 1e4)

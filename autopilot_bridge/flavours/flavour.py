@@ -187,6 +187,8 @@ class Flavour:
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
         sends_events: what happens is told in EVENT messages, texts repeat them.
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
+        reboot_starts_again: a reboot starts the simulated vehicle again too, at its first place and level
+            (ArduPilot's SITL); else only the autopilot boots, as on a vehicle.
         gps_source: which receiver the first GPS is, as the parameters were at boot.
     """
 
@@ -220,4 +222,5 @@ class Flavour:
     sends_events: bool
     bytewise_parameters: bool
     listed_modes: tuple[ListedMode, ...] = ()
+    reboot_starts_again: bool = False
     gps_source: Callable[[ParameterStore], GpsSource] = own_receiver

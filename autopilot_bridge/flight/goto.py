@@ -8,6 +8,7 @@ from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, T
 from autopilot_bridge.flight.ground import TakeoffRamp
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus
+from autopilot_bridge.flight.yaw import Turn, wrap_pi
 from autopilot_bridge.navigation import layout as nav_layout
 
 _WANTS_UP_M = 0.3
@@ -21,6 +22,7 @@ class GotoTask:
     Args:
         position_ned_m: place, (3,); NaN components mean the place where the vehicle comes to rest.
         yaw_rad: heading; NaN: by the vehicle's yaw behaviour.
+        turn: a commanded turn there, flown while `yaw_rad` is NaN.
         speed_m_s: None: the cruise speed.
         acceptance_m: distance at which the place is reached; None: the parameter.
     """
@@ -32,8 +34,11 @@ class GotoTask:
         "_ramp",
         "_reached",
         "_speed_m_s",
+        "_turn",
         "_wanted",
+        "_yaw_age_s",
         "_yaw_rad",
+        "_yaw_rate_rad_s",
     )
 
     def __init__(
@@ -41,12 +46,16 @@ class GotoTask:
         position_ned_m: Array,
         *,
         yaw_rad: float = math.nan,
+        turn: Turn | None = None,
         speed_m_s: float | None = None,
         acceptance_m: float | None = None,
     ) -> None:
         self._wanted: Array = np.array(position_ned_m, dtype=np.float64)
         self._place: Array = self._wanted.copy()
         self._yaw_rad = yaw_rad
+        self._yaw_rate_rad_s = math.nan
+        self._yaw_age_s = 0.0
+        self._turn = turn
         self._speed_m_s = speed_m_s
         self._acceptance_m = acceptance_m
         self._motion: SmoothMotion | None = None
@@ -68,6 +77,12 @@ class GotoTask:
         self._reached = False
         if self._motion is not None:
             self._begin(ctx, self._motion)
+
+    def set_yaw(self, yaw_rad: float, yaw_rate_rad_s: float) -> None:
+        """The heading, or how it turns, from now on; NaN: not given. The rate ends with GUID_TIMEOUT."""
+        self._yaw_rad = yaw_rad
+        self._yaw_rate_rad_s = yaw_rate_rad_s
+        self._yaw_age_s = 0.0
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Change the speed on the way (DO_CHANGE_SPEED)."""
@@ -103,7 +118,7 @@ class GotoTask:
             return TaskStatus.RUNNING
         motion.synchronise(ctx)
         motion.fly_to(ctx, self._place)
-        motion.steer(ctx, self._yaw_rad, self._place)
+        self._steer(ctx, motion)
         motion.write(ctx)
         if not self._reached:
             radius = ctx.multicopter.acceptance_radius_m if self._acceptance_m is None else self._acceptance_m
@@ -112,6 +127,22 @@ class GotoTask:
                 self._reached = True
                 ctx.events.append(TaskFinished("goto"))
         return TaskStatus.DONE if self._reached else TaskStatus.RUNNING
+
+    def _steer(self, ctx: FlightContext, motion: SmoothMotion) -> None:
+        """One tick of the heading."""
+        rate_rad_s = self._yaw_rate_rad_s
+        if math.isnan(rate_rad_s):
+            motion.steer(ctx, self._yaw_rad, self._place, turn=self._turn)
+            return
+        self._yaw_age_s += ctx.dt_s
+        if self._yaw_age_s > ctx.multicopter.guided_timeout_s:
+            self.set_yaw(motion.heading.yaw_rad, math.nan)
+            motion.steer(ctx, self._yaw_rad)
+        elif math.isnan(self._yaw_rad):
+            motion.heading.turn(rate_rad_s, ctx.multicopter, ctx.dt_s)
+        else:
+            wanted = wrap_pi(self._yaw_rad + rate_rad_s * self._yaw_age_s)
+            motion.steer(ctx, wanted, yaw_rate_rad_s=rate_rad_s)
 
 
 class RepositionTask(GotoTask):

@@ -19,6 +19,7 @@ from autopilot_bridge.flight.hold import HoldTask
 from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.offboard import NAN3, Vector
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus, clear_setpoint
+from autopilot_bridge.flight.yaw import Turn
 from autopilot_bridge.navigation import layout as nav_layout
 
 
@@ -54,6 +55,7 @@ class GuidedTask:
         "_position",
         "_ramp",
         "_rates",
+        "_turn",
         "_velocity",
         "_yaw_rad",
         "_yaw_rate_rad_s",
@@ -71,6 +73,7 @@ class GuidedTask:
         self._hover_down_m = math.nan
         self._yaw_rad = math.nan
         self._yaw_rate_rad_s = math.nan
+        self._turn: Turn | None = None
         self._age_s = 0.0
         self._hold = HoldTask()
         self._goto: GotoTask | None = None
@@ -90,18 +93,20 @@ class GuidedTask:
         position_ned_m: Vector,
         *,
         yaw_rad: float = math.nan,
+        yaw_rate_rad_s: float = math.nan,
         speed_m_s: float | None = None,
     ) -> None:
-        """Fly to a place and stay; NaN components: keep the present ones."""
-        _asked_for_yaw(ctx, yaw_rad)
+        """Fly to a place and stay; NaN components: keep the present ones. A yaw rate expires."""
+        _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         target = np.array(position_ned_m, dtype=np.float64)
         if self.kind is GuidedKind.POSITION and self._goto is not None and self._goto_started:
-            if np.array_equal(target, self._position, equal_nan=True) and speed_m_s is None:
-                return  # a repeated target isn't a new leg
-            self._goto.set_target(ctx, target, yaw_rad=yaw_rad, speed_m_s=speed_m_s)
+            # a repeated target isn't a new leg
+            if speed_m_s is not None or not np.array_equal(target, self._position, equal_nan=True):
+                self._goto.set_target(ctx, target, speed_m_s=speed_m_s)
         else:
-            self._goto = GotoTask(target, yaw_rad=yaw_rad, speed_m_s=speed_m_s)
+            self._goto = GotoTask(target, speed_m_s=speed_m_s)
             self._goto_started = False
+        self._goto.set_yaw(yaw_rad, yaw_rate_rad_s)
         self._position[:] = target
         self.kind = GuidedKind.POSITION
 
@@ -184,12 +189,13 @@ class GuidedTask:
         self.kind = kind
         self._yaw_rad = yaw_rad
         self._yaw_rate_rad_s = yaw_rate_rad_s
+        self._turn = None
         self._age_s = 0.0
 
-    def set_yaw(self, yaw_rad: float) -> None:
-        """Turn to a heading while the target stays (CONDITION_YAW)."""
-        self._yaw_rad = yaw_rad
-        self._yaw_rate_rad_s = math.nan
+    def set_turn(self, turn: Turn) -> None:
+        """Turn as commanded while the target stays (CONDITION_YAW)."""
+        self._turn = turn
+        self._yaw_rad = self._yaw_rate_rad_s = math.nan
 
     def activate(self, ctx: FlightContext) -> None:
         ctx.phase = FlightPhase.CRUISE
@@ -260,7 +266,7 @@ class GuidedTask:
             motion.heading.turn(self._yaw_rate_rad_s, ctx.multicopter, ctx.dt_s)
         else:
             ahead = trajectory.position_ned_m + 4.0 * trajectory.velocity_ned_m_s
-            motion.steer(ctx, self._yaw_rad, ahead)
+            motion.steer(ctx, self._yaw_rad, ahead, turn=self._turn)
         motion.write(ctx)
 
     def _integrate_acceleration(self, ctx: FlightContext, motion: SmoothMotion) -> None:

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
 from autopilot_bridge.flight.corners import Point, passing_speed, turn_in_distance
 from autopilot_bridge.flight.ground import TakeoffRamp
@@ -32,7 +33,7 @@ from autopilot_bridge.flight.spline import SplineCurve, SplineFlight
 from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.flight.trajectory import SPEED
-from autopilot_bridge.flight.yaw import wrap_pi
+from autopilot_bridge.flight.yaw import Turn, wrap_pi
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 
@@ -74,7 +75,7 @@ class MissionTask(PlanTask):
         habits: how the firmware goes through a plan.
     """
 
-    __slots__ = ("_leg", "_motion", "_nose", "_ramp", "_speed_m_s", "_yaw_rad")
+    __slots__ = ("_leg", "_motion", "_nose", "_ramp", "_speed_m_s", "_turning")
 
     def __init__(self, store: MissionStore, *, first_item: int = 0, habits: PlanHabits = PX4_PLANS) -> None:
         super().__init__(store, first_item=first_item, habits=habits)
@@ -83,7 +84,7 @@ class MissionTask(PlanTask):
         self._ramp: TakeoffRamp | None = None
         self._nose = Nose()
         self._speed_m_s: float | None = None
-        self._yaw_rad = math.nan
+        self._turning: Turn | None = None
 
     def activate(self, ctx: FlightContext) -> None:
         ctx.phase = FlightPhase.CRUISE
@@ -119,7 +120,7 @@ class MissionTask(PlanTask):
         target = target_of(item, ctx)
         if target is None:
             return False
-        self._yaw_rad = math.nan  # CONDITION_YAW lasts until the next place
+        self._turning = None  # CONDITION_YAW lasts until the next place
         if command in (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF):
             base = float(ctx.home_ned_m[2])
             base = float(ctx.nav[nav_layout.POS_NED_M][2]) if math.isnan(base) else base
@@ -140,16 +141,20 @@ class MissionTask(PlanTask):
         return self._begin_leg(ctx, item, target, came_from)
 
     def _turn(self, ctx: FlightContext, item: MissionItem) -> None:
-        angle = math.radians(item.param1) if math.isfinite(item.param1) else 0.0
-        if item.param4 == 1.0:
-            direction = -1.0 if item.param3 < 0.0 else 1.0
-            angle = float(ctx.nav[_NAV_YAW]) + direction * angle
-        self._yaw_rad = wrap_pi(angle)
+        self._turning = Turn(
+            math.radians(item.param1) if math.isfinite(item.param1) else 0.0,
+            direction=int(item.param3 > 0.0) - int(item.param3 < 0.0),
+            rate_max_rad_s=math.radians(item.param2) if item.param2 > 0.0 else None,
+            relative=item.param4 == 1.0,
+        )
         if self._leg is not None:
-            self._leg.yaw_rad = self._yaw_rad
+            self._leg.yaw_rad = math.nan
 
     def _turned(self, ctx: FlightContext) -> bool:
-        return abs(wrap_pi(float(ctx.nav[_NAV_YAW]) - self._yaw_rad)) < _YAW_REACHED_RAD
+        if self._turning is None:
+            return True
+        behind = wrap_pi(float(ctx.setpoint[sp.YAW_RAD]) - float(ctx.nav[_NAV_YAW]))
+        return self._turning.done and abs(behind) < _YAW_REACHED_RAD
 
     def _item_yaw(self, ctx: FlightContext, item: MissionItem) -> float | None:
         if not ctx.multicopter.use_waypoint_yaw or not math.isfinite(item.param4):
@@ -292,7 +297,7 @@ class MissionTask(PlanTask):
         if sub is not None:
             self._fly_sub(ctx, sub)
             if isinstance(sub, HoldTask | OrbitTask):
-                self._nose.point(ctx, self._wanted_yaw(ctx, self._yaw_rad))
+                self._nose.point(ctx, self._wanted_yaw(ctx, math.nan), self._turning)
         elif leg is not None:
             self._fly_leg(ctx, motion, ramp, leg)
         return TaskStatus.DONE if self._finished else TaskStatus.RUNNING
@@ -314,7 +319,7 @@ class MissionTask(PlanTask):
             self._fly_spline(ctx, motion, leg, leg.spline)
             return
         motion.fly_to(ctx, leg.target, 0.0 if leg.arrived else leg.passing_m_s, leg.turn_in_m)
-        motion.steer(ctx, self._wanted_yaw(ctx, leg.yaw_rad), leg.target)
+        motion.steer(ctx, self._wanted_yaw(ctx, leg.yaw_rad), leg.target, turn=self._turning)
         motion.write(ctx)
         item = self._store.items[self._seq]
         vehicle = ctx.nav[nav_layout.POS_NED_M]
@@ -342,7 +347,7 @@ class MissionTask(PlanTask):
         trajectory = motion.trajectory
         if not ctx.position_valid:
             motion.brake(ctx)
-            motion.steer(ctx, leg.yaw_rad)
+            motion.steer(ctx, leg.yaw_rad, turn=self._turning)
             motion.write(ctx)
             return
         if spline.done:  # from here on it is a place to hold, or to pass on from
@@ -357,9 +362,10 @@ class MissionTask(PlanTask):
         trajectory.velocity_ned_m_s[:] = velocity
         trajectory.acceleration_ned_m_s2[:] = acceleration
         course = math.atan2(float(velocity[1]), float(velocity[0]))
-        along = course if ctx.multicopter.yaw_behaviour is not YawBehaviour.KEEP else math.nan
+        follows = ctx.multicopter.yaw_behaviour is not YawBehaviour.KEEP and self._turning is None
+        along = course if follows else math.nan
         held = leg.yaw_rad if math.isfinite(leg.yaw_rad) else along
-        motion.steer(ctx, self._wanted_yaw(ctx, held), leg.target)
+        motion.steer(ctx, self._wanted_yaw(ctx, held), leg.target, turn=self._turning)
         motion.write(ctx)
 
 

@@ -17,7 +17,7 @@ from autopilot_bridge.flight.trajectory import (
     SPEED_UP,
     TrajectoryGenerator,
 )
-from autopilot_bridge.flight.yaw import YawSteering
+from autopilot_bridge.flight.yaw import Turn, YawSteering
 from autopilot_bridge.navigation import layout as nav_layout
 
 _CONTINUE_WITHIN_M: Final = 2.0  # a running trajectory this close to the vehicle is taken over as it is
@@ -164,12 +164,16 @@ class SmoothMotion:
         yaw_rad: float,
         target_ned_m: Array | None = None,
         yaw_rate_rad_s: float = 0.0,
+        turn: Turn | None = None,
     ) -> None:
-        """One tick of the heading: to `yaw_rad`, or by the vehicle's yaw behaviour where that is NaN; to the
-        region of interest before either, where the nose is on it.
+        """One tick of the heading: to `yaw_rad`; where that is NaN, by a commanded turn, or else by the
+        vehicle's yaw behaviour; to the region of interest before all, where the nose is on it.
 
         `yaw_rate_rad_s` is the rate at which the wanted heading turns itself.
         """
+        if turn is not None and math.isnan(yaw_rad) and not ctx.nose_on_roi:
+            self.heading.follow(turn, ctx.multicopter, ctx.dt_s)
+            return
         wanted = yaw_rad
         if ctx.nose_on_roi:
             looked_at = roi_heading(ctx)

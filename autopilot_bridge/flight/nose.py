@@ -4,7 +4,7 @@ import math
 
 from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.flight.yaw import YawSteering
+from autopilot_bridge.flight.yaw import Turn, YawSteering
 
 
 class Nose:
@@ -15,16 +15,19 @@ class Nose:
     def __init__(self) -> None:
         self._heading = YawSteering()
 
-    def point(self, ctx: FlightContext, yaw_rad: float) -> None:
-        """Turn towards a heading; NaN leaves the task's own."""
+    def point(self, ctx: FlightContext, yaw_rad: float, turn: Turn | None = None) -> None:
+        """Turn towards a heading; where that is NaN, as commanded; without a turn the task's own stays."""
         setpoint = ctx.setpoint
         if setpoint[sp.LEVEL] != sp.TRAJECTORY:
             return
-        if math.isnan(yaw_rad):
+        if math.isnan(yaw_rad) and turn is None:
             yaw, rate = float(setpoint[sp.YAW_RAD]), float(setpoint[sp.YAW_RATE_RAD_S])
             if math.isfinite(yaw):
                 self._heading.reset(yaw, rate if math.isfinite(rate) else 0.0)
             return
-        self._heading.turn_to(yaw_rad, ctx.multicopter, ctx.dt_s)
+        if turn is not None and math.isnan(yaw_rad):
+            self._heading.follow(turn, ctx.multicopter, ctx.dt_s)
+        else:
+            self._heading.turn_to(yaw_rad, ctx.multicopter, ctx.dt_s)
         setpoint[sp.YAW_RAD] = self._heading.yaw_rad
         setpoint[sp.YAW_RATE_RAD_S] = self._heading.rate_rad_s

@@ -5,11 +5,59 @@ import math
 from autopilot_bridge.flight.parameters import FlightParameters
 
 _GAIN_1_S = 2.0
+_TURNED_RAD = math.radians(1.0)
 
 
 def wrap_pi(angle_rad: float) -> float:
     """Angle wrapped to [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
+
+
+class Turn:
+    """A commanded turn with its direction and rate (CONDITION_YAW); afterwards the heading is held.
+
+    Args:
+        angle_rad: heading to turn to; with `relative` the angle to turn by.
+        direction: positive clockwise, negative counter-clockwise, 0: the shorter way (relative: clockwise).
+        rate_max_rad_s: None: the vehicle's own limit.
+        relative: turn by the angle, not to it.
+    """
+
+    __slots__ = ("_angle_rad", "_direction", "_left_rad", "_relative", "rate_max_rad_s")
+
+    def __init__(
+        self,
+        angle_rad: float,
+        *,
+        direction: int = 0,
+        rate_max_rad_s: float | None = None,
+        relative: bool = False,
+    ) -> None:
+        self._angle_rad = angle_rad
+        self._direction = direction
+        self._relative = relative
+        self._left_rad = math.nan
+        self.rate_max_rad_s = rate_max_rad_s
+
+    def left_rad(self, heading_rad: float) -> float:
+        """The angle still to turn by from a heading, positive clockwise; fixed at the first call."""
+        if math.isnan(self._left_rad):
+            if self._relative:
+                self._left_rad = math.copysign(self._angle_rad, -1.0 if self._direction < 0 else 1.0)
+            else:
+                self._left_rad = wrap_pi(self._angle_rad - heading_rad)
+                if self._direction * self._left_rad < 0.0:
+                    self._left_rad += math.copysign(2.0 * math.pi, self._direction)
+        return self._left_rad
+
+    def advance(self, turned_rad: float) -> None:
+        """The heading has turned."""
+        self._left_rad -= turned_rad
+
+    @property
+    def done(self) -> bool:
+        """The wanted heading is reached."""
+        return abs(self._left_rad) < _TURNED_RAD
 
 
 class YawSteering:
@@ -41,14 +89,20 @@ class YawSteering:
     ) -> None:
         """One tick of the shorter way to `target_rad`, which turns at a rate itself; NaN stops the turn."""
         rate_max = parameters.yaw_rate_max_rad_s if rate_max_rad_s is None else rate_max_rad_s
-        acc = parameters.yaw_acceleration_rad_s2
         wanted = 0.0
         if math.isfinite(target_rad):
-            error = wrap_pi(target_rad - self.yaw_rad)
-            size = min(rate_max, _GAIN_1_S * abs(error), math.sqrt(1.6 * acc * abs(error)))
-            wanted = target_rate_rad_s + math.copysign(size, error)
+            wanted = target_rate_rad_s + _rate(wrap_pi(target_rad - self.yaw_rad), rate_max, parameters)
             wanted = min(rate_max, max(-rate_max, wanted))
         self.turn(wanted, parameters, dt_s)
+
+    def follow(self, turn: Turn, parameters: FlightParameters, dt_s: float) -> None:
+        """One tick of a commanded turn."""
+        rate_max = parameters.yaw_rate_max_rad_s
+        if turn.rate_max_rad_s is not None:
+            rate_max = min(rate_max, turn.rate_max_rad_s)
+        before = self.yaw_rad
+        self.turn(_rate(turn.left_rad(before), rate_max, parameters), parameters, dt_s)
+        turn.advance(wrap_pi(self.yaw_rad - before))
 
     def turn(self, rate_rad_s: float, parameters: FlightParameters, dt_s: float) -> None:
         """One tick towards a rate."""
@@ -56,3 +110,10 @@ class YawSteering:
         before = self.rate_rad_s
         self.rate_rad_s += min(step, max(-step, rate_rad_s - before))
         self.yaw_rad = wrap_pi(self.yaw_rad + 0.5 * (before + self.rate_rad_s) * dt_s)
+
+
+def _rate(error_rad: float, rate_max_rad_s: float, parameters: FlightParameters) -> float:
+    """Rate at which an angle is turned, slowing down towards its end."""
+    size = abs(error_rad)
+    braking = math.sqrt(1.6 * parameters.yaw_acceleration_rad_s2 * size)
+    return math.copysign(min(rate_max_rad_s, _GAIN_1_S * size, braking), error_rad)

@@ -8,6 +8,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.flavours import ardupilot_modes
+from autopilot_bridge.flight.yaw import Turn
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_ardupilot import ArduPilotCommands
@@ -49,14 +50,17 @@ class ArduCopterCommands(ArduPilotCommands):
         return Result.ACCEPTED
 
     def turn(self, command: Command, source: Source) -> Result:
-        """CONDITION_YAW: p1 deg, p2 deg/s, p3 direction, p4 1 = relative."""
+        """CONDITION_YAW: p1 deg, p2 deg/s (0: ATC_SLEW_YAW), p3 direction, p4 1 = relative."""
         if not 0.0 <= command.p1 <= 360.0 or command.p4 not in (0.0, 1.0):
             return Result.FAILED
-        direction = whole(command.p3, 0) or 0
-        yaw_rad = math.radians(command.p1)
-        if command.p4 == 1.0:
-            yaw_rad = self.heading_rad() + (-yaw_rad if direction < 0 else yaw_rad)
-        self.commander.guidance.turn(yaw_rad)
+        self.commander.guidance.turn(
+            Turn(
+                math.radians(command.p1),
+                direction=whole(command.p3, 0) or 0,
+                rate_max_rad_s=math.radians(command.p2) if command.p2 > 0.0 else None,
+                relative=command.p4 == 1.0,
+            )
+        )
         return Result.ACCEPTED
 
     def pause_continue(self, command: Command, source: Source) -> Result:

@@ -52,6 +52,7 @@ class ArduPilotCommands(CommandHandlers):
             mavlink.MAV_CMD_DO_SET_HOME: self.set_home,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.terminate,
             mavlink.MAV_CMD_DO_SET_SERVO: self.set_servo,
+            mavlink.MAV_CMD_DO_SEND_BANNER: self.send_banner,
         }
 
     @abstractmethod
@@ -176,6 +177,11 @@ class ArduPilotCommands(CommandHandlers):
         channel = whole(command.p1)
         if channel is None or not _FIRST_FREE_SERVO <= channel <= _SERVO_CHANNELS:
             return Result.FAILED
+        return Result.ACCEPTED
+
+    def send_banner(self, command: Command, source: Source) -> Result:
+        """DO_SEND_BANNER: the texts of the firmware's version, on the channel that asks."""
+        self.hooks.banner(source.channel)
         return Result.ACCEPTED
 
     def fail(self, command: Command, source: Source) -> Result:

@@ -16,9 +16,8 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import CommandDenied
 from autopilot_bridge.commander.verdict import Reason, Result
 from autopilot_bridge.mission_wire import UNSET_INT
-from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, Channel, MavlinkMessage, Source
 
 FORCE_NUMBER: Final = 21196
 _LOCAL_FRAMES: Final = frozenset(
@@ -121,6 +120,7 @@ class CommandHooks:
         intervals: message rates and requests.
         parameters: the parameter store (fence switch, reset to defaults).
         announce: sends a STATUSTEXT.
+        banner: sends the texts that say which firmware this is, on one channel.
         set_current_item: goes on from another mission item; False refuses.
         mission_item_count: stored items.
         inject_failure: switches sensor failures; None: this vehicle has none.
@@ -129,6 +129,7 @@ class CommandHooks:
     intervals: MessageIntervals
     parameters: ParameterStore
     announce: Announce
+    banner: Callable[[Channel], None]
     set_current_item: Callable[[int], bool]
     mission_item_count: Callable[[], int]
     inject_failure: FailureHook | None = None
@@ -268,10 +269,6 @@ class CommandHandlers(ABC):
             return math.nan
         reference_down_m = float(context.home_ned_m[2]) if relative else context.frame.origin.alt_m
         return reference_down_m - altitude_m
-
-    def heading_rad(self) -> float:
-        """The vehicle's heading."""
-        return float(self.commander.context.nav[nav.EULER_RAD][2])
 
 
 def on_earth(command: Command) -> bool:

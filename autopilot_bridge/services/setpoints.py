@@ -253,7 +253,7 @@ class ArduCopterSetpoints:
         elif target.has_acceleration and not target.has_position:
             guided.set_acceleration(context, target.acceleration, yaw_rad=yaw, yaw_rate_rad_s=yaw_rate)
         elif target.has_position:
-            self.commander.guidance.go_to(guided, target.position, yaw_rad=yaw)
+            self.commander.guidance.go_to(guided, target.position, yaw_rad=yaw, yaw_rate_rad_s=yaw_rate)
         else:
             guided.set_hold(context)
 

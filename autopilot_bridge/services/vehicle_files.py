@@ -4,6 +4,7 @@ from autopilot_bridge.flavours.card_layout import CARD_LAYOUTS
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services import packed_parameters
 from autopilot_bridge.services.component_metadata import MOUNT, ComponentMetadataService
+from autopilot_bridge.services.counters import Counters
 from autopilot_bridge.services.events import EventService
 from autopilot_bridge.services.file_transfer import FileTransferService
 from autopilot_bridge.services.log_book import LogBook
@@ -46,6 +47,7 @@ def vehicle_files(parts: AutopilotParts) -> tuple[Microservice, ...]:
     else:
         places["@PARAM",] = _packed_parameters(parts.parameters)
         places["@MISSION",] = plan_files(parts.stores)
+        told = (Counters(parts),)
     files = FileTransferService(MountTable(places))
     logs = LogTransferService(
         book,

@@ -16,6 +16,7 @@ from flightsim.sensors import SensorSuite
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.sensors.faults import UnsupportedFaultError
 from flightsim.vehicle import Vehicle
+from flightsim.wind_profile import WindLaw, WindProfile
 
 Fault = tuple[FaultType, dict[str, Any]]
 
@@ -24,6 +25,9 @@ _PASCALS_PER_METRE: Final = -12.0
 _FIX_SATELLITES: Final = 4
 _FULL_VOLTAGE: Final = 12.6  # SIM_BATT_VOLTAGE of ArduPilot's own battery
 _MAX_WIND_M_S: Final = 60.0
+_WIND_OVER_HEIGHT: Final = ("SIM_WIND_T", "SIM_WIND_T_ALT", "SIM_WIND_T_COEF")
+_SQUARE_ROOT: Final = 0.0  # of SIM_WIND_T
+_LINEAR: Final = 2.0
 _W20_PER_TURBULENCE: Final = 5.0  # MIL-F-8785C near the ground: along the wind about a fifth of W20
 
 
@@ -81,11 +85,19 @@ class SimulatorParameters:
         else:
             self._weaken_motors(*wanted)
 
-    def _blow(self, speed_m_s: float, from_deg: float, rising_deg: float, turbulence_m_s: float) -> None:
+    def _blow(
+        self,
+        speed_m_s: float,
+        from_deg: float,
+        rising_deg: float,
+        turbulence_m_s: float,
+        *over_height: float,
+    ) -> None:
         to_rad, up_rad = math.radians(from_deg) + math.pi, math.radians(rising_deg)
         level_m_s = speed_m_s * math.cos(up_rad)
         self._vehicle.set_wind(
             (level_m_s * math.cos(to_rad), level_m_s * math.sin(to_rad), -speed_m_s * math.sin(up_rad)),
+            profile=_profile(speed_m_s, *over_height),
             wind_at_20_ft_m_s=_W20_PER_TURBULENCE * turbulence_m_s,
         )
 
@@ -160,7 +172,23 @@ class SimulatorParameters:
             number(store, "SIM_WIND_DIR", 180.0),
             clamp(number(store, "SIM_WIND_DIR_Z", 0.0), -90.0, 90.0),
             clamp(number(store, "SIM_WIND_TURB", 0.0), 0.0, 10.0),
+            number(store, "SIM_WIND_T", 0.0),
+            clamp(number(store, "SIM_WIND_T_ALT", 60.0), 1.0, 1000.0),
+            clamp(number(store, "SIM_WIND_T_COEF", 0.01), -1.0, 1.0),
         )
+
+
+def _profile(speed_m_s: float, law: float, height_m: float, gradient_1_s: float) -> WindProfile:
+    """Wind over height by SIM_WIND_T of ArduPilot 4.6.3.
+
+    0: it grows with the square root of height up to SIM_WIND_T_ALT; 2: linearly; otherwise it is the same.
+    """
+    if law == _SQUARE_ROOT:
+        return WindProfile(law=WindLaw.POWER, exponent=0.5, reference_height_m=height_m, top_m=height_m)
+    if law == _LINEAR and speed_m_s > 0.0:
+        gradient_1_m = clamp(gradient_1_s / speed_m_s, -10.0, 10.0)
+        return WindProfile(law=WindLaw.LINEAR, gradient_1_m=gradient_1_m, reference_height_m=height_m)
+    return WindProfile()
 
 
 def _biased(store: ParameterStore, prefix: str) -> Fault:
@@ -195,7 +223,7 @@ _GROUPS: Final[Mapping[Group, tuple[str, ...]]] = {
     _P._battery: ("SIM_BATT_VOLTAGE",),
     _P._motors: ("SIM_ENGINE_FAIL", "SIM_ENGINE_MUL"),
     _P._radio: ("SIM_RC_FAIL",),
-    _P._wind: ("SIM_WIND_SPD", "SIM_WIND_DIR", "SIM_WIND_DIR_Z", "SIM_WIND_TURB"),
+    _P._wind: ("SIM_WIND_SPD", "SIM_WIND_DIR", "SIM_WIND_DIR_Z", "SIM_WIND_TURB", *_WIND_OVER_HEIGHT),
 }
 _GROUP_OF: Final = {name: group for group, names in _GROUPS.items() for name in names}
 _UNITS: Final = {

@@ -102,6 +102,7 @@ class SitlVehicle:
             power=self._on_power,
         )
         self._epoch_us = configuration.unix_epoch_us
+        self._starts_again = flavour.reboot_starts_again
         self._boot_us = 0
         self._power: PowerAction | None = None
         self._power_us = NEVER_US  # when it goes down, or boots
@@ -182,12 +183,15 @@ class SitlVehicle:
             self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us + time_us)
             self._actuators = self.autopilot.actuators
             self.links.restart(self.autopilot)
-            if self._crew is not None:
+            if self._crew is not None or (self._starts_again and self.vehicle.launcher is not None):
                 self._crew = self._crew_of(self.autopilot.commander)
             return
         again = self._power is PowerAction.REBOOT
         self._boot_us = self._power_us = time_us + REBOOT_US if again else NEVER_US
         self._power = None
+        if again and self._starts_again:
+            self.vehicle.reset()
+            self.crashed = False
         self._actuators = np.zeros_like(self._actuators)
         self.autopilot.close()
         self.links.restart(None)

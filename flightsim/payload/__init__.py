@@ -15,6 +15,7 @@ from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
 from flightsim.payload.main_field import MainField
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
+from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
 from flightsim.payload.survey_magnetometer import (
     MagneticReading,
     SurveyMagnetometer,
@@ -65,11 +66,14 @@ __all__ = [
     "Static",
     "SurveyMagnetometer",
     "SurveyMagnetometerParameters",
+    "SurveyParameters",
     "SyntheticMapParameters",
     "TargetMotion",
     "TargetView",
     "Trajectory",
     "camera_from_gimbal",
     "gimbal_from_camera",
+    "surveyed",
     "synthetic_map",
+    "truth_behind",
 ]

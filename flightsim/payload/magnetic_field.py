@@ -1,4 +1,4 @@
-"""The magnetic field as it is: the map that was surveyed once, and the targets that have come since."""
+"""The magnetic field as it is: geology and main field on a grid, and the targets."""
 
 from collections.abc import Sequence
 
@@ -13,47 +13,47 @@ Array = NDArray[np.float64]
 
 
 class MagneticField:
-    """Total field at any place: map and signatures.
+    """Total field at any place: the true background and signatures.
 
-    The published map (a file, see `MagneticMap.save`) is this field without the signatures. So on the map,
-    reading - map is what the targets add, and noise. Beyond the map's edges and in its holes the field goes
+    What a mission knows is a published map, `survey.surveyed` of the background, so reading - map is what the
+    targets add, noise, and the error of the survey. Beyond the grid's edges and in its holes the field goes
     on as at the nearest data, so that a magnetometer reads something everywhere.
 
     Attributes:
-        published: the map.
+        home: origin of the frame.
         signatures: the targets.
     """
 
-    __slots__ = ("_axes", "_background", "_field_ned_nt", "published", "signatures")
+    __slots__ = ("_axes", "_background", "_field_ned_nt", "home", "signatures")
 
     def __init__(
         self,
-        published: MagneticMap,
+        background: MagneticMap,
         signatures: Sequence[Signature] = (),
         *,
         decimal_year: float = 2026.0,
     ) -> None:
-        """Put the targets onto the map.
+        """Put the targets into the field.
 
         Args:
-            published: the map.
+            background: the true field without them.
             signatures: the targets.
             decimal_year: date of the main field, which gives the direction.
 
         Raises:
-            MagneticMapError: a target outside the map.
+            MagneticMapError: a target outside the grid.
         """
         for number, signature in enumerate(signatures, 1):
-            published.require_inside(f"target {number}", signature.north_m, signature.east_m)
-        self.published = published
+            background.require_inside(f"target {number}", signature.north_m, signature.east_m)
+        self.home = background.home
         self.signatures = tuple(signatures)
-        self._background = published.without_holes()
-        row_step_m, column_step_m = published.spacing_m
+        self._background = background.without_holes()
+        row_step_m, column_step_m = background.spacing_m
         self._axes = (
-            (float(published.north_m[0]), row_step_m, published.north_m.size - 1.0),
-            (float(published.east_m[0]), column_step_m, published.east_m.size - 1.0),
+            (float(background.north_m[0]), row_step_m, background.north_m.size - 1.0),
+            (float(background.east_m[0]), column_step_m, background.east_m.size - 1.0),
         )
-        main = MainField(published.home, decimal_year)
+        main = MainField(background.home, decimal_year)
         self._field_ned_nt: Array = main.total_nt * main.direction_ned
 
     def total_nt(self, north_m: float, east_m: float, height_m: float) -> float:

@@ -9,6 +9,8 @@ The file is a numpy `.npz` archive that needs nothing of this package to be read
     vertical_gradient_nt_m  (rows, columns) change of the total field with height, upwards; absent: not known
     height_m                height above home that the map is valid at
     home_lat_deg, home_lon_deg, home_alt_m   the home whose local frame it is in
+    error_nt                stated standard deviation of total_field_nt; absent: not stated
+    line_spacing_m          distance of the survey's lines, across which the error changes; absent: not stated
 
 Between grid points it is interpolated bilinearly in both arrays. A reading at a height h compares with
 total_field_nt + vertical_gradient_nt_m * (h - height_m).
@@ -18,7 +20,7 @@ import math
 import tokenize
 import zipfile
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -36,6 +38,7 @@ _UNREADABLE: Final = (
     *(OSError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError),
     *(ValueError, TypeError, SyntaxError, tokenize.TokenError),
 )
+_STATED: Final = ("error_nt", "line_spacing_m")
 _CSV_HEADER: Final = "north_m,east_m,total_field_nt"
 
 
@@ -53,6 +56,8 @@ class MagneticMap:
         vertical_gradient_nt_m: (rows, columns) upward derivative; None: not known, taken as zero.
         height_m: above home, what the map is valid at.
         home: origin of its frame.
+        error_nt: standard deviation of `total_field_nt` as the survey states it; None: not stated.
+        line_spacing_m: distance of the survey's lines; None: not stated.
     """
 
     north_m: Array
@@ -61,6 +66,8 @@ class MagneticMap:
     height_m: float
     home: Home
     vertical_gradient_nt_m: Array | None = None
+    error_nt: float | None = None
+    line_spacing_m: float | None = None
 
     def __post_init__(self) -> None:
         for name, lines in (("north_m", self.north_m), ("east_m", self.east_m)):
@@ -90,6 +97,9 @@ class MagneticMap:
             )
         if not math.isfinite(self.height_m):
             raise MagneticMapError(f"height_m = {self.height_m} of a magnetic map is not finite")
+        for name, value in (("error_nt", self.error_nt), ("line_spacing_m", self.line_spacing_m)):
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise MagneticMapError(f"{name} = {value} of a magnetic map is not accepted: more than 0 is")
 
     @property
     def spacing_m(self) -> tuple[float, float]:
@@ -154,13 +164,10 @@ class MagneticMap:
         if np.all(np.isfinite(self.total_field_nt)):
             return self
         gradient = self.vertical_gradient_nt_m
-        return MagneticMap(
-            north_m=self.north_m,
-            east_m=self.east_m,
+        return replace(
+            self,
             total_field_nt=_fill(self.total_field_nt),
             vertical_gradient_nt_m=None if gradient is None else _fill(gradient),
-            height_m=self.height_m,
-            home=self.home,
         )
 
     def save(self, path: Path) -> None:
@@ -177,6 +184,9 @@ class MagneticMap:
         }
         if self.vertical_gradient_nt_m is not None:
             contents["vertical_gradient_nt_m"] = self.vertical_gradient_nt_m
+        for name in _STATED:
+            if getattr(self, name) is not None:
+                contents[name] = getattr(self, name)
         # Like numpy.savez_compressed, but without the time of day: the same map gives the same bytes.
         with zipfile.ZipFile(path, "w", compression=zipfile.ZIP_DEFLATED) as archive:
             for name, value in contents.items():
@@ -219,6 +229,7 @@ class MagneticMap:
                 total_field_nt=found["total_field_nt"].astype(np.float64),
                 vertical_gradient_nt_m=None if gradient is None else gradient.astype(np.float64),
                 height_m=float(found["height_m"]),
+                **{name: float(found[name]) for name in _STATED if name in found},
                 home=Home(
                     lat_deg=float(found["home_lat_deg"]),
                     lon_deg=float(found["home_lon_deg"]),

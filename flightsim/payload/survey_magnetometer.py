@@ -120,7 +120,7 @@ class SurveyMagnetometer:
         self._countdown = 0
         self._truth = truth
         self._field = field
-        self._home_frame = HomeFrame(field.published.home)
+        self._home_frame = HomeFrame(field.home)
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._permanent_nt: Array = p.heading_error_nt * self._rng.standard_normal(3)
         self._drift_nt = p.drift_nt * float(self._rng.standard_normal())

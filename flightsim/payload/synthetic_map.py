@@ -34,6 +34,8 @@ class SyntheticMapParameters:
         anomaly_nt: root mean square of the anomaly.
         source_depth_m: of the rock below the survey height.
         spectral_exponent: b above; 3 is common for crust.
+        shallow_anomaly_nt, shallow_depth_m: a second layer, of the ground itself: what lies between the
+            lines of a survey and is not on its map.
     """
 
     south_m: float = -2000.0
@@ -45,6 +47,8 @@ class SyntheticMapParameters:
     anomaly_nt: float = 60.0
     source_depth_m: float = 500.0
     spectral_exponent: float = 3.0
+    shallow_anomaly_nt: float = 3.0
+    shallow_depth_m: float = 100.0
 
     def __post_init__(self) -> None:
         require_finite(
@@ -55,6 +59,8 @@ class SyntheticMapParameters:
             height_m=self.height_m,
         )
         require_positive(spacing_m=self.spacing_m, source_depth_m=self.source_depth_m)
+        require_positive(shallow_depth_m=self.shallow_depth_m)
+        require_not_negative(shallow_anomaly_nt=self.shallow_anomaly_nt)
         require_not_negative(anomaly_nt=self.anomaly_nt, spectral_exponent=self.spectral_exponent)
         for low, high, names in (
             (self.south_m, self.north_m, "south_m and north_m"),
@@ -96,23 +102,17 @@ def synthetic_map(
         decimal_year: date of the main field (WMM-2025).
     """
     p = parameters
-    rows, columns = p.shape
     rng = np.random.Generator(np.random.PCG64(seed))
-    # A field made by Fourier transform repeats itself; of twice the size only a quarter is shown.
-    noise = np.fft.rfft2(rng.standard_normal((2 * rows, 2 * columns)))
-    k_north = 2.0 * math.pi * np.fft.fftfreq(2 * rows, p.spacing_m)
-    k_east = 2.0 * math.pi * np.fft.rfftfreq(2 * columns, p.spacing_m)
-    k = np.hypot(k_north[:, None], k_east[None, :])
-    k[0, 0] = np.inf  # no mean: that is the main field's
-    spectrum = noise * k ** (-0.5 * p.spectral_exponent) * np.exp(-np.minimum(k, 1e9) * p.source_depth_m)
-    spectrum[0, 0] = 0.0
-    k[0, 0] = 0.0
-    size = (2 * rows, 2 * columns)
-    anomaly: Array = np.fft.irfft2(spectrum, s=size)[:rows, :columns]
-    gradient: Array = np.fft.irfft2(-k * spectrum, s=size)[:rows, :columns]
-    anomaly = anomaly - anomaly.mean()
-    scale = p.anomaly_nt / float(np.sqrt(np.mean(anomaly**2)))
+    layers = [
+        _layer(p, rng, amplitude_nt, depth_m)
+        for amplitude_nt, depth_m in (
+            (p.anomaly_nt, p.source_depth_m),
+            (p.shallow_anomaly_nt, p.shallow_depth_m),
+        )
+    ]
+    anomaly, gradient = (np.sum(parts, axis=0) for parts in zip(*layers, strict=True))
 
+    rows, columns = p.shape
     main = MainField(home, decimal_year)
     north_m: Array = p.south_m + p.spacing_m * np.arange(rows, dtype=np.float64)
     east_m: Array = p.west_m + p.spacing_m * np.arange(columns, dtype=np.float64)
@@ -120,8 +120,30 @@ def synthetic_map(
     return MagneticMap(
         north_m=north_m,
         east_m=east_m,
-        total_field_nt=main_nt + scale * anomaly,
-        vertical_gradient_nt_m=main.gradient_up_nt_m + scale * gradient,
+        total_field_nt=main_nt + anomaly,
+        vertical_gradient_nt_m=main.gradient_up_nt_m + gradient,
         height_m=p.height_m,
         home=home,
     )
+
+
+def _layer(
+    p: SyntheticMapParameters, rng: np.random.Generator, amplitude_nt: float, depth_m: float
+) -> tuple[Array, Array]:
+    """Anomaly of one layer, without a mean, and its upward derivative."""
+    rows, columns = p.shape
+    # A field made by Fourier transform repeats itself; of twice the size only a quarter is shown.
+    noise = np.fft.rfft2(rng.standard_normal((2 * rows, 2 * columns)))
+    k_north = 2.0 * math.pi * np.fft.fftfreq(2 * rows, p.spacing_m)
+    k_east = 2.0 * math.pi * np.fft.rfftfreq(2 * columns, p.spacing_m)
+    k = np.hypot(k_north[:, None], k_east[None, :])
+    k[0, 0] = np.inf  # no mean: that is the main field's
+    spectrum = noise * k ** (-0.5 * p.spectral_exponent) * np.exp(-np.minimum(k, 1e9) * depth_m)
+    spectrum[0, 0] = 0.0
+    k[0, 0] = 0.0
+    size = (2 * rows, 2 * columns)
+    anomaly: Array = np.fft.irfft2(spectrum, s=size)[:rows, :columns]
+    gradient: Array = np.fft.irfft2(-k * spectrum, s=size)[:rows, :columns]
+    anomaly = anomaly - anomaly.mean()
+    scale = amplitude_nt / float(np.sqrt(np.mean(anomaly**2)))
+    return scale * anomaly, scale * gradient

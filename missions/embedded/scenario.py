@@ -14,17 +14,23 @@ from flightsim.payload import (
     CameraParameters,
     Circle,
     ConstantVelocity,
+    DipoleSignature,
     GaussianSignature,
     GimbalParameters,
     GroundTargetParameters,
     MagneticField,
     MagneticMap,
+    MainField,
     PayloadParameters,
     RandomWalk,
+    Signature,
     Static,
     SurveyMagnetometerParameters,
+    SurveyParameters,
     SyntheticMapParameters,
+    surveyed,
     synthetic_map,
+    truth_behind,
 )
 from flightsim.payload import TargetMotion as Motion
 from flightsim.random_streams import RandomStreams
@@ -74,7 +80,8 @@ def targets_of(scenario: Scenario) -> tuple[GroundTargetParameters, ...]:
 def magnetic_field_of(
     scenario: Scenario, *, home: Home, seed: int, decimal_year: float
 ) -> MagneticField | None:
-    """The field that magnetometers measure; a map that is made is published where the scenario says.
+    """The field that magnetometers measure; a survey of a field that is made is published where the
+    scenario says.
 
     Raises:
         ValueError: an unusable map, or a target outside it.
@@ -83,15 +90,27 @@ def magnetic_field_of(
     survey = scenario.survey
     if survey is None:
         return None
+    stream = RandomStreams(seed).child("magnetic_survey")
     if survey.map_path is not None:
         published = MagneticMap.load(survey.map_path)
         _require_here(published, survey.map_path, home)
+        truth = truth_behind(published, SurveyParameters(), seed=stream)
     else:
-        published = _made_map(survey, home, seed, decimal_year)
+        truth = _made_field(survey, home, seed, decimal_year)
         if survey.publish_to is not None:
-            _publish(published, survey.publish_to)
-    signatures = []
-    if survey.target_ne_m is not None:
+            _publish(surveyed(truth, SurveyParameters(), seed=stream), survey.publish_to)
+    signatures: list[Signature] = []
+    if survey.target_ne_m is not None and survey.moment_a_m2 is not None:
+        moment = survey.moment_a_m2 * MainField(truth.home, decimal_year).direction_ned
+        signatures.append(
+            DipoleSignature(
+                north_m=survey.target_ne_m[0],
+                east_m=survey.target_ne_m[1],
+                height_m=-survey.depth_m,
+                moment_ned_a_m2=tuple(moment.tolist()),
+            )
+        )
+    elif survey.target_ne_m is not None:
         signatures.append(
             GaussianSignature(
                 north_m=survey.target_ne_m[0],
@@ -102,7 +121,7 @@ def magnetic_field_of(
                 heading_rad=survey.orientation_rad,
             )
         )
-    return MagneticField(published, signatures, decimal_year=decimal_year)
+    return MagneticField(truth, signatures, decimal_year=decimal_year)
 
 
 def _publish(made: MagneticMap, path: Path) -> None:
@@ -135,7 +154,7 @@ def _require_here(published: MagneticMap, path: Path, home: Home) -> None:
         )
 
 
-def _made_map(survey: SurveyScenario, home: Home, seed: int, decimal_year: float) -> MagneticMap:
+def _made_field(survey: SurveyScenario, home: Home, seed: int, decimal_year: float) -> MagneticMap:
     half_n_m, half_e_m = 0.5 * survey.height_m, 0.5 * survey.width_m
     return synthetic_map(
         SyntheticMapParameters(

@@ -12,7 +12,10 @@ from autopilot_bridge.sitl.configuration import HOMES
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
+from flightsim.vehicle import VehicleDivergedError
+from flightsim.wind_profile import WindLaw, WindProfile
 from missions.embedded.scenario import equipped
+from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.scenario import Scenario
 
@@ -31,7 +34,8 @@ class EmbeddedConfiguration:
         seed: one seed makes one flight.
         physics_rate_hz: steps per second of vehicle time.
         speedup: simulated seconds per wall second at most; None: as fast as the machine can.
-        wind_speed_m_s, wind_from_deg: steady wind.
+        wind_speed_m_s, wind_from_deg: mean wind, at 10 m above ground.
+        wind_profile: law of the wind over height, a `flightsim.wind_profile.WindLaw`.
         turbulence: "none", "light", "moderate" or "severe".
         parameters: autopilot parameters that differ from the flavour's defaults.
         home: "lat,lon,alt[,heading]"; None: where the flavour's own SITL stands.
@@ -48,6 +52,7 @@ class EmbeddedConfiguration:
     speedup: float | None = None
     wind_speed_m_s: float = 0.0
     wind_from_deg: float = 0.0
+    wind_profile: str = "log"
     turbulence: str = "none"
     parameters: Mapping[str, float] = field(default_factory=dict)
     home: str | None = None
@@ -85,6 +90,7 @@ class EmbeddedSitl:
         environment = Environment.from_wind(
             speed_m_s=configuration.wind_speed_m_s,
             from_deg=configuration.wind_from_deg,
+            profile=WindProfile(law=WindLaw(configuration.wind_profile)),
             turbulence=configuration.turbulence,
         )
         world = SitlConfiguration(
@@ -97,8 +103,15 @@ class EmbeddedSitl:
         self.sitl = Sitl(equipped(world, configuration.scenario))
         self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
         sitl = self.sitl
+
+        def advance() -> None:
+            try:
+                sitl.advance()
+            except VehicleDivergedError as error:
+                raise MissionError(f"the simulation ended: {error}") from error
+
         self.loop = VirtualTimeLoop(
-            sitl.advance,
+            advance,
             lambda: sitl.time_us,
             speedup=configuration.speedup,
             max_time_us=round(configuration.max_flight_s * 1e6),

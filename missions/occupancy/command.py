@@ -35,6 +35,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         detection_range_m=given["detection_range"],
         threshold_nt=given["threshold"],
         noise_nt=given["noise"],
+        map_error_nt=given["map_error"],
         confirmations=given["confirmations"],
         raise_radius_m=given["raise_radius"],
         search_time_s=given["search_time"],
@@ -44,6 +45,8 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         amplitude_nt=given["amplitude"],
         sigma_along_m=along_m,
         sigma_across_m=across_m,
+        moment_a_m2=given["moment"],
+        depth_m=given["depth"],
     )
 
 
@@ -86,6 +89,11 @@ COMMAND: Final = MissionCommand(
         ),
         option("--threshold", type=float, default=3.0, help="Reading less map beyond it is an anomaly, nT."),
         option("--noise", type=float, default=0.5, help="Of reading less map, one sigma, nT."),
+        option(
+            "--map-error",
+            type=float,
+            help="Of the published map, one sigma, nT. [default: as the map states it, else 1]",
+        ),
         option("--confirmations", type=int, default=2, help="Passes that must see an anomaly at one place."),
         option("--raise-radius", type=float, default=300.0, help="Scores are raised around anomalies, m."),
         option("--search-time", type=float, default=900.0, help="Give up after so many seconds."),
@@ -116,6 +124,19 @@ COMMAND: Final = MissionCommand(
             help="Of that target's anomaly, nT.",
         ),
         option(
+            "--moment",
+            scope=Scope.EMBEDDED,
+            type=float,
+            help="Dipole moment of that target, A m2, along the Earth's field, in place of a Gaussian.",
+        ),
+        option(
+            "--depth",
+            scope=Scope.EMBEDDED,
+            type=float,
+            default=10.0,
+            help="Of a target with a moment, below home, m.",
+        ),
+        option(
             "--sigma", scope=Scope.EMBEDDED, default="80x60", help="Its extent, m: one sigma along x across."
         ),
     ),
@@ -126,6 +147,9 @@ COMMAND: Final = MissionCommand(
             "area": ("area_ne_m",),
             "threshold": ("threshold_nt",),
             "noise": ("noise_nt",),
+            "map_error": ("map_error_nt",),
+            "moment": ("moment_a_m2",),
+            "depth": ("depth_m",),
             "rate": ("rate_hz",),
             "map": ("map_file",),
             "target": ("target_ne_m",),

@@ -4,6 +4,7 @@ Source: seed 003, sections III.C (an anomaly is what exceeds the noise) and IV.B
 """
 
 import math
+from collections import deque
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -11,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from missions.errors import PlanError
+from missions.occupancy.significance import LEAST_RATIO, signal_to_noise
 
 Array = NDArray[np.float64]
 
 _SQRT_2PI: Final = math.sqrt(2.0 * math.pi)
 _QUADRATURE: Final = np.polynomial.legendre.leggauss(8)
 _ENDS_AT: Final = 0.5  # of the threshold: noise about the threshold doesn't cut an anomaly in two
+_SIGMAS: Final = 3.0  # of map and noise together, below which no reading is beyond the threshold
+_POINT_M: Final = 10.0  # of track, over which readings are averaged for the test of a pass
+_PASS_POINTS: Final = 80
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,6 +79,25 @@ class DetectionModel:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MapError:
+    """What a published map states of its error.
+
+    Attributes:
+        sigma_nt: standard deviation; 0: the map is taken for the truth.
+        correlation_m: distance over which it is alike.
+    """
+
+    sigma_nt: float = 0.0
+    correlation_m: float = 100.0
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.sigma_nt) and self.sigma_nt >= 0.0):
+            raise PlanError(f"--map-error {self.sigma_nt:g} nT is not possible; ask for 0 or more")
+        if not (math.isfinite(self.correlation_m) and self.correlation_m > 0.0):
+            raise PlanError(f"the map's error is alike over {self.correlation_m:g} m; accepted: more than 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Anomaly:
     """A place where the field differs from the map by more than the threshold.
 
@@ -94,9 +118,11 @@ class Anomaly:
 
 
 class AnomalyDetector:
-    """Threshold on the differential measurement: reading less map.
+    """Threshold on the differential measurement, reading less map, and a test of the whole pass.
 
-    An anomaly begins beyond the threshold and ends below half of it. What differs slowly (bias of the
+    An anomaly begins beyond the threshold, or beyond what map and noise explain, if that is more, and ends
+    below half of it. Then all readings of the pass must show a bump that the map's error doesn't explain
+    (`significance`). What differs slowly (bias of the
     sensor, daily variation, a map that is off) is followed by a running level, which stands still
     meanwhile. What goes on for too long is no target but a level that is off: it is begun anew. Readings
     that aren't finite, or come late, are dropped and counted.
@@ -105,12 +131,15 @@ class AnomalyDetector:
         residual_nt: newest differential measurement, level removed; NaN before the first.
         anomalous: an anomaly is going on.
         dropped: readings that were no use.
+        insignificant: anomalies that may be errors of the map.
     """
 
     def __init__(
         self,
         *,
         threshold_nt: float,
+        noise_nt: float = 0.5,
+        map_error: MapError | None = None,
         least_samples: int = 2,
         level_time_s: float = 20.0,
         longest_s: float = 40.0,
@@ -119,6 +148,8 @@ class AnomalyDetector:
 
         Args:
             threshold_nt: what counts as an anomaly; several standard deviations of the noise.
+            noise_nt: standard deviation of a reading.
+            map_error: of the map; None: none.
             least_samples: readings beyond the threshold that make one; a single outlier is none.
             level_time_s: time constant of the running level.
             longest_s: a target is passed in less.
@@ -132,7 +163,12 @@ class AnomalyDetector:
             raise PlanError(f"{least_samples} samples make no anomaly; at least 1 is needed")
         self.residual_nt = math.nan
         self.dropped = 0
-        self._threshold_nt = threshold_nt
+        self.insignificant = 0
+        self._map_error = map_error or MapError()
+        self._noise_nt = noise_nt
+        unexplained_nt = _SIGMAS * math.hypot(noise_nt, self._map_error.sigma_nt)
+        self._threshold_nt = max(threshold_nt, unexplained_nt if self._map_error.sigma_nt else 0.0)
+        self._points: deque[list[float]] = deque(maxlen=_PASS_POINTS)  # sums of n, e, difference; count
         self._least_samples = least_samples
         self._level_time_us = level_time_s * 1e6
         self._longest_us = longest_s * 1e6
@@ -158,6 +194,7 @@ class AnomalyDetector:
         if time_us <= self._time_us or not math.isfinite(difference_nt + north_m + east_m):
             self.dropped += 1
             return None
+        self._add_point(north_m, east_m, difference_nt)
         if self._peak is not None and time_us - self._began_us > self._longest_us:
             self._peak, self._level_nt = None, math.nan
         if math.isnan(self._level_nt):
@@ -179,7 +216,37 @@ class AnomalyDetector:
         self._level_nt += residual_nt * min(1.0, elapsed_us / self._level_time_us)
         if ended is None or ended.samples < self._least_samples:
             return None
+        if not self._significant():
+            self.insignificant += 1
+            return None
         return replace(ended, profile=tuple(self._profile))
+
+    def _add_point(self, north_m: float, east_m: float, difference_nt: float) -> None:
+        """Take a reading into the pass: into its newest point, or a new one."""
+        if self._points:
+            newest = self._points[-1]
+            if math.hypot(north_m - newest[0] / newest[3], east_m - newest[1] / newest[3]) < _POINT_M:
+                for k, value in enumerate((north_m, east_m, difference_nt, 1.0)):
+                    newest[k] += value
+                return
+        self._points.append([north_m, east_m, difference_nt, 1.0])
+
+    def _significant(self) -> bool:
+        """Whether the pass shows more than the map's error."""
+        error = self._map_error
+        if error.sigma_nt == 0.0:
+            return True
+        sums = np.array(self._points)
+        places = sums[:, :3] / sums[:, 3:]
+        ratio = signal_to_noise(
+            places[:, 0],
+            places[:, 1],
+            places[:, 2],
+            noise_nt=self._noise_nt,
+            map_error_nt=error.sigma_nt,
+            correlation_m=error.correlation_m,
+        )
+        return ratio >= LEAST_RATIO
 
     def _grown(self, time_us: int, residual_nt: float, north_m: float, east_m: float) -> Anomaly:
         """The anomaly that goes on, with one more reading."""

@@ -45,6 +45,7 @@ def search_figures(
         "least_separation_m": _rounded(
             least_separation_m(debriefing.records, [notes.system_id for notes, _ in debriefing.flights])
         ),
+        "map_error_nt": round(team.map_error.sigma_nt, 3),
         "candidates": [
             {**(_place(candidate.place_ne_m) or {}), "passes": candidate.passes}
             for candidate in search.candidates
@@ -111,6 +112,7 @@ def _searcher_block(searcher: "Searcher", system_id: int, kind: str, heading: He
         },
         "readings": 0 if watch is None else watch.samples,
         "readings_dropped": 0 if watch is None else watch.placer.dropped + watch.detector.dropped,
+        "anomalies_insignificant": 0 if watch is None else watch.detector.insignificant,
         "anomalies": [_anomaly(anomaly) for anomaly in searcher.anomalies],
     }
 

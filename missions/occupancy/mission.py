@@ -105,6 +105,8 @@ class OccupancyMission(Mission[OccupancyOptions]):
                 sigma_along_m=options.sigma_along_m,
                 sigma_across_m=options.sigma_across_m,
                 orientation_rad=orientation_rad,
+                moment_a_m2=options.moment_a_m2,
+                depth_m=options.depth_m,
             )
         )
 

@@ -7,9 +7,10 @@ from typing import Final
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import PlanError
 from missions.occupancy.decision import DecisionParameters
-from missions.occupancy.detection import DetectionModel
+from missions.occupancy.detection import DetectionModel, MapError
 from missions.occupancy.occupancy_map import GridLayout
 from missions.occupancy.search import SearchParameters
+from missions.occupancy.survey_map import SurveyMap
 from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits
 
@@ -17,6 +18,10 @@ LARGEST_SIDE_M: Final = 50_000.0
 LEAST_SIGMAS: Final = 3.0
 """Threshold over noise: below, noise alone makes anomalies."""
 
+LARGEST_DEPTH_M: Final = 1000.0
+_USUAL_ERROR_NT: Final = 1.0  # of a map that states none
+_USUAL_LINES_M: Final = 200.0
+_SHARE_OF_LINES: Final = 0.5  # of their distance: over it the error of a map is alike
 _PENALTY_OF_WINGS: Final = 0.2
 _PENALTY_OF_MULTICOPTERS: Final = 0.05
 _MULTICOPTER_M_S: Final = 10.0
@@ -37,6 +42,8 @@ class OccupancyOptions(MissionOptions):
         detection_range_m: standard deviation of the fall-off with distance.
         threshold_nt: of the differential measurement; what is beyond is an anomaly.
         noise_nt: standard deviation of the differential measurement where there is no target.
+        map_error_nt: standard deviation of the published map; None: what the map states, and 1 nT where it
+            states nothing.
         confirmations: passes that must see an anomaly at one place.
         raise_radius_m: scores are raised within this distance of an anomaly.
         search_time_s: the search is given up after this time.
@@ -44,7 +51,9 @@ class OccupancyOptions(MissionOptions):
         map_file: published magnetic map; None: the embedded world makes one from its seed.
         target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle what
             the result is compared with.
-        amplitude_nt, sigma_along_m, sigma_across_m: of the embedded world's target.
+        amplitude_nt, sigma_along_m, sigma_across_m: of the embedded world's target, a Gaussian.
+        moment_a_m2, depth_m: of the embedded world's target as a dipole, magnetised along the Earth's
+            field, and its depth below home; None: it is a Gaussian.
     """
 
     altitude_m: float = 80.0
@@ -59,6 +68,7 @@ class OccupancyOptions(MissionOptions):
     detection_range_m: float = 80.0
     threshold_nt: float = 3.0
     noise_nt: float = 0.5
+    map_error_nt: float | None = None
     confirmations: int = 2
     raise_radius_m: float = 300.0
     search_time_s: float = 900.0
@@ -68,6 +78,8 @@ class OccupancyOptions(MissionOptions):
     amplitude_nt: float = 30.0
     sigma_along_m: float = 80.0
     sigma_across_m: float = 60.0
+    moment_a_m2: float | None = None
+    depth_m: float = 10.0
 
     def __post_init__(self) -> None:
         super(OccupancyOptions, self).__post_init__()
@@ -105,6 +117,13 @@ class OccupancyOptions(MissionOptions):
                 f"--amplitude {self.amplitude_nt:g} nT of the target is not beyond --threshold "
                 f"{self.threshold_nt:g} nT: no pass could see it; lower the threshold"
             )
+        if self.map_error_nt is not None:
+            MapError(sigma_nt=self.map_error_nt)
+        check_positive(moment=self.moment_a_m2)
+        if not (math.isfinite(self.depth_m) and abs(self.depth_m) <= LARGEST_DEPTH_M):
+            raise PlanError(
+                f"--depth {self.depth_m:g} m of the target is not within {LARGEST_DEPTH_M:g} m of home"
+            )
         layout = self.layout  # these refuse what makes no search
         _ = self.search_parameters, self.decision_parameters
         if self.target_ne_m is not None and not layout.contains(*self.target_ne_m):
@@ -131,6 +150,15 @@ class OccupancyOptions(MissionOptions):
             raise_radius_m=self.raise_radius_m,
             confirmations=self.confirmations,
             noise_nt=self.noise_nt,
+        )
+
+    def map_error(self, survey_map: SurveyMap) -> MapError:
+        """Error of a published map: what was chosen, else what the map states, else a careful survey's."""
+        stated_nt = survey_map.error_nt if self.map_error_nt is None else self.map_error_nt
+        spacing_m = survey_map.line_spacing_m or _USUAL_LINES_M
+        return MapError(
+            sigma_nt=_USUAL_ERROR_NT if stated_nt is None else stated_nt,
+            correlation_m=_SHARE_OF_LINES * spacing_m,
         )
 
     @property

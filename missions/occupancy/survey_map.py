@@ -3,7 +3,9 @@
 The file is a numpy `.npz` archive, in the format "flightstack-magnetic-map-1": grid lines `north_m` (rows,)
 and `east_m` (columns,) from the map's home, `total_field_nt` (rows, columns) with NaN where there is no
 data, `height_m` above home that the map is valid at, its home (`home_lat_deg`, `home_lon_deg`,
-`home_alt_m`), and, where it is known, `vertical_gradient_nt_m` (rows, columns), the change with height.
+`home_alt_m`), and, where they are known, `vertical_gradient_nt_m` (rows, columns), the change with height,
+`error_nt`, the standard deviation of the field as the survey states it, and `line_spacing_m`, the distance
+of its lines.
 """
 
 import math
@@ -37,6 +39,7 @@ _NEEDED: Final = (
     "home_lon_deg",
     "home_alt_m",
 )
+_STATED: Final = ("error_nt", "line_spacing_m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,6 +52,8 @@ class SurveyMap:
         vertical_gradient_nt_m: (rows, columns), upwards; zeros where it isn't known.
         height_m: above home, what the map is valid at.
         home: origin of the map's frame.
+        error_nt: standard deviation that the survey states; None: it states none.
+        line_spacing_m: of the survey; None: not stated.
     """
 
     north_m: Array
@@ -57,6 +62,8 @@ class SurveyMap:
     vertical_gradient_nt_m: Array
     height_m: float
     home: GeodeticPosition
+    error_nt: float | None = None
+    line_spacing_m: float | None = None
 
     def total_nt(self, north_m: float, east_m: float, height_m: float) -> float:
         """Field at a place and height from the map's home, bilinear; NaN without data."""
@@ -144,6 +151,10 @@ def load_survey_map(path: Path) -> SurveyMap:
         path, "vertical_gradient_nt_m", found.get("vertical_gradient_nt_m", np.zeros(total_nt.shape))
     )
     height_m, lat_deg, lon_deg, alt_m = (_number(path, name, found[name]) for name in _NEEDED[4:])
+    stated = {name: _number(path, name, found[name]) for name in _STATED if name in found}
+    for name, value in stated.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise PlanError(f"--map {path}: {name} {value:g} is not accepted; more than 0 is")
     shape = (north_m.size, east_m.size)
     rising = all(
         lines.ndim == 1 and lines.size >= 2 and bool(np.all(np.diff(lines) > 0.0))
@@ -172,6 +183,7 @@ def load_survey_map(path: Path) -> SurveyMap:
         vertical_gradient_nt_m=gradient,
         height_m=height_m,
         home=GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m),
+        **stated,
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from missions.errors import MissionError
 from missions.kind import VehicleKind
-from missions.occupancy.detection import Anomaly, AnomalyDetector
+from missions.occupancy.detection import Anomaly, AnomalyDetector, MapError
 from missions.occupancy.field_watch import FieldWatch, PlacedReading
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions, check_reach, check_vehicle
@@ -99,6 +99,11 @@ class SearchTeam:
         # vehicles elsewhere booted at different times: the first one's clock is the team's
         now_us = self._vehicles[0].clock.time_us
         self._offsets_us = [now_us - vehicle.clock.stamp_us for vehicle in self._vehicles]
+
+    @property
+    def map_error(self) -> MapError:
+        """Error of the published map that the team goes by."""
+        return self._options[0].map_error(self._map)
 
     @property
     def over(self) -> bool:
@@ -227,7 +232,11 @@ class SearchTeam:
         return FieldWatch(
             self._vehicles[index],
             self._map,
-            AnomalyDetector(threshold_nt=self._options[index].threshold_nt),
+            AnomalyDetector(
+                threshold_nt=self._options[index].threshold_nt,
+                noise_nt=self._options[index].noise_nt,
+                map_error=self._options[index].map_error(self._map),
+            ),
             on_sample=on_sample,
             on_anomaly=on_anomaly,
         )

@@ -28,6 +28,8 @@ from autopilot_bridge.flight import (
 )
 from autopilot_bridge.flight.context import TouchedDown
 from autopilot_bridge.flight.return_home import return_height
+from autopilot_bridge.flight.yaw import Turn, YawSteering
+from autopilot_bridge.navigation import layout as nav_layout
 from flightsim.rotations import quaternion_from_euler
 from tests.flight.rig import Rig, positions, tilts, velocities
 
@@ -281,6 +283,47 @@ def test_guided_velocity_expires_and_position_stays() -> None:
     task.set_position(rig.ctx, (0.0, 0.0, -12.0))
     rig.run(9.0)
     assert rig.nav[10:13] == pytest.approx([0.0, 0.0, -12.0], abs=0.3)
+
+
+def _yaws_deg(log: np.ndarray) -> np.ndarray:
+    """Unwrapped headings of a log."""
+    return np.degrees(np.unwrap(log[:, nav_layout.EULER_RAD][:, 2]))
+
+
+@pytest.mark.parametrize(
+    ("direction", "relative", "turned_deg"),
+    [(0, False, 90.0), (1, False, 90.0), (-1, False, -270.0), (1, True, 90.0), (-1, True, -90.0)],
+)
+def test_a_commanded_turn_has_its_rate_and_direction(
+    direction: int, relative: bool, turned_deg: float
+) -> None:
+    turn = Turn(math.radians(90.0), direction=direction, rate_max_rad_s=math.radians(20.0), relative=relative)
+    rig = flying(RepositionTask(np.array([0.0, 0.0, -10.0]), turn=turn))
+    first = _yaws_deg(rig.run(3.0))
+    rate_deg_s = (first[-1] - first[len(first) // 2]) / 1.5
+    assert rate_deg_s == pytest.approx(math.copysign(20.0, turned_deg), abs=1.5)
+    rest = _yaws_deg(rig.run(15.0))
+    assert first[-1] - first[0] + rest[-1] - rest[0] == pytest.approx(turned_deg, abs=3.0)
+    assert turn.done
+
+
+def test_a_commanded_turn_never_exceeds_the_vehicle_s_rate() -> None:
+    parameters = FlightParameters(yaw_rate_max_rad_s=math.radians(30.0))
+    heading, turn = YawSteering(), Turn(math.radians(170.0), rate_max_rad_s=math.radians(300.0))
+    for _ in range(100):
+        heading.follow(turn, parameters, 0.02)
+        assert heading.rate_rad_s <= math.radians(30.0) + 1e-9
+
+
+def test_guided_positions_turn_at_their_yaw_rate_until_the_time_out() -> None:
+    task = GuidedTask()
+    rig = flying(task)
+    task.set_position(rig.ctx, (0.0, 0.0, -10.0), yaw_rate_rad_s=math.radians(20.0))
+    yaws = _yaws_deg(rig.run(3.0))
+    assert (yaws[-1] - yaws[len(yaws) // 2]) / 1.5 == pytest.approx(20.0, abs=1.5)
+    rig.run(2.0)
+    yaws = _yaws_deg(rig.run(2.0))
+    assert abs(yaws[-1] - yaws[0]) < 2.0  # GUID_TIMEOUT
 
 
 def test_guided_attitude_thrust_is_a_climb_rate() -> None:

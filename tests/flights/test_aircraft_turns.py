@@ -8,10 +8,14 @@ import pytest
 from autopilot_bridge.mavlink import dialect
 from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
+from flightsim.wind_profile import WindProfile
 from tests.flights.aircraft import AircraftFlight
 from tests.flights.turn_geometry import turn_over_m
 
-LIGHT = Environment.from_wind(speed_m_s=6.0, from_deg=210.0, turbulence=Turbulence.LIGHT)
+# The wind at the height that is flown at, where it is 1.4 times that of 10 m above ground.
+LIGHT = Environment.from_wind(
+    speed_m_s=6.0, from_deg=210.0, profile=WindProfile(), turbulence=Turbulence.LIGHT
+)
 PLACE = (150.0, 150.0)
 
 

@@ -368,6 +368,13 @@ def test_sim_parameters_break_the_world() -> None:
     put("SIM_WIND_DIR", 90.0)
     put("SIM_WIND_SPD", 8.0)
     flight.fly(6.0)
+    low_m_s = float(np.hypot(*flight.truth[t.WIND_NED_M_S][:2]))
+    height_m = float(flight.truth[t.HEIGHT_ABOVE_GROUND_M])
+    assert low_m_s == pytest.approx(
+        8.0 * math.sqrt(height_m / 60.0), abs=0.05
+    )  # SIM_WIND_T 0: square root to 60 m
+    put("SIM_WIND_T", 1.0)
+    flight.fly(6.0)
     assert flight.tilt_deg > 6.0 and flight.speed_m_s < 0.5
     put("SIM_WIND_SPD", 0.0)
     flight.fly(5.0)

@@ -51,8 +51,11 @@ def small_map(**changes: object) -> MagneticMap:
 
 
 def made(seed: int = 1, **changes: float) -> MagneticMap:
+    one_layer = {"shallow_anomaly_nt": 0.0}
     return synthetic_map(
-        SyntheticMapParameters(**changes), home=HOME, seed=RandomStreams(seed).child("magnetic_map")
+        SyntheticMapParameters(**(one_layer | changes)),
+        home=HOME,
+        seed=RandomStreams(seed).child("magnetic_map"),
     )
 
 
@@ -236,6 +239,15 @@ def test_geology_has_the_size_and_the_place_it_was_told() -> None:
     anomaly = grid.total_field_nt - main
     assert np.sqrt(np.mean(anomaly**2)) == pytest.approx(40.0)
     assert abs(anomaly.mean()) < 1e-6
+
+
+def test_the_ground_adds_a_layer_of_its_own() -> None:
+    """The same deep rock, and beside it what is shallow: shorter, and independent of it."""
+    deep, both = (made(anomaly_nt=40.0, shallow_anomaly_nt=size_nt) for size_nt in (0.0, 5.0))
+    shallow = both.total_field_nt - deep.total_field_nt
+    assert np.sqrt(np.mean(shallow**2)) == pytest.approx(5.0)
+    roughness = [np.diff(part, axis=0).std() / part.std() for part in (shallow, deep.total_field_nt)]
+    assert roughness[0] > 1.5 * roughness[1]
 
 
 def test_geology_has_the_spectrum_it_was_told() -> None:

@@ -74,6 +74,7 @@ class ServiceRig(Rig):
             intervals=self.intervals,
             parameters=self.store,
             announce=self.status.announce,
+            banner=self.status.banner,
             set_current_item=self._set_current,
             mission_item_count=lambda: len(self.missions.items),
             inject_failure=self._inject,

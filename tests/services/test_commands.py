@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -328,6 +329,61 @@ def test_ardupilot_yaw_turns_and_the_place_stays() -> None:
     rig.run(8.0)
     assert rig.context.nav[27] == pytest.approx(math.pi / 4, abs=0.02)
     assert rig.context.nav[10:12] == pytest.approx((0.0, 0.0), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "turned_deg", "rate_deg_s"),
+    [((90, 10, -1, 0), -270.0, 10.0), ((60, 5, 1, 1), 60.0, 5.0), ((90, 0, 0, 0), 90.0, 60.0)],
+)
+def test_ardupilot_turns_at_the_rate_and_in_the_direction_of_the_command(
+    parameters: tuple[float, ...], turned_deg: float, rate_deg_s: float
+) -> None:
+    rig = rig_of("ardupilot", "flying")
+    rig.run(1.0)
+    assert rig.long(115, *parameters) == [0]
+    yaws = []
+    for _ in range(40 * 50):
+        rig.tick()
+        yaws.append(rig.context.nav[27])
+    turned = np.degrees(np.unwrap([0.0, *yaws]))
+    assert np.abs(np.diff(turned)).max() * 50.0 >= rate_deg_s - 0.5
+    assert turned[-1] == pytest.approx(turned_deg, abs=1.0)
+    assert np.abs(np.diff(turned)).max() * 50.0 <= rate_deg_s + 0.5
+
+
+def test_ardupilot_position_setpoints_turn_at_their_yaw_rate() -> None:
+    rig = rig_of("ardupilot", "flying")
+    rig.run(1.0)
+    mask = 0b0101_1111_1000  # positions and yaw rate count
+    rig.handle(
+        mavlink.MAVLink_set_position_target_local_ned_message(
+            0, 1, 1, 1, mask, 0.0, 0.0, -10.0, 0, 0, 0, 0, 0, 0, 0.0, 0.2
+        )
+    )
+    before = rig.context.nav[27]
+    rig.run(2.5)
+    assert 0.3 < rig.context.nav[27] - before < 0.55
+
+
+def test_ardupilot_starts_its_mission_when_the_throttle_is_raised() -> None:
+    rig = ServiceRig("ardupilot")
+    rig.upload(rig.waypoint(0.0, 0.0, 10.0, command=22), rig.waypoint(20.0, 0.0, 10.0))
+    rig.commander.set_mode(FlightMode.GUIDED)
+    assert rig.commander.arm().accepted
+    rig.commander.set_mode(FlightMode.MISSION)
+
+    def stick(throttle: int) -> None:
+        rig.handle(mavlink.MAVLink_manual_control_message(1, 0, 0, throttle, 0, 0))
+
+    for _ in range(100):
+        stick(0)
+        rig.tick()
+    assert rig.height_m < 0.1
+    for _ in range(100):
+        stick(500)
+        rig.tick()
+    rig.run(6.0)
+    assert rig.height_m > 5.0
 
 
 def test_change_speed_lasts_until_the_next_mode() -> None:

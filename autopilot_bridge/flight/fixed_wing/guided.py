@@ -91,7 +91,7 @@ class GuidedTask(AircraftTask):
         if airspeed_m_s is not None and math.isfinite(airspeed_m_s) and airspeed_m_s > 0.0:
             self.set_airspeed(ctx, airspeed_m_s, 0.0)
         self._forget_overrides()
-        self._loiter = LoiterTask(target, radius_m)
+        self._loiter = LoiterTask(target, radius_m, glides=True)
         self._loiter_started = False
         self._place_given = True
         self.kind = GuidedKind.POSITION

@@ -22,6 +22,8 @@ class LoiterTask(AircraftTask):
         radius_m: positive clockwise seen from above; None or NaN: the parameter's.
         airspeed_m_s: equivalent airspeed; None or NaN: the parameter's.
         turns: DONE (and circling on) after so many; None: never.
+        glides: from GLIDE_SLOPE_MIN above the circle on, the height follows the straight way to its centre
+            until the circle is reached (ArduPlane); else the circle's height is flown at once.
 
     Attributes:
         centre_ned_m: centre and height flown, (3,); its NaNs are filled in by `activate`.
@@ -32,9 +34,11 @@ class LoiterTask(AircraftTask):
         "_airspeed_m_s",
         "_circle",
         "_finished",
+        "_glides",
         "_lost",
         "_path",
         "_placeless",
+        "_start",
         "_turns",
         "_wanted",
         "centre_ned_m",
@@ -47,6 +51,8 @@ class LoiterTask(AircraftTask):
         radius_m: float | None = None,
         airspeed_m_s: float | None = None,
         turns: float | None = None,
+        *,
+        glides: bool = False,
     ) -> None:
         super().__init__()
         self._wanted: Array = np.full(3, np.nan)
@@ -60,7 +66,9 @@ class LoiterTask(AircraftTask):
         self._lost = PositionLost()
         self._circle = Circle(0.0, 0.0, 1.0)
         self._finished = False
+        self._glides = glides
         self._placeless = False
+        self._start: Array = np.full(3, np.nan)
 
     @property
     def circling(self) -> bool:
@@ -75,6 +83,7 @@ class LoiterTask(AircraftTask):
     def set_height(self, down_m: float) -> None:
         """Climb or descend to another height while circling, local NED."""
         self._wanted[2] = self.centre_ned_m[2] = down_m
+        self._glides = False
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
         """Another airspeed (DO_CHANGE_SPEED); None: the parameter's."""
@@ -86,6 +95,7 @@ class LoiterTask(AircraftTask):
         self._placeless = not ctx.position_valid and not bool(np.isfinite(self._wanted[0:2]).all())
         here = (state.north_m, state.east_m, state.down_m)
         self.centre_ned_m[:] = np.where(np.isfinite(self._wanted), self._wanted, here)
+        self._start[:] = here
         if not (math.isfinite(self.radius_m) and abs(self.radius_m) >= 1.0):
             self.radius_m = ctx.fixed_wing.loiter_radius_m
         self._circle = Circle(float(self.centre_ned_m[0]), float(self.centre_ned_m[1]), self.radius_m)
@@ -117,7 +127,7 @@ class LoiterTask(AircraftTask):
     def _follow(self, ctx: FlightContext) -> None:
         command, guidance = self._command, self._path.of(ctx)
         command.airspeed_m_s = self._airspeed_m_s
-        command.down_m = float(self.centre_ned_m[2])
+        command.down_m = self._down_m(ctx)
         if ctx.position_valid:
             if self._lost.found():
                 if self._placeless:
@@ -128,3 +138,16 @@ class LoiterTask(AircraftTask):
             command.lateral_acceleration_m_s2 = guidance.lateral_acceleration_m_s2
         else:
             self._lost.fly(ctx, command, self._circle.direction)
+
+    def _down_m(self, ctx: FlightContext) -> float:
+        """Height to fly at now, local down: the circle's, or the glide's on the way there."""
+        end_m = float(self.centre_ned_m[2])
+        self._glides = self._glides and not self._circle.circling
+        drop_m = end_m - float(self._start[2])
+        if not self._glides or drop_m < ctx.fixed_wing.glide_slope_min_m:
+            return end_m
+        way = self.centre_ned_m[0:2] - self._start[0:2]
+        flown = (self._state.north_m - self._start[0], self._state.east_m - self._start[1])
+        length_2 = float(way @ way)
+        share = 1.0 if length_2 < 1.0 else min(1.0, max(0.0, float(way @ np.array(flown)) / length_2))
+        return end_m - (1.0 - share) * drop_m

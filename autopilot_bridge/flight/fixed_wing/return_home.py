@@ -123,7 +123,7 @@ class ReturnTask(AircraftTask):
 
     def _fly_home(self, ctx: FlightContext) -> None:
         self.phase = ReturnPhase.FLY
-        self._set_sub(ctx, LoiterTask(self._home, ctx.fixed_wing.return_loiter_radius_m))
+        self._set_sub(ctx, LoiterTask(self._home, ctx.fixed_wing.return_loiter_radius_m, glides=True))
 
     def _land_by_plan(self, ctx: FlightContext, place: ReturnPlace) -> bool:
         """Go on along the plan, or with its landing sequence, if there is one."""

@@ -81,6 +81,27 @@ def test_arduplane_circles_home_at_its_altitude_the_other_way_round() -> None:
     assert mass.airspeed == pytest.approx(30.0, abs=0.3)
 
 
+def test_arduplane_glides_down_on_its_way_home() -> None:
+    """Higher than GLIDE_SLOPE_MIN above the return altitude it loses the height over the whole way."""
+    parameters = replace(ARDUPILOT, glide_slope_min_m=15.0)
+    mass = PointMass((1200.0, 0.0, -130.0), math.pi, (0.0, 0.0), parameters)
+    mass.fly(ReturnTask())
+    halfway = mass.run(30.0)
+    middle = halfway[np.argmin(np.abs(halfway[:, 0] - 600.0))]
+    assert -middle[2] == pytest.approx(115.0, abs=3.0)
+    mass.run(60.0)
+    assert -mass.place[2] == pytest.approx(100.0, abs=1.0)
+
+
+def test_arduplane_dives_the_last_few_metres_at_once() -> None:
+    parameters = replace(ARDUPILOT, glide_slope_min_m=15.0)
+    mass = PointMass((1200.0, 0.0, -112.0), math.pi, (0.0, 0.0), parameters)
+    mass.fly(ReturnTask())
+    mass.run(15.0)
+    assert mass.place[0] > 700.0
+    assert -mass.place[2] == pytest.approx(100.0, abs=1.0)
+
+
 @pytest.mark.parametrize(
     "destination", [ReturnDestination.LANDING_SEQUENCE, ReturnDestination.HOME_THEN_LANDING_SEQUENCE]
 )

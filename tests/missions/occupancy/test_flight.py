@@ -11,14 +11,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flightsim.payload import MagneticMap
+from flightsim.payload import DipoleSignature, MagneticMap
 from missions import cli
+from missions.embedded.scenario import magnetic_field_of
 from missions.errors import PlanError
 from missions.occupancy.mission import MAP_NAME, OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
 from missions.request import RunRequest
-from missions.scenario import Scenario
+from missions.scenario import Scenario, Setting
 from missions.session import fly
 
 SMALL = OccupancyOptions(
@@ -68,12 +69,50 @@ def test_the_folder_holds_map_summary_log_and_picture(found):
     assert (found.folder / "track.png").stat().st_size > 20_000
 
 
+def unpublished(scenario: Scenario) -> Scenario:
+    """The same world, whose map is not written again."""
+    return replace(scenario, survey=replace(scenario.survey, publish_to=None))
+
+
 @pytest.mark.slow
-def test_a_search_with_the_published_map_is_the_same_search(found, tmp_path):
+def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_repeats_itself(found, tmp_path):
     options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
-    again = fly(OccupancyMission(), request(tmp_path / "again", options, picture=False))
-    assert (again.folder / "flight.tlog").read_bytes() == (found.folder / "flight.tlog").read_bytes()
+    first, again = (
+        fly(OccupancyMission(), request(tmp_path / name, options, picture=False)) for name in ("a", "b")
+    )
+    assert (again.folder / "flight.tlog").read_bytes() == (first.folder / "flight.tlog").read_bytes()
+    assert (first.folder / "flight.tlog").read_bytes() != (found.folder / "flight.tlog").read_bytes()
+    assert first.summary["target_found"] is True
     assert not (again.folder / MAP_NAME).exists()
+
+
+def test_the_field_is_not_the_published_map(found):
+    """What the magnetometers read differs from the map by the error that the map states, away from the
+    target.
+    """
+    published = MagneticMap.load(found.folder / MAP_NAME)
+    assert published.error_nt == pytest.approx(found.summary["map_error_nt"], abs=1e-3)
+    truth = magnetic_field_of(
+        unpublished(OccupancyMission().scenario(SMALL, Setting(seed=1, folder=found.folder))),
+        home=published.home,
+        seed=1,
+        decimal_year=2026.0,
+    )
+    assert truth is not None
+    north_m, east_m = (axis.ravel() for axis in np.meshgrid(np.arange(-550.0, -250.0, 20.0), [-500.0, 500.0]))
+    difference_nt = truth.total_at_nt(north_m, east_m, published.height_m) - published.interpolate(
+        north_m, east_m
+    )
+    assert 0.2 < np.sqrt(np.mean(difference_nt**2)) < 3.0 * published.error_nt
+    dipole = replace(SMALL, moment_a_m2=2e4)
+    seen = magnetic_field_of(
+        unpublished(OccupancyMission().scenario(dipole, Setting(seed=1, folder=found.folder))),
+        home=published.home,
+        seed=1,
+        decimal_year=2026.0,
+    )
+    assert isinstance(seen.signatures[0], DipoleSignature)
+    assert np.linalg.norm(seen.signatures[0].moment_ned_a_m2) == pytest.approx(2e4)
 
 
 def test_a_map_without_data_in_the_area_is_refused_before_anything_starts(found, tmp_path):

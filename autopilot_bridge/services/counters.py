@@ -1,0 +1,34 @@
+"""Parameters in which ArduPilot counts: stored mission items (MIS_TOTAL), boots (STAT_BOOTCNT)."""
+
+from typing import Final
+
+from autopilot_bridge.mission_plan import MissionType
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+
+MISSION_ITEMS: Final = "MIS_TOTAL"
+BOOTS: Final = "STAT_BOOTCNT"
+
+
+class Counters(Microservice):
+    """Keeps the counters; a change is announced and stored like any other parameter's.
+
+    Args:
+        parts: the autopilot's parameters and plans.
+    """
+
+    unhurried = True
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._parameters = parts.parameters
+        self._mission = parts.stores[MissionType.MISSION]
+        self._booted = False
+
+    def tick(self, time_us: int) -> None:
+        """Count the boot once; follow the stored mission."""
+        parameters = self._parameters
+        if not self._booted:
+            self._booted = True
+            parameters.set(BOOTS, parameters.get(BOOTS) + 1.0, check_range=False)
+        items = float(len(self._mission.items))
+        if parameters.get(MISSION_ITEMS) != items:
+            parameters.set(MISSION_ITEMS, items, check_range=False)

@@ -1,0 +1,129 @@
+"""Rotary gusts on a wing: the rotation of the air that its turbulence makes over span and length.
+
+MIL-F-8785C, paragraph 3.7.5.3 (spectra over the spatial frequency W, one-sided, b the wing span):
+
+    p_g: sigma_w^2 / L_w  0.8 (pi L_w / 4 b)^(1/3) / (1 + (4 b W / pi)^2), independent of the velocities
+    q_g: W^2 / (1 + (4 b W / pi)^2) of the spectrum of w_g
+    r_g: W^2 / (1 + (3 b W / pi)^2) of the spectrum of v_g
+
+p_g is made from unit white noise by an exactly discretised first-order filter. Its variance is the integral
+of its spectrum, 0.8 (pi / 4 b)^(1/3) pi^2 sigma_w^2 / (8 b L_w^(2/3)). q_g and r_g are the slopes of the
+vertical and the lateral turbulence along the path, which a first-order filter of length 4 b / pi or 3 b /
+pi smooths: (w - its low pass) / length. Air that turns with q nose-up moves by w = -q x at the distance x
+ahead, so q_g = -dw/dx, and r_g = dv/dx in the same way.
+
+The standard's rates are about body axes of level flight. Here they belong to the horizontal axes along and
+across the heading, and are turned into the body's, so that a bank of any size gets the same field of air.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.kernels import kernel
+from flightsim.rotations import rotate_inverse
+
+Array = NDArray[np.float64]
+
+_BLOCK_STEPS: Final = 512
+_LEAST_AIRSPEED_M_S: Final = 1.0  # as for the turbulence that it goes with
+_ROTARY: Final = 1  # added to the spawn key of the turbulence's stream
+
+
+@kernel
+def roll_gust_sigma_rad_s(sigma_w_m_s: float, length_w_m: float, span_m: float) -> float:
+    """Standard deviation of p_g."""
+    shape = 0.8 * (math.pi / (4.0 * span_m)) ** (1.0 / 3.0) * math.pi**2 / (8.0 * span_m)
+    return sigma_w_m_s * math.sqrt(shape) / length_w_m ** (1.0 / 3.0)
+
+
+@kernel
+def _advance(
+    state: Array,
+    normal: float,
+    dt_s: float,
+    airspeed_m_s: float,
+    span_m: float,
+    scales: Array,
+    gust_ned_m_s: Array,
+    q_ned_from_frd: Array,
+    work: Array,
+    out: Array,
+) -> None:
+    """state = (p_g / sigma, low-passed north, east, down); scales as `turbulence.low_altitude_scales`."""
+    travelled_m = max(airspeed_m_s, _LEAST_AIRSPEED_M_S) * dt_s
+    vertical_m, lateral_m = 4.0 * span_m / math.pi, 3.0 * span_m / math.pi
+    d = travelled_m / vertical_m
+    state[0] = math.exp(-d) * state[0] + math.sqrt(-math.expm1(-2.0 * d)) * normal
+    gain_v, gain_w = -math.expm1(-travelled_m / lateral_m), -math.expm1(-d)
+    state[1] += gain_v * (gust_ned_m_s[0] - state[1])
+    state[2] += gain_v * (gust_ned_m_s[1] - state[2])
+    state[3] += gain_w * (gust_ned_m_s[2] - state[3])
+    w, x, y, z = q_ned_from_frd
+    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    c, s = math.cos(heading), math.sin(heading)
+    p = state[0] * roll_gust_sigma_rad_s(scales[3], scales[1], span_m)
+    q = -(gust_ned_m_s[2] - state[3]) / vertical_m
+    right_m_s = c * (gust_ned_m_s[1] - state[2]) - s * (gust_ned_m_s[0] - state[1])
+    work[0] = c * p - s * q
+    work[1] = s * p + c * q
+    work[2] = right_m_s / lateral_m
+    rotate_inverse(q_ned_from_frd, work, out)
+
+
+class RotaryGusts:
+    """Rotation of the air around one aircraft with wings, beside its `DrydenTurbulence`.
+
+    Attributes:
+        rates_frd_rad_s: (3,) present rotation of the air over ground, body axes, written in place by `step`.
+    """
+
+    __slots__ = ("_block", "_dt_s", "_generator", "_next", "_span_m", "_state", "_work", "rates_frd_rad_s")
+
+    def __init__(self, *, span_m: float, dt_s: float, seed_sequence: np.random.SeedSequence) -> None:
+        """Start in the stationary state of p_g, with no slopes.
+
+        Args:
+            span_m: wing span.
+            dt_s: step.
+            seed_sequence: the vehicle's stream for turbulence; p_g draws from a stream of its own below it.
+        """
+        self._span_m = span_m
+        self._dt_s = dt_s
+        own = np.random.SeedSequence(
+            entropy=seed_sequence.entropy, spawn_key=(*seed_sequence.spawn_key, _ROTARY)
+        )
+        self._generator = np.random.Generator(np.random.PCG64(own))
+        self._block = np.empty(_BLOCK_STEPS)
+        self._next = _BLOCK_STEPS
+        self._state = np.array([self._generator.standard_normal(), 0.0, 0.0, 0.0])
+        self._work = np.zeros(3)
+        self.rates_frd_rad_s = np.zeros(3)
+
+    def step(self, gust_ned_m_s: Array, scales: Array, airspeed_m_s: float, q_ned_from_frd: Array) -> None:
+        """Advance one step.
+
+        Args:
+            gust_ned_m_s: (3,) the turbulence's velocity in this step.
+            scales: (4,) its lengths and intensities, as of `turbulence.low_altitude_scales`.
+            airspeed_m_s: true airspeed.
+            q_ned_from_frd: (4,) attitude.
+        """
+        if self._next == _BLOCK_STEPS:
+            self._generator.standard_normal(out=self._block)
+            self._next = 0
+        _advance(
+            self._state,
+            self._block[self._next],
+            self._dt_s,
+            airspeed_m_s,
+            self._span_m,
+            scales,
+            gust_ned_m_s,
+            q_ned_from_frd,
+            self._work,
+            self.rates_frd_rad_s,
+        )
+        self._next += 1
