@@ -276,7 +276,7 @@ def main() -> None:
         false = sum(trial.false for trial in own)
         (right, down), (off_right, off_down) = errors.std(axis=0), errors.mean(axis=0)
         sys.stdout.write(
-            f"{name}: place {right:.2f} and {down:.2f} px (sigma), mean {off_right:+.2f} and {off_down:+.2f}; "
+            f"{name}: place {right:.2f} and {down:.2f} px sigma, mean {off_right:+.2f} and {off_down:+.2f}; "
             f"{false} false detections in {len(own)} pictures\n"
         )
 

@@ -101,8 +101,16 @@ class Firmware:
         ]
 
     @contextmanager
-    def running(self, folder: Path, *, instance: int = 0, speed: float = 1.0) -> Iterator[str]:
-        """Run an instance in a new folder; gives the address to connect to. It is ended with the context."""
+    def running(
+        self, folder: Path, *, instance: int = 0, speed: float = 1.0
+    ) -> Iterator["subprocess.Popen[bytes]"]:
+        """Run an instance in a new folder. It is ended with the context.
+
+        Args:
+            folder: its output is in firmware.txt there.
+            instance: 0 to 9; side by side each needs its own.
+            speed: times real time.
+        """
         folder.mkdir(parents=True)
         environment = dict(os.environ)
         if self.name == "px4":
@@ -119,7 +127,7 @@ class Firmware:
                 start_new_session=True,
             )
         try:
-            yield self.address(instance)
+            yield process
         finally:
             _end(process)
 

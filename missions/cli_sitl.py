@@ -205,7 +205,7 @@ def sitl(
     """
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
-    from autopilot_bridge.clock.pacing import wall_time_s
+    from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
     from autopilot_bridge.sitl import (
         PaceReport,
         Sitl,
@@ -217,6 +217,7 @@ def sitl(
     )
     from autopilot_bridge.sitl.configuration import HOMES
     from flightsim.environment import Environment
+    from flightsim.vehicle import VehicleDivergedError
     from flightsim.wind_profile import WindLaw, WindProfile
     from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
@@ -251,6 +252,7 @@ def sitl(
                     turbulence=turbulence,
                 ),
                 seed=seed,
+                unix_epoch_us=unix_time_us(),  # its clients live by the calendar
             )
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)
@@ -289,11 +291,14 @@ def sitl(
         if autopilot == "ardupilot" and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
             server.wait_for_client(lambda: ending.asked)
-        server.run(
-            lambda: ending.asked,
-            report=report if sys.stderr is not None and sys.stderr.isatty() else None,
-            until_us=None if duration is None else round(duration * 1e6),
-        )
+        try:
+            server.run(
+                lambda: ending.asked,
+                report=report if sys.stderr.isatty() else None,
+                until_us=None if duration is None else round(duration * 1e6),
+            )
+        except VehicleDivergedError as error:
+            raise click.ClickException(f"the simulation ended: {error}") from error
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")
     return _FAILED if losses.any else 0

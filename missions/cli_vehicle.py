@@ -180,6 +180,15 @@ def doctor(**given: Any) -> int:
     else:
         for finding in findings:
             click.echo(str(finding))
-        against = f"; problems: {len(problems)}" if problems else ""
-        click.echo(f"it would {'' if would_arm else 'not '}arm{against}")
+        click.echo(_verdict(len(problems), would_arm=would_arm))
     return FAILED if problems else 0
+
+
+def _verdict(problems: int, *, would_arm: bool) -> str:
+    """The last line of the doctor."""
+    if not problems:
+        return "it would arm; no problems"
+    noun = "1 problem" if problems == 1 else f"{problems} problems"
+    if would_arm:
+        return f"{noun}: don't fly it so, although its own pre-arm checks are passed"
+    return f"it would not arm; {noun}"

@@ -106,13 +106,13 @@ class PictureDetection:
         ball_half_size_px, ball_slope_px: of a ball; it isn't foreshortened, and blur doesn't hide it.
     """
 
-    max_probability: float = 0.99
-    half_size_px: float = 10.9
-    slope_px: float = 0.75
-    foreshortening: float = 0.73
-    blur_factor: float = 3.5
-    ball_half_size_px: float = 2.9
-    ball_slope_px: float = 0.3
+    max_probability: float = 0.998
+    half_size_px: float = 10.7
+    slope_px: float = 1.03
+    foreshortening: float = 0.742
+    blur_factor: float = 3.4
+    ball_half_size_px: float = 2.01
+    ball_slope_px: float = 0.042
 
     def __post_init__(self) -> None:
         require_probability(max_probability=self.max_probability)

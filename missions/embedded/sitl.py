@@ -12,8 +12,10 @@ from autopilot_bridge.sitl.configuration import HOMES
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
+from flightsim.vehicle import VehicleDivergedError
 from flightsim.wind_profile import WindLaw, WindProfile
 from missions.embedded.scenario import equipped
+from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.scenario import Scenario
 
@@ -101,8 +103,15 @@ class EmbeddedSitl:
         self.sitl = Sitl(equipped(world, configuration.scenario))
         self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
         sitl = self.sitl
+
+        def advance() -> None:
+            try:
+                sitl.advance()
+            except VehicleDivergedError as error:
+                raise MissionError(f"the simulation ended: {error}") from error
+
         self.loop = VirtualTimeLoop(
-            sitl.advance,
+            advance,
             lambda: sitl.time_us,
             speedup=configuration.speedup,
             max_time_us=round(configuration.max_flight_s * 1e6),

@@ -39,6 +39,7 @@ def check_turns(
     airspeed_m_s: float,
     limits: FixedWingLimits,
     *,
+    radius_m: float | None = None,
     size_m: tuple[float, float] | None = None,
     spacing_m: float | None = None,
 ) -> float:
@@ -50,15 +51,17 @@ def check_turns(
         curve: to be flown.
         airspeed_m_s: equivalent.
         limits: of the aircraft.
+        radius_m: tightest turn; None: what the limits say of a path that the autopilot's guidance follows.
         size_m, spacing_m: width and height, and track spacing, that the curve was made for: a refusal then
             tells those that would do.
 
     Raises:
         PlanError: says how tight it is, and what to change.
     """
-    radius_m = limits.path_radius_m(airspeed_m_s)
+    if radius_m is None:
+        radius_m = limits.path_radius_m(airspeed_m_s)
     reason = f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter})"
-    if limits.guided_radius_m(airspeed_m_s) >= radius_m:
+    if radius_m > limits.turn_radius_m(airspeed_m_s):
         reason = f"its path guidance ({limits.guidance_parameter})"
     needs = f"{radius_m:.0f} m at {airspeed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind with {reason}"
     if isinstance(curve, Polyline):

@@ -2,7 +2,8 @@
 
 The distance from the path obeys d'' + 2 zeta omega d' + omega^2 d = 0 around the acceleration that the path's
 own curvature takes, looked up as far ahead as the bank needs to build up. A slow integral takes out what a
-wing that hangs a little leaves.
+wing that hangs a little leaves. What a bank gives is measured in flight (`TurnEffect`): an aircraft that
+slips in its turns has to bank more.
 """
 
 import math
@@ -17,6 +18,49 @@ _LEAST_COS_CRAB: Final = 0.5
 _LEAST_CURVE: Final = 0.3  # of the radius: how far inside a bend its centre still counts
 _INTEGRAL_WITHIN_M: Final = 15.0
 _INTEGRAL_MAX_M_S2: Final = 1.0
+_PRIOR_M2_S3: Final = 10.0  # as much as a second at 18 degrees of bank
+_LEAST_EFFECT: Final = 0.5
+_LARGEST_EFFECT: Final = 1.3
+_LEAST_BANK_M_S2: Final = 0.8  # 5 degrees: below, it is noise that is compared
+_LONGEST_GAP_S: Final = 0.5
+_EFFECT_MEMORY_S: Final = 30.0  # of banked flight
+
+
+class TurnEffect:
+    """Acceleration that a bank gives, as a share of a coordinated turn's; least squares over telemetry.
+
+    Of the acceleration across the course, speed times rate of the course, against g tan(bank). Coordinated
+    turns give 1; the plane model in ArduPilot 4.6.3, which slips in turns, 0.7.
+    """
+
+    def __init__(self) -> None:
+        self._banked = self._turned = _PRIOR_M2_S3  # begins at 1
+        self._last: tuple[int, float] | None = None
+
+    @property
+    def share(self) -> float:
+        """The estimate, within what an aircraft can have."""
+        return max(_LEAST_EFFECT, min(_LARGEST_EFFECT, self._turned / self._banked))
+
+    def update(self, time_us: int, vel_ne_m_s: tuple[float, float], roll_rad: float, yaw_rad: float) -> None:
+        """Take a position message's velocity, and the attitude of the moment.
+
+        Args:
+            time_us: of the velocity; one that was taken already is left out.
+            vel_ne_m_s: over ground.
+            roll_rad, yaw_rad: of the attitude.
+        """
+        speed, course = math.hypot(*vel_ne_m_s), math.atan2(vel_ne_m_s[1], vel_ne_m_s[0])
+        last, self._last = self._last, (time_us, course)
+        if last is None or not 0.0 < (dt := (time_us - last[0]) * 1e-6) < _LONGEST_GAP_S:
+            return
+        turned = speed * math.remainder(course - last[1], math.tau) / dt
+        crab = math.remainder(course - yaw_rad, math.tau)
+        banked = GRAVITY_M_S2 * math.tan(max(-1.4, min(1.4, roll_rad))) * max(_LEAST_COS_CRAB, math.cos(crab))
+        kept = math.exp(-dt / _EFFECT_MEMORY_S) if abs(banked) > _LEAST_BANK_M_S2 else 1.0
+        if kept < 1.0:
+            self._turned = kept * self._turned + turned * banked * dt
+            self._banked = kept * self._banked + banked * banked * dt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,10 +94,14 @@ class PathRoll:
     Args:
         path: with its leads.
         parameters: gains and limits.
+        effect: of banks; it goes on to be updated by whoever has the telemetry.
     """
 
-    def __init__(self, path: FlyablePath, parameters: PathRollParameters) -> None:
+    def __init__(
+        self, path: FlyablePath, parameters: PathRollParameters, effect: TurnEffect | None = None
+    ) -> None:
         self._path = path
+        self._effect = TurnEffect() if effect is None else effect
         self._parameters = parameters
         self._integral_m_s2 = 0.0
         self._time_us: int | None = None
@@ -81,7 +129,8 @@ class PathRoll:
         push = bend - 2.0 * p.damping * p.frequency_rad_s * (back_m_s + away_m_s)
         push -= self._integrated(across, time_us)
         crab = math.remainder(over_ground - heading_rad, math.tau)
-        roll = math.atan(push / (GRAVITY_M_S2 * max(_LEAST_COS_CRAB, math.cos(crab))))
+        given = self._effect.share * GRAVITY_M_S2 * max(_LEAST_COS_CRAB, math.cos(crab))
+        roll = math.atan(push / given)
         return max(-p.bank_max_rad, min(p.bank_max_rad, roll))
 
     def _integrated(self, across_m: float, time_us: int) -> float:

@@ -1,5 +1,6 @@
 """Flying a pattern with wings: along the path by setpoints, or as an uploaded mission with its landing."""
 
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -35,13 +36,20 @@ def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -
     limits.check_altitude(options.own_altitude_m)
     coarse = curve.points(np.linspace(0.0, curve.end, _REACH_SAMPLES))
     limits.check_reach(float(np.hypot(*coarse.T).max()))
-    return check_turns(
+    check = partial(
+        check_turns,
         curve,
         options.speed_m_s,
         limits,
         size_m=(options.width_m, options.height_m),
         spacing_m=options.spacing_m,
     )
+    try:
+        return check(radius_m=limits.path_radius_m(options.speed_m_s))
+    except PlanError:
+        if options.via is Via.WAYPOINTS:  # followed by the autopilot's own guidance
+            raise
+    return check(radius_m=limits.turn_radius_m(options.speed_m_s))
 
 
 async def fly_pattern_with_wings(

@@ -14,7 +14,7 @@ from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.vehicle import Vehicle
 from missions.wings.entry import Entry
 from missions.wings.flight import PatternFlight
-from missions.wings.guidance import PathRoll, PathRollParameters
+from missions.wings.guidance import PathRoll, PathRollParameters, TurnEffect
 from missions.wings.place import PlaceOnPath
 
 _ENTRY_S: Final = 0.8  # from the decision to leave the circle to the first setpoint that is flown
@@ -32,8 +32,9 @@ async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     await vehicle.takeoff(options.own_altitude_m)
     notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
     notes.begin("transit", clock.stamp_us)
-    await _to_the_start(vehicle, flight)
-    stream = _Stream(vehicle, flight, gains)
+    effect = TurnEffect()
+    await _to_the_start(vehicle, flight, effect)
+    stream = _Stream(vehicle, flight, gains, effect)
     if vehicle.adapter.roll_alone:
         await vehicle.change_altitude(options.own_altitude_m)
         await vehicle.follow(stream.roll, options.rate_hz)
@@ -43,8 +44,11 @@ async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     notes.end(clock.stamp_us)
 
 
-async def _to_the_start(vehicle: Vehicle, flight: PatternFlight) -> None:
-    """Circle beside the way into the pattern until the aircraft flies along it, at its height."""
+async def _to_the_start(vehicle: Vehicle, flight: PatternFlight, effect: TurnEffect) -> None:
+    """Circle beside the way into the pattern until the aircraft flies along it, at its height.
+
+    The circle shows what a bank gives.
+    """
     frame = LocalFrame(vehicle.home)
     here = await vehicle.position()
     north, east, _ = frame.ned_from_geodetic(here.lat_deg, here.lon_deg, here.alt_m)
@@ -57,12 +61,24 @@ async def _to_the_start(vehicle: Vehicle, flight: PatternFlight) -> None:
         wait=False,
     )
     await vehicle.change_airspeed(flight.options.speed_m_s)
+
+    def leaving() -> bool:
+        _measure(vehicle, effect)
+        return entry.leaving(vehicle, _ENTRY_S)
+
     await vehicle.wait_until(
-        lambda: entry.leaving(vehicle, _ENTRY_S),
+        leaving,
         what="the way into the pattern",
         on=("GLOBAL_POSITION_INT",),
         timeout_s=240.0 + flight.away_s,
     )
+
+
+def _measure(vehicle: Vehicle, effect: TurnEffect) -> None:
+    position, attitude = vehicle.latest(telemetry.Position), vehicle.latest(telemetry.Attitude)
+    if position is not None and attitude is not None:
+        north_m_s, east_m_s, _ = position.vel_ned_m_s
+        effect.update(position.time_us, (north_m_s, east_m_s), attitude.roll_rad, attitude.yaw_rad)
 
 
 async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
@@ -83,11 +99,14 @@ async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
 class _Stream:
     """Setpoints by where the aircraft is along the route; tells the pattern's beginning and end."""
 
-    def __init__(self, vehicle: Vehicle, flight: PatternFlight, gains: PathRollParameters) -> None:
+    def __init__(
+        self, vehicle: Vehicle, flight: PatternFlight, gains: PathRollParameters, effect: TurnEffect
+    ) -> None:
         self._vehicle = vehicle
         self._flight = flight
         self._place = PlaceOnPath(vehicle, flight.route, float(flight.route.arc_m[0]))
-        self._law = PathRoll(flight.route, gains)
+        self._effect = effect
+        self._law = PathRoll(flight.route, gains, effect)
         self._lead_s = gains.lead_s
 
     def _go_on(self) -> bool:
@@ -128,6 +147,7 @@ class _Stream:
         attitude = vehicle.latest(telemetry.Attitude)
         if attitude is None:
             raise MissionError(f"the vehicle tells no attitude (ATTITUDE); {vehicle.heard()}")
+        _measure(vehicle, self._effect)
         return AttitudeSetpoint(
             roll_rad=self._law.roll_rad(self._place, attitude.yaw_rad, vehicle.clock.time_us)
         )

@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
 from missions import cli, cli_vehicle_params
+from missions.cli_vehicle import _verdict
 from missions.cli_vehicle_link import confirm
 
 
@@ -38,3 +39,34 @@ def test_where_the_input_is_closed_nobody_can_be_asked(monkeypatch: pytest.Monke
     with pytest.raises(click.UsageError, match="delete all: not confirmed; give --yes"):
         asyncio.run(confirm("delete all", False))
     asyncio.run(confirm("delete all", True))
+
+
+@pytest.mark.parametrize(
+    ("problems", "would_arm", "words"),
+    [
+        (0, True, "it would arm; no problems"),
+        (1, True, "1 problem: don't fly it so, although its own pre-arm checks are passed"),
+        (2, False, "it would not arm; 2 problems"),
+    ],
+)
+def test_the_doctor_s_verdict_does_not_contradict_itself(problems: int, would_arm: bool, words: str) -> None:
+    assert _verdict(problems, would_arm=would_arm) == words
+
+
+def test_rounding_of_a_table_of_defaults_is_no_difference() -> None:
+    parameters = pytest.importorskip(
+        "missions.vehicle_client.parameters", reason="the MAVSDK client library is not installed"
+    )
+    vehicle = {
+        name: parameters.Value(number=number, type=kind)
+        for name, number, kind in (
+            ("COMPASS_DEC", 0.22335722, 9),
+            ("INS_GYROFFS_X", 2.1559314e-05, 9),
+            ("OTHER", 0.22336, 9),
+            ("WHOLE", 1_000_001, 6),
+        )
+    }
+    table = {"COMPASS_DEC": 0.223357, "INS_GYROFFS_X": 2.15593e-05, "OTHER": 0.223357, "WHOLE": 1_000_000.0}
+    found = parameters.differences(vehicle, table, rounded=True)
+    assert [difference.name for difference in found] == ["OTHER", "WHOLE"]
+    assert len(parameters.differences(vehicle, table)) == 4  # a file has all digits

@@ -6,13 +6,15 @@ its waypoint.
 """
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from missions.atmosphere import GRAVITY_M_S2
+from missions.errors import PlanError
 from missions.library import PatternMission, find_mission
-from missions.options import FlightOptions
+from missions.options import FlightOptions, Via
 from missions.planning.flyable import FlyablePath, flyable_path
 from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import roll_in_m
@@ -95,3 +97,16 @@ def test_bends_are_no_tighter_than_the_guidance_follows() -> None:
     assert isinstance(px4, FixedWingLimits)
     assert px4.path_radius_m(15.0) == pytest.approx(15.0 * 0.7 * 40.0 / math.pi)
     assert px4.waypoint_lead_s == 0.0  # an aircraft of PX4 1.16.1 does not read a waypoint's radius
+
+
+def test_setpoints_bend_as_tightly_as_the_aircraft_can_bank() -> None:
+    mission = find_mission("lissajous")
+    limits = ArduPlane().limits(STOCK_PLANE)
+    chosen = FlightOptions(
+        width_m=1000.0, height_m=1000.0, given=frozenset({"width_m", "height_m", "via"}), via=Via.SETPOINTS
+    )
+    options = mission.adapted(chosen, limits)
+    assert isinstance(limits, FixedWingLimits)
+    assert check_wings(mission.curve(options), options, limits) == limits.turn_radius_m(22.0)
+    with pytest.raises(PlanError, match=r"its path guidance \(NAVL1_PERIOD\)"):
+        mission.check(replace(options, via=Via.WAYPOINTS), limits)

@@ -24,7 +24,7 @@ from missions.planning.flyable import flyable_path
 from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import check_turns, roll_in_m
 from missions.wings.entry import Entry, with_leads
-from missions.wings.guidance import PathRoll, PathRollParameters
+from missions.wings.guidance import PathRoll, PathRollParameters, TurnEffect
 from missions.wings.place import PlaceOnPath
 
 AEROSONDE = FixedWingLimits(
@@ -187,11 +187,15 @@ def test_polylines_are_checked_by_what_their_corners_take() -> None:
     assert check_turns(Polyline(((0.0, 0.0), (300.0, 0.0))), 25.0, AEROSONDE) == radius
 
 
-def follow(wind: tuple[float, float], offset_m: float) -> np.ndarray:
-    """Distances of a point mass that banks with a lag, from 20 s on."""
+def follow(wind: tuple[float, float], offset_m: float, effect: float = 1.0) -> np.ndarray:
+    """Distances of a point mass that banks with a lag, from 20 s on.
+
+    Its banks give a share of a coordinated turn's acceleration; the law measures it ten times a second.
+    """
+    measured = TurnEffect()
     path = flyable_path(named_lissajous("L2", width_m=2100.0, height_m=2100.0), 100.0, 25.0)
     route = with_leads(path, 30.0)
-    law = PathRoll(route, PathRollParameters())
+    law = PathRoll(route, PathRollParameters(), measured)
     place = object.__new__(PlaceOnPath)
     place.arc_m = float(route.arc_m[0])
     (north, east), course, _ = route.at(place.arc_m)
@@ -207,8 +211,11 @@ def follow(wind: tuple[float, float], offset_m: float) -> np.ndarray:
         place.vel_north_m_s, place.vel_east_m_s = vel
         place.ground_speed_m_s = math.hypot(*vel)
         roll += dt / 0.4 * (law.roll_rad(place, heading, k * 20_000) - roll)
-        heading += dt * GRAVITY_M_S2 * math.tan(roll) / airspeed
+        heading += dt * effect * GRAVITY_M_S2 * math.tan(roll) / airspeed
+        if k % 5 == 0:
+            measured.update(k * 20_000, vel, roll, heading)
         across.append(place.across_m)
+    assert measured.share == pytest.approx(effect, abs=0.06)
     return np.array(across[1000:])
 
 
@@ -218,6 +225,13 @@ def test_banks_follow_a_path_in_wind(wind: tuple[float, float], offset_m: float)
     across = follow(wind, offset_m)
     assert np.sqrt((across**2).mean()) < 1.0
     assert np.abs(across).max() < 3.0
+
+
+@pytest.mark.parametrize("effect", [0.7, 1.15])
+def test_banks_follow_a_path_when_the_aircraft_slips_in_its_turns(effect: float) -> None:
+    across = follow((-3.0, 4.0), 0.0, effect)
+    assert np.sqrt((across**2).mean()) < 1.0
+    assert np.abs(across).max() < 4.0
 
 
 def test_gains_that_cannot_be_are_refused() -> None:

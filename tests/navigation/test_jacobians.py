@@ -191,6 +191,23 @@ def test_delayed_measurement(kind: str, axis: int) -> None:
     np.testing.assert_allclose(row, expected, atol=5e-3)  # first order in the delay of 20 ms
 
 
+@pytest.mark.parametrize("delay_s", [0.0, 0.3])
+def test_delayed_height_is_that_of_the_past(delay_s: float) -> None:
+    """A vehicle that sank by `delay * v_down` since the pressure was sampled was that much higher then: the
+    predicted pressure altitude, and its variance, by the same row."""
+    error = RandomStreams(5).generator("error").normal(size=SIZE)
+    work = np.zeros(s.WORK_SIZE)
+    work[:SIZE] = error
+    past_down = error[s.POS + 2] - delay_s * error[s.VEL + 2]
+    assert fusion.baro_dot(work, s.DX, delay_s) == pytest.approx(-past_down + error[s.BARO_OFFSET], abs=1e-12)
+    root = RandomStreams(6).generator("covariance").normal(size=(SIZE, SIZE))
+    p = root @ root.T
+    row = np.zeros(SIZE)
+    row[[s.POS + 2, s.VEL + 2, s.BARO_OFFSET]] = -1.0, delay_s, 1.0
+    assert fusion.baro_ph(p, work, delay_s) == pytest.approx(float(row @ p @ row), rel=1e-12)
+    np.testing.assert_allclose(work[s.PH : s.PH + SIZE], p @ row, rtol=1e-12, atol=1e-12)
+
+
 @pytest.mark.parametrize("kind", ["airspeed", "sideslip"])
 def test_air_data(kind: str) -> None:
     """Gain, innovation and predicted variance of the update itself: with P the identity the error estimate
