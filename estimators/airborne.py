@@ -20,52 +20,84 @@ _ARMED: Final = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 _IN_AIR: Final = (2, 3, 4)  # MAV_LANDED_STATE_IN_AIR, _TAKEOFF, _LANDING
 _LEAST_HEIGHT_MM: Final = 2000
 _LEAST_AIRSPEED_M_S: Final = 8.0
+_LEAST_THROTTLE_PERCENT: Final = 20
+_CLEAR_HEIGHT_MM: Final = 10_000
+_CLEAR_SPEED_M_S: Final = 5.0
+_GROUND_TYPES: Final = (5, 10, 11, 12)
+"""MAV_TYPE_ANTENNA_TRACKER, _GROUND_ROVER, _SURFACE_BOAT, _SUBMARINE."""
 _HOLD_US: Final = 2_500_000
 """How long a state counts that is not told again: one lost message of a 1 Hz stream doesn't end it."""
 _AUTOPILOT: Final = 1
 
+Samples = tuple[NDArray[np.int64], NDArray[Any]]
+"""Times and values."""
 _Judge = Callable[[NDArray[Any]], NDArray[np.bool_]]
 
 
 def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple[Spans, str]:
-    """When a vehicle was in the air.
+    """When a vehicle was in the air, by the first evidence that shows any time in the air:
 
-    EXTENDED_SYS_STATE tells it, but some autopilots call a take-off run a flight: what comes before a vehicle
-    is 2 m above where it began, and after it was so much above where it ended, is left out. Where the state
-    isn't known, a vehicle counts that is armed and more than 2 m above home (or faster than 8 m/s through the
-    air where no height is told; or armed, where neither is).
+    * EXTENDED_SYS_STATE. Some autopilots call a take-off run a flight: what comes before a vehicle is 2 m
+      above where it began, and after it was so much above where it ended, is left out.
+    * Armed and more than 2 m above home.
+    * Armed and faster than 8 m/s through the air.
+    * Armed with the throttle above 20 % (a hover below 2 m, or in a hall where no height is known).
+    * Above 10 m and faster than 5 m/s, though no message says that it was armed.
+
+    A vehicle that can't fly (rover, boat, submarine, antenna tracker) counts while it is armed.
 
     Returns:
-        Spans, and what they are taken from; all time where the log tells nothing of it ("all of the log").
+        Spans, and what they are taken from; no spans and the reason where there is evidence and none of it
+        shows the vehicle in the air; all time where the log tells nothing of it ("all of the log").
     """
 
-    def column(name: str, field: str) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
+    def column(name: str, field: str) -> Samples | None:
         # Asked for by name only where it is: the log's dialect may not have it at all.
         if not any(key.name == name and key.system_id == system_id for key in log.keys):
             return None
         tables = log.tables(name, system_id=system_id, component_id=_AUTOPILOT, boot=boot)
         return (tables[0].time_us, tables[0][field]) if tables else None
 
-    def spans_of(name: str, field: str, judge: _Judge) -> Spans | None:
-        found = column(name, field)
-        return None if found is None else _spans(found[0], judge(found[1]))
+    def spans_of(samples: Samples | None, judge: _Judge) -> Spans:
+        return [] if samples is None else _spans(samples[0], judge(samples[1]))
 
-    told = spans_of("EXTENDED_SYS_STATE", "landed_state", lambda state: np.isin(state, _IN_AIR))
+    heights = column("GLOBAL_POSITION_INT", "relative_alt")
+    landed = column("EXTENDED_SYS_STATE", "landed_state")
+    told = spans_of(landed, lambda state: np.isin(state, _IN_AIR))
+    types, modes = column("HEARTBEAT", "type"), column("HEARTBEAT", "base_mode")
+    armed = spans_of(modes, lambda mode: (mode & _ARMED) != 0)
+    if types is not None and np.isin(types[1], _GROUND_TYPES).any():
+        if armed:
+            return armed, "armed"
+        return [ALWAYS], "all of the log (a vehicle that does not fly, never armed)"
     if told:
-        heights = column("GLOBAL_POSITION_INT", "relative_alt")
         if heights is not None:
             told = [_off_the_ground(span, *heights) for span in told]
         return told, "EXTENDED_SYS_STATE"
-    armed = spans_of("HEARTBEAT", "base_mode", lambda mode: (mode & _ARMED) != 0)
-    if armed is None:
+    if landed is None and modes is None:
         return [ALWAYS], "all of the log"
-    high = spans_of("GLOBAL_POSITION_INT", "relative_alt", lambda height: height > _LEAST_HEIGHT_MM)
-    if high is not None:
-        return _both(armed, high), "armed, above 2 m"
-    fast = spans_of("VFR_HUD", "airspeed", lambda speed: speed > _LEAST_AIRSPEED_M_S)
-    if fast is not None:
-        return _both(armed, fast), "armed, faster than 8 m/s"
-    return armed, "armed"
+    hud = {field: column("VFR_HUD", field) for field in ("airspeed", "groundspeed", "throttle")}
+    high = spans_of(heights, lambda height: height > _LEAST_HEIGHT_MM)
+    if heights is not None and np.ptp(heights[1].astype(np.int64)) < _LEAST_HEIGHT_MM // 2:
+        high, heights = [], None  # a height that never changes is none
+    fast = spans_of(hud["airspeed"], lambda speed: speed > _LEAST_AIRSPEED_M_S)
+    driven = spans_of(hud["throttle"], lambda percent: percent > _LEAST_THROTTLE_PERCENT)
+    for spans, source in (
+        (_both(armed, high), "armed, above 2 m"),
+        (_both(armed, fast), "armed, faster than 8 m/s"),
+        (_both(armed, driven), "armed, throttle above 20 %"),
+    ):
+        if spans:
+            return spans, source
+    if not armed:
+        clearly_high = spans_of(heights, lambda height: height > _CLEAR_HEIGHT_MM)
+        moving = spans_of(hud["groundspeed"], lambda speed: speed > _CLEAR_SPEED_M_S)
+        if both := _both(clearly_high, moving):
+            return both, "above 10 m, faster than 5 m/s; never armed by its messages"
+        return [], "never armed"
+    if landed is None and heights is None and all(samples is None for samples in hud.values()):
+        return armed, "armed"
+    return [], "armed, but never above 2 m, faster than 8 m/s, or with the throttle above 20 %"
 
 
 def within(spans: Spans, time_us: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -19,6 +19,7 @@ from estimators.references import (
     error_figures,
     errors,
     home_of,
+    lacking_references,
     references,
     target_reference,
 )
@@ -55,6 +56,7 @@ class Comparison:
         airborne_s: how long that was.
         airborne_from: what says so.
         figures: statistics by name of the reference.
+        not_compared: why there are no figures; "" where there are.
     """
 
     label: str
@@ -68,6 +70,7 @@ class Comparison:
     airborne_s: float
     airborne_from: str
     figures: Mapping[str, Sequence[ErrorFigures]]
+    not_compared: str
 
     @property
     def reference(self) -> str | None:
@@ -167,7 +170,34 @@ def _compared(
         airborne_s=airborne_s,
         airborne_from=airborne_from,
         figures=figures,
+        not_compared=""
+        if any(figures.values())
+        else _why_not(log, subject, table.columns, wanted, bool(known), counted, airborne_from),
     )
+
+
+def _why_not(
+    log: "Log | None",
+    subject: int,
+    columns: Sequence[str],
+    wanted: Sequence[str],
+    referenced: bool,
+    counted: NDArray[np.bool_],
+    airborne_from: str,
+) -> str:
+    """Why estimates have no errors, in words."""
+    compared = [column for column in columns if column in COMPARED]
+    if not compared:
+        known = ", ".join(COMPARED)
+        return f"no reference for its columns {', '.join(columns)}; there are references for {known}"
+    if not referenced:
+        what = " and ".join({AUTOPILOT: "of the autopilot", TRUTH: "of the truth"}[name] for name in wanted)
+        lacking = [] if log is None or not subject else lacking_references(log, subject, compared)
+        tail = f" (no {', no '.join(lacking)})" if lacking and AUTOPILOT in wanted else ""
+        return f"the log has nothing {what} for {', '.join(compared)}{tail}"
+    if not counted.any():
+        return f"no estimate was made in the air: {airborne_from}"
+    return "estimates and references have no time in common"
 
 
 def _log_of(logs: "Sequence[Log]", subject: int) -> "Log | None":

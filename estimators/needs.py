@@ -8,6 +8,8 @@ from estimators.interface import Need
 
 __all__ = ["EstimatorError", "Supply", "lacking", "message_names", "supplies", "wanted_rate_hz"]
 
+NOT_STREAMED = frozenset({"PARAM_VALUE"})
+"""Messages that an autopilot sends on request or when something changes: no rate can be asked for."""
 RATE_TOLERANCE = 0.95
 """Streams come a little slower than they are asked for: 19.2 Hz of IMU serve where 20 are needed."""
 

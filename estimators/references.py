@@ -28,6 +28,7 @@ __all__ = [
     "error_figures",
     "errors",
     "home_of",
+    "lacking_references",
     "quantity_of",
     "references",
     "target_reference",
@@ -115,6 +116,17 @@ def references(
     frame = None if place is None else LocalFrame(place)
     found = {AUTOPILOT: _autopilot(log, system_id, boot, frame), TRUTH: _truth(log, system_id, boot, frame)}
     return {name: Reference(name, columns) for name, columns in found.items() if columns}
+
+
+def lacking_references(log: "Log", system_id: int, columns: Sequence[str]) -> list[str]:
+    """Messages that columns would be compared with, and that a vehicle's autopilot has not sent."""
+    angles = ("roll_rad", "pitch_rad", "yaw_rad")
+    needed = ["ATTITUDE"] if any(column in angles for column in columns) else []
+    if any(column not in angles for column in columns):
+        needed.append("GLOBAL_POSITION_INT")
+    if any(column in ("north_m", "east_m") for column in columns):
+        needed.append("HOME_POSITION")
+    return [name for name in needed if _table(log, name, system_id, None) is None]
 
 
 def target_reference(

@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from estimators.errors import EstimatorError, EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Estimator, Need
@@ -19,6 +21,15 @@ __all__ = ["Replay", "log_rate_hz", "log_supplies", "replay", "vehicles_in"]
 
 _LEARNT_FROM = 20
 """SYSTEM_TIMEs of each vehicle that are looked at before several logs are put in order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a log, as `Log.inside` takes it."""
+
+    from_s: float | None = None
+    to_s: float | None = None
+    boot: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,8 +61,9 @@ def replay(
     make: Callable[[], Estimator[Any]],
     *,
     system_id: int | None = None,
-    from_us: int | None = None,
-    to_us: int | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    boot: int | None = None,
 ) -> Replay:
     """Run an estimator over a log, one for each vehicle in it; or over the logs of a team.
 
@@ -59,11 +71,12 @@ def replay(
         logs: open; several only for an estimator of a team, each with vehicles of its own.
         make: a fresh estimator.
         system_id: the one vehicle that counts; None: all in the log.
-        from_us, to_us: part of each boot to read, vehicle time; None: from its begin, to its end.
+        from_s, to_s, boot: part of each log to read, as `Log.inside` takes them.
 
     Raises:
         EstimatorError: the estimator needs what it may not see; several logs for an estimator of one vehicle,
             or with the same vehicle in them.
+        LogError: there is no such part in a log.
     """
     opened = [logs] if not isinstance(logs, Sequence) else list(logs)
     probe = Fleet(make)
@@ -76,8 +89,8 @@ def replay(
     failure = ""
     if not (fleet.team and lacking) and served:
         try:
-            for time_us, message in _messages(opened, fleet, system_id):
-                if (from_us is None or time_us >= from_us) and (to_us is None or time_us <= to_us):
+            for time_us, message, inside in _messages(opened, fleet, system_id, Part(from_s, to_s, boot)):
+                if inside:
                     fleet.take(time_us, message)
                 else:
                     fleet.pass_over(time_us, message)
@@ -138,16 +151,32 @@ def _own_vehicles(logs: Sequence["Log"], needs: Sequence[Need], system_id: int |
     return found
 
 
-def _messages(logs: Sequence["Log"], fleet: Fleet, system_id: int | None) -> Iterator[tuple[int, Message]]:
-    """Needed messages in the order of the file; of several logs, in the order of the team's common time."""
+def _messages(
+    logs: Sequence["Log"], fleet: Fleet, system_id: int | None, part: Part
+) -> Iterator[tuple[int, Message, bool]]:
+    """Needed messages in the order of the file, and whether they lie in the part that counts; of several
+    logs, in the order of the team's common time.
+    """
     names = sorted(fleet.heard_names)
-    streams = [log.messages(_present(log, names), system_id=system_id) for log in logs]
+    streams = [_messages_of(log, _present(log, names), system_id, part) for log in logs]
     if len(streams) == 1:
         return streams[0]
     runner = fleet.runners[0]
     for log in logs:
         runner.learn_times(_first_system_times(log))
     return heapq.merge(*streams, key=lambda item: runner.common_us(item[0], item[1].src_system))
+
+
+def _messages_of(
+    log: "Log", names: Sequence[str], system_id: int | None, part: Part
+) -> Iterator[tuple[int, Message, bool]]:
+    selections = log.select(names, system_id=system_id)
+    messages = log.messages(names, system_id=system_id)
+    if part == Part() or not selections:
+        return ((time_us, message, True) for time_us, message in messages)
+    order = np.sort(np.concatenate([stream.order[rows].astype(np.int64) for stream, rows in selections]))
+    inside = log.inside(order, from_s=part.from_s, to_s=part.to_s, boot=part.boot).tolist()
+    return ((*item, kept) for item, kept in zip(messages, inside, strict=True))
 
 
 def _present(log: "Log", names: Sequence[str]) -> list[str]:

@@ -11,9 +11,11 @@ In full, for each system:
 * The autopilot leads. As long as it has not been heard with a stamp, any component does.
 * A leader's stamp no older than a second before the newest is the message's time, and the newest if it is
   greater.
-* An older one is a new boot, if it is also more than a second older than the newest of the same message: its
-  own clock has gone back. If it is not, the stamp has gone stale (a receiver without a fix repeats the time
-  of its last one), and the message has the newest time.
+* An older one that is also more than a second older than the newest of the same message is a new boot if it
+  is less than half of the newest time or 30 s older, or if the stamps have stayed behind while they went on
+  by 3 s. Otherwise it is late: a radio or a serial line can deliver frames of the past in a burst. One that
+  is not older than the newest of the same message has gone stale (a receiver without a fix repeats the time
+  of its last one). Late and stale messages have the newest time.
 * A stamp of another component counts for its message when it is within a second of the newest (it may have
   booted with the vehicle); otherwise the message has the newest.
 * Before the first stamp the time is 0.
@@ -32,7 +34,11 @@ AUTOPILOT: Final = 1
 """Component id of autopilots (MAV_COMP_ID_AUTOPILOT1)."""
 
 LATE_US: Final = 1_000_000
-"""A step back by more is a new boot."""
+"""A stamp that is further behind is late, or begins a new boot."""
+FAR_BACK_US: Final = 30_000_000
+"""No burst of late frames is so old: a step back by more is a new boot."""
+SETTLED_US: Final = 3_000_000
+"""Stamps that go on for so long behind the newest time are of a new boot."""
 
 UNIX_TIME_US: Final = 1_000_000_000_000_000
 """`time_usec` from here on is a Unix time (this one is of September 2001)."""
@@ -58,6 +64,7 @@ class _SystemTime:
     newest_us: int = 0
     boot: int = 0
     led: bool = False
+    behind_us: int = -1  # the stamp with which the time stepped back and has not returned yet
     by_message: dict[tuple[int, int], int] = field(default_factory=dict)
 
 
@@ -103,8 +110,16 @@ class VehicleTime:
                 system.by_message[key] = own
             if own > system.newest_us:
                 system.newest_us = own
+            system.behind_us = -1
             return own
-        if own < last - LATE_US:
+        if own < last - LATE_US and system.behind_us < 0:
+            system.behind_us = own
+        if own < last - LATE_US and (
+            2 * own < system.newest_us
+            or own < system.newest_us - FAR_BACK_US
+            or own >= system.behind_us + SETTLED_US
+        ):
+            system.behind_us = -1
             system.boot += 1
             system.newest_us = own
             system.by_message.clear()
@@ -157,6 +172,7 @@ def _vehicle_times(
     newest = np.zeros(256, dtype=np.int64)
     epoch = np.zeros(256, dtype=np.int64)  # of what is remembered by stream; older is forgotten
     led = np.zeros(256, dtype=np.bool_)
+    behind = np.full(256, -1, dtype=np.int64)
     last_of = np.zeros(len(systems), dtype=np.int64)
     epoch_of = np.zeros(len(systems), dtype=np.int64)
     for index in range(len(times)):
@@ -179,9 +195,17 @@ def _vehicle_times(
             epoch_of[stream] = epoch[system]
             last_of[stream] = 0
         last = last_of[stream]
+        if own < last - LATE_US and own < newest[system] - LATE_US and behind[system] < 0:
+            behind[system] = own
         if own >= newest[system] - LATE_US:
             newest[system] = max(newest[system], own)
-        elif own < last - LATE_US:
+            behind[system] = -1
+        elif own < last - LATE_US and (
+            2 * own < newest[system]
+            or own < newest[system] - FAR_BACK_US
+            or own >= behind[system] + SETTLED_US
+        ):
+            behind[system] = -1
             begins[index] = 1
             newest[system] = own
             epoch[system] += 1

@@ -10,6 +10,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
+import jsbsim
 import numpy as np
 
 from flightsim.airframe import Airframe, AirframeError, FlightLimits, Role, load_airframe
@@ -58,8 +59,11 @@ def flight_envelope(
 @lru_cache(maxsize=32)
 def _envelope(airframe: Airframe, home: Home, temperature_offset_k: float, _content: str) -> FlightEnvelope:
     air = Environment(temperature_offset_k=temperature_offset_k)
-    tunnel = WindTunnel(airframe, home=home, environment=air, height_m=_HEIGHT_M)
-    return _Survey(tunnel).envelope()
+    try:
+        tunnel = WindTunnel(airframe, home=home, environment=air, height_m=_HEIGHT_M)
+        return _Survey(tunnel).envelope()
+    except (TrimError, jsbsim.BaseError) as error:
+        raise AirframeError(f"vehicle '{airframe.name}' can't be trimmed: {error}") from None
 
 
 class _Survey:

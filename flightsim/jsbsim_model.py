@@ -117,16 +117,15 @@ def _load(airframe: Airframe, folder: Path, physics_rate_hz: int) -> tuple[jsbsi
     fdm.set_systems_path(str(package / "systems"))
     fdm.set_dt(1.0 / physics_rate_hz)  # filters and actuators take it when they are made
     try:
-        loaded = fdm.load_model(airframe.jsbsim, False)
-    except RuntimeError as error:
+        if not fdm.load_model(airframe.jsbsim, False):
+            raise AirframeError(_refusal(airframe, messages.warnings))
+        if airframe.kind is AirframeKind.FIXED_WING:
+            # the friction of JSBSim's wheels starts from uninitialised memory, which only a reset clears
+            fdm.set_property_value("ic/h-agl-ft", 1000.0)
+            fdm.run_ic()
+            fdm.reset_to_initial_conditions(0)
+    except jsbsim.BaseError as error:
         raise AirframeError(_refusal(airframe, [*messages.warnings, str(error)])) from None
-    if not loaded:
-        raise AirframeError(_refusal(airframe, messages.warnings))
-    if airframe.kind is AirframeKind.FIXED_WING:
-        # the friction of JSBSim's wheels starts from uninitialised memory, which only a reset clears
-        fdm.set_property_value("ic/h-agl-ft", 1000.0)
-        fdm.run_ic()
-        fdm.reset_to_initial_conditions(0)
     fdm.set_dt(1.0 / physics_rate_hz)
     hold_motion(fdm, False)
     return fdm, tuple(messages.warnings)

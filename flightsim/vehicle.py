@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any, Final
 
+import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,7 @@ from flightsim import truth as t
 from flightsim.actuation import FixedWingActuators
 from flightsim.airframe import (
     Airframe,
+    AirframeError,
     AirframeKind,
     LaunchKind,
     LaunchParameters,
@@ -143,8 +145,20 @@ class Vehicle:
 
         Args:
             initial: how to start; by default as at construction.
+
+        Raises:
+            AirframeError: the model cannot be used, or its motion is not possible where it starts.
         """
-        start = initial or self._initial
+        try:
+            self._start(initial or self._initial)
+        except jsbsim.BaseError as error:
+            raise AirframeError(f"{self._unusable}: JSBSim says: {' '.join(str(error).split())}") from None
+
+    @property
+    def _unusable(self) -> str:
+        return f"vehicle '{self.airframe.name}' can't be simulated from its start"
+
+    def _start(self, start: InitialState) -> None:
         fixed_wing = self.airframe.kind is AirframeKind.FIXED_WING
         launch = _launch_parameters(self.airframe, start)
         fdm, self.load_warnings = load_fdm(self.airframe, self.physics_rate_hz, launcher=launch is not None)
@@ -193,7 +207,10 @@ class Vehicle:
             seed_sequence=self._seed_sequence,
         )
         if self._read(self._steps) != _SOUND:
-            raise self._diverged()
+            raise AirframeError(
+                f"{self._unusable}: forces, attitude or position become infinite before the first step; "
+                f"check {self.airframe.xml_path} (mass, inertia, gear)"
+            )
         self._let_launcher_carry(self.launcher)
         self._refresh_magnetic_field()
 
@@ -223,7 +240,10 @@ class Vehicle:
         launcher = self.launcher
         if launcher is not None:
             launcher.step()
-        self._run()
+        try:
+            self._run()
+        except jsbsim.BaseError as error:
+            raise self._diverged(f"JSBSim says: {' '.join(str(error).split())}") from None
         self._steps += 1
         motion = self._read(self._steps)
         if launcher is not None:
@@ -350,10 +370,10 @@ class Vehicle:
         self.crash = self._reader.touches.words(self._steps, self.truth)
         lay_down(self.truth, ground_alt_m)
 
-    def _diverged(self) -> VehicleDivergedError:
+    def _diverged(self, why: str = "its motion is not possible") -> VehicleDivergedError:
         return VehicleDivergedError(
             f"vehicle '{self.airframe.name}' diverged at step {self._steps} "
-            f"({self._steps / self.physics_rate_hz:.3f} s): its motion is not possible"
+            f"({self._steps / self.physics_rate_hz:.3f} s): {why}"
         )
 
     def _refresh_magnetic_field(self) -> None:

@@ -86,6 +86,7 @@ def command_line() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point: runs the command line and exits. Every error is one line on stderr."""
+    _open_closed_streams()
     words = sys.argv[1:] if arguments is None else arguments
     if words[:1] == ["vehicle"]:  # MAVSDK is native code
         crashed = "the MAVSDK library crashed, and what was under way is not done; try again"
@@ -120,6 +121,25 @@ def run_command_line(arguments: list[str] | None = None) -> int:
         click.echo(f"flightstack: {said}", err=True)
         return FAILED
     return result if isinstance(result, int) else DONE
+
+
+def _open_closed_streams() -> None:
+    """Put the null device in place of standard streams that were closed (`2>&-`).
+
+    What is written there is lost, as the user wants, and no file or socket gets the number of one of them.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is not None:
+            continue
+        null = os.open(os.devnull, os.O_RDWR)
+        if null != number:
+            try:
+                os.fstat(number)
+            except OSError:
+                os.dup2(null, number)
+                os.close(null)
+                null = number
+        setattr(sys, name, os.fdopen(null, "w" if number else "r", encoding="utf-8"))
 
 
 def _let_go_of_output() -> None:

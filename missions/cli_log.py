@@ -49,9 +49,19 @@ def _selection_options(command: Command) -> Command:
                 help="Only messages for which it holds, by the newest values: 'HEARTBEAT.custom_mode == 4'.",
             ),
             click.option(
-                "--from", "from_s", type=FiniteRange(min=0.0), metavar="S", help="Log time, seconds."
+                "--from",
+                "from_s",
+                type=FiniteRange(min=0.0),
+                metavar="S",
+                help="Begin at this time, seconds since the vehicle's boot, as log info prints it.",
             ),
-            click.option("--to", "to_s", type=FiniteRange(min=0.0), metavar="S"),
+            click.option("--to", "to_s", type=FiniteRange(min=0.0), metavar="S", help="End at this time."),
+            click.option(
+                "--boot",
+                type=click.IntRange(min=0),
+                metavar="N",
+                help="Boot of the vehicle, as log info numbers them. [default: all]",
+            ),
         )
     ):
         command = option(command)
@@ -76,6 +86,7 @@ def _open(path: Path, dialect: str | None) -> "Log":
 
 def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
     from estimators.logs.condition import Condition
+    from estimators.logs.errors import NothingThere
     from estimators.logs.raw_records import window
 
     names = [name.strip() for group in given["types"] for name in group.split(",") if name.strip()]
@@ -93,7 +104,13 @@ def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
         missing = [name for name in names if name.upper() not in {key.name.upper() for key in log.keys}]
         if there and missing:
             click.echo(f"{log.path} has no {', '.join(missing)}", err=True)
-        return window(log, selections, given["from_s"], given["to_s"])
+        timed = given["from_s"] is not None or given["to_s"] is not None
+        if timed and given["boot"] is None and len(boots := log.boots_at(given["from_s"], given["to_s"])) > 1:
+            several = ", ".join(map(str, boots))
+            click.echo(f"the times fit to boots {several}; all count, --boot chooses one", err=True)
+        return window(log, selections, given["from_s"], given["to_s"], given["boot"])
+    except NothingThere:
+        raise  # about what is in the log, not about how it was asked for
     except BridgeError as error:
         raise click.UsageError(str(error)) from error
 
@@ -189,7 +206,7 @@ def cut(path: Path, out: Path, dialect: str | None, **given: Any) -> None:
     metavar="WHAT:KIND[=VALUE][@FROM-TO]",
     help="WHAT: gyro, accel, mag, baro, gps, airspeed, distance_sensor, battery, MESSAGE, or MESSAGE.field. "
     "KIND: off, stuck, garbage, wrong, drift, noise, spike, slow, delayed, drop, intermittent. "
-    "VALUE in SI units; times in seconds of the log. May be repeated.",
+    "VALUE in SI units; times as of --from. May be repeated.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 def mutate(

@@ -34,8 +34,20 @@ _SECONDS = FiniteRange(min=0.0, max=1e9)
     show_default=True,
     help="What the estimates are compared with; of both, the autopilot's word leads the summary.",
 )
-@click.option("--from", "from_s", type=_SECONDS, metavar="S", help="Begin at this vehicle time, s.")
-@click.option("--to", "to_s", type=_SECONDS, metavar="S", help="End at this vehicle time, s.")
+@click.option(
+    "--from",
+    "from_s",
+    type=_SECONDS,
+    metavar="S",
+    help="Begin at this time, seconds since the vehicle's boot, as log info prints it.",
+)
+@click.option("--to", "to_s", type=_SECONDS, metavar="S", help="End at this time.")
+@click.option(
+    "--boot",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Boot of the vehicle, as log info numbers them. [default: all]",
+)
 @click.option("--dialect", metavar="NAME|FILE.xml", help="Of the logs. [default: all of MAVLink's messages]")
 @click.option(
     "--out",
@@ -55,7 +67,7 @@ def replay(**given: Any) -> int:
     from estimators.logs import LogError
     from missions.errors import PlanError
     from missions.estimation.over_logs import ReplayRequest, check_out, failed, replay_logs
-    from missions.estimation.report import EstimationResult, table_lines, warnings_of
+    from missions.estimation.report import EstimationResult, notes_of, table_lines, warnings_of
 
     for path in given["logs"]:
         if path.is_dir():
@@ -84,6 +96,7 @@ def replay(**given: Any) -> int:
             against=given["against"],
             from_s=given["from_s"],
             to_s=given["to_s"],
+            boot=given["boot"],
             dialect=given["dialect"],
             out=given["out"],
             picture=not given["no_picture"],
@@ -97,6 +110,8 @@ def replay(**given: Any) -> int:
     for line in table_lines(done):
         click.echo(line)
     for label, result in done:
+        for note in notes_of(result.summary):
+            click.echo(f"{label}: {note}")
         for warning in warnings_of(result.summary):
             click.echo(f"flightstack: {label}: {warning}", err=True)
         samples, speed = result.summary["samples"], result.summary["wall_time_s"]

@@ -129,6 +129,13 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
     default="none",
     show_default=True,
 )
+@click.option(
+    "--gps",
+    type=click.Choice(["differential", "standalone"]),
+    default="differential",
+    show_default=True,
+    help="Receiver: decimetres with corrections, or metres that wander without.",
+)
 @click.option("--camera", is_flag=True, help="Every vehicle carries a camera on a gimbal.")
 @click.option(
     "--target",
@@ -181,6 +188,7 @@ def sitl(
     wind: str,
     wind_profile: str,
     turbulence: str,
+    gps: str,
     camera: bool,
     targets: tuple[str, ...],
     map_file: str | None,
@@ -205,7 +213,7 @@ def sitl(
     """
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
-    from autopilot_bridge.clock.pacing import wall_time_s
+    from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
     from autopilot_bridge.sitl import (
         PaceReport,
         Sitl,
@@ -217,6 +225,7 @@ def sitl(
     )
     from autopilot_bridge.sitl.configuration import HOMES
     from flightsim.environment import Environment
+    from flightsim.vehicle import VehicleDivergedError
     from flightsim.wind_profile import WindLaw, WindProfile
     from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
@@ -238,6 +247,7 @@ def sitl(
                     flavour=autopilot,
                     launch=launch,
                     heading_deg=heading_deg,
+                    gps=gps,
                     parameters={
                         **_loss_times(autopilot, speedup),
                         **({} if params is None else parameters_from_file(params)),
@@ -251,6 +261,7 @@ def sitl(
                     turbulence=turbulence,
                 ),
                 seed=seed,
+                unix_epoch_us=unix_time_us(),  # its clients live by the calendar
             )
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)
@@ -289,11 +300,14 @@ def sitl(
         if autopilot == "ardupilot" and not ports and not no_wait:
             click.echo(f"waiting for a client on {opened[0][2]}", err=True)
             server.wait_for_client(lambda: ending.asked)
-        server.run(
-            lambda: ending.asked,
-            report=report if sys.stderr is not None and sys.stderr.isatty() else None,
-            until_us=None if duration is None else round(duration * 1e6),
-        )
+        try:
+            server.run(
+                lambda: ending.asked,
+                report=report if sys.stderr.isatty() else None,
+                until_us=None if duration is None else round(duration * 1e6),
+            )
+        except VehicleDivergedError as error:
+            raise click.ClickException(f"the simulation ended: {error}") from error
     lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
     click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")
     return _FAILED if losses.any else 0

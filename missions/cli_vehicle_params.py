@@ -156,11 +156,10 @@ def compare(other: str, **given: Any) -> int:
     from missions.vehicle_client.parameters import differences, read_all
 
     async def work(client: "VehicleClient") -> "list[Difference]":
-        wanted = _defaults(client) if other == "defaults" else read_untyped_parameter_file(Path(other))
-        found = differences(await read_all(client), wanted)
-        if other == "defaults":  # our tables need not be the vehicle's
-            return [difference for difference in found if difference.vehicle is not None]
-        return found
+        if other != "defaults":
+            return differences(await read_all(client), read_untyped_parameter_file(Path(other)))
+        found = differences(await read_all(client), _defaults(client), rounded=True)
+        return [d for d in found if d.vehicle is not None]  # our tables need not be the vehicle's
 
     found = with_client(given, work)
     if given["as_json"]:

@@ -23,19 +23,25 @@ def report_lines(report: LogReport) -> Iterator[str]:
     if any(report.drops.values()):
         yield "dropped: " + _counts(report.drops)
     yield "remarks: " + ", ".join(f"{_words(name)} {value}" for name, value in report.remarks.items())
+    yield f"times: {report.clock}; --from and --to count the same"
+    several = any(span.boot for vehicle in report.vehicles for span in vehicle.modes)
     for vehicle in report.vehicles:
         yield ""
-        yield from _vehicle(vehicle)
+        yield from _vehicle(vehicle, several)
     boots = [boot for boot in report.boots if boot.end_us > boot.start_us]
     if len({boot.system_id for boot in boots}) < len(boots):
         yield ""
-        for boot in boots:
-            yield f"boot {boot.number} of system {boot.system_id}: {_span(boot.start_us, boot.end_us)}"
+        for item in boots:
+            yield (
+                f"boot {item.number} of system {item.system_id}: "
+                f"{_span(item.start_us, item.end_us)}, time of that system"
+            )
     if report.gaps:
         yield ""
         yield f"gaps: {len(report.gaps)}"
         for gap in report.gaps[:_GAPS_SHOWN]:
-            yield f"  system {gap.system_id}: nothing heard {_span(gap.start_us, gap.end_us)}"
+            boot = f"boot {gap.boot}, " if several else ""
+            yield f"  system {gap.system_id}: nothing received {boot}{_span(gap.start_us, gap.end_us)}"
     if report.losses:
         yield ""
         yield f"{'component':>9} {'frames':>9} {'lost':>8} {'loss %':>7} {'late':>6}"
@@ -43,10 +49,10 @@ def report_lines(report: LogReport) -> Iterator[str]:
             share = 100.0 * loss.lost / max(1, loss.frames + loss.lost)
             who = f"{loss.system_id}/{loss.component_id}"
             yield f"{who:>9} {loss.frames:>9} {loss.lost:>8} {share:>7.2f} {loss.late:>6}"
-    for item in report.unknown:
+    for unknown in report.unknown:
         yield (
-            f"unknown message {item.message_id} from {item.system_id}/{item.component_id}: "
-            f"{item.count} frames, {item.frame_bytes} bytes"
+            f"unknown message {unknown.message_id} from {unknown.system_id}/{unknown.component_id}: "
+            f"{unknown.count} frames, {unknown.frame_bytes} bytes"
         )
     yield ""
     yield f"{'component':>9} {'message':<32} {'count':>8} {'Hz':>8} {'gap s':>8}  instances"
@@ -54,24 +60,32 @@ def report_lines(report: LogReport) -> Iterator[str]:
         who = f"{stream.system_id}/{stream.component_id}"
         instances = ",".join(str(item) for item in stream.instances[:8])
         yield (
-            f"{who:>9} {stream.name:<32} {stream.count:>8} {stream.rate_hz:>8.2f} "
+            f"{who:>9} {stream.name:<32} {stream.count:>8} {_rate(stream.rate_hz):>8} "
             f"{stream.longest_gap_s:>8.2f}  {instances}"
         ).rstrip()
 
 
-def _vehicle(vehicle: VehicleReport) -> Iterator[str]:
+def _vehicle(vehicle: VehicleReport, several: bool) -> Iterator[str]:
+    def span(boot: int, start_us: int, end_us: int) -> str:
+        return (f"boot {boot}, " if several else "") + _span(start_us, end_us)
+
     boots = "" if vehicle.boots == 1 else f", {vehicle.boots} boots"
-    yield f"vehicle {vehicle.system_id}: {vehicle.autopilot} {vehicle.type}{boots}"
+    firmware = f", {vehicle.firmware}" if vehicle.firmware else ""
+    yield f"vehicle {vehicle.system_id}: {vehicle.autopilot} {vehicle.type}{firmware}{boots}"
     for flight in vehicle.flights:
-        yield f"  armed {_span(flight.start_us, flight.end_us)}"
-    for span in vehicle.modes[:_MODES_SHOWN]:
-        yield f"  {span.mode:<16} {_span(span.start_us, span.end_us)}"
+        yield f"  armed {span(flight.boot, flight.start_us, flight.end_us)}"
+    for mode in vehicle.modes[:_MODES_SHOWN]:
+        yield f"  {mode.mode:<16} {span(mode.boot, mode.start_us, mode.end_us)}"
     if len(vehicle.modes) > _MODES_SHOWN:
         yield f"  ... and {len(vehicle.modes) - _MODES_SHOWN} more modes"
 
 
 def _span(start_us: int, end_us: int) -> str:
     return f"{start_us * 1e-6:.2f} to {end_us * 1e-6:.2f} s ({(end_us - start_us) * 1e-6:.1f} s)"
+
+
+def _rate(rate_hz: float) -> str:
+    return f"{rate_hz:.2f}" if rate_hz else "-"  # one message, or all at once: no rate is known
 
 
 def _date(unix_us: int) -> str:

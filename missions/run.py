@@ -207,6 +207,8 @@ def wind_words(wind: Mapping[str, Any]) -> str:
     """The wind of an embedded flight in words: `summary.json`'s `wind`."""
     speed_m_s, turbulence = wind["speed_m_s"], wind["turbulence"]
     steady = f"wind {speed_m_s:g} m/s from {wind['from_deg']:g} degrees" if speed_m_s else "no steady wind"
+    if speed_m_s and wind["profile"] != "uniform":
+        steady += f" at 10 m, {wind['profile']} profile"
     if turbulence == "none":
         return steady if speed_m_s else "still air"
     return f"{steady}, {turbulence} turbulence"

@@ -37,7 +37,7 @@ from missions.run import (
     wind_words,
     write_summary,
 )
-from missions.signing import client_signing, key_missing
+from missions.signing import client_signing, require_key
 from missions.together import together
 from missions.vehicle.vehicle import Vehicle
 
@@ -165,8 +165,7 @@ def _fly_interruptible(
         except KeyboardInterrupt as interrupt:
             outcome, reason, by_signal = INTERRUPTED, INTERRUPTED, signal_of(interrupt)
         except (MissionError, PlanError, BridgeError) as error:
-            notes = (*getattr(error, "__notes__", ()), *key_missing(request, flight.vehicles))
-            outcome, reason = FAILED, "; ".join((str(error), *notes))
+            outcome, reason = FAILED, "; ".join((str(error), *getattr(error, "__notes__", ())))
         finally:
             recorder.close()
     finally:
@@ -177,7 +176,7 @@ def _fly_interruptible(
     debriefing = _debrief(mission, request, recorder.records, flight)
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
-        reason = _missed_check(request, blocks)
+        reason = mission.verdict(debriefing, request.max_error_m) or _missed_check(request, blocks)
         if recorder.failure:
             reason = "; ".join(filter(None, (reason, f"{recorder.failure}; it was flown on without a log")))
         outcome = FAILED if reason else COMPLETED
@@ -265,6 +264,7 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
     vehicle.notes.autopilot = vehicle.autopilot
     vehicle.notes.kind = str(vehicle.kind)
     if request.connect:
+        await require_key(request, vehicle)
         await vehicle.set_parameters(request.parameters)
     await vehicle.wait_ready(leave_mission=mission.commands)
 
@@ -393,6 +393,7 @@ def _summary(
             "profile": request.wind_profile,
             "turbulence": request.turbulence,
         }
+        summary["gps"] = request.gps
     return summary
 
 

@@ -1,13 +1,13 @@
 """Signing on a client's side: the key from a file, time from the calendar."""
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from autopilot_bridge.clock.pacing import unix_time_us
 from autopilot_bridge.errors import SigningKeyError
-from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState
+from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState, definition, dialect
 from autopilot_bridge.mavlink.signing import RADIO, signing_time
+from missions.errors import VehicleTimeout
 
 if TYPE_CHECKING:
     from missions.request import RunRequest
@@ -43,13 +43,21 @@ def client_signing(key: SigningKey | None, *, link_id: int = 0) -> LinkSigning |
     return None if key is None else LinkSigning(SigningState(key, clock=now), link_id=link_id, policy=RADIO)
 
 
-def key_missing(request: "RunRequest", vehicles: Iterable["Vehicle"]) -> list[str]:
-    """What keeps a vehicle that signs from answering anybody without its key, when that is what happened."""
-    if not request.connect or request.signing_key is not None:
-        return []
-    return [
-        f"vehicle {vehicle.system_id} signs what it says, and has answered nothing: is its key missing "
-        "(--signing-key FILE)?"
-        for vehicle in vehicles
-        if vehicle.signs and not vehicle.answered
-    ]
+async def require_key(request: "RunRequest", vehicle: "Vehicle") -> None:
+    """See that a vehicle that signs answers us, before anything is set or uploaded.
+
+    A vehicle that signs may take unsigned frames all the same (PX4 and ArduPilot do on USB).
+
+    Raises:
+        VehicleTimeout: it does not answer, and no key was given.
+    """
+    if request.signing_key is not None or not vehicle.signs:
+        return
+    version = float(definition("AUTOPILOT_VERSION").message_id)
+    try:
+        await vehicle.try_command(dialect.MAV_CMD_REQUEST_MESSAGE, version)
+    except VehicleTimeout:
+        raise VehicleTimeout(
+            f"vehicle {vehicle.system_id} signs its messages and does not answer unsigned ones; give its "
+            "key with --signing-key FILE. Nothing was sent to it but a request for its version"
+        ) from None

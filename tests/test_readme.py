@@ -2,14 +2,13 @@
 
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import click
 import pytest
 
 from missions.cli import command_line
+from tests.clients.forked_process import flightstack_done
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -47,10 +46,7 @@ def test_the_two_lines_set_up_what_they_use() -> None:
 def fly(mission: str, folder: Path, *arguments: str) -> str:
     """Fly a mission of the README from a file; what it printed."""
     (folder / "mission.py").write_text(mission, encoding="utf-8")
-    words = [sys.executable, "-m", "missions", "fly", str(folder / "mission.py"), *arguments]
-    done = subprocess.run(
-        [*words, "--out", str(folder / "run")], cwd=ROOT, capture_output=True, text=True, check=False
-    )
+    done = flightstack_done("fly", str(folder / "mission.py"), *arguments, "--out", str(folder / "run"))
     assert done.returncode == 0, done.stderr
     assert (folder / "run" / "track.png").stat().st_size > 10_000
     return done.stdout

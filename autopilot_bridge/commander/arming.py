@@ -127,6 +127,8 @@ def arming_reasons(
     problem = situation.mission_problem
     if mode is FlightMode.MISSION and problem is not None and problem not in reasons:
         reasons.append(problem)
+    if situation.landing_sequence:
+        reasons.append(Reason.LANDING_SEQUENCE)
     if situation.battery_level >= BatteryLevel.CRITICAL:
         reasons.append(Reason.BATTERY_FAILSAFE)
     elif situation.battery_level >= BatteryLevel.LOW:

@@ -37,7 +37,7 @@ from autopilot_bridge.commander.mode_memory import ModeMemory
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.commander.pilot import PilotInput
-from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.setpoints import SetpointStream
 from autopilot_bridge.commander.situation import Situation
 from autopilot_bridge.commander.stick_override import StickOverride
@@ -47,6 +47,7 @@ from autopilot_bridge.commander.tasks import TaskRunner
 from autopilot_bridge.commander.vehicle_tasks import LandDetector, VehicleTasks
 from autopilot_bridge.commander.verdict import ACCEPTED, Reason, Verdict
 from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.flight.plan_reading import ends_in_landing, in_landing_sequence, starts_with_takeoff
 from autopilot_bridge.mission_plan import MissionStore
 
 # Health, failsafes and arming checks run at 10 Hz, as in PX4's commander; flight tasks at 50 Hz.
@@ -104,6 +105,7 @@ class Commander:
         self.parameters = parameters
         self.missions = missions
         self.vehicle = vehicle
+        self._mission_over = False
         self.mode = policy.initialising_mode or policy.boot_mode
         self.commanded_mode = self.mode
         self.armed = False
@@ -217,6 +219,24 @@ class Commander:
         self._command(mode)
         self._enter(mode)
 
+    def end_mission(self, mode: FlightMode | None = None) -> None:
+        """The mission flown is over.
+
+        Args:
+            mode: what its last item asks for; None: the policy's mode follows.
+        """
+        after = self.policy.mission_end_mode
+        follows = mode or after
+        if follows is None or self.mode is not FlightMode.MISSION:
+            return
+        stays = after in self.policy.kept_after_disarm
+        if self.airborne and not ends_in_landing(self.missions):
+            self.change_mode(follows)
+            if stays and after is not None:
+                self._mode_after_disarm = after
+        else:
+            self._mission_over = stays
+
     def arm(self, *, forced: bool = False) -> Verdict:
         """Let the motors turn, when every check passes."""
         if self.armed:
@@ -326,6 +346,12 @@ class Commander:
             terminated=self.terminated,
             mission_problem=self.mission_problem,
         )
+        self.situation.landing_sequence = (
+            self.policy.landing_blocks_arming
+            and self.commanded_mode is FlightMode.MISSION
+            and in_landing_sequence(self.missions)
+            and not starts_with_takeoff(self.missions.items)
+        )
         self._events.extend(self._fence_keeper.update(self.situation))
 
     @property
@@ -337,6 +363,7 @@ class Commander:
 
     def _command(self, mode: FlightMode) -> None:
         self.commanded_mode = self.situation.mode = mode
+        self._mission_over = False
         self._disarming.restart(self.time_us)
         self._override.restart(self.context.sticks)
         if mode in self.policy.kept_after_disarm:
@@ -379,7 +406,10 @@ class Commander:
         self.tasks.stop()
         self._events.extend(self.failsafes.update(self.situation, self.parameters))
         self.emit(Disarmed(time_us=self.time_us, reason=reason))
-        if self.policy.kept_after_disarm and self.commanded_mode not in self.policy.kept_after_disarm:
+        self._rewind_mission()
+        if self._mission_over and self.policy.mission_end_mode is not None:
+            self._command(self.policy.mission_end_mode)
+        elif self.policy.kept_after_disarm and self.commanded_mode not in self.policy.kept_after_disarm:
             self.commanded_mode = self._mode_after_disarm
         if not self.terminated:
             self._enter(self.commanded_mode)
@@ -403,3 +433,10 @@ class Commander:
         raised = self.policy.mission_waits_for_start and self.situation.throttle_high
         if raised and self.armed and self.landed and self.mode is FlightMode.MISSION:
             self.guidance.start_mission()
+
+    def _rewind_mission(self) -> None:
+        """Disarmed: where the firmware has it so, the mission begins again at its first item."""
+        restart, missions = self.policy.mission_restart, self.missions
+        flown = missions.current + 1 >= len(missions.items)
+        if restart is MissionRestart.AT_DISARM or (restart is MissionRestart.AFTER_LAST_ITEM and flown):
+            missions.current = 0

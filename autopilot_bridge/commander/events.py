@@ -186,11 +186,13 @@ class LandingDetected(Event):
 class MissionItemReached(Event):
     """An item of the mission is done; `index` counts as the stored plan does.
 
-    `distance_m`: from its place, for an item that an aircraft flew past; NaN for others.
+    `distance_m`: from its place, for an item that an aircraft flew past; NaN for others. `navigation`: it was
+    flown; False for DO_ and CONDITION_ items.
     """
 
     index: int
     distance_m: float = math.nan
+    navigation: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

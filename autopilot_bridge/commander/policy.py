@@ -2,11 +2,20 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum, auto
 
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
+
+
+class MissionRestart(Enum):
+    """When a stored mission begins again at its first item."""
+
+    NEVER = auto()
+    AFTER_LAST_ITEM = auto()  # at a disarm after its last item (PX4)
+    AT_DISARM = auto()  # at every disarm (ArduCopter)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,7 +40,6 @@ class CommanderPolicy:
         mission_waits_for_start: on the ground a mission starts on command only, not by being armed
             (ArduPilot).
         mission_first_item: 1 where item 0 is home (ArduPilot).
-        reports_do_items: items that are done at once are reported as reached, too (ArduPilot).
         manual_control_always: sticks are there without anybody sending them (ArduPilot's simulated radio).
         recovers: the commanded mode comes back by itself when a failsafe condition clears (PX4);
             else a failsafe is a mode change like any other (ArduPilot).
@@ -65,7 +73,11 @@ class CommanderPolicy:
         fence_bounds_targets: a place to fly to outside the geofence is refused (not on ArduPlane).
         gps_shown_when_used: SYS_STATUS shows the GPS only while its position may be flown by (PX4);
             clients take the bit for the vehicle's position.
-        mission_end_mode: mode after the last item of a mission, in the air; None: stays.
+        mission_end_mode: mode after the last item of a mission, in the air; None: stays. A mode that is
+            `kept_after_disarm` follows a mission that ends on the ground too, from the disarm on (PX4).
+        mission_restart: when a mission begins again at its first item.
+        landing_blocks_arming: a landing sequence that was begun is in the way of arming until mode or mission
+            change, unless the mission starts with a take-off (ArduPlane).
         force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
     """
 
@@ -84,7 +96,6 @@ class CommanderPolicy:
     mission_return_is_mode: bool
     mission_waits_for_start: bool
     mission_first_item: int
-    reports_do_items: bool
     manual_control_always: bool
     recovers: bool
     fallback_land: FlightMode | None
@@ -111,6 +122,8 @@ class CommanderPolicy:
     radio_restores_mode: bool = False
     ground_speed_apart: bool = False
     mission_end_mode: FlightMode | None = None
+    mission_restart: MissionRestart = MissionRestart.NEVER
+    landing_blocks_arming: bool = False
     plans: PlanHabits = PX4_PLANS
     fence_bounds_targets: bool = True
     fence_in_status: bool = False

@@ -29,6 +29,7 @@ class Situation:
         throttle_high: the throttle stick is up.
         home_set: home is known.
         mission_problem: why the stored mission can't be flown; None when it can.
+        landing_sequence: the mission mode is chosen, and a landing that the mission has begun blocks arming.
         battery_level: warning level.
         outside_fence: beyond the geofence.
         fence_present: there is a geofence to keep to.
@@ -57,6 +58,7 @@ class Situation:
     throttle_high: bool = False
     home_set: bool = False
     mission_problem: Reason | None = Reason.MISSION_MISSING
+    landing_sequence: bool = False
     battery_level: BatteryLevel = BatteryLevel.OK
     outside_fence: bool = False
     fence_present: bool = False

@@ -43,7 +43,7 @@ class TaskFollower:
                 self._mission_finished()
             case flight.MissionModeRequested():
                 if commander.policy.mission_return_is_mode and commander.mode is commander.commanded_mode:
-                    commander.change_mode(FlightMode.RETURN)
+                    commander.end_mission(FlightMode.RETURN)
             case flight.ItemCommanded(seq=seq):
                 commander.emit(ItemCommanded(time_us=commander.time_us, index=seq))
             case flight.HomeChangeRequested():
@@ -62,18 +62,19 @@ class TaskFollower:
     def _item_reached(self, event: flight.WaypointReached) -> None:
         commander = self._commander
         items = commander.missions.items
-        last = event.seq + 1 == len(items)  # tells clients that the mission is over
-        if not (event.navigation or last or commander.policy.reports_do_items):
-            return
         distance_m = float("nan")
         if event.navigation and event.seq < len(items):
             distance_m = commander.vehicle.distance_to(items[event.seq], commander.context)
-        reached = MissionItemReached(time_us=commander.time_us, index=event.seq, distance_m=distance_m)
-        commander.emit(reached)
+        commander.emit(
+            MissionItemReached(
+                time_us=commander.time_us,
+                index=event.seq,
+                distance_m=distance_m,
+                navigation=event.navigation,
+            )
+        )
 
     def _mission_finished(self) -> None:
         commander = self._commander
         commander.emit(MissionFinished(time_us=commander.time_us, landed=commander.landed))
-        end = commander.policy.mission_end_mode
-        if end is not None and commander.airborne and commander.mode is FlightMode.MISSION:
-            commander.change_mode(end)
+        commander.end_mission()

@@ -49,6 +49,7 @@ class Reason(Enum):
     CALIBRATING = auto()
     LEANING = auto()  # standing too far from level
     THROTTLE_HIGH = auto()
+    LANDING_SEQUENCE = auto()
     NOT_LANDED = auto()
     NOT_ARMED = auto()
     ALREADY_FLYING = auto()

@@ -5,7 +5,7 @@ from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
-from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.control.parameters import MulticopterParameters
@@ -76,7 +76,6 @@ POLICY: Final = CommanderPolicy(
     mission_return_is_mode=False,
     mission_waits_for_start=True,
     mission_first_item=1,
-    reports_do_items=True,
     manual_control_always=True,
     recovers=False,
     fallback_land=FlightMode.LAND,
@@ -90,6 +89,7 @@ POLICY: Final = CommanderPolicy(
     mode_denied=Result.FAILED,
     disarm_in_air_denied=Result.FAILED,
     gcs_needed_to_arm=False,
+    mission_restart=MissionRestart.AT_DISARM,
     force_arm_skips_checks=True,
     fence_in_status=True,
     plans=ARDUCOPTER_PLANS,

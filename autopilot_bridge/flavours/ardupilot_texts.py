@@ -36,6 +36,7 @@ _REASONS: Final[Mapping[Reason, str]] = {
     Reason.CALIBRATING: "Calibration running",
     Reason.LEANING: "Leaning",
     Reason.THROTTLE_HIGH: "Throttle too high",
+    Reason.LANDING_SEQUENCE: "In landing sequence",
 }
 _MODE_REASONS: Final[Mapping[Reason, str]] = {
     Reason.POSITION: "requires position",
@@ -117,7 +118,7 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
             return (Notice(Severity.EMERGENCY, text),)
         case events.BatteryWarning():
             return battery_warning(event)
-        case events.MissionItemReached(index=index):
+        case events.MissionItemReached(index=index, navigation=True):
             return (Notice(Severity.INFO, f"Reached command #{index}"),)
     return ()
 

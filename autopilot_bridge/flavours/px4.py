@@ -5,7 +5,7 @@ from typing import Final
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
-from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.control import MulticopterController
 from autopilot_bridge.control.parameters import MulticopterParameters
@@ -66,7 +66,6 @@ POLICY: Final = CommanderPolicy(
     mission_return_is_mode=True,
     mission_waits_for_start=False,
     mission_first_item=0,
-    reports_do_items=False,
     manual_control_always=False,
     recovers=True,
     fallback_land=FlightMode.DESCEND,
@@ -82,6 +81,8 @@ POLICY: Final = CommanderPolicy(
     gcs_needed_to_arm=True,
     force_arm_skips_checks=False,
     gps_shown_when_used=True,
+    mission_end_mode=FlightMode.HOLD,
+    mission_restart=MissionRestart.AFTER_LAST_ITEM,
 )
 
 IDENTITY: Final = Identity(

@@ -74,7 +74,7 @@ class ManualInput:
 class WaypointReached:
     """A mission item was completed (MISSION_ITEM_REACHED).
 
-    `navigation` is False for DO_ and CONDITION_ items: ArduPilot reports them as reached, PX4 doesn't.
+    `navigation` is False for DO_ and CONDITION_ items.
     """
 
     seq: int

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
-from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 
 
@@ -124,3 +124,26 @@ def landing_start(items: Sequence[MissionItem]) -> int | None:
         if item.command == Command.DO_LAND_START:
             return seq
     return None
+
+
+def in_landing_sequence(missions: MissionStore) -> bool:
+    """The current item is part of the landing: behind DO_LAND_START, or the landing itself."""
+    items, current = missions.items, missions.current
+    if not 0 <= current < len(items):
+        return False
+    start = landing_start(items)
+    behind_start = start is not None and current >= start
+    return behind_start or items[current].command == Command.NAV_LAND
+
+
+def starts_with_takeoff(items: Sequence[MissionItem]) -> bool:
+    """The first item that is flown is a take-off; item 0 is home (ArduPilot)."""
+    first = next((item for item in items[1:] if is_navigation(item)), None)
+    return first is not None and first.command in (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF)
+
+
+def ends_in_landing(missions: MissionStore) -> bool:
+    """The current item is a landing."""
+    items, current = missions.items, missions.current
+    landings = (Command.NAV_LAND, Command.NAV_VTOL_LAND)
+    return 0 <= current < len(items) and items[current].command in landings

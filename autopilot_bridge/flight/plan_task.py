@@ -160,7 +160,7 @@ class PlanTask(ABC):
                 seq += 1
                 continue
             if item.command in JUMPS:
-                seq = self._jump(ctx, item, seq)
+                seq = self._jump(item, seq)
                 continue
             if self._habits.conditions:
                 self._beside.append(seq)
@@ -185,14 +185,13 @@ class PlanTask(ABC):
 
     # items that take no time
 
-    def _jump(self, ctx: FlightContext, item: MissionItem, seq: int) -> int:
+    def _jump(self, item: MissionItem, seq: int) -> int:
         """DO_JUMP, DO_JUMP_TAG: the next sequence number."""
         target = jump_target(item, self._store.items)
         left = self._jumps.get(seq, round(item.param2) if math.isfinite(item.param2) else 0)
         if target is not None and target >= self._first_item and left != 0:
             self._jumps[seq] = left - 1 if left > 0 else left
             return target
-        self._tell(ctx, WaypointReached(seq, navigation=False))
         return seq + 1
 
     def _act(self, ctx: FlightContext, item: MissionItem, seq: int) -> None:

@@ -6,6 +6,7 @@ udppeer:14580,127.0.0.1:14540  own UDP port and a partner to send to from the st
 tcp:127.0.0.1:5760             connect by TCP (also tcpout:, tcp://, tcpout://)
 tcpin:127.0.0.1:5760           listen on TCP (also tcpin://)
 serial:/dev/ttyACM0:115200     serial port and baud rate (also serial://, and /dev/ttyACM0,115200)
+./ttyV0,57600                  the same of a device anywhere, such as a link to a pseudo-terminal: DEVICE,BAUD
 flight.tlog                    telemetry log, replayed
 """
 
@@ -153,6 +154,9 @@ def _parsed(text: str) -> Address:
         return _serial(*_split_baud(stripped, ","))
     match = _SCHEME.fullmatch(stripped)
     if match is None:
+        device, comma, baud = stripped.rpartition(",")
+        if comma and device:
+            return _serial(device, baud or "none")
         raise _Refused("no such form")
     scheme, rest = match[1].lower(), match[3]
     if scheme == "serial":

@@ -9,6 +9,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flavours import ardupilot_plane_modes
+from autopilot_bridge.flight.plan_reading import in_landing_sequence, landing_start
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.command_ardupilot import ArduPilotCommands
@@ -17,7 +18,6 @@ from autopilot_bridge.services.command_common import (
     CommandHooks,
     whole,
 )
-from autopilot_bridge.services.mission_landing import in_landing_sequence, landing_start
 
 _CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
 _INFO: Final = mavlink.MAV_SEVERITY_INFO
@@ -67,7 +67,7 @@ class ArduPlaneCommands(ArduPilotCommands):
     # arming and modes
 
     def arm_disarm(self, command: Command, source: Source) -> Result:
-        """COMPONENT_ARM_DISARM: a landing sequence that would be flown or was flown is in the way."""
+        """COMPONENT_ARM_DISARM: a landing sequence that would not be flown is in the way."""
         checked = not self.is_forced(command) and self.commander.parameters.check_arming
         if command.p1 == 1.0 and checked and not self.commander.armed:
             problem = self._mission_problem()
@@ -81,8 +81,6 @@ class ArduPlaneCommands(ArduPilotCommands):
         autoland = self.hooks.parameters.get("RTL_AUTOLAND")
         if landing_start(missions.items) is not None and autoland == _AUTOLAND_OFF:
             return "DO_LAND_START set and RTL_AUTOLAND disabled"
-        if self.commander.mode is FlightMode.MISSION and in_landing_sequence(missions):
-            return "In landing sequence"
         return None
 
     def set_flight_mode(self, mode: FlightMode) -> Result:

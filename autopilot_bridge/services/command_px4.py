@@ -103,12 +103,7 @@ class Px4Commands(CommandHandlers):
             down_m=down_m,
             yaw_rad=command.p4,
             speed_m_s=command.p1,
-            radius_m=self.radius_of(command),
         ).result
-
-    def radius_of(self, command: Command) -> float:
-        """Radius of DO_REPOSITION's circle, positive clockwise; NaN: there is none."""
-        return math.nan
 
     def orbit(self, command: Command, source: Source) -> Result:
         """DO_ORBIT: p1 radius (negative: counter-clockwise), p2 speed, p3 ORBIT_YAW_BEHAVIOUR, centre."""

@@ -14,7 +14,8 @@ from autopilot_bridge.services.command_px4 import Px4Commands
 class Px4PlaneCommands(Px4Commands):
     """PX4's commands for an aircraft: those of a multicopter; places are circled.
 
-    DO_ORBIT stays in Hold, which circles (`CommanderPolicy.orbit_mode`).
+    DO_REPOSITION circles with NAV_LOITER_RAD, clockwise: its radius (p3) is not read. DO_ORBIT has a radius
+    and stays in Hold, which circles (`CommanderPolicy.orbit_mode`).
     """
 
     def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
@@ -28,10 +29,6 @@ class Px4PlaneCommands(Px4Commands):
             down_m=down_m, yaw_rad=math.nan, north_m=north_m, east_m=east_m
         )
         return verdict.result
-
-    def radius_of(self, command: Command) -> float:
-        """DO_REPOSITION: p3 radius, negative counter-clockwise; 0 or NaN: NAV_LOITER_RAD."""
-        return command.p3
 
     def go_around(self, command: Command, source: Source) -> Result:
         """DO_GO_AROUND: breaks off a landing."""

@@ -127,9 +127,9 @@ class MissionService:
         return self._report.current_message()
 
     def item_reached(self, seq: int) -> None:
-        """The flying task is done with an item: send MISSION_ITEM_REACHED to everybody."""
+        """The flying task is done with an item: the next `tick` sends MISSION_ITEM_REACHED."""
         if 0 <= seq <= 65535:
-            self._report.item_reached(seq, self._last_time_us)
+            self._report.item_reached(seq)
 
     def problems(self, *, landed: bool = True) -> tuple[str, ...]:
         """Why the stored mission may not be flown, in the firmware's words; empty when nothing is wrong."""

@@ -53,6 +53,7 @@ class MissionReport:
         self._progress = progress
         self._announced = (self._mission.current, self._mission.version)
         self._reached = -1
+        self._unsent = False
         self._repeats_left = 0
         self._repeat_at_us = 0
 
@@ -79,15 +80,18 @@ class MissionReport:
             rally_id=ids[2],
         )
 
-    def item_reached(self, seq: int, time_us: int) -> None:
-        """Tell everybody that an item is done."""
+    def item_reached(self, seq: int) -> None:
+        """An item is done; the next `tick` sends it.
+
+        Of items that are done at the same time only the last is sent: a waypoint directly before a DO_ item
+        is not reported, as both firmwares have it.
+        """
         self._reached = seq
-        self._repeats_left = self._policy.reached_repeats
-        self._repeat_at_us = time_us + REPEAT_INTERVAL_US
-        send_to_all(self._broadcast, mavlink.MAVLink_mission_item_reached_message(seq))
+        self._unsent = True
 
     def forget_reached(self) -> None:
-        """A new plan is on its way: do not repeat what was reached in the old one."""
+        """A new plan is on its way: do not report what was reached in the old one."""
+        self._unsent = False
         self._repeats_left = 0
 
     def tick(self, time_us: int) -> None:
@@ -98,7 +102,12 @@ class MissionReport:
             if self._policy.sends_current_on_change and mission.items:
                 for channel in self._broadcast.channels:
                     send_extended(channel, self.current_message())
-        if self._repeats_left and time_us >= self._repeat_at_us:
+        if self._unsent:
+            self._unsent = False
+            self._repeats_left = self._policy.reached_repeats
+            self._repeat_at_us = time_us + REPEAT_INTERVAL_US
+            send_to_all(self._broadcast, mavlink.MAVLink_mission_item_reached_message(self._reached))
+        elif self._repeats_left and time_us >= self._repeat_at_us:
             self._repeats_left -= 1
             self._repeat_at_us += REPEAT_INTERVAL_US
             send_to_all(self._broadcast, mavlink.MAVLink_mission_item_reached_message(self._reached))

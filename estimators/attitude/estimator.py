@@ -10,6 +10,7 @@ import numpy as np
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from estimators.attitude import layout as at
 from estimators.attitude.air import AirData
+from estimators.attitude.board_trim import BoardTrim
 from estimators.attitude.estimate import AttitudeEstimate
 from estimators.attitude.forms import FORM_NAMES, FORM_OF_KIND, FORM_OF_TYPE
 from estimators.attitude.parameters import (
@@ -55,6 +56,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._gap_max_us = round(p.gap_max_s * 1e6)
         self._guard = InputGuard(max_gap_us=self._gap_max_us)
         self._instance = p.imu_instance
+        self._trim = BoardTrim(p)  # a vehicle keeps its parameters when it boots anew
         self._airspeed_age_us = round(p.airspeed_age_max_s * 1e6)
         self._air = AirData(p.airspeed, self._airspeed_age_us)
         self._handlers: dict[str, Callable[[int, Message], Outcome]] = {
@@ -62,6 +64,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             "VFR_HUD": self._vfr_hud,
             "AIRSPEED": self._airspeed,
             "SCALED_PRESSURE": self._scaled_pressure,
+            "PARAM_VALUE": self._param_value,
         }
         wanted = _IMU_NAMES if p.imu is ImuSource.AUTO else (p.imu.value,)
         inertial = {"HIGHRES_IMU": self._highres_imu, "RAW_IMU": self._raw_imu}
@@ -91,7 +94,13 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             purpose="airspeed, rate of climb and throttle of a fixed wing",
             optional=p.vehicle is not VehicleKind.FIXED_WING,
         )
-        return inertial, heartbeat, air
+        trim = Need(
+            messages=("PARAM_VALUE",),
+            rate_hz=0.0,
+            purpose="the trim of the board (AHRS_TRIM_X, AHRS_TRIM_Y)",
+            optional=True,
+        )
+        return inertial, heartbeat, air, trim
 
     def handle(self, time_us: int, message: Message) -> Outcome:
         # Others may have inertial sensors of their own.
@@ -166,6 +175,8 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             "imu": self._imu_name or "none",
             "gyro_bias_rad_s": float(np.linalg.norm(x[at.GYRO_BIAS : at.GYRO_BIAS + 3])),
         }
+        if self._trim.active:
+            told["note"] = self._trim.text
         if self._form == at.ROTOR:
             told["drag_1_s"] = float(x[at.DRAG])
         elif self._form == at.WING and x[at.LIFT] > 0.0:
@@ -183,6 +194,9 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             self._form = form
         self._disarmed = not message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED
         return Outcome.USED
+
+    def _param_value(self, time_us: int, message: Message) -> Outcome:
+        return Outcome.USED if self._trim.learn(message.param_id, message.param_value) else Outcome.IGNORED
 
     def _vfr_hud(self, time_us: int, message: Message) -> Outcome:
         refused = self._guard.check(
@@ -251,6 +265,8 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         if name != self._imu_name and not self._chosen(time_us, name):
             return Outcome.IGNORED
         sample = SAMPLES[name](message)
+        if self._trim.active:
+            sample = self._trim.turned(sample)
         refused = self._guard.check(time_us, name, sample)
         if refused is not None:
             if refused is not Outcome.TIME_JUMP:

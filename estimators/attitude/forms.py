@@ -39,6 +39,7 @@ _OTHERS: Final = (
     "GROUND_ROVER",
     "SURFACE_BOAT",
     "SUBMARINE",
+    "ANTENNA_TRACKER",
     "GROUND_QUADRUPED",
 )
 

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 __all__ = ["AirspeedSource", "AttitudeParameters", "ImuSource", "VehicleKind"]
 
+TRIM_LIMIT_RAD: Final = 0.3
+"""ArduPilot itself accepts 10 degrees."""
+
 
 class VehicleKind(StrEnum):
     """Which form of the filter runs."""
@@ -57,6 +60,8 @@ class AttitudeParameters:
         rest_gain_1_s: in place of k_p while the vehicle is disarmed; k_I is a quarter of its square then.
         rest_bias_time_s: of the longest mean by which the bias about the down axis is found at rest.
         reference_tolerance_m_s2: by how much the reference's length may differ from g to count for half.
+        trim_roll_rad, trim_pitch_rad: of the board against the vehicle; None: the vehicle's parameters
+            AHRS_TRIM_X and AHRS_TRIM_Y where they are known (PX4 corrects its sensors itself).
         gap_max_s: longer silence of the inertial sensor starts the filter anew.
         airspeed_age_max_s: an older airspeed is not used.
         airspeed_min_m_s: below, there is no lift to speak of: angle of attack and sideslip are zero.
@@ -96,6 +101,8 @@ class AttitudeParameters:
     rest_gain_1_s: float = 0.5
     rest_bias_time_s: float = 20.0
     reference_tolerance_m_s2: float = 2.0
+    trim_roll_rad: float | None = None
+    trim_pitch_rad: float | None = None
     gap_max_s: float = 2.0
     airspeed_age_max_s: float = 3.0
     airspeed_min_m_s: float = 6.0
@@ -142,6 +149,8 @@ _RANGES: Final[dict[str, tuple[float, float]]] = {
     "rest_gain_1_s": (0.0, 50.0),
     "rest_bias_time_s": (0.1, 1e4),
     "reference_tolerance_m_s2": (0.01, float("inf")),
+    "trim_roll_rad": (-TRIM_LIMIT_RAD, TRIM_LIMIT_RAD),
+    "trim_pitch_rad": (-TRIM_LIMIT_RAD, TRIM_LIMIT_RAD),
     "gap_max_s": (0.05, 60.0),
     "airspeed_age_max_s": (0.1, 60.0),
     "airspeed_min_m_s": (1.0, 100.0),
@@ -181,7 +190,7 @@ def _choice(kind: type[StrEnum], name: str, value: str) -> StrEnum:
 NUMBERS: Final = tuple(
     field.name
     for field in fields(AttitudeParameters)
-    if field.name not in ("vehicle", "imu", "imu_instance", "airspeed")
+    if field.name not in ("vehicle", "imu", "imu_instance", "airspeed", "trim_roll_rad", "trim_pitch_rad")
 )
 
 

@@ -1,12 +1,12 @@
-"""ArduPilot's onboard logs (.bin): read with pymavlink's DFReader, decoded as columns.
+"""ArduPilot's onboard logs in binary form (.bin), and PX4's of before 2016: columns and MAVLink messages.
 
-DFReader finds the messages and their formats; the columns are cut out of the mapped file in one piece each,
-with DFReader's multipliers.
+pymavlink's DFReader finds the messages and their formats; the columns are cut out of the mapped file in one
+piece each, with DFReader's multipliers. `dataflash_text` reads the text form.
 """
 
 import contextlib
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,20 +14,21 @@ import numpy as np
 from pymavlink import DFReader
 
 from estimators.logs.dataflash_mapping import map_messages
+from estimators.logs.dataflash_time import PX4_TIME, RawTable, stamp
 from estimators.logs.errors import LogError
 from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
+from estimators.logs.sdlog2_mapping import map_sdlog2
 
 _HEADER: Final = 3
-_META: Final = frozenset({"FMT", "FMTU", "UNIT", "MULT"})
-_TIME: Final = "TimeUS"
-_MAX_TIME_US: Final = 10**13
+META: Final = frozenset({"FMT", "FMTU", "UNIT", "MULT"})
+"""Formats that describe others."""
 
 
 def open_dataflash(path: Path) -> MappedSource:
     """Open an ArduPilot .bin.
 
     Raises:
-        LogError: it can't be read, or holds no message with a time.
+        LogError: it can't be read, or holds no message.
     """
     complaints = io.StringIO()
     try:
@@ -38,42 +39,67 @@ def open_dataflash(path: Path) -> MappedSource:
             f"{path} can't be read as an ArduPilot .bin: {type(error).__name__} {error}; is it whole?"
         ) from error
     data = np.frombuffer(reader.data_map, dtype=np.uint8)
-    tables: dict[str, Records] = {}
-    parts: list[Part] = []
+    tables: list[RawTable] = []
     message_bytes = torn = 0
     for kind, layout in sorted(reader.formats.items()):
         starts = np.asarray(reader.offsets[kind], dtype=np.int64)
         whole = starts[starts + layout.len <= len(data)]
         torn += len(starts) - len(whole)
         message_bytes += len(whole) * layout.len
-        if layout.name in _META or not len(whole):
+        if layout.name in META or not len(whole):
             continue
         columns = _columns(data, whole, layout)
-        times = columns.get(_TIME)
-        if times is None or times.dtype.kind not in "iu":
-            continue
-        times = times.astype(np.int64)
-        good = (times >= 0) & (times < _MAX_TIME_US)
-        columns = {name: column[good] for name, column in columns.items()}
-        times = times[good]
-        if not len(times):
-            continue
-        tables[layout.name] = Records(times, columns)
-        parts.append(own_part(layout.name, -1 - kind, times, columns, _units(layout)))
-    if not parts:
-        raise LogError(f"{path} holds no message with a time (TimeUS); is it an ArduPilot .bin, and whole?")
-    timebase_s = float(reader.clock.timebase) if reader.clock is not None else 0.0
-    offset_us = round(timebase_s * 1e6) if timebase_s > 0.0 else None
-    parts = _without_namesakes(parts, map_messages(tables, offset_us))
-    return MappedSource(
+        if columns:
+            tables.append(RawTable(layout.name, kind, whole, columns, _units(layout)))
+    if not tables:
+        described = len(reader.formats) - 1
+        raise LogError(
+            f"{path} holds the descriptions of {described} formats, but no message: nothing was logged"
+            if described
+            else f"{path} begins like an ArduPilot .bin, but describes no format; is it whole?"
+        )
+    return dataflash_source(
         path,
-        size_bytes=len(data),
-        format="bin",
-        parts=parts,
-        unix_offset_us=offset_us,
+        tables,
         bytes_by_kind={"messages": message_bytes, "junk": len(data) - message_bytes},
         drops={"torn_messages": torn},
         remarks={"formats": len(reader.formats), "complaints": complaints.getvalue().count("\n")},
+    )
+
+
+def dataflash_source(
+    path: Path,
+    raw: Sequence[RawTable],
+    *,
+    bytes_by_kind: Mapping[str, int],
+    drops: Mapping[str, int],
+    remarks: Mapping[str, int | str],
+    banner: str = "",
+) -> MappedSource:
+    """Tables as they are in a file, with their times and the MAVLink messages that they give.
+
+    Args:
+        path: the file.
+        raw: what it holds; not empty.
+        bytes_by_kind, drops, remarks: figures for the report.
+        banner: what the file says of its firmware outside of its messages.
+    """
+    times = stamp(raw)
+    tables: dict[str, Records] = {}
+    own: list[Part] = []
+    for table, time_us in zip(raw, times.time_us, strict=True):
+        tables[table.name] = Records(time_us, table.columns)
+        own.append(own_part(table.name, -1 - table.number, time_us, table.columns, table.units))
+    mapped = (map_sdlog2 if times.clock == PX4_TIME else map_messages)(tables, times.unix_offset_us, banner)
+    return MappedSource(
+        path,
+        size_bytes=sum(bytes_by_kind.values()),
+        format="bin",
+        parts=_without_namesakes(own, mapped),
+        unix_offset_us=times.unix_offset_us,
+        bytes_by_kind=bytes_by_kind,
+        drops={**drops, "implausible_times": times.implausible},
+        remarks={**remarks, "times": times.clock},
     )
 
 
@@ -83,7 +109,7 @@ def _columns(data: Array, starts: Array, layout: Any) -> dict[str, Array]:
         [(f"f{index}", _element(code)) for index, code in enumerate(layout.msg_fmts[: len(layout.columns)])]
     )
     size = min(dtype.itemsize, layout.len - _HEADER)
-    if size < dtype.itemsize:  # a format that says less bytes than its fields need
+    if not size or size < dtype.itemsize:  # no fields, or a format that says less bytes than its fields need
         return {}
     rows = data[starts[:, None] + np.arange(_HEADER, _HEADER + dtype.itemsize)]
     records = np.ascontiguousarray(rows).view(dtype).reshape(-1)

@@ -1,7 +1,8 @@
 """ArduPilot's log messages as the MAVLink messages that estimators ask for.
 
-Source: ArduPilot's log message documentation (ardupilot.org, "Onboard Message Log Messages", 4.x): angles in
-degrees, pressures in pascal, IMU in SI.
+Source: ArduPilot's log message documentation (ardupilot.org, "Onboard Message Log Messages", 4.x) and
+the formats that logs of 2013 to 2026 describe: angles in degrees, pressures in pascal, IMU in SI.
+`dataflash_state` has the modes and what events say.
 """
 
 from collections.abc import Mapping
@@ -10,35 +11,33 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect
-from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, newest, value_at
+from estimators.logs.ardupilot_firmware import Firmware
+from estimators.logs.dataflash_state import firmware, state_parts, throttle
+from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, value_at
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
-_EV_ARMED, _EV_DISARMED = 10, 11
 _HOME: Final = 1  # ORGN.Type
-_TYPES: Final = {
-    "ArduCopter": dialect.MAV_TYPE_QUADROTOR,
-    "ArduPlane": dialect.MAV_TYPE_FIXED_WING,
-    "ArduRover": dialect.MAV_TYPE_GROUND_ROVER,
-    "Rover": dialect.MAV_TYPE_GROUND_ROVER,
-    "ArduSub": dialect.MAV_TYPE_SUBMARINE,
-}
+_FILTERS: Final = ("XKF1", "NKF1", "EKF1")
+"""Navigation filters' solutions, the newest first."""
 
 
-def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None) -> list[Part]:
+def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None, banner: str = "") -> list[Part]:
     """MAVLink messages from what the log has.
 
     Args:
         tables: by name.
         unix_offset_us: Unix time of vehicle time 0; None: not known.
+        banner: what a text log says of its firmware outside of its messages.
     """
+    made_by = firmware(tables, banner)
     found = [
         *_imu(tables),
         *_attitude(tables),
-        *_air(tables),
+        *_air(tables, made_by),
         *_positions(tables),
         *_home(tables),
         *_gps(tables),
-        *_state(tables),
+        *state_parts(tables, made_by, banner),
     ]
     if unix_offset_us is not None:
         times = each_second(tables.values())
@@ -47,23 +46,31 @@ def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None) -> l
 
 
 def _imu(tables: Mapping[str, Records]) -> list[Part]:
-    imu = tables.get("IMU")
-    if imu is None or not imu.has("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"):
+    """Instances of IMU; before 2019 each of them had a table of its own."""
+    names = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
+    found = []
+    for number, name in enumerate(("IMU", "IMU2", "IMU3")):
+        imu = tables.get(name)
+        if imu is not None and imu.has(*names):
+            instances = imu.columns.get("I", np.full(len(imu.time_us), number))
+            found.append((imu, instances))
+    if not found:
         return []
-    c = imu.columns
+
+    def joined(column: str, default: float = 0.0) -> Array:
+        return np.concatenate(
+            [imu.columns.get(column, np.full(len(imu.time_us), default)) for imu, _ in found]
+        )
+
     return [
         mavlink_part(
             "HIGHRES_IMU",
-            imu.time_us,
-            xacc=c["AccX"],
-            yacc=c["AccY"],
-            zacc=c["AccZ"],
-            xgyro=c["GyrX"],
-            ygyro=c["GyrY"],
-            zgyro=c["GyrZ"],
-            temperature=c.get("T", 0.0),
+            np.concatenate([imu.time_us for imu, _ in found]),
+            **{f"{axis}acc": joined(f"Acc{axis.upper()}") for axis in "xyz"},
+            **{f"{axis}gyro": joined(f"Gyr{axis.upper()}") for axis in "xyz"},
+            temperature=joined("T"),
             fields_updated=_ACCELEROMETER_AND_GYRO,
-            id=c.get("I", 0),
+            id=np.concatenate([instances for _, instances in found]),
         )
     ]
 
@@ -100,9 +107,9 @@ def _attitude(tables: Mapping[str, Records]) -> list[Part]:
     return found
 
 
-def _air(tables: Mapping[str, Records]) -> list[Part]:
+def _air(tables: Mapping[str, Records], made_by: Firmware) -> list[Part]:
     found = []
-    airspeed, baro, ekf = tables.get("ARSP"), tables.get("BARO"), tables.get("XKF1", tables.get("NKF1"))
+    airspeed, baro = tables.get("ARSP"), tables.get("BARO")
     if airspeed is not None and airspeed.has("Airspeed"):
         found.append(
             mavlink_part(
@@ -114,18 +121,19 @@ def _air(tables: Mapping[str, Records]) -> list[Part]:
                 raw_press=airspeed.columns.get("DiffPress", np.zeros(len(airspeed.time_us))) / 100.0,
             )
         )
-        first = airspeed.instance("I", 0)
-        times = first.time_us
+    speed = _speed(tables, made_by)
+    if speed is not None:
+        times = speed.time_us
         found.append(
             mavlink_part(
                 "VFR_HUD",
                 times,
-                airspeed=first.columns["Airspeed"],
+                airspeed=speed.columns["speed"],
                 groundspeed=value_at(_first(tables.get("GPS")), "Spd", times),
                 heading=np.mod(value_at(tables.get("ATT"), "Yaw", times), 360.0),
-                throttle=value_at(tables.get("CTUN"), "ThO", times),
+                throttle=np.clip(value_at(throttle(tables, made_by), "percent", times), 0.0, 100.0),
                 alt=value_at(tables.get("POS"), "Alt", times),
-                climb=-value_at(_first(ekf, "C"), "VD", times),
+                climb=_climb(tables, times),
             )
         )
     if baro is not None and baro.has("Press"):
@@ -143,10 +151,48 @@ def _air(tables: Mapping[str, Records]) -> list[Part]:
     return found
 
 
+def _speed(tables: Mapping[str, Records], made_by: Firmware) -> Records | None:
+    """Airspeed as VFR_HUD has it: measured, else estimated, else (not of fixed wings) over ground."""
+    airspeed = _first(tables.get("ARSP"))
+    if airspeed is not None and airspeed.has("Airspeed") and len(airspeed.time_us):
+        return Records(airspeed.time_us, {"speed": airspeed.columns["Airspeed"]})
+    for name, column in (("CTUN", "As"), ("NTUN", "Arspd"), ("NTUN", "AspE")):
+        table = tables.get(name)
+        if made_by.vehicle == "plane" and table is not None and table.has(column):
+            return Records(table.time_us, {"speed": table.columns[column]})
+    tune = tables.get("CTUN")
+    if made_by.vehicle == "plane" or tune is None:
+        return None
+    return Records(tune.time_us, {"speed": value_at(_first(tables.get("GPS")), "Spd", tune.time_us)})
+
+
+def _climb(tables: Mapping[str, Records], times: Array) -> Array:
+    """Rate of climb, m/s: of the navigation filter, else of the altitude controller (cm/s)."""
+    ekf, tune = _filter(tables), tables.get("CTUN")
+    if ekf is not None and ekf.has("VD"):
+        return -value_at(ekf, "VD", times)
+    name = next((n for n in ("CRt", "CRate") if tune is not None and n in tune.columns), "")
+    return 0.01 * value_at(tune, name, times)
+
+
+def _filter(tables: Mapping[str, Records]) -> Records | None:
+    """The first core of the navigation filter in use."""
+    table = next((tables[name] for name in _FILTERS if name in tables), None)
+    return _first(table, "C")
+
+
+def _height(tables: Mapping[str, Records], times: Array, alt_m: Array) -> Array:
+    """Height above home, m: of the altitude controller, else above the first altitude."""
+    tune = tables.get("CTUN")
+    for name in ("BAlt", "BarAlt"):
+        if tune is not None and name in tune.columns:
+            return value_at(tune, name, times)
+    return alt_m - (alt_m[0] if len(alt_m) else 0.0)
+
+
 def _positions(tables: Mapping[str, Records]) -> list[Part]:
     found = []
-    ekf = _first(tables.get("XKF1", tables.get("NKF1")), "C")
-    position = tables.get("POS")
+    ekf, position = _filter(tables), tables.get("POS")
     if ekf is not None and ekf.has("PN", "PE", "PD", "VN", "VE", "VD"):
         c = ekf.columns
         found.append(
@@ -166,14 +212,40 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
                 lat=c["Lat"] * 1e7,
                 lon=c["Lng"] * 1e7,
                 alt=c["Alt"] * 1e3,
-                relative_alt=c.get("RelHomeAlt", np.zeros(len(times))) * 1e3,
+                relative_alt=c.get("RelHomeAlt", c.get("RelAlt", _height(tables, times, c["Alt"]))) * 1e3,
                 vx=100.0 * value_at(ekf, "VN", times),
                 vy=100.0 * value_at(ekf, "VE", times),
                 vz=100.0 * value_at(ekf, "VD", times),
                 hdg=100.0 * np.mod(value_at(tables.get("ATT"), "Yaw", times), 360.0),
             )
         )
+    elif (gps := _fixes(tables)) is not None:  # before 2015 the position was in no other message
+        c, times = gps.columns, gps.time_us
+        height = c.get("RelAlt", c.get("RAlt"))
+        found.append(
+            mavlink_part(
+                "GLOBAL_POSITION_INT",
+                times,
+                lat=c["Lat"] * 1e7,
+                lon=c["Lng"] * 1e7,
+                alt=c["Alt"] * 1e3,
+                relative_alt=1e3 * (_height(tables, times, c["Alt"]) if height is None else height),
+                vx=100.0 * c["Spd"] * np.cos(np.radians(c["GCrs"])),
+                vy=100.0 * c["Spd"] * np.sin(np.radians(c["GCrs"])),
+                vz=-100.0 * _climb(tables, times),
+                hdg=100.0 * np.mod(value_at(tables.get("ATT"), "Yaw", times), 360.0),
+            )
+        )
     return found
+
+
+def _fixes(tables: Mapping[str, Records]) -> Records | None:
+    """GPS messages that hold a position."""
+    gps = _first(tables.get("GPS"))
+    if gps is None or not gps.has("Status", "Lat", "Lng", "Alt", "Spd", "GCrs"):
+        return None
+    fixes = gps.where((gps.columns["Status"] >= dialect.GPS_FIX_TYPE_3D_FIX) & (gps.columns["Lat"] != 0.0))
+    return fixes if len(fixes.time_us) else None
 
 
 def _home(tables: Mapping[str, Records]) -> list[Part]:
@@ -200,9 +272,10 @@ def _gps(tables: Mapping[str, Records]) -> list[Part]:
     if gps is None or not gps.has("Status", "Lat", "Lng", "Alt", "Spd", "GCrs"):
         return []
     for number, name in ((0, "GPS_RAW_INT"), (1, "GPS2_RAW")):
-        if number and "I" not in gps.columns:
+        own = tables.get("GPS2") if number and "I" not in gps.columns else gps
+        if own is None or not own.has("Status", "Lat", "Lng", "Alt", "Spd", "GCrs"):
             continue
-        one = gps.instance("I", number)
+        one = own.instance("I", number)
         c = one.columns
         found.append(
             mavlink_part(
@@ -220,55 +293,6 @@ def _gps(tables: Mapping[str, Records]) -> list[Part]:
             )
         )
     return found
-
-
-def _state(tables: Mapping[str, Records]) -> list[Part]:
-    found = []
-    texts = tables.get("MSG")
-    if texts is not None and texts.has("Message"):
-        text = texts.columns["Message"].astype("S50")
-        found.append(mavlink_part("STATUSTEXT", texts.time_us, severity=dialect.MAV_SEVERITY_INFO, text=text))
-    mode = tables.get("MODE")
-    if mode is None or not mode.has("ModeNum"):
-        return found
-    armed_us, armed = _armed(tables)
-    times = np.union1d(each_second(tables.values()), np.concatenate((mode.time_us, armed_us)))
-    times = times[times >= int(mode.time_us.min())]
-    is_armed = newest(armed_us, armed, times).astype(bool)
-    found.append(
-        mavlink_part(
-            "HEARTBEAT",
-            times,
-            type=_vehicle_type(texts),
-            autopilot=dialect.MAV_AUTOPILOT_ARDUPILOTMEGA,
-            base_mode=dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-            + np.where(is_armed, dialect.MAV_MODE_FLAG_SAFETY_ARMED, 0),
-            custom_mode=newest(mode.time_us, mode.columns["ModeNum"], times),
-            system_status=np.where(is_armed, dialect.MAV_STATE_ACTIVE, dialect.MAV_STATE_STANDBY),
-            mavlink_version=3,
-        )
-    )
-    return found
-
-
-def _armed(tables: Mapping[str, Records]) -> tuple[Array, Array]:
-    """When it was armed (1) and disarmed (0)."""
-    arm, events = tables.get("ARM"), tables.get("EV")
-    if arm is not None and arm.has("ArmState"):
-        return arm.time_us, (arm.columns["ArmState"] != 0).astype(np.int64)
-    if events is not None and events.has("Id"):
-        told = events.where(np.isin(events.columns["Id"], (_EV_ARMED, _EV_DISARMED)))
-        return told.time_us, (told.columns["Id"] == _EV_ARMED).astype(np.int64)
-    return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-
-
-def _vehicle_type(texts: Records | None) -> int:
-    if texts is not None and texts.has("Message"):
-        for raw in texts.columns["Message"].tolist():
-            word = raw.decode("ascii", "replace").split(" ", 1)[0]
-            if word in _TYPES:
-                return int(_TYPES[word])
-    return int(dialect.MAV_TYPE_GENERIC)
 
 
 def _first(table: Records | None, field: str = "I") -> Records | None:

@@ -12,6 +12,7 @@ from estimators.logs.iterate import Selection, messages_in_order
 from estimators.logs.log import Log
 from estimators.logs.new_file import new_file
 from estimators.logs.table import Table
+from estimators.logs.units import to_si
 from estimators.messages import SOURCE_FIELDS
 
 FORMATS: Final = ("csv", "parquet", "npz", "mcap")
@@ -32,7 +33,7 @@ def export(
         selections: from `Log.select`.
         path: the folder (csv, parquet) or file (npz, mcap); nothing is overwritten.
         form: one of `FORMATS`.
-        si: SI units and radians in place of wire values (not MCAP, whose messages stay MAVLink's).
+        si: SI units and radians in place of wire values.
 
     Returns:
         What was written.
@@ -45,8 +46,6 @@ def export(
         raise LogError(f"no export to {form!r}; accepted: {', '.join(FORMATS)}")
     if not selections:
         raise LogError(f"nothing of {log.path} is selected; choose other messages, sources or conditions")
-    if si and form == "mcap":
-        raise LogError("mcap holds MAVLink's own values; leave --si out, or export to csv, parquet or npz")
     return writer(log, selections, path, si)
 
 
@@ -170,17 +169,29 @@ def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> li
         writer = Writer(file)
         writer.start(profile="", library="flightstack")
         channels = {}
+        factors: dict[tuple[str, int, int], dict[str, float]] = {}
         for stream, _ in selections:
-            definition = stream.description.definition
+            units = stream.description.units
+            converted = {field: to_si(unit) for field, unit in units.items()} if si else {}
+            factors[stream.name, stream.system_id, stream.component_id] = {
+                field: factor for field, (factor, _) in converted.items()
+            }
             schema = {
                 "title": stream.name,
                 "type": "object",
                 "properties": {
-                    field.name: _json_type(field.code, field.length) for field in definition.wire_fields
+                    field.name: _json_type(
+                        field.code,
+                        field.length,
+                        converted[field.name][1] if field.name in converted else units.get(field.name, ""),
+                        whole=field.name not in converted,
+                    )
+                    for field in stream.description.definition.wire_fields
                 },
             }
+            prefix = "mavlink_si" if si else "mavlink"
             number = writer.register_schema(
-                name=f"mavlink.{stream.name}", encoding="jsonschema", data=json.dumps(schema).encode()
+                name=f"{prefix}.{stream.name}", encoding="jsonschema", data=json.dumps(schema).encode()
             )
             channels[stream.name, stream.system_id, stream.component_id] = writer.register_channel(
                 topic=f"/{stream.system_id}/{stream.component_id}/{stream.name}",
@@ -198,6 +209,7 @@ def _mcap(log: Log, selections: Sequence[Selection], path: Path, si: bool) -> li
                 for name, value in zip(message._fields, message, strict=True)
                 if name not in SOURCE_FIELDS
             }
+            fields |= {name: _scaled(fields[name], factor) for name, factor in factors[key].items()}
             writer.add_message(
                 channel_id=channels[key],
                 log_time=_nanoseconds(log_time_us or time_us),
@@ -221,11 +233,20 @@ def _nanoseconds(time_us: int) -> int:
     return min(max(time_us, 0) * 1000, (1 << 64) - 1)
 
 
-def _json_type(code: str, length: int) -> dict[str, Any]:
+def _json_type(code: str, length: int, unit: str, *, whole: bool) -> dict[str, Any]:
+    """Schema of a field; its unit is the description, as JSON schema has no word for it."""
     if code == "s":
         return {"type": "string"}
-    element = {"type": "number" if code in "fd" else "integer"}
-    return {"type": "array", "items": element} if length else element
+    element: dict[str, Any] = {"type": "number" if code in "fd" or not whole else "integer"}
+    made = {"type": "array", "items": element} if length else element
+    return made | ({"description": unit} if unit else {})
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    """A value or the elements of an array in SI units; null stays null."""
+    if isinstance(value, list):
+        return [_scaled(item, factor) for item in value]
+    return value * factor if isinstance(value, (int, float)) else value
 
 
 def _plain(value: Any) -> Any:

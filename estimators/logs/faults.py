@@ -97,7 +97,7 @@ class Fault:
         fields: fields by message name; no fields: the whole message.
         kind: what happens.
         value: how much; None where the kind has none.
-        from_s, to_s: when, in seconds since the first record.
+        from_s, to_s: when, in seconds of the log's clock (`Log.clock`).
     """
 
     fields: MappingProxyType[str, tuple[str, ...]]

@@ -1,5 +1,6 @@
 """A flight log as columns, whatever the format of its file."""
 
+import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -11,15 +12,20 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.logs.errors import LogError
+from estimators.logs.errors import LogError, NothingThere
 from estimators.logs.iterate import Selection, messages_in_order
+from estimators.logs.log_clock import LogClock, make_clock
 from estimators.logs.report import LogReport, make_report
-from estimators.logs.source import LogSource, Stream
+from estimators.logs.source import LogSource, Positions, Stream
 from estimators.logs.table import Table
 from estimators.messages import Message
+from estimators.vehicle_time import stamp_field
 
 _LONG_GAP_US: Final = 5_000_000
 _LONG_GAP_INTERVALS: Final = 10.0
+_LEAST_SPAN_US: Final = 1_000_000
+"""A rate is counted over this at least: 900 parameters within 30 ms are 900 in a second."""
+_MAX_RATED_INSTANCES: Final = 32
 
 Ids = int | Collection[int] | None
 """One id, several, or any."""
@@ -144,6 +150,61 @@ class Log:
         return tuple(found)
 
     @cached_property
+    def clock(self) -> LogClock:
+        """The clock in which times of the log are told and asked for."""
+        return make_clock(self.source)
+
+    def inside(
+        self,
+        order: NDArray[np.int64],
+        *,
+        from_s: float | None = None,
+        to_s: float | None = None,
+        boot: int | None = None,
+    ) -> NDArray[np.bool_]:
+        """Which messages lie in a part of the log.
+
+        Args:
+            order: positions of messages.
+            from_s, to_s: seconds of `clock`; None: no limit. `to_s` itself is left out.
+            boot: number of a boot of the clock's vehicle; None: that part of each boot.
+
+        Raises:
+            LogError: a time is negative or no number, the end is before the beginning, nothing was recorded
+                then, or there is no such boot.
+        """
+        clock = self.clock
+        for option, value in (("--from", from_s), ("--to", to_s)):
+            if value is not None and not (math.isfinite(value) and value >= 0.0):
+                raise LogError(f"{option} {value:g} is no time; give {clock.text}")
+        if from_s is not None and to_s is not None and to_s <= from_s:
+            raise LogError(f"--to {to_s:g} is not behind --from {from_s:g}; give a later time")
+        boots = int(clock.boot[-1]) + 1
+        if boot is not None and not 0 <= boot < boots:
+            raise LogError(f"--boot {boot} is not in {self.path}; it has 0 to {boots - 1}")
+        low = -math.inf if from_s is None else from_s * 1e6
+        high = math.inf if to_s is None else to_s * 1e6
+        timed = (clock.time_us >= low) & (clock.time_us < high)
+        if boot is not None:
+            timed &= clock.boot == boot
+        if not timed.any():
+            spans = [self._clock_span_us(number) for number in (range(boots) if boot is None else (boot,))]
+            there = ", ".join(f"{1e-6 * first:.1f} to {1e-6 * last:.1f}" for first, last in spans)
+            raise NothingThere(f"{self.path} has nothing at that time; it has {there} s ({clock.text})")
+        return timed[order]
+
+    def boots_at(self, from_s: float | None, to_s: float | None) -> list[int]:
+        """Boots that have something between two times of `clock`."""
+        low = -math.inf if from_s is None else from_s * 1e6
+        high = math.inf if to_s is None else to_s * 1e6
+        times = self.clock.time_us
+        return [int(number) for number in np.unique(self.clock.boot[(times >= low) & (times < high)])]
+
+    def _clock_span_us(self, boot: int) -> tuple[int, int]:
+        times = self.clock.time_us[self.clock.boot == boot]
+        return int(times.min()), int(times.max())
+
+    @cached_property
     def _recorded_us(self) -> tuple[int, int]:
         """First and last time of a record."""
         ends = self.source.log_time_us(np.array([0, self.source.count - 1], dtype=np.int64))
@@ -185,21 +246,42 @@ class Log:
         return max(rates, default=0.0)
 
     def stream_rate_hz(self, stream: Stream, rows: NDArray[np.int64] | slice = slice(None)) -> float:
-        """Mean rate of one stream while it was sent."""
+        """Mean rate of one stream while it was sent, counted over a second at least; 0: not known.
+
+        Of a message with instances (two IMUs in HIGHRES_IMU) it is the rate of the fastest instance.
+        """
         order = stream.order[rows]
         if len(order) < 2:
             return 0.0
+        times = self._rate_times_us(stream, order)
+        field = stream.description.instance_field
+        if field is None:
+            return _rate_hz(times)
+        values = self.stream_table(stream)[field][rows]
+        instances = np.unique(values)
+        if len(instances) > _MAX_RATED_INSTANCES:  # names of values, parameters
+            return _rate_hz(times)
+        return max(_rate_hz(times[values == instance]) for instance in instances)
+
+    def _rate_times_us(self, stream: Stream, order: Positions) -> NDArray[np.int64]:
+        """The clock on which a stream's rate is counted.
+
+        A message with a stamp of its own has that. The vehicle time of others goes on in steps with the
+        messages around them; when they were recorded is finer, where the record was made in real time.
+        """
         times = self.source.time_us[order]
-        if times[0] == times[-1]:  # no clock that runs: systems without an autopilot
-            times = self.source.log_time_us(order)
-        steps = np.diff(times)
-        steps = steps[steps >= 0]
-        if not len(steps):
-            return 0.0
-        limit = max(_LONG_GAP_US, _LONG_GAP_INTERVALS * float(np.median(steps)))
-        steps = steps[steps <= limit]
-        total = int(steps.sum())
-        return len(steps) / (total * 1e-6) if total else 0.0
+        stamped = stamp_field(stream.name, stream.description.definition.field_names) is not None
+        if stamped and times[0] != times[-1]:
+            return times
+        recorded = self.source.log_time_us(order)
+        if times[0] == times[-1]:  # no clock that runs: systems without an autopilot, stamps that are all 0
+            if recorded[0] != recorded[-1]:
+                return recorded
+            return np.maximum.accumulate(self.source.time_us)[order]
+        first, last = self._recorded_us
+        spans = [boot.end_us - boot.start_us for boot in self.boots if boot.system_id == stream.system_id]
+        real_time = last > first and 0.5 < sum(spans) / (last - first) < 2.0
+        return recorded if real_time else times
 
     def table(
         self,
@@ -369,6 +451,18 @@ class Log:
             )
         names = sorted({stream.name for stream in self.source.streams})
         return LogError(f"{self.path} has no {name.upper()}; it has {', '.join(names)}")
+
+
+def _rate_hz(times_us: NDArray[np.int64]) -> float:
+    """Messages a second while they were sent; gaps are left out."""
+    steps = np.diff(times_us)
+    steps = steps[steps >= 0]
+    if not len(steps):
+        return 0.0
+    limit = max(_LONG_GAP_US, _LONG_GAP_INTERVALS * float(np.median(steps)))
+    steps = steps[steps <= limit]
+    total = int(steps.sum())
+    return len(steps) / (max(total, _LEAST_SPAN_US) * 1e-6) if total else 0.0
 
 
 def _names(names: str | Iterable[str] | None) -> Sequence[str] | None:

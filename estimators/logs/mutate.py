@@ -46,7 +46,7 @@ def mutated_records(
     Raises:
         LogError: a fault touches nothing, or a field that a message does not have.
     """
-    start_us = int(record_times_us(log, np.zeros(1, dtype=np.int64))[0])
+    clock_s: NDArray[np.float64] = (log.clock.time_us * 1e-6).astype(np.float64)
     gone: list[NDArray[np.int64]] = []
     later: dict[int, int] = {}
     changed: dict[int, bytes] = {}
@@ -58,7 +58,7 @@ def mutated_records(
                 continue
             rng = np.random.default_rng([seed, number, stream.system_id, stream.component_id, touched])
             order = stream.order[rows].astype(np.int64)
-            times_s = ((record_times_us(log, order) - start_us) * 1e-6).astype(np.float64)
+            times_s = clock_s[order]
             hit = np.flatnonzero((times_s >= fault.from_s) & (times_s < fault.to_s))
             if not len(hit):
                 continue

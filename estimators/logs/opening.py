@@ -10,16 +10,18 @@ from estimators.logs.source import LogSource
 from estimators.logs.tlog import open_tlog
 
 _ULG_MAGIC: Final = bytes.fromhex("554c6f67011235")
-_DATAFLASH_MAGIC: Final = bytes.fromhex("a39580")
-_HEAD_BYTES: Final = 16
+_DATAFLASH_MAGIC: Final = bytes.fromhex("a395")
+_DATAFLASH_FMT: Final = bytes.fromhex("a395808059") + b"FMT"
+"""The message that describes the format of formats; some logs have junk before it."""
+_HEAD_BYTES: Final = 8192
 
 
 def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
     """Open a log.
 
     Args:
-        path: a telemetry log (.tlog), a capture of a MAVLink stream, an ArduPilot .bin, or a PX4 .ulg; told
-            by its content, whatever its name is.
+        path: a telemetry log (.tlog), a capture of a MAVLink stream, an ArduPilot onboard log (.bin, or .log
+            in text form), or a PX4 .ulg; told by its content, whatever its name is.
         dialect: of a telemetry log: a dialect of pymavlink's by name ("common"), or the path of an XML
             definition file; None: every message of MAVLink's public definitions.
 
@@ -33,15 +35,24 @@ def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
 
 def _open_source(path: Path, head: bytes, dialect: str | Path | None) -> LogSource:
     """The one place that knows the formats."""
-    if not head.startswith((_ULG_MAGIC, _DATAFLASH_MAGIC)):
+    ulog = head.startswith(_ULG_MAGIC)
+    binary = head.startswith(_DATAFLASH_MAGIC) or _DATAFLASH_FMT in head
+    text = not ulog and not binary and b"FMT," in head
+    if text:
+        from estimators.logs.dataflash_text import looks_like_text, open_text
+
+        text = looks_like_text(head)
+    if not (ulog or binary or text):
         return open_tlog(path, load_dialect(dialect))
     if dialect is not None:
         raise LogError(f"{path} is no MAVLink stream; a dialect ({dialect}) has no effect, leave it out")
     # Imported here, for the libraries behind them take their time.
-    if head.startswith(_ULG_MAGIC):
+    if ulog:
         from estimators.logs.ulog import open_ulog
 
         return open_ulog(path)
+    if text:
+        return open_text(path)
     from estimators.logs.dataflash import open_dataflash
 
     return open_dataflash(path)

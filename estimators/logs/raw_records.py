@@ -1,6 +1,5 @@
 """Records of a telemetry log as they are: time stamp and frame, to be cut out, changed, or played."""
 
-import math
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -42,28 +41,16 @@ def record_times_us(log: Log, order: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def window(
-    log: Log, selections: Sequence[Selection], from_s: float | None, to_s: float | None
+    log: Log,
+    selections: Sequence[Selection],
+    from_s: float | None,
+    to_s: float | None,
+    boot: int | None = None,
 ) -> list[Selection]:
-    """What of a selection was recorded between two times.
-
-    Args:
-        from_s, to_s: seconds since the first record; None: no limit. `to_s` itself is left out.
-
-    Raises:
-        LogError: a time is negative or no number, or the end is before the beginning.
-    """
-    for option, value in (("--from", from_s), ("--to", to_s)):
-        if value is not None and not (math.isfinite(value) and value >= 0.0):
-            raise LogError(f"{option} {value:g} is no time; give seconds from the beginning of the log")
-    if from_s is not None and to_s is not None and to_s <= from_s:
-        raise LogError(f"--to {to_s:g} is not behind --from {from_s:g}; give a later time")
-    start_us = int(record_times_us(log, np.zeros(1, dtype=np.int64))[0])
-    low = -math.inf if from_s is None else start_us + from_s * 1e6
-    high = math.inf if to_s is None else start_us + to_s * 1e6
+    """What of a selection lies in a part of the log; arguments and errors as of `Log.inside`."""
     found = []
     for stream, rows in selections:
-        times = record_times_us(log, stream.order[rows].astype(np.int64))
-        kept = rows[(times >= low) & (times < high)]
+        kept = rows[log.inside(stream.order[rows].astype(np.int64), from_s=from_s, to_s=to_s, boot=boot)]
         if len(kept):
             found.append((stream, kept))
     return found

@@ -44,8 +44,9 @@ class Gap:
     """A time in which nothing was heard of a system with an autopilot, though its clock went on.
 
     Attributes:
-        system_id, boot: which system, in which of its boots.
-        start_us, end_us: vehicle time before and after.
+        system_id: which system.
+        boot: number of the boot of the log's clock.
+        start_us, end_us: on the log's clock, before and after.
     """
 
     system_id: int
@@ -81,6 +82,7 @@ class LogReport:
         boots, gaps: for each system.
         vehicles: what they are, modes and flights.
         streams: rates, by system, component and name.
+        clock: what times of gaps, modes and flights are counted from.
     """
 
     path: str
@@ -99,6 +101,7 @@ class LogReport:
     gaps: tuple[Gap, ...]
     vehicles: tuple[VehicleReport, ...]
     streams: tuple[StreamReport, ...]
+    clock: str
 
     def to_dict(self) -> dict[str, Any]:
         """The same for JSON: numbers, texts, lists and dictionaries."""
@@ -130,6 +133,7 @@ def make_report(log: "Log") -> LogReport:
         gaps=_gaps(log),
         vehicles=vehicles(log),
         streams=_streams(log),
+        clock=log.clock.text,
     )
 
 
@@ -161,6 +165,7 @@ def _streams(log: "Log") -> tuple[StreamReport, ...]:
 
 def _gaps(log: "Log") -> tuple[Gap, ...]:
     found = []
+    clock = log.clock
     # Who has no autopilot has no clock that goes on by itself.
     clocked = {stream.system_id for stream in log.source.streams if stream.component_id == AUTOPILOT}
     for boot in log.boots:
@@ -171,15 +176,18 @@ def _gaps(log: "Log") -> tuple[Gap, ...]:
             for stream in log.source.streams
             if stream.system_id == boot.system_id
         ]
-        times = np.maximum.accumulate(log.source.time_us[np.sort(np.concatenate(orders))])
-        times = times[times > 0]
+        order = np.sort(np.concatenate(orders))
+        times = np.maximum.accumulate(log.source.time_us[order])
+        order, times = order[times > 0], times[times > 0]
         for row in np.flatnonzero(np.diff(times) > GAP_US).tolist():
+            before, after = int(order[row]), int(order[row + 1])
+            own = boot.system_id == clock.system_id
             found.append(
                 Gap(
                     system_id=boot.system_id,
-                    boot=boot.number,
-                    start_us=int(times[row]),
-                    end_us=int(times[row + 1]),
+                    boot=int(clock.boot[after]),
+                    start_us=int(times[row] if own else clock.time_us[before]),
+                    end_us=int(times[row + 1] if own else clock.time_us[after]),
                 )
             )
     return tuple(found)

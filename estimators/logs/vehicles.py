@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect, enum_name
+from estimators.logs.ardupilot_firmware import firmware_of, mode_names
 from estimators.logs.table import Table
 from estimators.vehicle_time import AUTOPILOT
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from estimators.logs.log import Log
 
 _HEARTBEAT: Final = "HEARTBEAT"
+_STATUSTEXT: Final = "STATUSTEXT"
+_AUTOPILOT_VERSION: Final = "AUTOPILOT_VERSION"
 _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 _CUSTOM: Final = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
@@ -28,8 +31,8 @@ class ModeSpan:
     Attributes:
         mode: name, as ground stations call it.
         custom_mode: number in HEARTBEAT.
-        boot: number of the boot.
-        start_us, end_us: vehicle time.
+        boot: number of the boot of the log's clock.
+        start_us, end_us: on the log's clock.
     """
 
     mode: str
@@ -44,8 +47,8 @@ class Flight:
     """Time armed, from the first HEARTBEAT that says so to the first that does not (or to the last one).
 
     Attributes:
-        boot: number of the boot.
-        start_us, end_us: vehicle time.
+        boot: number of the boot of the log's clock.
+        start_us, end_us: on the log's clock.
     """
 
     boot: int
@@ -59,6 +62,7 @@ class VehicleReport:
 
     Attributes:
         system_id: its id.
+        firmware: its name and version, "ArduCopter V3.3-dev (82481f30)", "PX4 1.16.1"; "": not known.
         autopilot, type: names of MAV_AUTOPILOT and MAV_TYPE without the prefix, "PX4", "QUADROTOR"; of the
             newest HEARTBEAT.
         boots: how many boots of it are in the log.
@@ -66,6 +70,7 @@ class VehicleReport:
     """
 
     system_id: int
+    firmware: str
     autopilot: str
     type: str
     boots: int
@@ -86,33 +91,73 @@ def vehicles(log: "Log") -> tuple[VehicleReport, ...]:
             continue
         table = table.select(kinds)
         starts = log.source.boot_starts.get(table.system_id, np.empty(0, dtype=np.int64))
-        boot_of = np.searchsorted(starts, table.order, side="right")
+        times_us, boot_of = log.clock.time_us[table.order], log.clock.boot[table.order]
         autopilot, vehicle_type = int(table["autopilot"][-1]), int(table["type"][-1])
+        text, version = _firmware(log, table.system_id, autopilot)
         found.append(
             VehicleReport(
                 system_id=table.system_id,
+                firmware=text,
                 autopilot=_enum_name("MAV_AUTOPILOT", autopilot),
                 type=_enum_name("MAV_TYPE", vehicle_type),
                 boots=len(starts) + 1,
-                modes=_modes(table, boot_of, autopilot, vehicle_type),
-                flights=_flights(table, boot_of),
+                modes=_modes(table, times_us, boot_of, autopilot, vehicle_type, version),
+                flights=_flights(table, times_us, boot_of),
             )
         )
     return tuple(found)
 
 
-def mode_name(autopilot: int, vehicle_type: int, base_mode: int, custom_mode: int) -> str:
-    """Name of a mode as ground stations call it, from the fields of HEARTBEAT; "MODE 7" when it has none."""
-    from pymavlink import mavutil  # here, for it takes its time
+def mode_name(
+    autopilot: int,
+    vehicle_type: int,
+    base_mode: int,
+    custom_mode: int,
+    version: tuple[int, int] | None = None,
+) -> str:
+    """Name of a mode as ground stations call it, from the fields of HEARTBEAT; "MODE 7" when it has none.
 
+    Args:
+        autopilot, vehicle_type, base_mode, custom_mode: of HEARTBEAT.
+        version: of an ArduPilot firmware, major and minor; None: not known.
+    """
     if autopilot == dialect.MAV_AUTOPILOT_PX4:
+        from pymavlink import mavutil  # here, for it takes its time
+
         return str(mavutil.interpret_px4_mode(base_mode, custom_mode))
-    names = mavutil.mode_mapping_bynumber(vehicle_type) if base_mode & _CUSTOM else None
-    return str((names or {}).get(custom_mode, f"MODE {custom_mode}"))
+    names = mode_names(vehicle_type, version) if base_mode & _CUSTOM else {}
+    return names.get(custom_mode, f"MODE {custom_mode}")
+
+
+def _firmware(log: "Log", system_id: int, autopilot: int) -> tuple[str, tuple[int, int] | None]:
+    """What a vehicle says of its firmware, and its version: by its banner, else by AUTOPILOT_VERSION."""
+    for table in _of_autopilot(log, _STATUSTEXT, system_id):
+        made_by = firmware_of(text.decode("ascii", "replace") for text in table["text"].tolist())
+        if made_by.text:
+            return made_by.text, made_by.version
+    for table in _of_autopilot(log, _AUTOPILOT_VERSION, system_id):
+        numbers = table["flight_sw_version"]
+        if numbers.any():
+            number = int(numbers[np.flatnonzero(numbers)[0]])
+            major, minor, patch = number >> 24, number >> 16 & 0xFF, number >> 8 & 0xFF
+            name = "PX4" if autopilot == dialect.MAV_AUTOPILOT_PX4 else "firmware"
+            return f"{name} {major}.{minor}.{patch}", (major, minor)
+    return "", None
+
+
+def _of_autopilot(log: "Log", name: str, system_id: int) -> list[Table]:
+    if not any(key.name == name and key.system_id == system_id for key in log.keys):
+        return []
+    return log.tables(name, system_id=system_id, component_id=AUTOPILOT)
 
 
 def _modes(
-    table: Table, boot_of: NDArray[np.int64], autopilot: int, vehicle_type: int
+    table: Table,
+    times_us: NDArray[np.int64],
+    boot_of: NDArray[np.int64],
+    autopilot: int,
+    vehicle_type: int,
+    version: tuple[int, int] | None,
 ) -> tuple[ModeSpan, ...]:
     custom, base = table["custom_mode"], table["base_mode"]
     # PX4's name of a mode depends on the base mode too, but not on whether it is armed; and other flags of it
@@ -122,25 +167,25 @@ def _modes(
         axis=0,
         return_inverse=True,
     )
-    names = [mode_name(autopilot, vehicle_type, int(b), int(c)) for c, b in pairs]
+    names = [mode_name(autopilot, vehicle_type, int(b), int(c), version) for c, b in pairs]
     named = np.array([names.index(name) for name in names])[which.reshape(-1)]
     firsts, ends = _spans(custom, named, boot_of)
     return tuple(
         ModeSpan(
-            mode=mode_name(autopilot, vehicle_type, int(base[first]), int(custom[first])),
+            mode=mode_name(autopilot, vehicle_type, int(base[first]), int(custom[first]), version),
             custom_mode=int(custom[first]),
             boot=int(boot_of[first]),
-            start_us=int(table.time_us[first]),
-            end_us=int(table.time_us[end]),
+            start_us=int(times_us[first]),
+            end_us=int(times_us[end]),
         )
         for first, end in zip(firsts, ends, strict=True)
     )
 
 
-def _flights(table: Table, boot_of: NDArray[np.int64]) -> tuple[Flight, ...]:
+def _flights(table: Table, times_us: NDArray[np.int64], boot_of: NDArray[np.int64]) -> tuple[Flight, ...]:
     armed = (table["base_mode"] & _ARMED) != 0
     return tuple(
-        Flight(boot=int(boot_of[first]), start_us=int(table.time_us[first]), end_us=int(table.time_us[end]))
+        Flight(boot=int(boot_of[first]), start_us=int(times_us[first]), end_us=int(times_us[end]))
         for first, end in zip(*_spans(armed, boot_of, boot_of), strict=True)
         if armed[first]
     )

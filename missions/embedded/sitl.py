@@ -12,8 +12,10 @@ from autopilot_bridge.sitl.configuration import HOMES
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
+from flightsim.vehicle import VehicleDivergedError
 from flightsim.wind_profile import WindLaw, WindProfile
 from missions.embedded.scenario import equipped
+from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.scenario import Scenario
 
@@ -36,6 +38,7 @@ class EmbeddedConfiguration:
         wind_profile: law of the wind over height, a `flightsim.wind_profile.WindLaw`.
         turbulence: "none", "light", "moderate" or "severe".
         parameters: autopilot parameters that differ from the flavour's defaults.
+        gps: receiver of all vehicles, "differential" or "standalone".
         home: "lat,lon,alt[,heading]"; None: where the flavour's own SITL stands.
         max_flight_s: vehicle time after which a run that has not ended fails.
         scenario: targets, payload and magnetic map that the mission asks for.
@@ -53,6 +56,7 @@ class EmbeddedConfiguration:
     wind_profile: str = "log"
     turbulence: str = "none"
     parameters: Mapping[str, float] = field(default_factory=dict)
+    gps: str = "differential"
     home: str | None = None
     max_flight_s: float = MAX_FLIGHT_S
     scenario: Scenario = field(default_factory=Scenario)
@@ -84,6 +88,7 @@ class EmbeddedSitl:
             parameters=configuration.parameters,
             launch=configuration.launch,
             heading_deg=home.heading_deg,
+            gps=configuration.gps,
         )
         environment = Environment.from_wind(
             speed_m_s=configuration.wind_speed_m_s,
@@ -101,8 +106,15 @@ class EmbeddedSitl:
         self.sitl = Sitl(equipped(world, configuration.scenario))
         self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
         sitl = self.sitl
+
+        def advance() -> None:
+            try:
+                sitl.advance()
+            except VehicleDivergedError as error:
+                raise MissionError(f"the simulation ended: {error}") from error
+
         self.loop = VirtualTimeLoop(
-            sitl.advance,
+            advance,
             lambda: sitl.time_us,
             speedup=configuration.speedup,
             max_time_us=round(configuration.max_flight_s * 1e6),

@@ -29,7 +29,7 @@ class ReplayRequest:
         settings: parameters as NAME=VALUE.
         system_id: the one vehicle that counts; None: all in each log.
         against: "autopilot", "truth" or "both".
-        from_s, to_s: part of the logs to replay, vehicle time.
+        from_s, to_s, boot: part of the logs to replay, as `Log.inside` takes them.
         dialect: of telemetry logs; None: every message of MAVLink's public definitions.
         out: run folder; with several logs the folder of theirs. None: the next `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
@@ -43,6 +43,7 @@ class ReplayRequest:
     against: str = "both"
     from_s: float | None = None
     to_s: float | None = None
+    boot: int | None = None
     dialect: str | None = None
     out: Path | None = None
     picture: bool = True
@@ -87,10 +88,9 @@ def replay_logs(
         result: EstimationResult | str
         try:
             opened = [open_log(path, dialect=request.dialect) for path in paths]
+            result = _replay_one(request, opened, make, found.NAME, several=len(groups) > 1)
         except LogError as error:
             result = str(error)
-        else:
-            result = _replay_one(request, opened, make, found.NAME, several=len(groups) > 1)
         results.append((label, result))
         if on_done is not None:
             on_done(label, result)
@@ -105,8 +105,9 @@ def _replay_one(
         logs,
         make,
         system_id=request.system_id,
-        from_us=_microseconds(request.from_s),
-        to_us=_microseconds(request.to_s),
+        from_s=request.from_s,
+        to_s=request.to_s,
+        boot=request.boot,
     )
     wall_s = wall_time_s() - begun_s
     failure = done.failure
@@ -127,7 +128,7 @@ def _replay_one(
             failure=failure,
             command=request.command,
             supplies=done.supplies,
-            more={"from_s": request.from_s, "to_s": request.to_s},
+            more={"from_s": request.from_s, "to_s": request.to_s, "boot": request.boot},
         )
     )
 
@@ -163,7 +164,3 @@ def check_out(request: ReplayRequest) -> None:
 def failed(result: EstimationResult | str) -> bool:
     """Whether a log gave less than was asked for."""
     return isinstance(result, str) or result.outcome == FAILED
-
-
-def _microseconds(seconds: float | None) -> int | None:
-    return None if seconds is None else round(seconds * 1e6)

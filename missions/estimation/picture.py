@@ -22,6 +22,8 @@ _ESTIMATE: Final = "#c2410c"
 _COLOURS: Final = {AUTOPILOT: "#1769aa", TRUTH: "#111827"}
 _IN_AIR: Final = "#f3f4f6"
 _MOST: Final = 6  # quantities in one picture
+_MOST_ALONE: Final = 9  # those without a reference
+_NOT_DRAWN: Final = ("target",)
 _POINTS: Final = 6000  # more can't be told apart
 _UNITS: Final = {"deg": "deg", "m": "m", "m_s": "m/s"}
 
@@ -32,16 +34,33 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
     Args:
         path: the file; it must not exist.
         title: above the picture.
-        compared: vehicles or targets; the first quantities of all of them are shown.
+        compared: vehicles or targets; the first quantities of all of them are shown, those with a reference
+            before those without.
     """
     shown = [
         (c, column) for c in compared for column in dict.fromkeys(k for r in c.references.values() for k in r)
     ][:_MOST]
-    figure = Figure(figsize=(10.0, 0.9 + 3.1 * len(shown)), dpi=120, layout="constrained", facecolor="white")
+    alone = [
+        (c, column)
+        for c in compared
+        for column in c.estimates
+        if (c, column) not in shown and column not in _NOT_DRAWN
+    ]
+    left_out = max(0, len(alone) - _MOST_ALONE)
+    alone = alone[:_MOST_ALONE]
+    heights = [1.9, 1.0] * len(shown) + [1.1] * len(alone)
+    figure = Figure(
+        figsize=(10.0, 0.9 + 3.1 * len(shown) + 1.2 * len(alone)),
+        dpi=120,
+        layout="constrained",
+        facecolor="white",
+    )
     FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=12, fontweight="bold", color=_INK)
-    grid = figure.add_gridspec(2 * len(shown), 1, height_ratios=(1.9, 1.0) * len(shown))
-    several = len({c.label for c, _ in shown}) > 1
+    more = f"\n{left_out} more columns are in estimates.csv" if left_out else ""
+    figure.suptitle(title + more, fontsize=12, fontweight="bold", color=_INK)
+    grid = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    several = len({c.label for c, _ in [*shown, *alone]}) > 1
+    below: Any = None
     for k, (c, column) in enumerate(shown):
         above = figure.add_subplot(grid[2 * k])
         below = figure.add_subplot(grid[2 * k + 1], sharex=above)
@@ -49,10 +68,16 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
         above.tick_params(labelbottom=False)
         if k == 0:
             _legend(above, c)
-        if k == len(shown) - 1:
-            below.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
         tidy(above)
         tidy(below)
+    for k, (c, column) in enumerate(alone):
+        below = figure.add_subplot(grid[2 * len(shown) + k])
+        _draw_alone(below, c, column, c.label if several else "")
+        if k == 0 and not shown:
+            _legend(below, c)
+        tidy(below)
+    if below is not None:
+        below.set_xlabel("vehicle time, s", fontsize=9, color=_INK)
     with path.open("xb") as file:
         figure.savefig(file, format="png", metadata={"Software": None})
 
@@ -114,6 +139,18 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
         ha="right", va="top", fontsize=8, color=_INK,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 1.5},
     )  # fmt: skip
+
+
+def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
+    """A column that nothing is known to compare with."""
+    name, unit, factor = quantity_of(column)
+    time_s = _continuous_s(c)
+    _shade(axes, time_s, c.counted)
+    thin = slice(None, None, max(1, len(time_s) // _POINTS))
+    values = factor * _parted(c.estimates[column], _breaks(time_s), column)
+    axes.plot(time_s[thin], values[thin], color=_ESTIMATE, linewidth=0.9)
+    written = _UNITS.get(unit, unit)
+    axes.set_ylabel(f"{label} {name}{', ' if written else ''}{written}".strip(), fontsize=8, color=_INK)
 
 
 def _limit(axes: Any, c: Comparison, column: str, factor: float) -> None:

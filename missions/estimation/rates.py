@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import definition, dialect
 from estimators.interface import Need
-from estimators.needs import RATE_TOLERANCE, lacking, wanted_rate_hz
+from estimators.needs import NOT_STREAMED, RATE_TOLERANCE, lacking, wanted_rate_hz
 
 __all__ = ["CHECK_PERIOD_S", "RateWatch", "interval_request"]
 
@@ -79,6 +79,8 @@ class RateWatch:
             which = f"vehicle {system_id}: " if len(ids) > 1 else ""
             self.lacking += [which + text for text in lacking(self._needs, rate_hz)]
             for index, need in enumerate(self._needs):
+                if NOT_STREAMED.issuperset(need.messages):
+                    continue
                 asked = self._to_ask(system_id, index, need, rate_hz)
                 requests += [(system_id, name, asked_hz) for name, asked_hz in asked]
         self.enough = not self.lacking

@@ -23,6 +23,7 @@ __all__ = [
     "INTERRUPTED",
     "EstimationResult",
     "ReportRequest",
+    "notes_of",
     "report",
     "table_lines",
     "warnings_of",
@@ -43,6 +44,7 @@ _NOTHING: Final[Mapping[str, Any]] = {
     "left_out": {},
     "airborne_s": 0.0,
     "reference": None,
+    "not_compared": None,
 }
 
 
@@ -143,7 +145,7 @@ def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationRe
         if summary_file:
             write_summary(request.folder, summary)
         write_estimates(request.folder, fleet)
-        if request.picture and any(c.references for c in compared):
+        if request.picture and compared:
             from missions.estimation.picture import draw_errors
 
             draw_errors(request.folder / PICTURE_NAME, _title(fleet.name, logs, summary), compared)
@@ -223,6 +225,21 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
     return found
 
 
+def notes_of(summary: Mapping[str, Any]) -> list[str]:
+    """What a reader should know: what the estimators corrected, and why something was not compared."""
+    found = []
+    for block in summary["vehicles"]:
+        which = "" if block["system_id"] is None else f"vehicle {block['system_id']}: "
+        if "note" in block["remarks"]:
+            found.append(which + block["remarks"]["note"])
+        found += [
+            f"{subject['subject']}: nothing is compared: {subject['not_compared']}"
+            for subject in block["subjects"]
+            if subject["not_compared"]
+        ]
+    return found
+
+
 def _by_value(item: tuple[Any, int]) -> str:
     return str(item[0].value)
 
@@ -235,6 +252,7 @@ def _subject(compared: Comparison) -> dict[str, Any]:
         "airborne_s": round(compared.airborne_s, 3),
         "airborne_from": compared.airborne_from,
         "reference": main,
+        "not_compared": compared.not_compared or None,
         **({} if main is None else _figures(compared, main)),
         "against": {
             name: {"sources": list(compared.sources[name]), **_figures(compared, name)}
@@ -250,7 +268,11 @@ def _figures(compared: Comparison, reference: str) -> dict[str, float]:
 
 def _headline(block: Mapping[str, Any]) -> dict[str, Any]:
     """What stands at the top of the summary: the first vehicle's, or the first target's."""
-    first = block["subjects"][0] if block["subjects"] else {"airborne_s": 0.0, "reference": None}
+    first = (
+        block["subjects"][0]
+        if block["subjects"]
+        else {"airborne_s": 0.0, "reference": None, "not_compared": None}
+    )
     own = {key: block[key] for key in ("system_id", "samples", "counters", "left_out", "boots", "remarks")}
     return own | {key: value for key, value in first.items() if key not in ("subject", "estimates")}
 

@@ -19,6 +19,9 @@ _NEEDED: Final = (
     | dialect.MAV_SYS_STATUS_AHRS
 )
 _SAID_ELSEWHERE: Final = PREARM_BIT | _RC_BIT | dialect.MAV_SYS_STATUS_SENSOR_BATTERY
+_TERRAIN_BIT: Final = dialect.MAV_SYS_STATUS_TERRAIN
+TERRAIN_PARAMETERS: Final = ("TERRAIN_FOLLOW", "RTL_ALT_TYPE")
+"""ArduPilot flies by terrain data where one of them is not 0."""
 _REASONS: Final = ("PreArm", "Arm:", "Arming denied", "Preflight Fail", "Preflight:")
 _UNKNOWN_EPH: Final = 65535
 _SATELLITES: Final = 6
@@ -56,6 +59,8 @@ def sensors(snapshot: Snapshot) -> list[Finding]:
             )
         ]
     sick = enabled & present & ~health & ~_SAID_ELSEWHERE
+    if not any(snapshot.parameters.get(name) for name in TERRAIN_PARAMETERS):
+        sick &= ~_TERRAIN_BIT  # it has no data here, and no use for them
     missing = _NEEDED & ~present & ~dialect.MAV_SYS_STATUS_AHRS
     findings = []
     if missing:
@@ -86,6 +91,23 @@ def _bit_names(bits: int) -> str:
 def reasons_against_arming(texts: tuple[str, ...]) -> list[str]:
     """The texts in which autopilots say why they don't arm, each once."""
     return list(dict.fromkeys(t.strip() for t in texts if t.startswith(_REASONS)))
+
+
+def not_ready_because(texts: tuple[str, ...], sensors_unhealthy: int) -> str:
+    """Why the pre-arm checks are not passed: the autopilot's texts, else the sensors that are not healthy.
+
+    Args:
+        texts: what the autopilot said when it was asked.
+        sensors_unhealthy: bits of SYS_STATUS: enabled, and not healthy.
+
+    Returns:
+        Words; "" where nothing is known.
+    """
+    reasons = reasons_against_arming(texts)
+    if reasons:
+        return " / ".join(reasons)
+    unhealthy = sensors_unhealthy & ~PREARM_BIT
+    return f"not healthy: {_bit_names(unhealthy)}" if unhealthy else ""
 
 
 def arming(snapshot: Snapshot) -> Finding:

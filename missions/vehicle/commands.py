@@ -32,22 +32,15 @@ class VehicleCommands(VehicleView):
         """Send any message."""
         self.connection.send(message)
 
-    def _request_message(self, name: str) -> None:
+    def send_command(self, command: int, *params: float) -> None:
+        """Send a COMMAND_LONG once, and wait for no answer."""
+        values = (*params, *(0.0,) * (7 - len(params)))
         self.send(
-            dialect.MAVLink_command_long_message(
-                self.system_id,
-                AUTOPILOT_COMPONENT,
-                dialect.MAV_CMD_REQUEST_MESSAGE,
-                0,
-                float(definition(name).message_id),
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-            )
+            dialect.MAVLink_command_long_message(self.system_id, AUTOPILOT_COMPONENT, command, 0, *values)
         )
+
+    def _request_message(self, name: str) -> None:
+        self.send_command(dialect.MAV_CMD_REQUEST_MESSAGE, float(definition(name).message_id))
 
     async def request(self, name: str, timeout_s: float = 2.0) -> MAVLinkMessage:
         """Have one message sent now (REQUEST_MESSAGE) and wait for it."""

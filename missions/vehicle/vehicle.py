@@ -14,6 +14,7 @@ from missions.connection import Connection
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits, Limits
+from missions.preflight.health import not_ready_because
 from missions.vehicle.adapter import PREARM, Mode
 from missions.vehicle.commands import HEARTBEAT_AGE_US
 from missions.vehicle.fixed_wing import FixedWingFlight
@@ -21,6 +22,7 @@ from missions.vehicle.guided import GuidedSession, SetpointSource
 
 _GROUND: Final = 1
 _ACCEPTED: Final = 0
+_REASONS_S: Final = 5.0  # at the end of a wait for readiness, in which the autopilot says what is missing
 _FARTHEST_M: Final = 10_000.0  # from home; beyond, latitude and longitude are more likely mistaken
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
@@ -81,19 +83,56 @@ class Vehicle(FixedWingFlight):
             missing = adapter.readiness(self)
             return not missing or (missing == [PREARM] and in_mission())
 
-        async def wait() -> None:
-            await self.wait_until(
-                ready,
-                what=lambda: "readiness to fly (missing: " + ", ".join(adapter.readiness(self)) + ")",
-                on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
-                timeout_s=timeout_s,
-            )
-
-        await wait()
+        await self._wait_readiness(ready, timeout_s)
         if in_mission():
             await self.set_mode(adapter.resting_mode)
             await self.rewind_mission()
-            await wait()
+            await self._wait_readiness(ready, timeout_s)
+
+    async def _wait_readiness(self, ready: Callable[[], bool], timeout_s: float) -> None:
+        """Wait; for the last seconds have the autopilot run its checks, so that it says what it lacks.
+
+        Raises:
+            VehicleTimeout: it is not ready; says why, as far as the autopilot tells.
+        """
+
+        async def wait(seconds: float) -> None:
+            await self.wait_until(
+                ready,
+                what=lambda: f"readiness to fly (missing: {', '.join(self.adapter.readiness(self))})",
+                on=("SYS_STATUS", "HOME_POSITION", "GLOBAL_POSITION_INT", "EKF_STATUS_REPORT"),
+                timeout_s=seconds,
+            )
+
+        reasons_s = min(_REASONS_S, 0.5 * timeout_s)
+        try:
+            await wait(timeout_s - reasons_s)
+            return
+        except VehicleTimeout:
+            known = {id(text) for text in self.status_texts}
+            self.send_command(dialect.MAV_CMD_RUN_PREARM_CHECKS)
+        try:
+            await wait(reasons_s)
+        except VehicleTimeout:
+            missing = self.adapter.readiness(self)
+            why = ""
+            if PREARM in missing:
+                texts = tuple(text.text for text in self.status_texts if id(text) not in known)
+                because = not_ready_because(texts, self._sensors_unhealthy)
+                why = (
+                    f"; the autopilot says: {because}" if because else ", and the autopilot does not say why"
+                )
+            raise VehicleTimeout(
+                f"no readiness to fly (missing: {', '.join(missing)}) within {timeout_s:g} s{why}; "
+                f"{self.heard()}"
+            ) from None
+
+    @property
+    def _sensors_unhealthy(self) -> int:
+        status = self.message("SYS_STATUS")
+        if status is None:
+            return 0
+        return int(status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health)
 
     async def limits(self, altitude_m: float = 0.0) -> Limits:
         """What the vehicle's parameters allow a planner.

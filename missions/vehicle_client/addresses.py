@@ -1,5 +1,7 @@
 """Our connection strings as MAVSDK takes them."""
 
+from pathlib import Path
+
 from autopilot_bridge.links import (
     VEHICLE_FORMS,
     Address,
@@ -30,6 +32,6 @@ def mavsdk_url(address: Address) -> str:
         case TcpServer():
             return f"tcpin://{address.host}:{address.port}"
         case SerialPort():
-            return f"serial://{address.device}:{address.baud}"
+            return f"serial://{Path(address.device).absolute()}:{address.baud}"
         case UdpPeer() | ReplayLog():
             raise PlanError(f"--connect {address}: not for this command; accepted: {VEHICLE_FORMS}")

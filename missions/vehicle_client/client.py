@@ -32,7 +32,7 @@ _KEPT_FILTER: Final = 25
 
 WANTED: Final[Mapping[str, tuple[str, ...]]] = {
     "px4": ("SYS_STATUS", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "HOME_POSITION", "ESTIMATOR_STATUS",
-            "BATTERY_STATUS", "EXTENDED_SYS_STATE"),
+            "BATTERY_STATUS", "EXTENDED_SYS_STATE", "SYSTEM_TIME"),
     "ardupilot": ("SYS_STATUS", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "HOME_POSITION", "EKF_STATUS_REPORT",
                   "BATTERY_STATUS", "EXTENDED_SYS_STATE", "RC_CHANNELS", "SYSTEM_TIME"),
 }  # fmt: skip
@@ -72,6 +72,18 @@ class VehicleClient:
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    @asynccontextmanager
+    async def quiet(self) -> AsyncIterator[None]:
+        """A block in which nothing is kept, for transfers of many messages.
+
+        MAVSDK would turn each of them into text for us: more than half of a download's processor time here.
+        """
+        await self.stop()
+        try:
+            yield
+        finally:
+            self.start()
 
     async def _keep_messages(self) -> None:
         async for message in self.direct.subscribe_message(""):

@@ -112,7 +112,7 @@ async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
         telling.cancel()
     found = []
     for entry in telling.result().current_mode_intention.problems:
-        text = f"{entry.message} {entry.description}".strip()
+        text = " ".join(f"{entry.message} {entry.description}".split())
         told = problem if entry.log_level <= 3 and not health & PREARM_BIT else warning
         found.append(told("arming check", text, f"look at {entry.health_component or 'it'}"))
     return found

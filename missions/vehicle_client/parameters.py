@@ -25,6 +25,7 @@ _LIST_TRIES: Final = 3
 _TYPES_S: Final = 1.0
 _INTEGERS: Final = frozenset((1, 2, 3, 4, 5, 6))
 _INT32: Final = INTEGER_LIMITS[ParameterType.INT32]
+_SIX_DIGITS: Final = 5e-6 + 6e-8  # half of the last of six digits at most, and single precision
 _LARGEST_FLOAT: Final = float(np.finfo(np.float32).max)
 
 
@@ -50,6 +51,11 @@ def same(a: float, b: float) -> bool:
     if math.isnan(a) or math.isnan(b):
         return math.isnan(a) and math.isnan(b)
     return a == b or np.float32(a) == np.float32(b)
+
+
+def _rounds_to(number: float, rounded: float) -> bool:
+    """Whether a number of single precision may have been rounded to another one of six digits."""
+    return not isinstance(number, int) and math.isclose(number, rounded, rel_tol=_SIX_DIGITS)
 
 
 async def read_all(client: VehicleClient) -> dict[str, Value]:
@@ -183,12 +189,20 @@ class Difference:
     other: float | None
 
 
-def differences(values: Mapping[str, Value], other: Mapping[str, float]) -> list[Difference]:
-    """All of them, by name. Parameters that only the vehicle has are none: a file may hold a part."""
+def differences(
+    values: Mapping[str, Value], other: Mapping[str, float], *, rounded: bool = False
+) -> list[Difference]:
+    """All of them, by name. Parameters that only the vehicle has are none: a file may hold a part.
+
+    Args:
+        values: the vehicle's.
+        other: what they are compared with.
+        rounded: the others have six digits: what differs by no more than their rounding is the same.
+    """
     found = []
     for name, number in sorted(other.items()):
         own = values.get(name)
-        if own is None or not same(own.number, number):
+        if own is None or not (same(own.number, number) or (rounded and _rounds_to(own.number, number))):
             found.append(Difference(name=name, vehicle=own, other=number))
     return found
 

@@ -46,6 +46,10 @@ FORMS = [
         "serial:/dev/serial/by-path/pci-0:14.0:57600",
     ),
     ("/dev/ttyACM0,115200", SerialPort("/dev/ttyACM0", 115200), "serial:/dev/ttyACM0:115200"),
+    ("./ttyV0,57600", SerialPort("./ttyV0", 57600), "serial:./ttyV0:57600"),
+    ("/tmp/pty/rover,9600", SerialPort("/tmp/pty/rover", 9600), "serial:/tmp/pty/rover:9600"),
+    ("ttyV0,57600", SerialPort("ttyV0", 57600), "serial:ttyV0:57600"),
+    ("serial:./ttyV0,57600", SerialPort("./ttyV0", 57600), "serial:./ttyV0:57600"),
     (" /dev/ttyACM0 ", SerialPort("/dev/ttyACM0", 115200), "serial:/dev/ttyACM0:115200"),
     ("logs/flight.tlog", ReplayLog(Path("logs/flight.tlog")), "logs/flight.tlog"),
 ]
@@ -84,6 +88,9 @@ def test_forms(text, address, canonical):
         ("udppeer:127.0.0.1:14580", "partner"),
         ("serial:", "device ''"),
         ("serial:/dev/ttyACM0,fast", "baud rate 'fast'"),
+        ("./ttyV0,", "baud rate 'none'"),
+        ("./ttyV0,fast", "baud rate 'fast'"),
+        ("./ttyV0", "no such form"),
         ("/dev/ttyACM0,0", "baud rate '0'"),
     ],
 )

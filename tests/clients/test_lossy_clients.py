@@ -49,10 +49,10 @@ def put_and_get(client: Client, flavour: str, folder: Path) -> tuple[bytes, byte
     file.write_bytes(data)
     there = f"{FOLDER[flavour]}/radio.bin"
     ftp.cmd_put([str(file), there])
-    if ftp.process_ftp_reply("CreateFile", timeout=60).error_code != mavftp.FtpError.Success:
+    if ftp.process_ftp_reply("put", timeout=60).error_code != mavftp.FtpError.Success:
         return data, None
     ftp.cmd_get([there, str(back)])
-    if ftp.process_ftp_reply("OpenFileRO", timeout=60).error_code != mavftp.FtpError.Success:
+    if ftp.process_ftp_reply("get", timeout=60).error_code != mavftp.FtpError.Success:
         return data, None
     return data, back.read_bytes()
 

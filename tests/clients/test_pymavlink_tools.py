@@ -43,12 +43,12 @@ def test_mavftp(script: Client, tmp_path: Path) -> None:
 
     done(client.cmd_mkdir([folder]))
     done(client.cmd_put([str(file), f"{folder}/data.bin"]))
-    done(client.process_ftp_reply("CreateFile", timeout=TRANSFER_S))
+    done(client.process_ftp_reply("put", timeout=TRANSFER_S))
     done(client.cmd_list([folder]))
     assert "data.bin" in {entry.name for entry in client.list_result}
     back = tmp_path / "back.bin"
     done(client.cmd_get([f"{folder}/data.bin", str(back)]))
-    done(client.process_ftp_reply("OpenFileRO", timeout=TRANSFER_S))
+    done(client.process_ftp_reply("get", timeout=TRANSFER_S))
     assert back.read_bytes() == file.read_bytes()
     done(client.cmd_crc([f"{folder}/data.bin"]))
     done(client.cmd_rename([f"{folder}/data.bin", f"{folder}/more.bin"]))

@@ -3,8 +3,6 @@
 import signal
 import socket
 import struct
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -12,6 +10,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from tests.clients.forked_process import flightstack_done
 from tests.clients.mavutil_link import mavutil_link
 from tests.clients.sitl_process import free_port, running_sitl
 
@@ -79,12 +78,7 @@ def test_a_busy_port_is_one_line_and_no_flight() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         link = f"udpin:127.0.0.1:{taken.getsockname()[1]}"
-        done = subprocess.run(
-            [sys.executable, "-m", "missions", "sitl", "--link", link],
-            capture_output=True,
-            text=True,
-            timeout=60.0,
-        )
+        done = flightstack_done("sitl", "--link", link, timeout=60.0)
     assert done.returncode in (1, 2)
     *_, last = done.stderr.splitlines()
     assert link in last and "in use" in last

@@ -14,6 +14,7 @@ import pytest
 from PIL import ExifTags, Image
 from pymavlink.dialects.v20 import all as mavlink
 
+from tests.clients.forked_process import flightstack_done
 from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import SitlProcess, free_port, running_sitl
 from tests.clients.video_client import picture_where, tags, watch, yellow
@@ -213,18 +214,11 @@ def test_a_killed_sitl_leaves_no_process_behind() -> None:
 
 def test_a_busy_port_is_told() -> None:
     import socket
-    import subprocess
-    import sys
 
     with socket.socket() as busy:
         busy.bind(("127.0.0.1", 0))
         busy.listen()
         port = busy.getsockname()[1]
-        done = subprocess.run(
-            [sys.executable, "-m", "missions", "sitl", "--camera", "--video", str(port), "--duration", "1"],
-            capture_output=True,
-            text=True,
-            timeout=120.0,
-        )
+        done = flightstack_done("sitl", "--camera", "--video", str(port), "--duration", "1", timeout=120.0)
     assert done.returncode == 2
     assert f"no video on 127.0.0.1 port {port}" in done.stderr

@@ -281,10 +281,15 @@ def test_arduplane_failsafe_on_the_ground_does_not_disarm() -> None:
     assert rig.commander.armed and rig.commander.mode is FlightMode.RETURN
 
 
-def test_px4_attitude_beyond_its_limits_is_told() -> None:
+@pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
+@pytest.mark.parametrize("angle_deg", [65.0, -65.0, 55.0, -55.0])
+def test_px4_attitude_beyond_its_limits_is_told(axis: int, angle_deg: float) -> None:
+    """60 degrees to either side (FD_FAIL_R, FD_FAIL_P)."""
     rig = flying("px4", FlightMode.HOLD)
-    rig.context.nav[nav.EULER_RAD] = (math.radians(65.0), 0.0, 0.0)
+    euler_rad = [0.0, 0.0, 0.0]
+    euler_rad[axis] = math.radians(angle_deg)
+    rig.context.nav[nav.EULER_RAD] = euler_rad
     rig.run(1.0)
     kinds = [event.kind for event in rig.happened(FailsafeActivated)]
-    assert kinds == [FailsafeKind.ATTITUDE_EXCESSIVE]
+    assert kinds == ([FailsafeKind.ATTITUDE_EXCESSIVE] if abs(angle_deg) > 60.0 else [])
     assert rig.commander.mode is FlightMode.HOLD  # CBRK_FLIGHTTERM: it only warns

@@ -91,11 +91,36 @@ def test_mission_from_the_ground(flavour: str) -> None:
     rig.run_until(lambda: not commander.armed, 200.0)
     reached = [event.index for event in rig.happened(MissionItemReached)]
     if flavour == "px4":
-        assert reached[:3] == [0, 1, 3]  # DO_ items are left out
+        assert reached[:4] == [0, 1, 2, 3]
+        assert commander.mode is FlightMode.HOLD
         assert FlightMode.RETURN in [event.mode for event in rig.events if hasattr(event, "mode")]
     else:
         assert reached[:4] == [1, 2, 3, 4]
         assert commander.mode is FlightMode.MISSION
+
+
+def test_a_px4_mission_that_lands_leaves_hold_behind() -> None:
+    rig = Rig("px4")
+    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 0.0, command=21))
+    rig.commander.set_mode(FlightMode.MISSION)
+    rig.commander.arm()
+    rig.run_until(lambda: rig.commander.airborne, 10.0)
+    rig.run_until(lambda: not rig.commander.armed, 60.0)
+    assert rig.commander.mode is rig.commander.commanded_mode is FlightMode.HOLD
+    assert rig.missions.current == 0  # it begins again
+    rig.commander.set_mode(FlightMode.MISSION)
+    assert rig.commander.arm().accepted
+    rig.run_until(lambda: rig.commander.airborne, 10.0)
+
+
+def test_copter_s_mission_begins_again_at_every_disarm() -> None:
+    rig = Rig("ardupilot")
+    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0), rig.waypoint(9.0, 0.0))
+    rig.commander.set_mode(FlightMode.GUIDED)
+    assert rig.commander.arm().accepted
+    rig.missions.current = 2
+    assert rig.commander.disarm().accepted
+    assert rig.missions.current == 0
 
 
 def test_the_end_of_a_mission_without_return_holds() -> None:
@@ -104,7 +129,8 @@ def test_the_end_of_a_mission_without_return_holds() -> None:
     rig.commander.set_mode(FlightMode.MISSION)
     rig.commander.arm()
     rig.run_until(lambda: rig.happened(MissionFinished), 60.0)
-    assert rig.commander.airborne and rig.commander.mode is FlightMode.MISSION
+    assert rig.commander.airborne and rig.commander.mode is FlightMode.HOLD
+    assert rig.texts()[-1] == "Mission finished, loitering"
 
 
 def test_px4_reports_the_last_item_reached_whatever_it_is() -> None:

@@ -100,6 +100,42 @@ def test_what_makes_no_sense_is_no_wall() -> None:
     assert not fence.broken((math.nan, 0.0, 0.0), HOME, FRAME, FenceParameters(radius_m=1.0), ALL_FENCES)
 
 
+HOME_AWAY = (120.0, -340.0, -7.0)
+COMPASS_RAD = [math.radians(bearing) for bearing in range(0, 360, 45)]
+
+
+@pytest.mark.parametrize("bearing_rad", COMPASS_RAD)
+def test_the_cylinder_stands_around_home(bearing_rad: float) -> None:
+    """A radius from home and heights above home, wherever home is in the local frame."""
+    fence = Geofence(MissionStore())
+    parameters = FenceParameters(enabled=True, radius_m=50.0, height_max_m=30.0)
+
+    def broken(distance_m: float, height_m: float) -> FenceType:
+        place = (
+            HOME_AWAY[0] + distance_m * math.cos(bearing_rad),
+            HOME_AWAY[1] + distance_m * math.sin(bearing_rad),
+            HOME_AWAY[2] - height_m,
+        )
+        return fence.broken(place, HOME_AWAY, FRAME, parameters, ALL_FENCES)
+
+    assert broken(49.9, 29.9) == FenceType(0)
+    assert broken(50.1, 29.9) == FenceType.CIRCLE
+    assert broken(49.9, 30.1) == FenceType.HEIGHT_MAX
+
+
+@pytest.mark.parametrize("bearing_rad", COMPASS_RAD)
+def test_the_distance_outside_is_measured_from_home(bearing_rad: float) -> None:
+    watch = FenceWatch(MissionStore())
+    place = (
+        HOME_AWAY[0] + 62.0 * math.cos(bearing_rad),
+        HOME_AWAY[1] + 62.0 * math.sin(bearing_rad),
+        HOME_AWAY[2] - 10.0,
+    )
+    parameters = FenceParameters(enabled=True, radius_m=50.0)
+    watch.update(place, HOME_AWAY, FRAME, parameters, time_us=1, armed=True, airborne=True, landing=False)
+    assert watch.distance_m == pytest.approx(12.0, abs=1e-9)
+
+
 def test_return_point() -> None:
     lat, lon, _ = FRAME.geodetic_from_ned(7.0, 8.0, 0.0)
     given = MissionItem(command=5000, frame=3, x=lat, y=lon)

@@ -17,6 +17,7 @@ from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.environment import Environment, Turbulence
 from flightsim.rotations import euler_from_quaternion, quaternion_from_euler
 from tests.flight.rig import Rig, positions, tilts, velocities
+from tests.rotations import rotation_matrix
 
 PX4_DEFAULTS = replace(
     MulticopterParameters(),
@@ -76,6 +77,18 @@ def test_attitude_control_turns_towards_the_setpoint(
         error = -error
     assert rate @ error >= -1e-6
     assert np.isfinite(rate).all()
+
+
+@pytest.mark.parametrize(
+    ("roll", "pitch"), [(0.0, 0.0), (0.4, 0.0), (-0.4, 0.0), (0.0, 0.5), (0.0, -0.5), (-0.3, 0.6)]
+)
+@pytest.mark.parametrize("yaw_rate", [0.7, -0.7])
+def test_yaw_rate_is_about_the_vertical(roll: float, pitch: float, yaw_rate: float) -> None:
+    """Without an attitude error, the body rates are those of a turn about NED down: R^T (0, 0, rate)."""
+    q, rate = np.zeros(4), np.zeros(3)
+    quaternion_from_euler(roll, pitch, 1.1, q)
+    attitude_control(q, q.copy(), yaw_rate, packed(MulticopterParameters()), rate, np.zeros(8))
+    assert rate == pytest.approx(rotation_matrix(q).T @ [0.0, 0.0, yaw_rate], abs=1e-9)
 
 
 @pytest.mark.parametrize("control", [MulticopterParameters(), PX4_DEFAULTS], ids=["iris", "px4"])

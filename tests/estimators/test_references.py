@@ -143,6 +143,44 @@ def test_comparison_over_two_boots(make_log, level):
         comparisons([opened], result.fleet.runners[1], "moon")
 
 
+def test_a_hover_in_a_hall_is_known_by_its_throttle(make_log):
+    """No height, no airspeed: the throttle shows it."""
+    log = make_log()
+    for k in range(400):
+        log.attitude(1.0 + 0.05 * k)
+        if k % 20 == 0:
+            log.heartbeat()
+            percent = 45 if 100 <= k < 300 else 8
+            log.say(dialect.MAVLink_vfr_hud_message(0.0, 0.0, 0, percent, 0.0, 0.0))
+    spans, source = airborne_spans(open_log(log.close()), 1)
+    assert source == "armed, throttle above 20 %"
+    assert spans == [(6_000_000, 16_000_000)]
+
+
+def test_never_in_the_air_says_why(make_log):
+    made = {}
+    for armed in (False, True):
+        log = make_log(f"{armed}.tlog")
+        for k in range(100):
+            log.attitude(1.0 + 0.05 * k)
+            if k % 20 == 0:
+                log.heartbeat(armed=armed)
+                log.say(dialect.MAVLink_vfr_hud_message(0.0, 0.0, 0, 0, 0.0, 0.0))
+        made[armed] = airborne_spans(open_log(log.close()), 1)
+    assert made[False] == ([], "never armed")
+    assert made[True][0] == [] and made[True][1].startswith("armed, but never above 2 m")
+
+
+def test_a_rover_counts_while_it_is_armed(make_log):
+    log = make_log()
+    for k in range(100):
+        log.attitude(1.0 + 0.05 * k)
+        if k % 20 == 0:
+            log.say(dialect.MAVLink_heartbeat_message(10, 3, 128, 0, 4, 3))
+    spans, source = airborne_spans(open_log(log.close()), 1)
+    assert source == "armed" and spans
+
+
 def test_a_run_on_the_runway_is_no_flight(make_log):
     """Some autopilots say that they fly as soon as they roll."""
     log = make_log()

@@ -91,7 +91,7 @@ def test_a_part_of_a_log(make_log, make):
     log = make_log()
     for k in range(200):
         log.attitude(1.0 + 0.05 * k)
-    result = replay(open_log(log.close()), make, from_us=3_000_000, to_us=4_000_000)
+    result = replay(open_log(log.close()), make, from_s=3.0, to_s=4.05)
     times = result.fleet.runners[1].tables["Level"].time_us
     assert (times[0], times[-1]) == (3_000_000, 4_000_000)
 
@@ -162,7 +162,7 @@ def test_a_boot_that_is_left_out_is_counted_all_the_same(make_log, make):
             if k % 20 == 0:
                 log.heartbeat()
     opened = open_log(log.close())
-    whole, part = replay(opened, make), replay(opened, make, from_us=10_000_000)
+    whole, part = replay(opened, make), replay(opened, make, from_s=10.0)
     assert [runner.boot for runner in (whole.fleet.runners[1], part.fleet.runners[1])] == [2, 2]
     (compared,) = comparisons(part.logs, part.fleet.runners[1], "truth")
     rolls = compared.references["truth"]["roll_rad"]

@@ -65,6 +65,40 @@ def test_time_that_goes_back_is_a_new_boot():
     assert (clock.boot(1), clock.boot(2)) == (1, 0)
 
 
+def test_a_burst_of_late_frames_is_no_new_boot():
+    """Frames of 1.4 s before came late on a serial line, ten minutes after boot."""
+    clock = VehicleTime()
+    late = [attitude(608_600 + 50 * k) for k in range(28)]
+    times = [clock.stamp(item) for item in (attitude(610_000), imu(610_000_000), *late, attitude(610_050))]
+    assert clock.boot(1) == 0
+    assert times[2] == 610_000_000 and times[-1] == 610_050_000
+
+
+@pytest.mark.parametrize(
+    ("before_s", "after_s", "boots"),
+    [
+        (610.0, 608.6, 0),  # late
+        (610.0, 570.0, 1),  # no burst is so old
+        (3.0, 0.4, 1),  # soon after boot
+        (25.0, 15.0, 0),  # not decided by one message ...
+    ],
+)
+def test_one_step_back(before_s, after_s, boots):
+    clock = VehicleTime()
+    clock.stamp(attitude(round(before_s * 1000)))
+    clock.stamp(attitude(round(after_s * 1000)))
+    assert clock.boot(1) == boots
+
+
+def test_time_that_goes_on_behind_is_a_new_boot():
+    """... but by those behind it: a boot whose first seconds were not received."""
+    clock = VehicleTime()
+    clock.stamp(attitude(25_000))
+    times = [clock.stamp(attitude(15_000 + 100 * k)) for k in range(40)]
+    assert clock.boot(1) == 1
+    assert times[:2] == [25_000_000] * 2 and times[-1] == 18_900_000
+
+
 def test_stale_receiver_is_no_new_boot():
     """A receiver that has lost its fix repeats the time of its last one."""
     clock = VehicleTime()

@@ -64,12 +64,12 @@ def test_gps_lost_while_circling(flavour: str) -> None:
     mode = flight.mode
     flight.inject(GPS, OFF)
     heights: list[float] = []
-    flight.fly(90.0, lambda: heights.append(flight.height_over_home_m))
+    flight.fly(60.0, lambda: heights.append(flight.height_over_home_m))  # two turns and a half
     assert flight.mode == mode and status(flight) == ACTIVE
     assert np.ptp(heights) < 12.0
     assert flight.distance_m(150.0, 150.0) < 250.0
     flight.inject(GPS, OK)
-    flight.fly(60.0)
+    flight.fly(45.0)
     assert flight.distance_m(150.0, 150.0) == pytest.approx(100.0, abs=12.0)
 
 
@@ -92,7 +92,7 @@ def test_px4_offboard_attitudes_go_on_without_gps() -> None:
     flight.set_mode("offboard")
     flight.inject(GPS, OFF)
     rolls: list[float] = []
-    flight.fly(120.0, lambda: rolls.append(flight.roll_deg))
+    flight.fly(60.0, lambda: rolls.append(flight.roll_deg))
     assert flight.mode == "offboard" and status(flight) == ACTIVE
     assert np.mean(rolls) == pytest.approx(22.0, abs=2.0) and np.std(rolls) < 3.0
 
@@ -108,7 +108,7 @@ def test_arduplane_guided_attitudes_go_on_without_gps() -> None:
         rolls.append(flight.roll_deg)
         heights.append(flight.height_over_home_m)
 
-    flight.fly(120.0, look)
+    flight.fly(60.0, look)
     assert flight.mode == "guided" and status(flight) == ACTIVE
     assert np.mean(rolls) == pytest.approx(22.0, abs=2.0)
     assert np.ptp(heights) < 12.0
@@ -130,7 +130,7 @@ def test_airspeed_fails(flavour: str, failure: int) -> None:
         speeds.append(flight.airspeed_m_s)
         heights.append(flight.height_over_home_m)
 
-    flight.fly(90.0, look)
+    flight.fly(60.0, look)
     assert flight.mode == mode
     assert min(speeds) > 14.0 and max(speeds) < 40.0
     assert np.ptp(heights) < 25.0

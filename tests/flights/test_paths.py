@@ -69,7 +69,7 @@ def test_setpoints_follow_the_curve(flown: Any, flights: str) -> None:
     ("name", "flavour"),
     [
         ("L1", "px4"),
-        ("L2", "ardupilot"),
+        slow("L2", "ardupilot"),
         ("sector", "ardupilot"),
         slow("parallel-sweep", "px4"),
         slow("expanding-square", "ardupilot"),

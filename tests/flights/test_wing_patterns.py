@@ -9,6 +9,7 @@ import pytest
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
 from missions.session import RunRequest, fly
+from tests.slow import slow
 
 FLAVOURS = ("px4", "ardupilot")
 STILL_RMS_M = 0.6
@@ -59,9 +60,9 @@ def well_flown(flight: dict[str, Any], rms_max_m: float) -> None:
     assert seconds(flight, "return") < RETURN_MAX_S
 
 
-@pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.slow)])
-def test_setpoints_follow_the_curve_in_still_air(flown: Any, flavour: str) -> None:
-    flight = flown("lissajous", flavour, None, windy=False, pattern="L2")
+@pytest.mark.parametrize(("pattern", "flavour"), [("L1", "px4"), slow("L2", "px4"), slow("L2", "ardupilot")])
+def test_setpoints_follow_the_curve_in_still_air(flown: Any, pattern: str, flavour: str) -> None:
+    flight = flown("lissajous", flavour, None, windy=False, pattern=pattern)
     well_flown(flight, STILL_RMS_M)
     assert flight["path_max_error_m"] < 3.0 * STILL_RMS_M
     assert "waypoints" not in flight  # setpoints are what an aircraft flies unless told otherwise
@@ -112,6 +113,7 @@ def test_a_team_of_aircraft_and_a_quadrotor_flies_as_one(tmp_path: Path) -> None
     assert quadrotor["path_rms_error_m"] < 1.0
 
 
+@pytest.mark.slow  # a quadrotor's is in tests/missions/test_session.py
 def test_a_search_time_ends_the_pattern_and_lands(tmp_path: Path) -> None:
     chosen = {"search_time_s": 60.0, "pattern": "L1"}
     request = RunRequest(

@@ -35,6 +35,7 @@ from missions.vehicle.vehicle import Vehicle
         ["--model", "iris"],
         ["--home", "47,8,400"],
         ["--turbulence", "light"],
+        ["--gps", "standalone"],
         ["--speedup", "2"],
     ],
     ids=lambda option: option[0],
@@ -148,23 +149,24 @@ def test_a_run_on_a_link_counts_from_the_first_heartbeat() -> None:
 
 
 @pytest.mark.parametrize(
-    ("speed_m_s", "turbulence", "words"),
+    ("speed_m_s", "profile", "turbulence", "words"),
     [
-        (0.0, "none", "still air"),
-        (6.0, "none", "wind 6 m/s from 270 degrees"),
-        (6.0, "moderate", "wind 6 m/s from 270 degrees, moderate turbulence"),
-        (0.0, "light", "no steady wind, light turbulence"),
+        (0.0, "log", "none", "still air"),
+        (6.0, "uniform", "none", "wind 6 m/s from 270 degrees"),
+        (6.0, "log", "moderate", "wind 6 m/s from 270 degrees at 10 m, log profile, moderate turbulence"),
+        (0.0, "log", "light", "no steady wind, light turbulence"),
     ],
 )
-def test_the_wind_in_words(speed_m_s: float, turbulence: str, words: str) -> None:
-    assert wind_words({"speed_m_s": speed_m_s, "from_deg": 270.0, "turbulence": turbulence}) == words
+def test_the_wind_in_words(speed_m_s: float, profile: str, turbulence: str, words: str) -> None:
+    wind = {"speed_m_s": speed_m_s, "from_deg": 270.0, "profile": profile, "turbulence": turbulence}
+    assert wind_words(wind) == words
 
 
 @pytest.mark.parametrize(
     ("arguments", "planned_m_s"),
     [
         (["orbit"], 5.0),  # what blows there unless somebody asks for it is not looked at
-        (["orbit", "--wind", "8@270"], 8.0),  # the user's word
+        (["orbit", "--wind", "8@270", "--wind-profile", "uniform"], 8.0),  # the user's word
         (["orbit", "--wind", "8@270", "--expect-wind", "3"], 3.0),
         (["orbit", "--connect", "udpin:127.0.0.1:0"], 5.0),
         (["orbit", "--connect", "udpin:127.0.0.1:0", "--expect-wind", "3"], 3.0),
@@ -245,7 +247,7 @@ def flown_summary(**more: object) -> dict[str, object]:
 def test_the_wind_that_was_flown_is_in_the_last_lines_and_above_the_picture(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    wind = {"speed_m_s": 5.0, "from_deg": 270.0, "turbulence": "light"}
+    wind = {"speed_m_s": 5.0, "from_deg": 270.0, "profile": "uniform", "turbulence": "light"}
     summary = flown_summary(wind=wind)
     result = RunResult(outcome="completed", reason="", folder=tmp_path, summary=summary)
     assert tell(result, MISSIONS["sector"]) == 0

@@ -57,3 +57,22 @@ def test_without_any_output_a_sitl_runs() -> None:
     done = run(">&-", "sitl", "--link", "udpin:127.0.0.1:0", "--speedup", "0", "--duration", "1")
     assert done.returncode == 0, done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("closed", ["2>&-", "2>&- <&-", ">&- 2>&- <&-"])
+def test_without_an_error_output_a_command_runs(closed: str, log: str) -> None:
+    done = run(closed, "log", "play", log, "--link", "udpout:127.0.0.1:9")
+    assert done.returncode == 0
+
+
+def test_no_file_gets_the_number_of_a_closed_stream() -> None:
+    code = (
+        "import os, sys; from missions.cli import main\n"
+        "try: main(['nosuch'])\n"
+        "except SystemExit as stop: print(stop.code, sys.stderr.fileno(), os.open('/dev/null', 0) > 2)"
+    )
+    done = subprocess.run(
+        ["sh", "-c", '"$@" 2>&-', "sh", sys.executable, "-c", code],
+        cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout == "2 2 True\n"

@@ -2,11 +2,11 @@
 
 import pytest
 
-from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState
+from autopilot_bridge.mavlink import FrameParser, LinkSigning, SigningKey, SigningState, dialect
 from missions.errors import VehicleTimeout
 from missions.options import FlightOptions
 from missions.request import RunRequest
-from missions.signing import key_missing
+from missions.signing import require_key
 
 KEY = SigningKey.from_passphrase("theirs")
 
@@ -26,27 +26,26 @@ def sign(autopilot):
     autopilot.encoder = SigningEncoder(autopilot.encoder)
 
 
-@pytest.mark.parametrize("answers", [False, True])
-def test_a_vehicle_that_signs_and_answers_nothing_may_want_its_key(flown, answers):
+REQUEST = RunRequest(options=FlightOptions(), connect=("udpin:127.0.0.1:1",))
+
+
+def test_a_vehicle_that_signs_and_does_not_answer_is_refused_before_anything_is_sent(flown):
     async def script(vehicle, autopilot):
-        if not answers:
-            autopilot.link.on_receive = lambda data: None
+        received = []
+        autopilot.link.on_receive = lambda data: received.extend(FrameParser().feed(data))
         await vehicle.wait_heartbeat()
-        try:
-            await vehicle.set_message_rate("VFR_HUD", 10.0)
-        except VehicleTimeout:
-            assert not answers
-        request = RunRequest(options=FlightOptions(), connect=("udpin:127.0.0.1:1",))
-        return key_missing(request, [vehicle])
+        with pytest.raises(VehicleTimeout, match=r"vehicle 1 signs its messages.*--signing-key FILE"):
+            await require_key(REQUEST, vehicle)
+        return {frame.message_id for frame in received}
 
-    told = flown(script, ready=False, setup=sign)
-    assert len(told) == (not answers)
-    assert answers or "--signing-key" in told[0]
+    assert flown(script, ready=False, setup=sign) <= {0, dialect.MAVLINK_MSG_ID_COMMAND_LONG}
 
 
-def test_a_vehicle_that_does_not_sign_wants_none(flown):
+@pytest.mark.parametrize("setup", [sign, lambda autopilot: None])
+def test_a_vehicle_that_answers_wants_no_key(flown, setup):
     async def script(vehicle, autopilot):
-        request = RunRequest(options=FlightOptions(), connect=("udpin:127.0.0.1:1",))
-        return key_missing(request, [vehicle])
+        await vehicle.wait_heartbeat()
+        await require_key(REQUEST, vehicle)
+        return len(autopilot.commands)
 
-    assert flown(script) == []
+    assert flown(script, ready=False, setup=setup) == (setup is sign)

@@ -301,3 +301,46 @@ def test_a_source_of_something_else_is_told_what_it_gave(flown, flavour, good_s)
             await vehicle.follow(lambda t: good if t < good_s else (0, 0, -10))
 
     flown(script, flavour)
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_what_keeps_a_vehicle_from_arming_is_told(flown, flavour):
+    def unready(autopilot):
+        autopilot.ready_after_us = 10**12
+        autopilot.text("PreArm: Compass not healthy")  # long ago, and mended since
+        answer = autopilot.on_command_long
+
+        def on_command_long(message):
+            if message.command == dialect.MAV_CMD_RUN_PREARM_CHECKS:
+                autopilot.text(
+                    "PreArm: Battery 1 below minimum"
+                    if flavour == "ardupilot"
+                    else "Preflight Fail: low battery"
+                )
+                autopilot.text("something else")
+            answer(message)
+
+        autopilot.on_command_long = on_command_long
+
+    async def script(vehicle, autopilot):
+        await vehicle.wait_heartbeat()
+        with pytest.raises(VehicleTimeout) as caught:
+            await vehicle.wait_ready(20.0)
+        return str(caught.value), autopilot.time_us
+
+    said, time_us = flown(script, flavour=flavour, ready=False, setup=unready)
+    why = "PreArm: Battery 1 below minimum" if flavour == "ardupilot" else "Preflight Fail: low battery"
+    assert "missing: pre-arm checks" in said and "within 20 s" in said
+    assert f"; the autopilot says: {why}; last heard" in said
+    assert time_us < 24_000_000
+
+
+def test_readiness_that_comes_at_the_last_moment_counts(flown):
+    def late(autopilot):
+        autopilot.ready_after_us = 19_000_000
+
+    async def script(vehicle, autopilot):
+        await vehicle.wait_heartbeat()
+        await vehicle.wait_ready(20.0)
+
+    flown(script, ready=False, setup=late)

@@ -96,8 +96,12 @@ def test_prediction_is_the_transition_and_the_noise() -> None:
     parameters = NavigationParameters(magnetometer_bias_turn_rad=1e15)
     t = STEPS * DT_S
     decay = np.ones(SIZE)
-    decay[s.GYRO_BIAS : s.GYRO_BIAS + 3] = np.exp(-t / parameters.gyro_bias_tau_s)
-    decay[s.ACCEL_BIAS : s.ACCEL_BIAS + 3] = np.exp(-t / parameters.accel_bias_tau_s)
+    decay[s.GYRO_BIAS : s.GYRO_BIAS + 3] = np.exp(
+        -t * parameters.gyro_bias_walk_rad_s_sqrt_s**2 / (2.0 * parameters.gyro_bias_rad_s**2)
+    )
+    decay[s.ACCEL_BIAS : s.ACCEL_BIAS + 3] = np.exp(
+        -t * parameters.accel_bias_walk_m_s2_sqrt_s**2 / (2.0 * parameters.accel_bias_m_s2**2)
+    )
     decay[s.GPS_ERROR : s.GPS_ERROR + 3] = np.exp(-t / parameters.gps_position_tau_s)
     decay[s.MAG_BIAS : s.MAG_BIAS + 3] = np.exp(-t / parameters.magnetometer_bias_tau_s)
     full = np.diag(decay) @ transition
@@ -189,6 +193,23 @@ def test_delayed_measurement(kind: str, axis: int) -> None:
     expected = numerical_row(kind, axis) @ np.linalg.inv(numerical_transition(now))
     row = analytic_row(kind, axis, STEPS * DT_S, now, now[s.SUM_FORCE : s.SUM_FORCE + 3])
     np.testing.assert_allclose(row, expected, atol=5e-3)  # first order in the delay of 20 ms
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.3])
+def test_delayed_height_is_that_of_the_past(delay_s: float) -> None:
+    """A vehicle that sank by `delay * v_down` since the pressure was sampled was that much higher then: the
+    predicted pressure altitude, and its variance, by the same row."""
+    error = RandomStreams(5).generator("error").normal(size=SIZE)
+    work = np.zeros(s.WORK_SIZE)
+    work[:SIZE] = error
+    past_down = error[s.POS + 2] - delay_s * error[s.VEL + 2]
+    assert fusion.baro_dot(work, s.DX, delay_s) == pytest.approx(-past_down + error[s.BARO_OFFSET], abs=1e-12)
+    root = RandomStreams(6).generator("covariance").normal(size=(SIZE, SIZE))
+    p = root @ root.T
+    row = np.zeros(SIZE)
+    row[[s.POS + 2, s.VEL + 2, s.BARO_OFFSET]] = -1.0, delay_s, 1.0
+    assert fusion.baro_ph(p, work, delay_s) == pytest.approx(float(row @ p @ row), rel=1e-12)
+    np.testing.assert_allclose(work[s.PH : s.PH + SIZE], p @ row, rtol=1e-12, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["airspeed", "sideslip"])

@@ -115,6 +115,17 @@ def test_px4_download_refuses_jumps_and_ends_in_silence(px4: Vehicle) -> None:
     assert upload(px4, plan(2)).type == 0
 
 
+def test_a_slow_download_goes_on_while_requests_come(px4: Vehicle) -> None:
+    """The timeout of 5 s counts from the last request, whenever the download began."""
+    upload(px4, plan(4))
+    px4.tick(100.0)
+    px4.tell(request_list())
+    for seq in range(4):
+        px4.tick(4.5)
+        assert names(px4.tell(request(seq))) == ["MISSION_ITEM_INT"]
+    assert px4.take_texts() == []
+
+
 def test_a_download_shows_one_plan_though_another_is_uploaded_meanwhile(px4: Vehicle) -> None:
     upload(px4, plan(4))
     px4.tell(request_list())
@@ -258,11 +269,21 @@ def test_item_reached(px4: Vehicle, ardupilot: Vehicle) -> None:
         vehicle.tick(0.1)
         vehicle.other.take()
         vehicle.service.item_reached(1)
-        assert [message.seq for message in vehicle.channel.take()] == [1]
+        heard = vehicle.tick(0.02)
+        assert [message.seq for _, message in heard] == [1]
         heard = vehicle.tick(20.0)
         assert names([message for _, message in heard]) == ["MISSION_ITEM_REACHED"] * repeats
         assert [round(when) for when, _ in heard] == list(range(1, repeats + 1))
         assert len(vehicle.other.take()) == repeats + 1
+
+
+def test_a_waypoint_directly_before_a_do_item_is_not_reported(vehicle: Vehicle) -> None:
+    upload(vehicle, plan(4))
+    vehicle.tick(0.1)
+    vehicle.service.item_reached(1)
+    vehicle.service.item_reached(2)  # DO_CHANGE_SPEED, done at once
+    reached = mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED
+    assert [m.seq for _, m in vehicle.tick(0.5) if m.get_msgId() == reached] == [2]
 
 
 def test_upload_while_the_mission_is_flown(px4: Vehicle, ardupilot: Vehicle) -> None:

@@ -1,9 +1,12 @@
 """Commands of aircraft: the plane's column of the reference tables, and where they send the aircraft."""
 
 import math
+from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.autopilot.status import StatusReport
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
@@ -188,15 +191,15 @@ def test_arduplane_reposition_changes_the_mode_only_when_told() -> None:
     assert rig.commander.mode is FlightMode.GUIDED
 
 
-@pytest.mark.parametrize(("radius_m", "flown_m"), [(90.0, 90.0), (-90.0, -90.0), (NAN, None), (0.0, None)])
-def test_px4_reposition_circles_with_the_radius_of_param3(radius_m: float, flown_m: float | None) -> None:
+@pytest.mark.parametrize("radius_m", [90.0, -90.0, NAN, 0.0])
+def test_px4_reposition_does_not_read_a_radius(radius_m: float) -> None:
     rig = rig_of("px4", "flying")
     altitude_m = 489.0 + 150.0  # over the sea in every frame: PX4 doesn't look at it
     place = rig.place(0.0, 500.0)
     assert rig.int(192, -1, 1, radius_m, math.radians(90.0), *place, altitude_m, frame=6) == [0]
     rig.tick()
     task = rig.commander.tasks.task
-    assert task.radius_m == pytest.approx(flown_m or rig.context.fixed_wing.loiter_radius_m)
+    assert task.radius_m == pytest.approx(rig.context.fixed_wing.loiter_radius_m)
     assert task.centre_ned_m == pytest.approx((0.0, 500.0, -150.0), abs=0.05)
 
 
@@ -280,6 +283,35 @@ def test_after_a_landing_the_mission_must_be_left_before_arming_again() -> None:
     assert rig.channel.texts() == ["In landing sequence: mission reset"]
     assert rig.missions.current == 0
     assert rig.long(ARM, 1) == [0]
+
+
+def test_a_landing_sequence_takes_the_prearm_bit_until_the_mode_changes() -> None:
+    rig = rig_of("ardupilot", "ready")
+    rig.store.set("RTL_AUTOLAND", 2)
+    rig.plan(*landing_plan(rig))
+    status = StatusReport(rig.flavour, rig.commander)
+    prearm = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    rig.commander.set_mode(FlightMode.MISSION)
+    rig.run(0.2)
+    assert status.sys_status()[2] & prearm
+    rig.missions.current = 4
+    rig.run(35.0)
+    assert not status.sys_status()[2] & prearm
+    assert "PreArm: In landing sequence" in rig.texts()
+    rig.long(MODE, 1, 5)
+    rig.run(0.2)
+    assert status.sys_status()[2] & prearm
+
+
+def test_a_mission_with_a_takeoff_may_be_armed_for_after_its_landing() -> None:
+    rig = rig_of("ardupilot", "ready")
+    rig.store.set("RTL_AUTOLAND", 2)
+    takeoff, *rest = landing_plan(rig)
+    rig.plan(replace(takeoff, command=TAKEOFF), *rest)
+    rig.commander.set_mode(FlightMode.MISSION)
+    rig.missions.current = 4
+    rig.run(0.2)
+    assert rig.commander.armable
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

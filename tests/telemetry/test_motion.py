@@ -1,8 +1,11 @@
 """The compiled frames of the fastest messages are the encoder's own frames, byte for byte."""
 
+import math
+
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition
+from autopilot_bridge.navigation import layout
 from autopilot_bridge.sitl import Sitl, SitlConfiguration
 from autopilot_bridge.telemetry.motion import MESSAGES
 
@@ -47,6 +50,28 @@ def test_contents_are_the_navigation_state(flying: Sitl) -> None:
     assert (place.lat, place.lon) == (round(lat_deg * 1e7), round(lon_deg * 1e7))
     assert place.alt == pytest.approx(alt_m * 1e3, abs=1.0)
     assert messages["HIGHRES_IMU"].zacc == pytest.approx(-9.8, abs=0.3)
+
+
+def test_global_position_has_centimetres_per_second_and_centidegrees(flying: Sitl) -> None:
+    """Units of common.xml: vx, vy, vz in cm/s (north, east, down), hdg in cdeg, relative_alt in mm up."""
+    autopilot = flying.vehicles[0].autopilot
+    motion, state = autopilot._messages.motion, autopilot.navigation.state
+    before = state.copy()
+    autopilot._view.advance(flying.time_us + 1)
+    try:
+        state[layout.VEL_NED_M_S] = 1.23, -4.56, 2.34
+        state[layout.EULER_RAD] = 0.1, -0.2, math.radians(-30.0)
+        state[layout.POS_NED_M] = 3.0, 4.0, autopilot.context.home_ned_m[2] - 17.5
+        (frame,) = FrameParser().feed(
+            motion.frames(motion.bits[definition("GLOBAL_POSITION_INT").message_id], FrameEncoder(7, 1))
+        )
+    finally:
+        state[:] = before
+        autopilot._view.advance(flying.time_us)
+    place = decode(frame)
+    assert (place.vx, place.vy, place.vz) == (123, -456, 234)
+    assert place.hdg == 33_000
+    assert place.relative_alt == 17_500
 
 
 def test_a_single_bit_makes_a_single_frame(flying: Sitl) -> None:

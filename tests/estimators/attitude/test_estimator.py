@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from autopilot_bridge.rotation import conjugate, from_euler, rotate
 from estimators.attitude import AttitudeEstimator, AttitudeParameters
 from estimators.attitude.air import AirData, pressure_pa, true_over_equivalent
 from estimators.attitude.parameters import AirspeedSource
@@ -26,6 +27,40 @@ def started(**parameters):
 def newest(found):
     (estimate,) = found.estimates
     return estimate
+
+
+# the board's trim
+
+
+def board_frame(vector, roll, pitch):
+    """A vector of the vehicle's frame in that of a board that is turned by roll and pitch in the vehicle."""
+    return rotate(conjugate(from_euler(roll, pitch, 0.0)), vector)
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_the_boards_trim_is_corrected(given):
+    """At rest with tilt, on a board that is turned by 3 and -2 degrees: the vehicle's attitude comes out."""
+    trim = math.radians(3.0), math.radians(-2.0)
+    settings = {"trim_roll_rad": trim[0], "trim_pitch_rad": trim[1]} if given else {}
+    found = AttitudeEstimator(AttitudeParameters(vehicle="fixed_wing", **settings))
+    for name, value in zip(("AHRS_TRIM_X", "AHRS_TRIM_Y"), trim, strict=True):
+        parameter = made("PARAM_VALUE", param_id=name, param_value=0.1 if given else value)
+        assert found.handle(0, parameter) is Outcome.USED
+    force = board_frame(FORCE, *trim)
+    for k in range(51):
+        found.handle(k * STEP_US, highres(k * STEP_US, force=force))
+    assert (newest(found).roll_rad, newest(found).pitch_rad) == pytest.approx((ROLL, PITCH), abs=1e-6)
+    assert "roll +3.00 deg, pitch -2.00 deg" in found.remarks()["note"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("AHRS_TRIM_X", math.nan), ("AHRS_TRIM_X", 1.0), ("AHRS_EKF_TYPE", 0.1)]
+)
+def test_what_is_no_trim(name, value):
+    found = started()
+    before = newest(found)
+    assert found.handle(STEP_US, made("PARAM_VALUE", param_id=name, param_value=value)) is Outcome.IGNORED
+    assert newest(found) == before and "note" not in found.remarks()
 
 
 # what it waits for
@@ -55,12 +90,13 @@ def test_form_by_type(kind, form):
 
 
 def test_needs():
-    inertial, kind, air = AttitudeEstimator().needs
+    inertial, kind, air, trim = AttitudeEstimator().needs
+    assert trim.optional and trim.messages == ("PARAM_VALUE",)
     assert inertial.rate_hz == 20.0
     assert inertial.messages[0] == "HIGHRES_IMU"
     assert not kind.optional
     assert air.optional
-    inertial, kind, air = AttitudeEstimator(AttitudeParameters(vehicle="fixed_wing", imu="RAW_IMU")).needs
+    inertial, kind, air, _ = AttitudeEstimator(AttitudeParameters(vehicle="fixed_wing", imu="RAW_IMU")).needs
     assert inertial.messages == ("RAW_IMU",)
     assert kind.optional
     assert not air.optional

@@ -146,6 +146,45 @@ def test_gravity_term_in_a_bank():
     assert found.x[at.ALPHA] == pytest.approx((lift_needed - lift) / slope, abs=math.radians(0.6))
 
 
+@pytest.mark.parametrize("path_deg", [25.0, -25.0])
+def test_gravity_along_the_path_of_a_climb(path_deg):
+    """A straight climb or dive at constant speed: the specific force along the path is g sin(gamma), all of
+    it weight, so the integrated speed stays the airspeed without any correction by it."""
+    path = math.radians(path_deg)
+    found = Filter(at.WING, pitch=path, attack=False, gain_1_s=0.0, bias_gain_1_s2=0.0)
+    found.air(20.0)
+    force = (G * math.sin(path), 0.0, -G * math.cos(path))
+    for _ in range(50):
+        found.feed((0.0, 0.0, 0.0), force)
+    assert found.x[at.SPEED] == pytest.approx(20.0, abs=1e-9)
+    assert found.x[at.REFERENCE : at.REFERENCE + 3] == pytest.approx(G * found.down, abs=1e-9)
+
+
+@pytest.mark.parametrize("path_deg", [30.0, -30.0])
+def test_gravity_across_the_path_of_a_climb(path_deg):
+    """Lift carries g cos(gamma) of a straight climb or dive, with gamma = pitch - angle of attack."""
+    lift, slope, airspeed, path = 0.005, 0.08, 25.0, math.radians(path_deg)
+    alpha = (G * math.cos(path) / airspeed**2 - lift) / slope
+    pitch = path + alpha
+    found = Filter(
+        at.WING,
+        pitch=pitch,
+        lift_1_m=lift,
+        lift_slope_1_m_rad=slope,
+        climb_time_s=math.inf,
+        thrust_m_s2=0.0,
+        thrust_loss_1_m=0.0,
+        gain_1_s=0.0,
+        bias_gain_1_s2=0.0,
+    )
+    force = (G * math.sin(pitch), 0.0, -G * math.cos(pitch))
+    for k in range(round(20.0 / STEP_S)):
+        if k % 5 == 0:
+            found.air(airspeed)
+        found.feed((0.0, 0.0, 0.0), force)
+    assert found.x[at.ALPHA] == pytest.approx(alpha, abs=1e-4)
+
+
 def test_sideslip_from_side_force():
     """Steady slip to the right: force to the left, of the ratio to lift that is assumed."""
     found = Filter(at.WING, attack=False)

@@ -81,6 +81,25 @@ def test_mcap(log, tmp_path):
     assert {schema.name for schema, _, _ in found} == {"mavlink.ATTITUDE", "mavlink.STATUSTEXT"}
 
 
+def test_mcap_in_si_units(log, tmp_path):
+    """The values and units of `Table.si`; what has no unit stays as it is."""
+    names = ["GPS_RAW_INT", "RAW_IMU", "STATUSTEXT"]
+    (path,) = export(log, log.select(names, system_id=1), tmp_path / "flight.mcap", "mcap", si=True)
+    with open(path, "rb") as file:
+        found = [
+            (schema, json.loads(message.data)) for schema, _, message in make_reader(file).iter_messages()
+        ]
+    for name in names[:2]:
+        table = log.table(name, system_id=1)
+        rows = [row for schema, row in found if schema.name == f"mavlink_si.{name}"]
+        for field in table.fields:
+            expected = table.si(field) if field in table.units else table[field]
+            assert [row[field] for row in rows] == expected.tolist(), field
+    schema = next(json.loads(item.data) for item, _ in found if item.name == "mavlink_si.GPS_RAW_INT")
+    assert schema["properties"]["lat"] == {"type": "number", "description": "rad"}
+    assert schema["properties"]["fix_type"] == {"type": "integer"}
+
+
 @pytest.mark.parametrize("form", FORMATS)
 def test_nothing_is_overwritten(log, tmp_path, form):
     target = tmp_path / "out"
@@ -100,8 +119,6 @@ def test_what_can_not_be_exported(log, tmp_path):
         export(log, log.select(), tmp_path / "a", "xlsx")
     with pytest.raises(LogError, match="nothing of"):
         export(log, [], tmp_path / "a", "csv")
-    with pytest.raises(LogError, match="leave --si out"):
-        export(log, log.select(), tmp_path / "a", "mcap", si=True)
     with pytest.raises(LogError, match="can't write"):
         export(log, log.select(), tmp_path / "no" / "such" / "a.npz", "npz")
 

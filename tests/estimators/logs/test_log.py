@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import all as dialect
 
 from estimators.logs import LogError, open_log
 from estimators.logs.condition import Condition
+from missions.log_text import report_lines
 from tests.estimators.logs.reference import EPOCH_US, build, pack, record, tlog
 from tests.recorded_logs import each_recorded_log
 
@@ -224,6 +225,66 @@ def test_rate_of_systems_without_a_clock_is_that_of_the_records(tmp_path):
     beat = pack(dialect.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3), system=255, component=190)
     path.write_bytes(tlog([beat] * 11, step_us=500_000))
     assert open_log(path).rate_hz("HEARTBEAT") == pytest.approx(2.0)
+
+
+def test_rates_of_bursts_and_of_stamps_that_are_all_0(tmp_path):
+    """A burst is counted over a second; messages without a clock by the time of their records."""
+    path = tmp_path / "a.tlog"
+    value = dialect.MAVLink_param_value_message(b"A", 1.0, 9, 900, 0)
+    attitude = [
+        (pack(dialect.MAVLink_attitude_message(ms, 0, 0, 0, 0, 0, 0)), ms) for ms in range(1000, 9000, 100)
+    ]
+    frames = [record(frame, EPOCH_US + ms * 1000) for frame, ms in attitude]
+    frames[40:40] = [record(pack(value), EPOCH_US + 5_000_000 + 30 * k) for k in range(900)]
+    path.write_bytes(b"".join(frames))
+    assert open_log(path).rate_hz("PARAM_VALUE") == pytest.approx(899.0)
+    zero = pack(dialect.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0))
+    path.write_bytes(tlog([zero] * 101, step_us=20_000))
+    assert open_log(path).rate_hz("ATTITUDE") == pytest.approx(50.0)
+
+
+def test_the_rate_of_two_imus_is_that_of_one(tmp_path):
+    path = tmp_path / "a.tlog"
+    frames = [
+        pack(dialect.MAVLink_highres_imu_message(1_000_000 + 40_000 * (k // 2), *[0.0] * 13, 63, k % 2))
+        for k in range(200)
+    ]
+    path.write_bytes(tlog(frames, step_us=20_000))
+    log = open_log(path)
+    assert log.rate_hz("HIGHRES_IMU") == pytest.approx(25.0, rel=0.01)
+    assert log.report().streams[0].rate_hz == pytest.approx(25.0, rel=0.01)
+
+
+def test_times_are_told_on_the_first_vehicles_clock_and_boot(tmp_path):
+    """Vehicle 2 booted 100 s before vehicle 1, which boots anew."""
+    path, frames = tmp_path / "a.tlog", []
+    for boot in range(2):
+        for second in range(1, 11):
+            other = dialect.MAVLink_attitude_message((100 + 10 * boot + second) * 1000, 0, 0, 0, 0, 0, 0)
+            own = dialect.MAVLink_attitude_message(second * 1000, 0, 0, 0, 0, 0, 0)
+            mode = 4 if second > 5 else 0
+            beats = [
+                pack(dialect.MAVLink_heartbeat_message(2, 3, 129 + 80, mode, 4, 3), system=n) for n in (1, 2)
+            ]
+            frames += [pack(own), pack(other, system=2), *beats]
+    path.write_bytes(tlog(frames, step_us=250_000))
+    log = open_log(path)
+    report = log.report()
+    assert report.clock == "seconds since boot of vehicle 1"
+    for vehicle in report.vehicles:
+        assert [(span.mode, span.boot, span.start_us) for span in vehicle.modes] == [
+            ("STABILIZE", 0, 1_000_000),
+            ("GUIDED", 0, 6_000_000),
+            ("STABILIZE", 1, 1_000_000),
+            ("GUIDED", 1, 6_000_000),
+        ]
+    lines = "\n".join(report_lines(report))
+    assert "armed boot 1, 1.00 to 10.00 s" in lines and "--from and --to count the same" in lines
+    order = np.arange(len(log))
+    assert log.inside(order, from_s=6.0, to_s=8.0, boot=1).sum() == 8  # both vehicles, two seconds
+    assert log.boots_at(6.0, 8.0) == [0, 1]
+    with pytest.raises(LogError, match="--boot 2 is not in"):
+        log.inside(order, boot=2)
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ def test_records_are_copied_as_they_are(log, tmp_path):
 
 
 def test_a_window_of_some_messages(log, tmp_path):
-    chosen = window(log, log.select("ATTITUDE", system_id=1), 2.0, 4.5)
+    chosen = window(log, log.select("ATTITUDE", system_id=1), 7.0, 9.5)  # since boot; the log begins at 5 s
     write_records(tmp_path / "cut.tlog", read_records(log, positions(chosen)))
     cut = open_log(tmp_path / "cut.tlog")
     assert len(cut) == 50 and {key.name for key in cut.keys} == {"ATTITUDE"}
@@ -71,25 +71,25 @@ def test_an_empty_selection_writes_nothing(log, tmp_path):
 
 
 def test_off_takes_messages_away(mutate):
-    log = mutate("gps:off@2-6")
+    log = mutate("gps:off@7-11")
     times = (log.table("GPS_RAW_INT").log_time_us - EPOCH_US) * 1e-6
     assert not np.any((times >= 2.0) & (times < 6.0)) and len(times) == COUNT // 4 - 20
     assert len(log.table("RAW_IMU")) == COUNT
 
 
 def test_off_of_one_unit_of_several_leaves_its_last_values(mutate):
-    imu = mutate("gyro:off@3-").table("RAW_IMU")
+    imu = mutate("gyro:off@8-").table("RAW_IMU")
     assert len(imu) == COUNT and set(imu["xgyro"].tolist()) == {10}
 
 
 @pytest.mark.parametrize(
     ("fault", "message", "field", "expected"),
     [
-        ("RAW_IMU.xgyro:wrong=0.5@5-", "RAW_IMU", "xgyro", 510),
-        ("accel:wrong=9.80665@5-", "RAW_IMU", "xacc", 1000),
+        ("RAW_IMU.xgyro:wrong=0.5@10-", "RAW_IMU", "xgyro", 510),
+        ("accel:wrong=9.80665@10-", "RAW_IMU", "xacc", 1000),
         ("ATTITUDE.roll:wrong=1", "ATTITUDE", "roll", 0.01 * (COUNT - 1) + 1),
-        ("ATTITUDE.roll:stuck@5-", "ATTITUDE", "roll", 1.0),
-        ("gyro:drift=0.1@5-", "RAW_IMU", "ygyro", round(-20 + 100 * 4.95)),
+        ("ATTITUDE.roll:stuck@10-", "ATTITUDE", "roll", 1.0),
+        ("gyro:drift=0.1@10-", "RAW_IMU", "ygyro", round(-20 + 100 * 4.95)),
         ("RAW_IMU.xgyro:wrong=1e9", "RAW_IMU", "xgyro", 32767),
         ("GPS_RAW_INT.lat:wrong=111.19493", "GPS_RAW_INT", "lat", -353600000 + 10_000),
         ("ATTITUDE:wrong=2", "ATTITUDE", "yaw", 2.0),
@@ -98,7 +98,7 @@ def test_off_of_one_unit_of_several_leaves_its_last_values(mutate):
 def test_values_are_changed_in_si_units(mutate, log, fault, message, field, expected):
     table = mutate(fault).table(message, system_id=1)
     assert table[field][-1] == pytest.approx(expected, abs=1.0 if abs(expected) > 1000 else 1e-5)
-    if "@5-" in fault and "stuck" not in fault:
+    if "@10-" in fault and "stuck" not in fault:
         before = table.log_time_us < EPOCH_US + 5_000_000
         assert np.array_equal(table[field][before], log.table(message, system_id=1)[field][before])
 
@@ -136,7 +136,7 @@ def test_stamps_that_go_back_or_far_away(tmp_path, fault):
 
 
 def test_delayed_messages_come_later_with_their_own_stamps(mutate):
-    log = mutate("RAW_IMU:delayed=0.12@2-8")
+    log = mutate("RAW_IMU:delayed=0.12@7-13")
     stamps = [time for time, _ in raw(log)]
     assert stamps == sorted(stamps)
     imu = log.table("RAW_IMU")

@@ -92,7 +92,7 @@ def test_dataflash_gives_the_messages_of_estimators(bin_log):
     imu = bin_log.table("HIGHRES_IMU", instance=1)
     assert len(imu) == 50 * SECONDS
     assert imu["xgyro"][0] == np.float32(0.11) and imu["zacc"][0] == np.float32(-9.7)
-    assert bin_log.rate_hz("HIGHRES_IMU") == pytest.approx(100.0, rel=0.02)  # two of 50 Hz
+    assert bin_log.rate_hz("HIGHRES_IMU") == pytest.approx(50.0, rel=0.02)  # of one of the two
     attitude = bin_log.table("ATTITUDE")
     assert attitude["roll"][-1] == pytest.approx(math.radians(30.0))
     assert attitude["pitch"][-1] == pytest.approx(math.radians(-5.5))
@@ -295,6 +295,26 @@ def test_ulog_vehicle_modes_flights_and_date(ulg_log):
     assert [span.mode for span in vehicle.modes] == ["MANUAL", "TAKEOFF", "MISSION"]
     assert vehicle.flights[0].start_us == 2_000_000
     assert ulg_log.start_unix_us == 1_700_000_000_000_000 - 200_000
+
+
+def test_single_imus_are_turned_as_the_board_is(ulog, tmp_path):
+    """The voted IMU comes corrected from the firmware; the others are turned, by 90 deg and 2 deg of roll."""
+    ulog.parameter("SENS_BOARD_ROT", 2)
+    ulog.parameter("SENS_BOARD_X_OFF", 2.0)
+    log = open_log(ulog.save(tmp_path / "flight.ulg"))
+    assert log.table("HIGHRES_IMU", instance=0)["ygyro"][0] == np.float32(-0.2)
+    second = log.table("HIGHRES_IMU", instance=1)  # 0.2 about x of the board
+    assert (second["xgyro"][0], second["ygyro"][0]) == pytest.approx((0.0, 0.2 * math.cos(math.radians(2.0))))
+    assert second["zgyro"][0] == pytest.approx(0.2 * math.sin(math.radians(2.0)))
+    assert "SENS_BOARD_*_OFF 2 0 0 deg" in log.report().remarks["board"]
+    assert b"SENS_BOARD_ROT" in log.table("PARAM_VALUE")["param_id"].tolist()
+
+
+def test_a_board_on_its_side_leaves_single_imus_out(ulog, tmp_path):
+    ulog.parameter("SENS_BOARD_ROT", 16)
+    log = open_log(ulog.save(tmp_path / "flight.ulg"))
+    assert set(log.table("HIGHRES_IMU")["id"].tolist()) == {0}
+    assert "left out" in log.report().remarks["board"]
 
 
 def test_damaged_ulog(ulog, tmp_path):

@@ -89,7 +89,58 @@ def test_several_logs_have_one_table_and_a_folder_each(tmp_path, capfd):
 def test_a_part_of_it(tmp_path):
     log = write_log(tmp_path / "flight.tlog")
     assert replay(log, "--estimator", LEVEL, "--from", 2, "--to", 3, "--out", tmp_path / "out") == 0
-    assert summary_of(tmp_path / "out")["samples"] == 21
+    assert summary_of(tmp_path / "out")["samples"] == 20  # the end itself is left out
+
+
+def test_a_boot_is_chosen(tmp_path, capfd):
+    log = write_log(tmp_path / "one.tlog")
+    both = tmp_path / "both.tlog"
+    both.write_bytes(log.read_bytes() * 2)
+    assert (
+        replay(both, "--estimator", LEVEL, "--from", 2, "--to", 3, "--boot", 1, "--out", tmp_path / "a") == 0
+    )
+    assert summary_of(tmp_path / "a")["samples"] == 20
+    assert replay(both, "--estimator", LEVEL, "--from", 2, "--to", 3, "--out", tmp_path / "b") == 0
+    assert summary_of(tmp_path / "b")["samples"] == 40
+    assert replay(both, "--estimator", LEVEL, "--from", 50, "--out", tmp_path / "c") == 1
+    assert "has nothing at that time; it has 1.0 to 10.9, 1.0 to 10.9 s" in capfd.readouterr().err
+
+
+def test_what_is_not_compared_says_why_and_is_drawn(tmp_path, capfd):
+    """A log without the reference of an own estimator's columns."""
+    mine = tmp_path / "mine.py"
+    text = Path(LEVEL).read_text().replace('("roll_rad", "pitch_rad")', '("lean_rad", "tilt_rad")', 1)
+    mine.write_text(text)
+    out = tmp_path / "out"
+    assert replay(write_log(tmp_path / "flight.tlog"), "--estimator", mine, "--out", out) == 0
+    summary = summary_of(out)
+    assert summary["reference"] is None
+    assert summary["not_compared"].startswith("no reference for its columns lean_rad, tilt_rad")
+    assert "nothing is compared: no reference for its columns" in capfd.readouterr().out
+    assert (out / "errors.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("against", "armed", "says"),
+    [
+        ("truth", True, "the log has nothing of the truth for roll_rad, pitch_rad"),
+        ("both", False, "no estimate was made in the air: never armed"),
+    ],
+)
+def test_no_truth_and_never_in_the_air(tmp_path, against, armed, says):
+    encoder = FrameEncoder(1, 1)
+    path = tmp_path / "flight.tlog"
+    with TlogWriter(path) as log:
+        for k in range(200):
+            ms = 1000 + k * 50
+            messages = [dialect.MAVLink_attitude_message(ms, 0.1, 0.1, 0, 0, 0, 0)]
+            if k % 20 == 0:
+                messages.append(dialect.MAVLink_heartbeat_message(2, 12, 128 if armed else 0, 0, 4, 3))
+            for message in messages:
+                log.write(10**15 + ms * 1000, encoder.encode(message))
+    assert replay(path, "--estimator", LEVEL, "--against", against, "--out", tmp_path / "out") == 0
+    assert summary_of(tmp_path / "out")["not_compared"] == says
+    assert (tmp_path / "out" / "errors.png").exists()
 
 
 def test_what_is_lacking_is_told_and_the_rest_goes_on(tmp_path, capfd):

@@ -8,11 +8,12 @@ import pytest
 
 from autopilot_bridge.fence_shapes import fence_shapes
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions.kind import VehicleKind
 from missions.preflight.fence_geometry import first_outside
 from missions.preflight.finding import Finding, Level
-from missions.preflight.health import health_findings, reasons_against_arming
+from missions.preflight.health import health_findings, not_ready_because, reasons_against_arming, sensors
 from missions.preflight.lost_link import lost_link_words
 from missions.preflight.settings import areas_watched, fence, settings_findings, shapes_join
 from missions.preflight.snapshot import Snapshot
@@ -50,6 +51,41 @@ def found(changes: dict[str, dict[str, Any] | None], texts: tuple[str, ...] = ()
 
 def test_a_ready_vehicle_is_ok() -> None:
     assert {finding.level for finding in found({}).values()} == {Level.OK}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "level"),
+    [
+        ({}, Level.OK),
+        ({"TERRAIN_FOLLOW": 0.0}, Level.OK),
+        ({"TERRAIN_FOLLOW": 1.0}, Level.WARNING),
+        ({"RTL_ALT_TYPE": 1.0}, Level.WARNING),
+    ],
+)
+def test_missing_terrain_data_matter_where_they_are_flown_by(
+    parameters: dict[str, float], level: Level
+) -> None:
+    messages = copy.deepcopy(READY)
+    bits = messages["SYS_STATUS"]
+    bits["onboard_control_sensors_present"] |= dialect.MAV_SYS_STATUS_TERRAIN
+    bits["onboard_control_sensors_enabled"] |= dialect.MAV_SYS_STATUS_TERRAIN
+    snapshot = Snapshot(flavour="ardupilot", kind=PLANE, messages=messages, parameters=parameters)
+    (finding,) = sensors(snapshot)
+    assert finding.level is level
+    assert ("terrain" in finding.text) == (level is Level.WARNING)
+
+
+@pytest.mark.parametrize(
+    ("texts", "unhealthy", "words"),
+    [
+        (("PreArm: a", "hello", "PreArm: b", "PreArm: a"), 0, "PreArm: a / PreArm: b"),
+        (("Preflight Fail: a",), dialect.MAV_SYS_STATUS_SENSOR_GPS, "Preflight Fail: a"),
+        ((), dialect.MAV_SYS_STATUS_SENSOR_GPS | dialect.MAV_SYS_STATUS_PREARM_CHECK, "not healthy: gps"),
+        ((), dialect.MAV_SYS_STATUS_PREARM_CHECK, ""),
+    ],
+)
+def test_why_it_is_not_ready(texts: tuple[str, ...], unhealthy: int, words: str) -> None:
+    assert not_ready_because(texts, unhealthy) == words
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,232 @@
+"""Times of the messages in an ArduPilot onboard log, for every way in which firmwares have written them.
+
+Source: the clocks of pymavlink's DFReader, and ArduPilot's own history of the format. Since 2015 (Copter 3.3)
+each message begins with `TimeUS`; before, most began with `TimeMS`, GPS gave the time since boot as `T`, and
+MODE, MSG, EV and CMD had no time; in 2013 only GPS had a time, that of the GPS week.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from estimators.logs.mapped import Array
+
+_OWN: Final = (("TimeUS", 1), ("TimeMS", 1000))
+_GPS: Final = frozenset({"GPS", "GPS2"})
+_WEEKS: Final = (("GWk", "GMS"), ("Week", "TimeMS"), ("Week", "Time"), ("Wk", "TWk"))
+"""Columns of the GPS week and of the milliseconds in it."""
+_GPS_EPOCH_S: Final = 315_964_800
+_LEAP_SECONDS: Final = 18
+_WEEK_S: Final = 7 * 86_400
+_FIRST_DATE_US: Final = 1_000_000_000_000_000
+_MAX_TIME_US: Final = 10**13
+_BLOCK: Final = 64
+_FAR_US: Final = 60_000_000
+_ASSUMED_US: Final = 20_000
+"""Between messages of the most frequent kind where a log has no time at all: 50 Hz, as DFReader assumes."""
+
+MICROSECONDS, MILLISECONDS, PX4_TIME, GPS_INTERPOLATED, NO_CLOCK = (
+    "microseconds since boot",
+    "milliseconds since boot",
+    "microseconds since boot, by TIME messages",
+    "interpolated between GPS times",
+    "none; 50 Hz is assumed",
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawTable:
+    """All messages of one format, as they are in the file.
+
+    Attributes:
+        name: of the format.
+        number: of the format.
+        positions: (n,) where in the file each begins, rising.
+        columns: fields by name, in the order of the format.
+        units: of the fields that have one.
+    """
+
+    name: str
+    number: int
+    positions: Array
+    columns: Mapping[str, Array]
+    units: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogTimes:
+    """Times of a log's messages.
+
+    Attributes:
+        time_us: (n,) for each table, microseconds since boot (or since the log began).
+        clock: what they are taken from.
+        unix_offset_us: Unix time of time 0, by the first GPS time with a date; None: not known.
+        implausible: stamps that were replaced by the time of the message before.
+    """
+
+    time_us: Sequence[Array]
+    clock: str
+    unix_offset_us: int | None
+    implausible: int
+
+
+def stamp(tables: Sequence[RawTable]) -> LogTimes:
+    """Times of all messages: a message without a time of its own has that of the message before it.
+
+    Args:
+        tables: at least one, none of them empty.
+    """
+    own = [_own_us(table) for table in tables]
+    clock = MICROSECONDS if any("TimeUS" in table.columns for table in tables) else MILLISECONDS
+    if not any(times is not None for times in own):
+        px4 = _px4_times(tables)
+        if px4 is not None:
+            own, clock = px4, PX4_TIME
+        else:
+            return _without_clock(tables)
+    positions = np.concatenate(
+        [t.positions for t, times in zip(tables, own, strict=True) if times is not None]
+    )
+    stamps = np.concatenate([times for times in own if times is not None])
+    sorting = np.argsort(positions, kind="stable")
+    positions, stamps = positions[sorting], stamps[sorting]
+    good = _plausible(stamps)
+    known_at, known_us = positions[good], stamps[good]
+    made = []
+    for table, times in zip(tables, own, strict=True):
+        rows = np.searchsorted(known_at, table.positions, side="right") - 1
+        before = known_us[np.maximum(rows, 0)] if len(known_us) else np.zeros(len(rows), dtype=np.int64)
+        if times is None:
+            made.append(before)
+            continue
+        # A stamp of its own counts where it is among those that were found plausible.
+        counts = (
+            (rows >= 0) & (known_at[np.maximum(rows, 0)] == table.positions) if len(known_at) else rows >= 0
+        )
+        made.append(np.where(counts, times, before))
+    return LogTimes(made, clock, _unix_offset_us(tables, made), int(np.count_nonzero(~good)))
+
+
+def _own_us(table: RawTable) -> Array | None:
+    """Own time stamps of a format; None where it has none."""
+    if table.name in _GPS and "T" in table.columns and "TimeUS" not in table.columns:
+        return _whole(table.columns["T"]) * 1000  # TimeMS is the time of the GPS week here
+    first = next(iter(table.columns), "")
+    for name, factor in _OWN:
+        # Where it isn't the first column, it is another clock's: that of a sensor's sample.
+        if name == first and table.columns[name].dtype.kind in "iuf":
+            return _whole(table.columns[name]) * factor
+    return None
+
+
+def _whole(column: Array) -> Array:
+    if column.dtype.kind == "f":
+        column = np.rint(np.nan_to_num(column, nan=-1.0, posinf=-1.0, neginf=-1.0))
+    return np.clip(column, -1, 2**53).astype(np.int64)
+
+
+def _plausible(stamps: Array) -> Array:
+    """Which stamps, in the order of the file, fit to those around them: damage makes others."""
+    good = (stamps >= 0) & (stamps < _MAX_TIME_US)
+    if np.count_nonzero(good) < 2 * _BLOCK:
+        return good
+    blocks = np.arange(len(stamps)) // _BLOCK
+    chosen = np.flatnonzero(good)
+    count = int(blocks[-1]) + 1
+    middles = np.full(count, -1, dtype=np.int64)
+    edges = np.searchsorted(blocks[chosen], np.arange(count + 1))
+    for block in range(count):
+        values = stamps[chosen[edges[block] : edges[block + 1]]]
+        if len(values):
+            middles[block] = int(np.partition(values, len(values) // 2)[len(values) // 2])
+    filled = np.where(middles >= 0, middles, np.maximum.accumulate(middles))
+    before = np.concatenate((filled[:1], filled[:-1]))
+    after = np.concatenate((filled[1:], filled[-1:]))
+    low = np.minimum(np.minimum(before, after), filled) - _FAR_US
+    high = np.maximum(np.maximum(before, after), filled) + _FAR_US
+    fits: Array = good & (stamps >= low[blocks]) & (stamps <= high[blocks])
+    return fits
+
+
+def _px4_times(tables: Sequence[RawTable]) -> list[Array | None] | None:
+    """PX4's logs of before 2016 (sdlog2): TIME messages give the time of those behind them."""
+    time = next((t for t in tables if t.name == "TIME" and "StartTime" in t.columns), None)
+    return None if time is None else [_whole(t.columns["StartTime"]) if t is time else None for t in tables]
+
+
+def _without_clock(tables: Sequence[RawTable]) -> LogTimes:
+    """Times where only GPS has told any: linear in the file between its messages; else by counting."""
+    known = _gps_seconds(tables)
+    if known is None:
+        busiest = max(tables, key=lambda table: len(table.positions))
+        ticks = np.arange(len(busiest.positions), dtype=np.int64) * _ASSUMED_US
+        made = [_between(table.positions, busiest.positions, ticks) for table in tables]
+        return LogTimes(made, NO_CLOCK, None, 0)
+    positions, unix_us = known
+    first = min(int(table.positions[0]) for table in tables)
+    start_us = int(_between(np.array([first]), positions, unix_us)[0])
+    made = [_between(table.positions, positions, unix_us) - start_us for table in tables]
+    dated = start_us if start_us > _FIRST_DATE_US else None
+    return LogTimes(made, GPS_INTERPOLATED, dated, 0)
+
+
+def _between(at: Array, positions: Array, times_us: Array) -> Array:
+    """Times at places in the file: linear between known ones, at the mean rate before and behind them."""
+    found = np.interp(at, positions, times_us)
+    if len(positions) > 1 and positions[-1] > positions[0]:
+        rate = (times_us[-1] - times_us[0]) / (positions[-1] - positions[0])
+        found = np.where(at < positions[0], times_us[0] - rate * (positions[0] - at), found)
+        found = np.where(at > positions[-1], times_us[-1] + rate * (at - positions[-1]), found)
+    rounded: Array = np.rint(found).astype(np.int64)
+    return rounded
+
+
+def _gps_seconds(tables: Sequence[RawTable]) -> tuple[Array, Array] | None:
+    """Places in the file and Unix times of the GPS messages whose time goes on."""
+    for table, week, milliseconds in _dated(tables):
+        unix_us = _unix_us(week, milliseconds)
+        rows = np.flatnonzero(milliseconds > 0)
+        rows = (
+            rows[np.concatenate(([True], np.diff(np.maximum.accumulate(unix_us[rows])) > 0))]
+            if len(rows)
+            else rows
+        )
+        if len(rows) > 1:
+            return table.positions[rows], unix_us[rows]
+    return None
+
+
+def _unix_us(week: Array, milliseconds: Array) -> Array:
+    seconds = _GPS_EPOCH_S + week * _WEEK_S - _LEAP_SECONDS
+    unix_us: Array = seconds * 1_000_000 + milliseconds * 1000
+    return unix_us
+
+
+def _dated(tables: Sequence[RawTable]) -> Iterable[tuple[RawTable, Array, Array]]:
+    for table in tables:
+        if table.name not in _GPS:
+            continue
+        for week, milliseconds in _WEEKS:
+            if week in table.columns and milliseconds in table.columns:
+                yield table, _whole(table.columns[week]), _whole(table.columns[milliseconds])
+                break
+        else:
+            if "Time" in table.columns:  # 2013: the time of the week alone
+                yield table, np.zeros(len(table.positions), dtype=np.int64), _whole(table.columns["Time"])
+
+
+def _unix_offset_us(tables: Sequence[RawTable], times_us: Sequence[Array]) -> int | None:
+    """Unix time of time 0, by the first GPS message with a date."""
+    of_table = {id(table): times for table, times in zip(tables, times_us, strict=True)}
+    for table, week, milliseconds in _dated(tables):
+        rows = np.flatnonzero(week > 0)
+        if len(rows):
+            row = int(rows[0])
+            unix_us = int(_unix_us(week[row : row + 1], milliseconds[row : row + 1])[0])
+            return unix_us - int(of_table[id(table)][row])
+    time = next((t for t in tables if t.name in _GPS and "GPSTime" in t.columns), None)
+    if time is not None and (rows := np.flatnonzero(time.columns["GPSTime"] > 0)).size:
+        return int(time.columns["GPSTime"][rows[0]]) - int(of_table[id(time)][rows[0]])
+    return None

@@ -1,0 +1,70 @@
+"""The one clock that times of a log are told in: the time since boot of its first vehicle.
+
+Messages of other systems have the vehicle's newest time at their place in the file, so that one time is one
+moment for all of them. A log without a vehicle that tells its time is timed by its records.
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.logs.source import LogSource
+from estimators.vehicle_time import AUTOPILOT
+
+_FIRST_GROUND_SYSTEM = 200
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogClock:
+    """Times of all messages of a log.
+
+    Attributes:
+        system_id: whose time since boot it is; None: seconds since the first record.
+        time_us: (count,) for each message, by its position.
+        boot: (count,) number of that system's boot, from 0.
+    """
+
+    system_id: int | None
+    time_us: NDArray[np.int64]
+    boot: NDArray[np.int64]
+
+    @property
+    def text(self) -> str:
+        """What it counts from, in words."""
+        if self.system_id is None:
+            return "seconds since the first record"
+        return f"seconds since boot of vehicle {self.system_id}"
+
+
+def make_clock(source: LogSource) -> LogClock:
+    """The clock of a log: of the lowest system id whose autopilot tells its time."""
+    times = source.time_us
+    system_id = min(
+        (
+            stream.system_id
+            for stream in source.streams
+            if stream.component_id == AUTOPILOT
+            and stream.system_id < _FIRST_GROUND_SYSTEM
+            and times[stream.order[-1]] > times[stream.order[0]]
+        ),
+        default=None,
+    )
+    if system_id is None:
+        recorded = source.log_time_us(np.arange(source.count))
+        clock = recorded - recorded[0] if recorded[0] != recorded[-1] else np.maximum.accumulate(times)
+        return LogClock(None, clock, np.zeros(source.count, dtype=np.int64))
+    own = np.zeros(source.count, dtype=np.int64)
+    is_own = np.zeros(source.count, dtype=np.bool_)
+    for stream in source.streams:
+        if stream.system_id == system_id:
+            own[stream.order] = times[stream.order]
+            is_own[stream.order] = True
+    starts = source.boot_starts.get(system_id, np.empty(0, dtype=np.int64))
+    boot = np.searchsorted(starts, np.arange(source.count), side="right").astype(np.int64)
+    newest = np.empty_like(own)
+    edges = [0, *starts.tolist(), source.count]
+    for begin, end in pairwise(edges):
+        newest[begin:end] = np.maximum.accumulate(own[begin:end])
+    return LogClock(system_id, np.where(is_own, own, newest), boot)

@@ -1,0 +1,59 @@
+"""The aircraft that come with the `jsbsim` package: each is simulated, or refused in one line."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from flightsim.airframe import AirframeError
+from flightsim.airframe_file import package_aircraft
+from flightsim.environment import Environment
+from flightsim.flight_envelope import flight_envelope
+from flightsim.home import Home
+from flightsim.vehicle import Vehicle
+from missions.cli import run_command_line
+from missions.cli_sitl import sitl
+
+
+def make(model: str) -> Vehicle:
+    return Vehicle(model, home=Home(), environment=Environment(), seed_sequence=np.random.SeedSequence(1))
+
+
+@pytest.mark.parametrize("model", ["minisgs", "paraglider", "L410", "J246"])
+def test_a_model_that_cannot_be_stepped_is_refused(model: str) -> None:
+    with pytest.raises(AirframeError, match=rf"'{model}' can't be simulated from its start.*{model}\.xml"):
+        make(model)
+
+
+@pytest.mark.parametrize("model", ["dr1", "f104", "L17"])
+def test_a_model_that_needs_properties_of_another_simulator_is_refused(model: str) -> None:
+    with pytest.raises(AirframeError, match=r"The property .* does not exist"):
+        make(model)
+
+
+def test_a_glider_that_has_no_glide_is_refused() -> None:
+    with pytest.raises(AirframeError, match="'SGS' can't be trimmed"):
+        flight_envelope("SGS")
+
+
+def test_the_command_line_refuses_a_model_in_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: object
+) -> None:
+    assert run_command_line(["fly", "lissajous", "--model", "F450", "--out", f"{tmp_path}/run"]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("flightstack: vehicle 'F450' can't") and told.count("\n") == 1
+    refused = CliRunner().invoke(sitl, ["--model", "minisgs", "--link", "udpin:127.0.0.1:0"])
+    assert refused.exit_code == 2
+    assert "vehicle 'minisgs' can't be simulated" in refused.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", package_aircraft())
+def test_each_model_of_the_package_is_flown_or_refused(model: str) -> None:
+    try:
+        vehicle = make(model)
+        flight_envelope(model)
+    except AirframeError as refusal:
+        assert "\n" not in str(refusal) or "JSBSim cannot load" in str(refusal)
+        return
+    for _ in range(250):
+        vehicle.step(np.zeros(16))
