@@ -81,7 +81,7 @@ def path_point(
     """The point of a path where the aircraft is, and as velocity the direction of the path a moment ahead.
 
     PX4's guidance demands V * 4 pi damping / period * sin(angle to that direction). In a bend, the direction
-    of the path so long ahead makes this the acceleration of the bend. The bend is not sent as an acceleration,
+    of the path so long ahead makes this the acceleration of the bend. It is not sent as an acceleration,
     since PX4 1.16.1 takes the curvature from it with the wrong sign on an aircraft.
 
     Args:
