@@ -23,6 +23,23 @@ class AttitudeFrom(StrEnum):
     """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
 
 
+_TAG_PX: Final = 24.0  # as seen from above; half the tags of 11 pixels are read
+_FORESHORTENING: Final = 0.742  # size that counts: times the sine of the depression to this power
+_FOCAL_PX: Final = 1108.5  # of the embedded camera, 1280 pixels over 60 degrees
+_LEAST_TAG_M: Final = 4.0
+
+
+class GpsOff(StrEnum):
+    """How GPS is switched off for the orbit."""
+
+    AUTO = "auto"
+    """By the command; of a simulator that does not know it, by its parameter."""
+    FAILURE = "failure"
+    """By MAV_CMD_INJECT_FAILURE."""
+    PARAMETER = "parameter"
+    """By a parameter of the simulator, or of the filter that fuses GPS."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitOptions(MissionOptions):
     """A circle around a target on the ground.
@@ -41,7 +58,8 @@ class OrbitOptions(MissionOptions):
         entry_bearing_rad: from the target to where GPS is lost.
         entry_distance_m: between the two.
         entry_heading_rad: of the nose there; None: towards the target.
-        gps_fault: GPS is switched off for the orbit (MAV_CMD_INJECT_FAILURE).
+        gps_fault: GPS is switched off for the orbit.
+        gps_off: how.
         lost_limit_s: the mission ends when the target was not seen for so long.
         attitude: whose roll and pitch it is flown with; the yaw is the autopilot's.
     """
@@ -61,6 +79,7 @@ class OrbitOptions(MissionOptions):
     entry_distance_m: float = 400.0
     entry_heading_rad: float | None = None
     gps_fault: bool = True
+    gps_off: GpsOff = GpsOff.AUTO
     lost_limit_s: float = 30.0
     attitude: AttitudeFrom = AttitudeFrom.AUTOPILOT
 
@@ -106,6 +125,16 @@ class OrbitOptions(MissionOptions):
     def height_over_target_m(self) -> float:
         """Of this vehicle."""
         return self.own_altitude_m - self.target_ground_m
+
+    @property
+    def tag_size_m(self) -> float:
+        """Side of the embedded world's tag: one that its camera reads from the orbit, and from somewhat
+        farther.
+        """
+        height_m = self.height_over_target_m
+        range_m = math.hypot(height_m, self.radius_m)
+        foreshortened = max(height_m / range_m, math.sin(LEAST_DEPRESSION_RAD)) ** _FORESHORTENING
+        return max(_LEAST_TAG_M, _TAG_PX * range_m / (_FOCAL_PX * foreshortened))
 
     @property
     def entry_course_rad(self) -> float:
