@@ -393,6 +393,7 @@ def _summary(
             "profile": request.wind_profile,
             "turbulence": request.turbulence,
         }
+        summary["gps"] = request.gps
     return summary
 
 
