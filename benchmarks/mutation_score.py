@@ -24,6 +24,7 @@ import importlib
 import importlib.abc
 import importlib.util
 import json
+import math
 import os
 import resource
 import signal
@@ -46,7 +47,11 @@ from benchmarks.mutation_map import PLAIN_TESTS, PYTEST_OPTIONS, TESTS, TestMap,
 
 MUTANT_BUDGET_S: Final = 20.0
 TIMEOUT_FACTOR: Final = 10.0
-TIMEOUT_FLOOR_S: Final = 60.0
+TIMEOUT_FLOOR_S: Final = 30.0
+"""A mutant may take so much more processor time than its tests do without the fault. Processor time, since a
+busy machine must not kill a mutant."""
+WAITING_LIMIT_S: Final = 1800.0
+"""By the wall clock: for mutants that wait and do nothing."""
 MEMORY_LIMIT_BYTES: Final = 16 << 30
 
 
@@ -95,13 +100,13 @@ class Child:
         self.mutant = mutant
         self.tests = len(tests)
         self._start_s = time.monotonic()
-        self._limit_s = TIMEOUT_FLOOR_S + TIMEOUT_FACTOR * sum(tests.values())
+        limit_s = TIMEOUT_FLOOR_S + TIMEOUT_FACTOR * sum(tests.values())
         text = mutant.source()
         with tempfile.NamedTemporaryFile(dir=folder, prefix="failure-", delete=False) as file:
             self._failure = Path(file.name)
         self._pid = os.fork()
         if not self._pid:
-            _test(mutant, text, list(tests), self._failure)
+            _test(mutant, text, list(tests), self._failure, math.ceil(limit_s))
 
     @property
     def spent_s(self) -> float:
@@ -110,7 +115,7 @@ class Child:
     def outcome(self) -> str | None:
         """What became of the mutant; None: its tests are still running."""
         ended, status = os.waitpid(self._pid, os.WNOHANG)
-        if not ended and self.spent_s < self._limit_s:
+        if not ended and self.spent_s < WAITING_LIMIT_S:
             return None
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._pid, signal.SIGKILL)  # and what the tests have started
@@ -118,7 +123,7 @@ class Child:
             os.waitpid(self._pid, 0)
             return "timeout"
         if os.WIFSIGNALED(status):
-            return "killed"
+            return "timeout" if os.WTERMSIG(status) == signal.SIGXCPU else "killed"
         return {pytest.ExitCode.OK: "survived"}.get(os.WEXITSTATUS(status), "killed")
 
     def first_failure(self) -> str:
@@ -127,7 +132,7 @@ class Child:
         return name
 
 
-def _test(mutant: Mutant, text: str, tests: Sequence[str], failure: Path) -> NoReturn:
+def _test(mutant: Mutant, text: str, tests: Sequence[str], failure: Path, limit_s: int) -> NoReturn:
     code = 1
     try:
         os.setsid()
@@ -135,10 +140,13 @@ def _test(mutant: Mutant, text: str, tests: Sequence[str], failure: Path) -> NoR
         for stream in (0, 1, 2):
             os.dup2(silent, stream)
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT_BYTES, MEMORY_LIMIT_BYTES))
+        resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
         numba.config.DISABLE_JIT = is_plain(mutant.path)
         flightsim.kernels._CacheFile.save = lambda *_: None  # mutants stay out of the kernels' cache
         sys.meta_path.insert(0, MutatedModule(mutant.module, ROOT / mutant.path, text))
-        code = int(pytest.main([*PYTEST_OPTIONS, "-x", *tests], plugins=[FirstFailure(failure)]))
+        code = int(
+            pytest.main([*PYTEST_OPTIONS, "-x", "--timeout=0", *tests], plugins=[FirstFailure(failure)])
+        )
     finally:  # a mutant may raise anything at import
         os._exit(code)
 

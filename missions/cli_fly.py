@@ -76,6 +76,11 @@ _FORECAST_HEIGHT_M: Final = 100.0  # at least; the wind of a profile grows littl
     type=click.Choice(["none", "light", "moderate", "severe"]),
     help="[default: none; orbit, occupancy: light]",
 )
+@_world(
+    "--gps",
+    type=click.Choice(["differential", "standalone"]),
+    help="Receiver: decimetres with corrections, or metres that wander without. [default: differential]",
+)
 @_flight(
     "--expect-wind",
     type=float,
@@ -236,6 +241,7 @@ def _fly(given: dict[str, Any]) -> int:
             wind_from_deg=wind_from_deg,
             wind_profile=given["wind_profile"],
             turbulence=given["turbulence"] or world.turbulence,
+            gps=given["gps"] or "differential",
             expected_wind_m_s=forecast_m_s,
             home=given["home"] or (None if given["connect"] else world.home),
             parameters=parameters,

@@ -129,6 +129,13 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
     default="none",
     show_default=True,
 )
+@click.option(
+    "--gps",
+    type=click.Choice(["differential", "standalone"]),
+    default="differential",
+    show_default=True,
+    help="Receiver: decimetres with corrections, or metres that wander without.",
+)
 @click.option("--camera", is_flag=True, help="Every vehicle carries a camera on a gimbal.")
 @click.option(
     "--target",
@@ -181,6 +188,7 @@ def sitl(
     wind: str,
     wind_profile: str,
     turbulence: str,
+    gps: str,
     camera: bool,
     targets: tuple[str, ...],
     map_file: str | None,
@@ -239,6 +247,7 @@ def sitl(
                     flavour=autopilot,
                     launch=launch,
                     heading_deg=heading_deg,
+                    gps=gps,
                     parameters={
                         **_loss_times(autopilot, speedup),
                         **({} if params is None else parameters_from_file(params)),

@@ -1,6 +1,6 @@
 """What every mission is."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -56,6 +56,14 @@ class Debriefing:
     records: "FlightRecords"
     flights: "Sequence[tuple[FlightNotes, FlightScore]]"
     options: MissionOptions
+
+
+def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "FlightScore"], str]) -> str:
+    """The verdicts on all vehicles of a flight in one sentence; "" if all have flown what was commanded."""
+    told = {notes.system_id: verdict(notes, score) for notes, score in debriefing.flights}
+    if len(told) == 1:
+        return next(iter(told.values()))
+    return "; ".join(f"vehicle {system_id}: {text}" for system_id, text in told.items() if text)
 
 
 class Mission(Generic[AnyOptions]):
@@ -121,6 +129,19 @@ class Mission(Generic[AnyOptions]):
         An estimator that is taken along gets those that it has and nobody has set.
         """
         return {}
+
+    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
+        """Why a flight that came to its end has not flown what was commanded; "" if it has.
+
+        By the messages of the vehicles alone. Here: the commanded paths, where there are any.
+
+        Args:
+            debriefing: of the flight.
+            max_error_m: the user's own bound for the path error.
+        """
+        from missions.verdict import path_verdict
+
+        return verdict_of_all(debriefing, lambda notes, score: path_verdict(notes, score, max_error_m))
 
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         """What `summary.json` has beside the figures of every flight."""

@@ -61,6 +61,7 @@ class FlightNotes:
         link_losses: when the link was lost, and back.
         lost_link: what the autopilot does without its ground station, in words; "": not known.
         reached: items of a mission file (index from 0) and when, in their order.
+        cut_short: the time that the user gave for the mission ended it before all was flown.
         marks: moments and figures that the mission gives a name to, for its own score.
     """
 
@@ -76,6 +77,7 @@ class FlightNotes:
     link_losses: list[LinkLoss] = field(default_factory=list)
     lost_link: str = ""
     reached: list[tuple[int, int]] = field(default_factory=list)
+    cut_short: bool = False
     marks: dict[str, float] = field(default_factory=dict)
     _open: tuple[str, int] | None = None
 

@@ -70,6 +70,7 @@ def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder
                 turbulence=request.turbulence,
                 parameters=request.parameters,
                 home=request.home,
+                gps=request.gps,
                 scenario=scenario,
             )
         )

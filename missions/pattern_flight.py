@@ -349,6 +349,7 @@ async def _fly_waypoints(
     except VehicleTimeout:
         if options.search_time_s is None:
             raise
+        notes.cut_short = True
         await vehicle.return_to_launch(wait=False)  # the search time is over
     notes.begin("return", clock.stamp_us)
     await vehicle.wait_disarmed(300.0 + 2.0 * reach_m)

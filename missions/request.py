@@ -26,7 +26,7 @@ class RunRequest:
         options: what the mission is to do.
         connect: connection strings, one per vehicle; empty: an embedded SITL.
         system_ids: of the vehicles, one per connection; empty: the first heard on each.
-        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, wind_profile, turbulence, home: of the
+        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, wind_profile, turbulence, gps, home: of the
             embedded SITL.
         model: its vehicle: of all of a team, or one for each.
         launch: how its aircraft get into the air: "runway", "catapult", "hand"; None: as described with them.
@@ -61,6 +61,7 @@ class RunRequest:
     wind_from_deg: float = 0.0
     wind_profile: str = "log"
     turbulence: str = "none"
+    gps: str = "differential"
     expected_wind_m_s: float | None = None
     home: str | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)

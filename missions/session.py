@@ -176,7 +176,7 @@ def _fly_interruptible(
     debriefing = _debrief(mission, request, recorder.records, flight)
     blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
     if outcome == COMPLETED:
-        reason = _missed_check(request, blocks)
+        reason = mission.verdict(debriefing, request.max_error_m) or _missed_check(request, blocks)
         if recorder.failure:
             reason = "; ".join(filter(None, (reason, f"{recorder.failure}; it was flown on without a log")))
         outcome = FAILED if reason else COMPLETED
@@ -393,6 +393,7 @@ def _summary(
             "profile": request.wind_profile,
             "turbulence": request.turbulence,
         }
+        summary["gps"] = request.gps
     return summary
 
 

@@ -16,7 +16,8 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours.external_mapping import ardupilot_external
 from autopilot_bridge.flavours.gps_source import GpsSource, ardupilot_gps_source
-from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
+from autopilot_bridge.flavours.mapping import FieldMap, RatioMap, build, clamp, integer, number, scaled_values
+from autopilot_bridge.flavours.navigation_noise import ardupilot_noise
 from autopilot_bridge.flavours.surroundings_mapping import (
     ardupilot_avoidance,
     ardupilot_follow,
@@ -158,15 +159,8 @@ NAVIGATION: Final = (
     FieldMap("no_aid_noise_m", "EK3_NOAID_M_NSE", low=0.5, high=50.0),
 )
 
-NAVIGATION_NOISE: Final = (
-    NoiseMap(("gps_position_noise_m", "gps_position_walk_m"), "EK3_POSNE_M_NSE"),
-    NoiseMap(("gps_velocity_noise_m_s",), "EK3_VELNE_M_NSE", (0, 1)),
-    NoiseMap(("gps_velocity_noise_m_s",), "EK3_VELD_M_NSE", (2,)),
-    NoiseMap(("barometer_noise_m",), "EK3_ALT_M_NSE"),
-    NoiseMap(("magnetometer_noise_gauss",), "EK3_MAG_M_NSE"),
-    NoiseMap(("accel_noise_m_s2_sqrt_hz",), "EK3_ACC_P_NSE"),
-    NoiseMap(("gyro_noise_rad_s_sqrt_hz",), "EK3_GYRO_P_NSE"),
-    NoiseMap(
+NAVIGATION_RATIOS: Final = (
+    RatioMap(
         (
             "gps_required_eph_m",
             "gps_required_epv_m",
@@ -333,11 +327,9 @@ def controller_parameters(store: ParameterStore) -> MulticopterParameters:
 
 
 def navigation_parameters(store: ParameterStore) -> NavigationParameters:
-    """EK3_*: gates as they are; noise and EK3_CHECK_SCALE relative to ArduPilot's defaults.
+    """EK3_*: noise and gates; EK3_CHECK_SCALE relative to ArduPilot's default.
 
-    The noise of `NavigationParameters` is tuned to this vehicle's sensors and ArduPilot's defaults are not,
-    so a parameter at its default gives the tuned value and twice the parameter twice the noise. GPS is fused
-    as a whole, when EK3_SRC1_POSXY names it.
+    GPS is fused as a whole, when EK3_SRC1_POSXY names it.
     """
     return build(
         NavigationParameters,
@@ -346,7 +338,8 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         use_gps=gps_is_fused(store),
         gps_may_repeat=ardupilot_gps_source(store) is GpsSource.MESSAGES,
         external=ardupilot_external(store),
-        **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
+        **ardupilot_noise(store),
+        **scaled_values(NavigationParameters(), store, NAVIGATION_RATIOS),
     )
 
 

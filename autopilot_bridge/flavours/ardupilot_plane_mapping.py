@@ -18,7 +18,7 @@ from autopilot_bridge.flavours.ardupilot_plane_parameters import ARDUPILOT_PLANE
 from autopilot_bridge.flavours.gps_source import GpsSource, ardupilot_gps_source
 from autopilot_bridge.flavours.mapping import (
     FieldMap,
-    NoiseMap,
+    RatioMap,
     build,
     clamp,
     field_values,
@@ -26,6 +26,7 @@ from autopilot_bridge.flavours.mapping import (
     number,
     scaled_values,
 )
+from autopilot_bridge.flavours.navigation_noise import ardupilot_noise
 from autopilot_bridge.flavours.plane_limits import (
     controller_values,
     flight_values,
@@ -139,10 +140,10 @@ _TOGETHER: Final = (
 """Fields that ArduPlane sets with the parameter of another one: they change in proportion to it."""
 
 CONTROLLER_SCALED: Final = (
-    NoiseMap(("wheel_p",), "STEER2SRV_P"),
-    NoiseMap(("wheel_i",), "STEER2SRV_I"),
-    NoiseMap(("wheel_integral_max",), "STEER2SRV_IMAX"),
-    NoiseMap(("wheel_rate_max_rad_s",), "GROUND_STEER_DPS"),
+    RatioMap(("wheel_p",), "STEER2SRV_P"),
+    RatioMap(("wheel_i",), "STEER2SRV_I"),
+    RatioMap(("wheel_integral_max",), "STEER2SRV_IMAX"),
+    RatioMap(("wheel_rate_max_rad_s",), "GROUND_STEER_DPS"),
 )
 
 AIRFRAME_FLIGHT: Final = (
@@ -199,10 +200,10 @@ NAVIGATION: Final = (
     FieldMap("wind_height_scale", "EK3_WIND_PSCALE", low=0.0, high=2.0),
 )
 
-NAVIGATION_NOISE: Final = (
-    *ardupilot_mapping.NAVIGATION_NOISE,
-    NoiseMap(("airspeed_noise_m_s",), "EK3_EAS_M_NSE"),
-    NoiseMap(("wind_walk_m_s_sqrt_s",), "EK3_WIND_P_NSE"),
+NAVIGATION_RATIOS: Final = (
+    *ardupilot_mapping.NAVIGATION_RATIOS,
+    RatioMap(("airspeed_noise_m_s",), "EK3_EAS_M_NSE"),
+    RatioMap(("wind_walk_m_s_sqrt_s",), "EK3_WIND_P_NSE"),
 )
 _CHECK_WIND: Final = 1  # bits of ARSPD_OPTIONS
 _USE_AGAIN: Final = 2
@@ -340,7 +341,8 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         airspeed_scale=math.sqrt(calibration),
         airspeed_checks=bool(options & _CHECK_WIND),
         airspeed_start_delay_s=5.0 if options & _USE_AGAIN else _NEVER_S,
-        **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
+        **ardupilot_noise(store),
+        **scaled_values(NavigationParameters(), store, NAVIGATION_RATIOS),
     )
 
 

@@ -29,27 +29,21 @@ class FieldMap(NamedTuple):
     high: float = 1e4
 
 
-class NoiseMap(NamedTuple):
-    """Fields that hold noise as it is tuned here, and the firmware parameter that scales them.
-
-    The firmwares' defaults fit other sensors and another filter than ours, so that their figures mean nothing
-    to it. What a user does with them is taken relative to the default: left alone they give the tuned value,
-    doubled twice that.
+class RatioMap(NamedTuple):
+    """Fields that follow a firmware parameter relative to its default: when it doubles, they double.
 
     Attributes:
-        fields: names in the parameter class; of numbers, or tuples of numbers.
+        fields: names in the parameter class.
         name: the firmware's name.
-        components: of a tuple, the ones to scale; None: all.
     """
 
     fields: tuple[str, ...]
     name: str
-    components: tuple[int, ...] | None = None
 
 
-def scaled_values(tuned: object, store: ParameterStore, table: Iterable[NoiseMap]) -> dict[str, Any]:
+def scaled_values(tuned: object, store: ParameterStore, table: Iterable[RatioMap]) -> dict[str, float]:
     """Fields of `tuned` scaled by what the parameters of the store are of their firmware's defaults."""
-    values: dict[str, Any] = {}
+    values: dict[str, float] = {}
     for entry in table:
         definition = store.find(entry.name)
         if definition is None:
@@ -59,12 +53,7 @@ def scaled_values(tuned: object, store: ParameterStore, table: Iterable[NoiseMap
         if ratio == 1.0:
             continue
         for field in entry.fields:
-            old = values.get(field, getattr(tuned, field))
-            if isinstance(old, tuple):
-                scaled = range(len(old)) if entry.components is None else entry.components
-                values[field] = tuple(v * ratio if i in scaled else v for i, v in enumerate(old))
-            else:
-                values[field] = old * ratio
+            values[field] = getattr(tuned, field) * ratio
     return values
 
 

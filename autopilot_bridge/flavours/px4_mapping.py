@@ -9,7 +9,8 @@ from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.parameters import CommanderParameters
 from autopilot_bridge.control.parameters import MulticopterParameters
 from autopilot_bridge.flavours.external_mapping import px4_external
-from autopilot_bridge.flavours.mapping import FieldMap, NoiseMap, build, clamp, integer, number, scaled_values
+from autopilot_bridge.flavours.mapping import FieldMap, RatioMap, build, clamp, integer, number, scaled_values
+from autopilot_bridge.flavours.navigation_noise import px4_noise
 from autopilot_bridge.flavours.surroundings_mapping import (
     px4_avoidance,
     px4_follow,
@@ -165,15 +166,7 @@ NAVIGATION: Final = (
     FieldMap("no_aid_noise_m", "EKF2_NOAID_NOISE", low=0.5, high=50.0),
 )
 
-NAVIGATION_NOISE: Final = (
-    NoiseMap(("gps_position_noise_m", "gps_position_walk_m"), "EKF2_GPS_P_NOISE"),
-    NoiseMap(("gps_velocity_noise_m_s",), "EKF2_GPS_V_NOISE"),
-    NoiseMap(("barometer_noise_m",), "EKF2_BARO_NOISE"),
-    NoiseMap(("magnetometer_noise_gauss",), "EKF2_MAG_NOISE"),
-    NoiseMap(("accel_noise_m_s2_sqrt_hz",), "EKF2_ACC_NOISE"),
-    NoiseMap(("gyro_noise_rad_s_sqrt_hz",), "EKF2_GYR_NOISE"),
-    NoiseMap(("gps_check_time_s",), "EKF2_REQ_GPS_H"),
-)
+NAVIGATION_RATIOS: Final = (RatioMap(("gps_check_time_s",), "EKF2_REQ_GPS_H"),)
 _GPS_POSITION_OR_VELOCITY: Final = 1 | 4  # of EKF2_GPS_CTRL
 
 
@@ -269,11 +262,9 @@ def controller_parameters(store: ParameterStore) -> MulticopterParameters:
 
 
 def navigation_parameters(store: ParameterStore) -> NavigationParameters:
-    """EKF2_*: gates, checks and time-outs as they are; noise and EKF2_REQ_GPS_H relative to PX4's defaults.
+    """EKF2_*: noise, gates, checks and time-outs; EKF2_REQ_GPS_H relative to PX4's default.
 
-    The noise of `NavigationParameters` is tuned to this vehicle's sensors and PX4's defaults are not, so a
-    parameter at its default gives the tuned value and twice the parameter twice the noise. GPS is fused as
-    a whole: with neither position nor velocity in EKF2_GPS_CTRL not at all.
+    GPS is fused as a whole: with neither position nor velocity in EKF2_GPS_CTRL not at all.
     """
     satellites = integer(store, "EKF2_REQ_NSATS", 6)
     return build(
@@ -283,7 +274,8 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         gps_required_satellites=max(4, min(12, satellites)),
         use_gps=gps_is_fused(store),
         external=px4_external(store),
-        **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
+        **px4_noise(store),
+        **scaled_values(NavigationParameters(), store, NAVIGATION_RATIOS),
     )
 
 

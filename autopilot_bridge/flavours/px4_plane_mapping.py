@@ -14,7 +14,7 @@ from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.flavours import mapping, px4_mapping
 from autopilot_bridge.flavours.mapping import (
     FieldMap,
-    NoiseMap,
+    RatioMap,
     build,
     clamp,
     field_values,
@@ -22,6 +22,7 @@ from autopilot_bridge.flavours.mapping import (
     number,
     scaled_values,
 )
+from autopilot_bridge.flavours.navigation_noise import px4_noise
 from autopilot_bridge.flavours.plane_limits import (
     controller_values,
     flight_values,
@@ -197,12 +198,13 @@ NAVIGATION: Final = (
     FieldMap("airspeed_stop_delay_s", "ASPD_FS_T_STOP", low=0.1, high=60.0),
 )
 
-NAVIGATION_NOISE: Final = (
-    *px4_mapping.NAVIGATION_NOISE,
-    NoiseMap(("airspeed_noise_m_s",), "EKF2_EAS_NOISE"),
-    NoiseMap(("sideslip_noise_rad",), "EKF2_BETA_NOISE"),
-    NoiseMap(("wind_walk_m_s_sqrt_s",), "EKF2_WIND_NSD"),
+NAVIGATION_RATIOS: Final = (
+    *px4_mapping.NAVIGATION_RATIOS,
+    RatioMap(("airspeed_noise_m_s",), "EKF2_EAS_NOISE"),
+    RatioMap(("sideslip_noise_rad",), "EKF2_BETA_NOISE"),
+    RatioMap(("wind_walk_m_s_sqrt_s",), "EKF2_WIND_NSD"),
 )
+"""Of the air, relative to the defaults: theirs contain the gusts, which the filter measures apart."""
 
 
 def airframe_overrides(envelope: FlightEnvelope) -> dict[str, float]:
@@ -300,7 +302,8 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
         use_sideslip=integer(store, "EKF2_FUSE_BETA", 1) > 0,
         airspeed_checks=bool(integer(store, "ASPD_DO_CHECKS", 7) & _DATA_CHECKS),
         airspeed_start_delay_s=_NEVER_S if start_s < 0.0 else clamp(start_s, 0.1, _NEVER_S),
-        **scaled_values(NavigationParameters(), store, NAVIGATION_NOISE),
+        **px4_noise(store),
+        **scaled_values(NavigationParameters(), store, NAVIGATION_RATIOS),
     )
 
 

@@ -37,6 +37,8 @@ FIXED_IN_FLIGHT: Final = (
     "history_s",
     "alignment_time_s",
     "fixed_wing",
+    "gyro_bias_rad_s",
+    "accel_bias_m_s2",
     "gps_check_time_s",
     "gps_may_repeat",
     "mag_ned_gauss",

@@ -151,8 +151,9 @@ class GpsAiding:
         horizontal, vertical = p.gps_position_noise_m
         obs[f.GPS_POS_VAR] = obs[f.GPS_POS_VAR + 1] = horizontal * horizontal
         obs[f.GPS_POS_VAR + 2] = vertical * vertical
-        scale = max(1.0, float(values[GPS_SPEED_ACCURACY_M_S]) / p.gps_nominal_speed_accuracy_m_s) ** 2
-        for i, noise in enumerate(p.gps_velocity_noise_m_s):
+        horizontal, vertical = p.gps_velocity_noise_m_s
+        scale = max(1.0, float(values[GPS_SPEED_ACCURACY_M_S]) / horizontal) ** 2
+        for i, noise in enumerate((horizontal, horizontal, vertical)):
             obs[f.GPS_VEL_VAR + i] = scale * noise * noise
             if obs[f.GPS_VEL + i] != obs[f.GPS_VEL + i]:  # not told: nothing is learnt of it
                 obs[f.GPS_VEL + i] = solution.past_velocity(row)[i]

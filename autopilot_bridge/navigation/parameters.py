@@ -28,27 +28,32 @@ _MAY_BE_ZERO = frozenset(
 class NavigationParameters:
     """What the filter believes about its sensors, and when it trusts them.
 
-    The noise figures are tuned values, as EKF2_* (PX4) and EK3_* (ArduPilot) are: they are set to fit the
-    class of sensors on the vehicle, from data sheets and Allan variances; nothing is read from the simulator.
-    Gates are in standard deviations of the innovation. Times and checks follow PX4 1.16's EKF2 where not said
-    otherwise.
+    The noise figures are the defaults of PX4 1.16's EKF2, converted to continuous time; a flavour sets them
+    by its parameters (`flavours/navigation_noise.py`). They are not the simulated sensors' figures: the
+    firmwares' defaults cover vibration, timing errors and cheap sensors on all frames, so they are larger.
+    Airspeed, sideslip and wind are different: the firmwares' noise stands for gusts, too, which this filter
+    measures apart from it.
+    Gates are in standard deviations of the innovation. Times and checks follow EKF2 where not said otherwise.
 
     Attributes:
         covariance_rate_hz: rate of covariance prediction and measurement updates; divides the physics rate.
-        gyro_noise_rad_s_sqrt_hz: angular random walk (EKF2_GYR_NOISE is its discrete counterpart).
-        gyro_bias_rad_s, gyro_bias_tau_s: first-order Gauss-Markov bias: 1-sigma (turn-on bias and wandering
-            together) and correlation time, long enough that 2 sigma^2 / tau is the wandering's random walk.
+        gyro_noise_rad_s_sqrt_hz: angular random walk (EKF2_GYR_NOISE per step of 10 ms).
+        gyro_bias_rad_s, gyro_bias_walk_rad_s_sqrt_s: bias, 1-sigma at the start (EKF2_GBIAS_INIT), and its
+            random walk (EKF2_GYR_B_NOISE); a Gauss-Markov process that never exceeds the first.
         gyro_scale_error, gyro_cross_axis_error: 1-sigma, fractions; they add uncertainty per angle turned.
         gyro_scale_tilt_rad: usual amplitude of tilting, over which its scale error adds up.
-        accel_noise_m_s2_sqrt_hz, accel_bias_m_s2, accel_bias_tau_s: as for the gyro; the bias includes what
-            scale and cross-axis errors make of gravity.
-        gps_position_noise_m: white part of the GPS position error, 1-sigma, (horizontal, vertical).
-        gps_position_walk_m, gps_position_tau_s: its Gauss-Markov part, (horizontal, vertical), and
-            correlation time.
-        gps_velocity_noise_m_s: 1-sigma of the GPS velocity, (north, east, down).
-        gps_nominal_speed_accuracy_m_s: what the receiver reports in good conditions; when it reports worse,
-            the velocity noise grows in proportion. What a reported position accuracy exceeds the white part
-            by is taken as correlated: atmosphere and multipath wander slowly.
+        accel_noise_m_s2_sqrt_hz, accel_bias_m_s2, accel_bias_walk_m_s2_sqrt_s: as for the gyro
+            (EKF2_ACC_NOISE, EKF2_ABIAS_INIT, EKF2_ACC_B_NOISE); the bias includes what scale and cross-axis
+            errors make of gravity.
+        gps_position_noise_m: white part of the GPS position error, 1-sigma, (horizontal, vertical):
+            EKF2_GPS_P_NOISE and 1.5 times that.
+        gps_position_walk_m: least 1-sigma of its slow part, (horizontal, vertical): multipath at the antenna,
+            which no correction removes. What the reported accuracy exceeds the white part by is slow, too.
+        gps_position_tau_s: correlation time of the slow part; multipath of a moving antenna changes in
+            minutes, the atmosphere's part in half an hour (Rankin, IEEE PLANS 1994).
+        gps_velocity_noise_m_s: least 1-sigma of the GPS velocity, (horizontal, vertical): EKF2_GPS_V_NOISE
+            and 1.5 times that. When the receiver reports a speed accuracy worse than the first, both grow in
+            proportion.
         use_gps: GPS is fused; otherwise only its quality is judged (EKF2_GPS_CTRL, EK3_SRC1_POSXY).
         gps_required_satellites, gps_required_eph_m, gps_required_epv_m, gps_required_speed_accuracy_m_s,
             gps_required_hdop: quality checks before use (EKF2_REQ_NSATS, _EPH, _EPV, _SACC, _PDOP).
@@ -59,12 +64,15 @@ class NavigationParameters:
         no_aid_timeout_s: without horizontal aiding for this long, position and velocity are no longer valid
             (EKF2_NOAID_TOUT).
         height_timeout_s: the same for heights.
-        barometer_noise_m: white noise of the pressure altitude.
+        barometer_noise_m: white noise of the pressure altitude (EKF2_BARO_NOISE).
         barometer_lag_s: first-order lag of the barometer, taken as a delay (EKF2_BARO_DELAY).
-        barometer_offset_walk_m_per_sqrt_s: random walk of the offset between pressure altitude and height.
+        barometer_offset_walk_m_per_sqrt_s: random walk of the offset between pressure altitude and height:
+            weather and the air in the case; a tenth of what EKF2's estimator of it allows, so that heights of
+            a flight keep together when the GPS height wanders.
         barometer_scale_error: 1-sigma of height over pressure altitude: days colder and warmer than standard.
-        magnetometer_noise_gauss: white noise of one axis.
-        magnetometer_bias_gauss: 1-sigma of the hard and soft iron that calibration left.
+        magnetometer_noise_gauss: white noise of one axis (EKF2_MAG_NOISE).
+        magnetometer_bias_gauss: 1-sigma of the hard and soft iron that calibration left; ArduPilot accepts a
+            calibration with a fit of up to 16 milligauss (COMPASS_CAL_FIT).
         magnetometer_bias_tau_s, magnetometer_bias_turn_rad: its correlation time, and the angle turned after
             which soft iron has made another bias of it.
         magnetometer_timeout_s: refused or missing for this long: no longer in use.
@@ -120,20 +128,19 @@ class NavigationParameters:
     """
 
     covariance_rate_hz: int = 25
-    gyro_noise_rad_s_sqrt_hz: float = 2.5e-4
-    gyro_bias_rad_s: float = 1.1e-3
-    gyro_bias_tau_s: float = 16000.0
+    gyro_noise_rad_s_sqrt_hz: float = 1.5e-3
+    gyro_bias_rad_s: float = 0.1
+    gyro_bias_walk_rad_s_sqrt_s: float = 1e-4
     gyro_scale_error: float = 0.0033
     gyro_cross_axis_error: float = 0.001
     gyro_scale_tilt_rad: float = 0.2
-    accel_noise_m_s2_sqrt_hz: float = 1.8e-3
-    accel_bias_m_s2: float = 0.025
-    accel_bias_tau_s: float = 40000.0
-    gps_position_noise_m: tuple[float, float] = (0.2, 0.5)
-    gps_position_walk_m: tuple[float, float] = (0.06, 0.12)
-    gps_position_tau_s: float = 100.0
-    gps_velocity_noise_m_s: tuple[float, float, float] = (0.06, 0.077, 0.158)
-    gps_nominal_speed_accuracy_m_s: float = 0.11
+    accel_noise_m_s2_sqrt_hz: float = 0.035
+    accel_bias_m_s2: float = 0.2
+    accel_bias_walk_m_s2_sqrt_s: float = 3e-4
+    gps_position_noise_m: tuple[float, float] = (0.5, 0.75)
+    gps_position_walk_m: tuple[float, float] = (0.1, 0.2)
+    gps_position_tau_s: float = 300.0
+    gps_velocity_noise_m_s: tuple[float, float] = (0.3, 0.45)
     use_gps: bool = True
     gps_may_repeat: bool = False
     gps_required_satellites: int = 6
@@ -148,13 +155,13 @@ class NavigationParameters:
     no_aid_timeout_s: float = 5.0
     height_timeout_s: float = 5.0
     barometer_gate: float = 5.0
-    barometer_noise_m: float = 0.11
+    barometer_noise_m: float = 3.5
     barometer_lag_s: float = 0.02
-    barometer_offset_walk_m_per_sqrt_s: float = 0.01
+    barometer_offset_walk_m_per_sqrt_s: float = 0.013
     barometer_scale_error: float = 0.04
     magnetometer_gate: float = 3.0
-    magnetometer_noise_gauss: float = 0.003
-    magnetometer_bias_gauss: float = 0.0032
+    magnetometer_noise_gauss: float = 0.05
+    magnetometer_bias_gauss: float = 0.01
     magnetometer_bias_tau_s: float = 1000.0
     magnetometer_bias_turn_rad: float = 9.0
     magnetometer_timeout_s: float = 5.0

@@ -286,6 +286,11 @@ class Solution:
         return (float(self.core[X_POS]), float(self.core[X_POS + 1]), float(self.core[X_POS + 2]))
 
 
+def _correlation_s(sigma: float, walk: float) -> float:
+    """Time constant of the Gauss-Markov process with this 1-sigma and this random walk (per root second)."""
+    return 2.0 * (sigma / walk) ** 2
+
+
 def process_from(p: NavigationParameters) -> Array:
     """The process noise of `covariance.predict`."""
     out: Array = np.zeros(cov.PROCESS_SIZE)
@@ -295,9 +300,9 @@ def process_from(p: NavigationParameters) -> Array:
     out[cov.TURN_TILT] = p.gyro_scale_error**2 * p.gyro_scale_tilt_rad
     out[cov.TURN_CROSS] = p.gyro_cross_axis_error**2
     out[cov.GYRO_BIAS_VAR] = p.gyro_bias_rad_s**2
-    out[cov.GYRO_BIAS_TAU] = p.gyro_bias_tau_s
+    out[cov.GYRO_BIAS_TAU] = _correlation_s(p.gyro_bias_rad_s, p.gyro_bias_walk_rad_s_sqrt_s)
     out[cov.ACCEL_BIAS_VAR] = p.accel_bias_m_s2**2
-    out[cov.ACCEL_BIAS_TAU] = p.accel_bias_tau_s
+    out[cov.ACCEL_BIAS_TAU] = _correlation_s(p.accel_bias_m_s2, p.accel_bias_walk_m_s2_sqrt_s)
     out[cov.GPS_VAR_HORIZONTAL] = p.gps_position_walk_m[0] ** 2
     out[cov.GPS_VAR_VERTICAL] = p.gps_position_walk_m[1] ** 2
     out[cov.GPS_TAU] = p.gps_position_tau_s

@@ -11,6 +11,7 @@ from flightsim.airframe import AirframeKind, LaunchKind, load_airframe
 from flightsim.environment import Environment
 from flightsim.home import Home
 from flightsim.payload import GroundTargetParameters, MagneticField, PayloadParameters
+from flightsim.sensors import GpsParameters, SensorSuiteParameters
 
 FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
 """2025-01-01T00:00:00Z: the moment of boot unless asked otherwise, so that equal flights give equal logs."""
@@ -60,6 +61,9 @@ class VehicleSpecification:
         launch: how an aircraft gets into the air: "runway", "catapult" or "hand"; None: as its description
             says.
         payload: what it carries for its mission; by default nothing.
+        gps: its receiver, one of `flightsim.sensors.RECEIVERS`: "differential" is about as exact as the
+            receivers in the firmwares' own simulators, "standalone" as a receiver without corrections.
+        sensors: all its sensors, in place of the usual ones and of `gps`; None: the usual ones.
     """
 
     system_id: int = 1
@@ -69,6 +73,8 @@ class VehicleSpecification:
     parameters: Mapping[str, float] = field(default_factory=dict)
     launch: str | None = None
     payload: PayloadParameters = field(default_factory=PayloadParameters)
+    gps: str = "differential"
+    sensors: SensorSuiteParameters | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.system_id <= MAX_VEHICLES:
@@ -76,6 +82,7 @@ class VehicleSpecification:
         if self.launch is not None and self.launch not in tuple(LaunchKind):
             accepted = ", ".join(kind.value for kind in LaunchKind)
             raise ValueError(f"launch {self.launch!r} is unknown; accepted: {accepted}")
+        GpsParameters.of(self.gps)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,6 +132,7 @@ def team(
     parameters: Mapping[str, float],
     launch: str | None = None,
     heading_deg: float = 0.0,
+    gps: str = "differential",
 ) -> tuple[VehicleSpecification, ...]:
     """`count` vehicles with system ids 1, 2, ... standing in a row to the right of the first.
 
@@ -135,6 +143,7 @@ def team(
         parameters: that differ from the flavour's defaults.
         launch: how the aircraft among them get into the air.
         heading_deg: the way they point; the row is at a right angle to it, so that runways are side by side.
+        gps: receiver of all of them.
 
     Raises:
         ValueError: count is not in 1..250, or doesn't fit the models; a launch of multicopters.
@@ -165,6 +174,7 @@ def team(
                 offset_ne_m=(right[0] * along_m + 0.0, right[1] * along_m),
                 parameters=parameters,
                 launch=launch if kind is AirframeKind.FIXED_WING else None,
+                gps=gps,
             )
         )
     return tuple(vehicles)

@@ -29,8 +29,10 @@ from flightsim.airframe import Airframe, AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
 from flightsim.payload import GroundTargets, Payload, PayloadParameters
 from flightsim.sensors import (
+    FIX_AFTER_10_S,
     FIX_AT_BOOT,
     RTK_FIX_AFTER_10_S,
+    GpsFixStage,
     GpsParameters,
     SensorSuite,
     SensorSuiteParameters,
@@ -77,9 +79,8 @@ class SitlVehicle:
         airframe = self.vehicle.airframe
         aircraft = airframe.kind is AirframeKind.FIXED_WING
         flavour = get_flavour(specification.flavour, airframe.kind)
-        fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
         self.sensors = SensorSuite(
-            fitted(gps=_gps(specification.flavour)),
+            specification.sensors or usual_sensors(specification, aircraft=aircraft),
             physics_rate_hz=configuration.physics_rate_hz,
             truth=self.vehicle.truth,
             seeds=lambda name: streams.child("vehicle", index, "sensor", name),
@@ -221,9 +222,13 @@ class SitlVehicle:
         self.links.take(channel, frames)
 
 
-def _gps(flavour: str) -> GpsParameters:
-    """The receiver, with the start-up that the firmware's own SITL shows."""
-    return GpsParameters(fix_timeline=RTK_FIX_AFTER_10_S if flavour == "ardupilot" else FIX_AT_BOOT)
+def usual_sensors(specification: VehicleSpecification, *, aircraft: bool) -> SensorSuiteParameters:
+    """What a vehicle of this kind carries; its receiver starts as in the firmware's own SITL."""
+    timeline: tuple[GpsFixStage, ...] = FIX_AT_BOOT
+    if specification.flavour == "ardupilot":
+        timeline = RTK_FIX_AFTER_10_S if specification.gps == "differential" else FIX_AFTER_10_S
+    fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
+    return fitted(gps=GpsParameters.of(specification.gps, fix_timeline=timeline))
 
 
 def _envelope(airframe: Airframe, configuration: SitlConfiguration) -> "FlightEnvelope":

@@ -4,6 +4,7 @@ import contextlib
 import io
 import os
 import re
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Final
@@ -13,7 +14,7 @@ from pyulog.core import ULog
 
 from estimators.logs.errors import LogError
 from estimators.logs.mapped import Array, MappedSource, Part, Records, own_part
-from estimators.logs.ulog_mapping import map_topics
+from estimators.logs.ulog_mapping import UlogFacts, board_rotation, map_topics
 
 _TIME: Final = "timestamp"
 _MOST_RETURNS: Final = 2000
@@ -77,7 +78,12 @@ def open_ulog(path: Path) -> MappedSource:
         raise LogError(f"{path} holds no messages; is it a PX4 .ulg, and whole?")
     size_bytes = path.stat().st_size
     offset_us = _unix_offset_us(topics)
-    mapped = map_topics(topics, log.logged_messages, offset_us)
+    facts = UlogFacts(
+        texts=log.logged_messages,
+        parameters={str(name): float(value) for name, value in log.initial_parameters.items()},
+        version=int(log.msg_info_dict.get("ver_sw_release", 0) or 0),
+    )
+    mapped = map_topics(topics, facts, offset_us)
     return MappedSource(
         path,
         size_bytes=size_bytes,
@@ -89,9 +95,25 @@ def open_ulog(path: Path) -> MappedSource:
         remarks={
             "dropout_ms": int(sum(item.duration for item in log.dropouts)),
             "corrupt": int(bool(log.file_corruption)),
+            **board_remarks(facts.parameters),
             "pyulog": metadata.version("pyulog"),
         },
     )
+
+
+def board_remarks(parameters: Mapping[str, float]) -> dict[str, str]:
+    """What is said of the board's rotation and offset: where they are corrected."""
+    if board_rotation(parameters) is None:
+        return {
+            "board": "SENS_BOARD_ROT is not about the vertical: IMUs other than the voted one are left out"
+        }
+    offsets = [parameters.get(f"SENS_BOARD_{axis}_OFF", 0.0) for axis in "XYZ"]
+    if not any(offsets) and not parameters.get("SENS_BOARD_ROT", 0.0):
+        return {}
+    shown = " ".join(f"{value:g}" for value in offsets)
+    return {
+        "board": f"SENS_BOARD_*_OFF {shown} deg: corrected by the firmware (voted IMU), here for the others"
+    }
 
 
 def _arrays(columns: dict[str, Array]) -> dict[str, Array]:

@@ -4,6 +4,7 @@ Source: PX4's message definitions (docs.px4.io, "uORB message reference", 1.12 t
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -38,6 +39,8 @@ _CUSTOM_MODES: Final = {  # NAVIGATION_STATE of vehicle_status: PX4's main and s
     20: (_MAIN_AUTO, 9),
     21: (_MAIN_POSITION, 1),
 }
+_LAST_YAW_ROTATION: Final = 7
+"""SENS_BOARD_ROT up to here: steps of 45 degrees about z."""
 _LANDED, _IN_AIR = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
 
 
@@ -45,16 +48,31 @@ Topics = Mapping[tuple[str, int], Records]
 """By name and instance."""
 
 
-def map_topics(topics: Topics, texts: Iterable[Any], unix_offset_us: int | None) -> list[Part]:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UlogFacts:
+    """What a log holds beside its topics.
+
+    Attributes:
+        texts: pyulog's logged messages.
+        parameters: of the vehicle, as the log began.
+        version: `ver_sw_release`; 0: not known.
+    """
+
+    texts: Iterable[Any]
+    parameters: Mapping[str, float]
+    version: int
+
+
+def map_topics(topics: Topics, facts: UlogFacts, unix_offset_us: int | None) -> list[Part]:
     """MAVLink messages from what the log has.
 
     Args:
         topics: by name and instance.
-        texts: pyulog's logged messages.
+        facts: what it holds beside them.
         unix_offset_us: Unix time of vehicle time 0; None: not known.
     """
     found = [
-        *_imu(topics),
+        *_imu(topics, facts.parameters),
         *_attitude(topics),
         *_air(topics),
         *_positions(topics),
@@ -62,7 +80,8 @@ def map_topics(topics: Topics, texts: Iterable[Any], unix_offset_us: int | None)
         *_gps(topics),
         *_state(topics),
         *_truth(topics),
-        *_texts(texts),
+        *_texts(facts.texts),
+        *_vehicle(topics, facts),
     ]
     if unix_offset_us is not None:
         times = each_second(topics.values())
@@ -75,21 +94,67 @@ def _find(topics: Topics, names: Iterable[str], *fields: str) -> Records | None:
     return next((t for name in names if (t := topics.get((name, 0))) is not None and t.has(*fields)), None)
 
 
-def _imu(topics: Topics) -> list[Part]:
-    """The voted pair of sensors is number 0; the others follow by their instance."""
+def board_rotation(parameters: Mapping[str, float]) -> Array | None:
+    """R_vehicle_from_board of SENS_BOARD_ROT and SENS_BOARD_*_OFF; None where the rotation is not about z.
+
+    PX4 1.16.1 (`sensor_calibration`): the offset's rotation times the board's. `sensor_combined` has it
+    already; the topics of single sensors have not.
+    """
+    steps = int(parameters.get("SENS_BOARD_ROT", 0.0))
+    if not 0 <= steps <= _LAST_YAW_ROTATION:
+        return None
+    roll, pitch, yaw = (np.radians(parameters.get(f"SENS_BOARD_{axis}_OFF", 0.0)) for axis in "XYZ")
+    return _about(2, yaw) @ _about(1, pitch) @ _about(0, roll) @ _about(2, steps * np.pi / 4.0)
+
+
+def _about(axis: int, angle_rad: float) -> Array:
+    """Rotation about x, y or z."""
+    rotation = np.eye(3)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    rotation[i, i] = rotation[j, j] = np.cos(angle_rad)
+    rotation[i, j], rotation[j, i] = -np.sin(angle_rad), np.sin(angle_rad)
+    return rotation
+
+
+def _vehicle(topics: Topics, facts: UlogFacts) -> list[Part]:
+    """AUTOPILOT_VERSION and PARAM_VALUE, as the log began."""
+    start = min(int(records.time_us.min()) for records in topics.values())
+    found = []
+    if facts.version:
+        found.append(mavlink_part("AUTOPILOT_VERSION", np.array([start]), flight_sw_version=facts.version))
+    if facts.parameters:
+        names = np.array([name.encode("ascii", "replace") for name in facts.parameters], dtype="S16")
+        found.append(
+            mavlink_part(
+                "PARAM_VALUE",
+                np.full(len(names), start),
+                param_id=names,
+                param_value=np.array(list(facts.parameters.values())),
+                param_type=dialect.MAV_PARAM_TYPE_REAL32,
+                param_count=len(names),
+                param_index=np.arange(len(names)),
+            )
+        )
+    return found
+
+
+def _imu(topics: Topics, parameters: Mapping[str, float]) -> list[Part]:
+    """The voted pair of sensors is number 0; the others follow by their instance, in the vehicle's frame."""
     samples: list[tuple[Array, Array, Array, int]] = []  # times, rates, specific forces, number
     combined = _find(topics, ("sensor_combined",), "gyro_rad", "accelerometer_m_s2")
     if combined is not None:
         c = combined.columns
         samples.append((combined.time_us, c["gyro_rad"], c["accelerometer_m_s2"], 0))
-    for number in range(0 if combined is None else 1, 4):
+    rotation = board_rotation(parameters)
+    for number in range(0 if combined is None else 1, 4 if rotation is not None else 0):
         rates, forces = topics.get(("sensor_gyro", number)), topics.get(("sensor_accel", number))
         if rates is None or forces is None or not (rates.has("x", "y", "z") and forces.has("x", "y", "z")):
             continue
         gyro = np.column_stack([rates.columns[axis] for axis in "xyz"])
         force = np.column_stack([value_at(forces, axis, rates.time_us, np.nan) for axis in "xyz"])
         known = np.isfinite(force).all(axis=1)
-        samples.append((rates.time_us[known], gyro[known], force[known], number))
+        assert rotation is not None
+        samples.append((rates.time_us[known], gyro[known] @ rotation.T, force[known] @ rotation.T, number))
     if not samples:
         return []
     times, gyros, accelerometers, numbers = zip(*samples, strict=True)

@@ -84,6 +84,15 @@ RTK_FIX_AFTER_10_S: Final = (
 )
 """ArduPilot's SITL: nothing until 9.7 s, then no fix with 3 satellites, then RTK fixed at 10.1 s."""
 
+FIX_AFTER_10_S: Final = (
+    RTK_FIX_AFTER_10_S[0],
+    GpsFixStage(start_s=10.1, fix_type=3, satellites=10, hdop=1.21, vdop=2.0),
+)
+"""The same for a receiver without corrections."""
+
+RECEIVERS: Final = ("differential", "standalone")
+"""Names of the receivers that `GpsParameters.of` knows."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GpsParameters:
@@ -100,6 +109,7 @@ class GpsParameters:
         horizontal_wander_m, vertical_wander_m: stationary one sigma per axis of the Gauss-Markov part.
         wander_time_constant_s: its correlation time.
         velocity_noise_north_m_s, velocity_noise_east_m_s, velocity_noise_down_m_s: white, one sigma.
+        reported_accuracy_scale: what the receiver reports of its accuracy over what it is.
         fix_timeline: stages by start time; before the first the receiver is silent.
     """
 
@@ -113,11 +123,15 @@ class GpsParameters:
     velocity_noise_north_m_s: float = 0.06
     velocity_noise_east_m_s: float = 0.077
     velocity_noise_down_m_s: float = 0.158
+    reported_accuracy_scale: float = 1.0
     fix_timeline: tuple[GpsFixStage, ...] = FIX_AT_BOOT
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
-        require_positive(wander_time_constant_s=self.wander_time_constant_s)
+        require_positive(
+            wander_time_constant_s=self.wander_time_constant_s,
+            reported_accuracy_scale=self.reported_accuracy_scale,
+        )
         require_not_negative(
             latency_s=self.latency_s,
             horizontal_noise_m=self.horizontal_noise_m,
@@ -144,17 +158,31 @@ class GpsParameters:
         }
         return cls(**(numbers | overrides))
 
+    @classmethod
+    def of(cls, receiver: str, **overrides: Any) -> "GpsParameters":
+        """The receiver of this name, one of `RECEIVERS`.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        if receiver == "differential":
+            return cls(**overrides)
+        if receiver == "standalone":
+            return cls.standalone(**overrides)
+        raise ValueError(f"GPS receiver {receiver!r} is unknown; accepted: {', '.join(RECEIVERS)}")
+
     def build(self, interval_s: float, rng: np.random.Generator) -> SensorModel:
         """One specimen: draws where the correlated error starts.
 
-        The accuracies reported are the true one-sigma errors per axis: eph and epv of both parts together,
-        the speed accuracy as root mean square of the three axes.
+        The accuracies reported are the one-sigma errors per axis: eph and epv of both parts together,
+        the speed accuracy as root mean square of the three axes, each times `reported_accuracy_scale`.
         """
         white = np.array([self.horizontal_noise_m, self.horizontal_noise_m, self.vertical_noise_m])
         wander = np.array([self.horizontal_wander_m, self.horizontal_wander_m, self.vertical_wander_m])
         velocity = np.array(
             [self.velocity_noise_north_m_s, self.velocity_noise_east_m_s, self.velocity_noise_down_m_s]
         )
+        reported = self.reported_accuracy_scale
         decay, unit_drive = gauss_markov(1.0, self.wander_time_constant_s, interval_s)
         stages = np.array(
             [(s.start_s, s.fix_type, s.satellites, s.hdop, s.vdop, s.error_scale) for s in self.fix_timeline],
@@ -166,9 +194,9 @@ class GpsParameters:
                 [decay],
                 unit_drive * wander,
                 velocity,
-                [math.hypot(self.horizontal_noise_m, self.horizontal_wander_m)],
-                [math.hypot(self.vertical_noise_m, self.vertical_wander_m)],
-                [math.sqrt(float(np.mean(velocity**2)))],
+                [reported * math.hypot(self.horizontal_noise_m, self.horizontal_wander_m)],
+                [reported * math.hypot(self.vertical_noise_m, self.vertical_wander_m)],
+                [reported * math.sqrt(float(np.mean(velocity**2)))],
                 [interval_s],
                 stages.ravel(),
             ]

@@ -1,11 +1,12 @@
 """Inertial measurement unit: three gyros and three accelerometers at the centre of gravity, one reading.
 
-Per axis: cross-axis matrix, turn-on bias, wandering bias (first-order Gauss-Markov), white noise, saturation,
-quantisation. Terms: Woodman, An introduction to inertial navigation (2007), section 3.2; IEEE Std 952.
+Per axis: the rotors' vibration, cross-axis matrix, turn-on bias, wandering bias (first-order Gauss-Markov),
+white noise, saturation, quantisation. Terms: Woodman, An introduction to inertial navigation (2007), section
+3.2; IEEE Std 952.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -18,6 +19,7 @@ from flightsim.kernels import kernel
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import gauss_markov, quantise, saturate
 from flightsim.sensors.sensor import SensorModel
+from flightsim.sensors.vibration import CONSTANTS, ROTORS, RotorVibrationParameters, add_vibration
 
 Array = NDArray[np.float64]
 
@@ -37,11 +39,15 @@ _TRIAD: Final = 17
 _RISE_K: Final = 2 * _TRIAD
 _WARMUP_DECAY: Final = _RISE_K + 1
 _TEMPERATURE_QUANTUM: Final = _RISE_K + 2
-_CONSTANTS: Final = _RISE_K + 3
+_VIBRATION: Final = _RISE_K + 3
+_CONSTANTS: Final = _VIBRATION + CONSTANTS
 
-# state: wandering bias of gyro and accelerometer, share of the self-heating still to come
+# state: wandering bias of gyro and accelerometer, share of the self-heating still to come, phases of the
+# rotors, rates and specific force with their vibration
 _WARMUP: Final = 6
-_STATE: Final = 7
+_PHASES: Final = 7
+_VIBRATING: Final = _PHASES + ROTORS
+_STATE: Final = _VIBRATING + 6
 _NORMALS: Final = 12
 
 
@@ -70,6 +76,7 @@ class ImuParameters:
         accel_range_m_s2, accel_quantum_m_s2: 24 g in 16 bits.
         self_heating_k, warm_up_s: the board's temperature over the air's, reached exponentially from boot.
         temperature_quantum_k: 0.125 K.
+        vibration: of the airframe by its rotors; None: none.
     """
 
     rate_hz: int = 250
@@ -93,6 +100,7 @@ class ImuParameters:
     self_heating_k: float = 15.0
     warm_up_s: float = 300.0
     temperature_quantum_k: float = 0.125
+    vibration: RotorVibrationParameters | None = field(default_factory=RotorVibrationParameters)
 
     def __post_init__(self) -> None:
         require_rate(self.rate_hz)
@@ -156,6 +164,10 @@ class ImuParameters:
         constants[_WARMUP_DECAY] = math.exp(-interval_s / self.warm_up_s)
         constants[_TEMPERATURE_QUANTUM] = self.temperature_quantum_k
         state[_WARMUP] = 1.0
+        if self.vibration is not None:
+            vibration, phases = self.vibration.build(interval_s, rng)
+            constants[_VIBRATION:] = vibration
+            state[_PHASES : _PHASES + ROTORS] = phases
         return SensorModel(
             kernel=_measure,
             constants=constants,
@@ -191,11 +203,18 @@ _ACCEL: Final = IMU_ACCEL_FRD_M_S2.start
 
 @kernel
 def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: int, out: Array) -> bool:
+    sensed = state[_VIBRATING : _VIBRATING + 6]
+    for axis in range(3):
+        sensed[axis] = truth[_RATES + axis]
+        sensed[3 + axis] = truth[_FORCE + axis]
+    if constants[_VIBRATION] > 0.0:
+        add_vibration(
+            truth, constants[_VIBRATION:], state[_PHASES : _PHASES + ROTORS], sensed[:3], sensed[3:]
+        )
     for triad in range(2):
         c = triad * _TRIAD
-        source = _RATES if triad == 0 else _FORCE
         target = _GYRO if triad == 0 else _ACCEL
-        x, y, z = truth[source], truth[source + 1], truth[source + 2]
+        x, y, z = sensed[3 * triad], sensed[3 * triad + 1], sensed[3 * triad + 2]
         for axis in range(3):
             wander = 3 * triad + axis
             m = c + _MATRIX + 3 * axis

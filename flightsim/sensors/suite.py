@@ -21,6 +21,7 @@ from flightsim.sensors.magnetometer import MagnetometerParameters
 from flightsim.sensors.rangefinder import RangefinderParameters
 from flightsim.sensors.schedule import Schedule, steps_per_sample
 from flightsim.sensors.sensor import Sensor, SensorParameters
+from flightsim.sensors.vibration import RotorVibrationParameters
 from flightsim.truth import TRUTH_SIZE
 
 
@@ -41,6 +42,7 @@ class SensorSuiteParameters:
     def fixed_wing(cls, **overrides: Any) -> "SensorSuiteParameters":
         """What a small aircraft carries: a multicopter's sensors, a pitot tube, a lidar for the flare."""
         fitted: dict[str, Any] = {
+            "imu": ImuParameters(vibration=RotorVibrationParameters(axis=0)),
             "rangefinder": RangefinderParameters.long_range(),
             "airspeed": AirspeedParameters(),
         }

@@ -38,6 +38,7 @@ class EmbeddedConfiguration:
         wind_profile: law of the wind over height, a `flightsim.wind_profile.WindLaw`.
         turbulence: "none", "light", "moderate" or "severe".
         parameters: autopilot parameters that differ from the flavour's defaults.
+        gps: receiver of all vehicles, "differential" or "standalone".
         home: "lat,lon,alt[,heading]"; None: where the flavour's own SITL stands.
         max_flight_s: vehicle time after which a run that has not ended fails.
         scenario: targets, payload and magnetic map that the mission asks for.
@@ -55,6 +56,7 @@ class EmbeddedConfiguration:
     wind_profile: str = "log"
     turbulence: str = "none"
     parameters: Mapping[str, float] = field(default_factory=dict)
+    gps: str = "differential"
     home: str | None = None
     max_flight_s: float = MAX_FLIGHT_S
     scenario: Scenario = field(default_factory=Scenario)
@@ -86,6 +88,7 @@ class EmbeddedSitl:
             parameters=configuration.parameters,
             launch=configuration.launch,
             heading_deg=home.heading_deg,
+            gps=configuration.gps,
         )
         environment = Environment.from_wind(
             speed_m_s=configuration.wind_speed_m_s,

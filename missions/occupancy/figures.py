@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from missions.occupancy.heading_score import HeadingScore, heading_score
 from missions.occupancy.separation import least_separation_m
@@ -55,6 +55,33 @@ def search_figures(
             for searcher, (notes, _), heading in zip(team.searchers, debriefing.flights, scores, strict=False)
         ],
     }
+
+
+HEADING_BOUND_RAD: Final = math.radians(30.0)
+"""Bound of the heading's error after each turn, which 95 % of a searcher's flight must keep."""
+_LEAST_S: Final = 30.0  # of a search that is judged
+
+
+def search_verdict(team: "SearchTeam", debriefing: "Debriefing") -> str:
+    """Why a search was not flown, by what the vehicles reported; "" if it was."""
+    for searcher, (notes, score) in zip(team.searchers, debriefing.flights, strict=False):
+        if searcher.ended_us - searcher.began_us < _LEAST_S * 1e6:
+            continue  # the others had found the target
+        if searcher.watch is None or not searcher.watch.samples:
+            return f"vehicle {notes.system_id} searched without any reading of the magnetic field"
+        track = score.estimate
+        if track is None:
+            return f"vehicle {notes.system_id} reported no position in its search"
+        heading = heading_score(
+            searcher.pilot.commands, track.time_s, track.yaw_rad, end_s=searcher.ended_us * 1e-6
+        )
+        if heading.p95_rad > HEADING_BOUND_RAD:
+            return (
+                f"vehicle {notes.system_id} did not fly its headings: 5 % of the time it was more than "
+                f"{math.degrees(heading.p95_rad):.0f} degrees off; accepted: "
+                f"{math.degrees(HEADING_BOUND_RAD):.0f}"
+            )
+    return ""
 
 
 def _heading(searcher: "Searcher", score: "FlightScore") -> HeadingScore:

@@ -133,6 +133,12 @@ class OccupancyMission(Mission[OccupancyOptions]):
             return None
         return flown
 
+    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
+        from missions.occupancy.figures import search_verdict
+
+        flown = self._flight_of(debriefing)
+        return "" if flown is None else search_verdict(flown.team, debriefing)
+
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         from missions.occupancy.figures import search_figures
 

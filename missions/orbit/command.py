@@ -30,7 +30,7 @@ def _place(text: str) -> tuple[float, float]:
 
 
 def _build(given: Given, common: Mapping[str, Any]) -> Any:
-    from missions.orbit.options import AttitudeFrom, OrbitOptions
+    from missions.orbit.options import AttitudeFrom, GpsOff, OrbitOptions
     from missions.scenario import TargetMotion
 
     heading, motion = given["entry_heading"], given["target_motion"]
@@ -51,6 +51,7 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         entry_distance_m=given["entry_distance"],
         entry_heading_rad=None if heading is None else _degrees("entry-heading", heading),
         gps_fault=not given["no_gps_fault"],
+        gps_off=GpsOff(given["gps_off"]),
         lost_limit_s=given["lost_limit"],
         attitude=AttitudeFrom(given["attitude"]),
     )
@@ -92,6 +93,13 @@ COMMAND: Final = MissionCommand(
             "--entry-heading", type=float, help="Of the nose there, degrees. [default: towards the target]"
         ),
         option("--no-gps-fault", is_flag=True, help="Leave GPS on; the orbit doesn't use it."),
+        option(
+            "--gps-off",
+            type=click.Choice(["auto", "failure", "parameter"]),
+            default="auto",
+            help="How GPS is switched off: by MAV_CMD_INJECT_FAILURE, by a parameter that is restored "
+            "afterwards, or by what a simulator takes.",
+        ),
         option(
             "--lost-limit", type=float, default=30.0, help="Give up when the target is unseen so long, s."
         ),

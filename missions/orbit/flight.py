@@ -7,9 +7,9 @@ from statistics import fmean, pstdev
 from typing import Final
 
 from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from autopilot_bridge.mavlink import dialect
 from missions import telemetry
 from missions.errors import MissionError
+from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
 from missions.orbit.look_out import TICK_HZ, LookOut
 from missions.orbit.options import OrbitOptions
@@ -21,8 +21,6 @@ from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 from missions.vehicle.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
 from missions.vehicle.vehicle import Vehicle
 
-_GPS: Final = dialect.FAILURE_UNIT_SENSOR_GPS
-_OFF, _SOUND = dialect.FAILURE_TYPE_OFF, dialect.FAILURE_TYPE_OK
 _GIMBAL_HZ: Final = 25.0
 _ENTRY_RAD: Final = math.radians(10.0)
 _CAPTURED: Final = 0.05  # of the radius
@@ -46,6 +44,7 @@ class OrbitFlight:
             OrbitParameters(radius_m=options.radius_m, direction=options.direction, bank_max_rad=bank_max)
         )
         self._pilot: AttitudePilot | None = None
+        self._gps: GpsSwitch | None = None
         self._captured_us: int | None = None
         self._near_us: int | None = None
         self._command: OrbitCommand | None = None
@@ -76,6 +75,8 @@ class OrbitFlight:
         await vehicle.payload.require(CAMERA_COMPONENT, GIMBAL_COMPONENT)
         pitch_min, pitch_max, _, _ = await vehicle.payload.request_gimbal_information()
         options.check_camera(self._limits, pitch_min, pitch_max)
+        if options.gps_fault:
+            self._gps = await GpsSwitch.find(vehicle, options.gps_off)
         vehicle.payload.take_gimbal_control()
         vehicle.payload.set_gimbal_rate(_GIMBAL_HZ)
         pilot = self._pilot = await vehicle.prepare_piloting()
@@ -280,18 +281,9 @@ class OrbitFlight:
     # GPS
 
     async def _lose_gps(self) -> None:
-        vehicle = self._vehicle
-        if not self._options.gps_fault:
-            return
-        try:
-            await vehicle.command(dialect.MAV_CMD_INJECT_FAILURE, float(_GPS), float(_OFF), 0.0)
-        except MissionError as error:
-            raise MissionError(
-                f"GPS can't be switched off in flight ({error}); fly with --no-gps-fault to orbit "
-                "without using it, "
-                "or allow it (PX4: SYS_FAILURE_EN 1)"
-            ) from error
-        vehicle.notes.marks["gps_lost_at_s"] = self._stamp_us * 1e-6
+        if self._gps is not None:
+            await self._gps.off()
+            self._vehicle.notes.marks["gps_lost_at_s"] = self._stamp_us * 1e-6
 
     async def _regain_gps(self) -> None:
         """GPS on, and wait for a fix (which it may have had all the time)."""
@@ -304,9 +296,9 @@ class OrbitFlight:
         notes.marks["target_losses"] = float(self._tracker.losses)
         notes.marks["detections_used"] = float(self._tracker.target.accepted)
         notes.marks["detections_rejected"] = float(self._tracker.target.rejected)
-        if "gps_lost_at_s" not in notes.marks:
+        if self._gps is None or "gps_lost_at_s" not in notes.marks:
             return
-        await vehicle.command(dialect.MAV_CMD_INJECT_FAILURE, float(_GPS), float(_SOUND), 0.0)
+        await self._gps.on()
         notes.marks["gps_back_at_s"] = self._stamp_us * 1e-6
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.mission import Debriefing, Mission, WorldDefaults
+from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
 from missions.orbit.options import WANDERING_M, OrbitOptions
+from missions.orbit.verdict import orbit_verdict
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.scenario import Scenario, Setting, TargetMotion, TargetScenario
 from missions.vehicle.vehicle import Vehicle
@@ -51,6 +52,9 @@ class OrbitMission(Mission[OrbitOptions]):
         options.check(limits)
         assert isinstance(limits, FixedWingLimits)
         await OrbitFlight(vehicle, options, limits).fly()
+
+    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
+        return verdict_of_all(debriefing, lambda notes, _score: orbit_verdict(notes))
 
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         from missions.orbit.score import orbit_figures

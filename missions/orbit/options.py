@@ -23,6 +23,17 @@ class AttitudeFrom(StrEnum):
     """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
 
 
+class GpsOff(StrEnum):
+    """How GPS is switched off for the orbit."""
+
+    AUTO = "auto"
+    """By the command; of a simulator that does not know it, by its parameter."""
+    FAILURE = "failure"
+    """By MAV_CMD_INJECT_FAILURE."""
+    PARAMETER = "parameter"
+    """By a parameter of the simulator, or of the filter that fuses GPS."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitOptions(MissionOptions):
     """A circle around a target on the ground.
@@ -41,7 +52,8 @@ class OrbitOptions(MissionOptions):
         entry_bearing_rad: from the target to where GPS is lost.
         entry_distance_m: between the two.
         entry_heading_rad: of the nose there; None: towards the target.
-        gps_fault: GPS is switched off for the orbit (MAV_CMD_INJECT_FAILURE).
+        gps_fault: GPS is switched off for the orbit.
+        gps_off: how.
         lost_limit_s: the mission ends when the target was not seen for so long.
         attitude: whose roll and pitch it is flown with; the yaw is the autopilot's.
     """
@@ -61,6 +73,7 @@ class OrbitOptions(MissionOptions):
     entry_distance_m: float = 400.0
     entry_heading_rad: float | None = None
     gps_fault: bool = True
+    gps_off: GpsOff = GpsOff.AUTO
     lost_limit_s: float = 30.0
     attitude: AttitudeFrom = AttitudeFrom.AUTOPILOT
 

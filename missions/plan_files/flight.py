@@ -85,7 +85,7 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
     except VehicleTimeout:
         if options.time_limit_s is None:
             raise
-        ended = False
+        ended, notes.cut_short = False, True
     if notes.current != "return":
         notes.begin("return", clock.stamp_us)
     if not (ended and watch.lands):

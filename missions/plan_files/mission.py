@@ -12,13 +12,16 @@ from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import PlanError
 from missions.kind import VehicleKind
-from missions.mission import Debriefing, Mission, WorldDefaults
+from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
+from missions.notes import PATTERN, Phase
 from missions.plan_files.document import FLOWN_TO, NAV_LAND, MissionDocument
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.flight import check_distance, fly_document, own_speed_m_s
 from missions.plan_files.options import FileOptions
+from missions.plan_files.progress import CURVED
 from missions.plan_files.route import Stop, route_of, scored_stops, straight
 from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.item_tracker import THROUGH
 
 if TYPE_CHECKING:
     from missions.notes import FlightNotes
@@ -102,6 +105,36 @@ class FileMission(Mission[FileOptions]):
 
     def title(self, options: FileOptions) -> str:
         return self.document.path.name
+
+    def verdict(self, debriefing: Debriefing, max_error_m: float | None) -> str:
+        return verdict_of_all(debriefing, lambda notes, score: self._verdict(notes, score, max_error_m))
+
+    def _verdict(self, notes: "FlightNotes", score: "FlightScore", max_error_m: float | None) -> str:
+        """Every waypoint was passed, in their order; the way between them is the autopilot's own."""
+        from missions.verdict import NO_TRACK, WAYPOINT_SLACK_M, flown_track, waypoint_verdict
+
+        commanded = notes.commanded
+        if commanded is None:
+            return ""
+        kind = VehicleKind(notes.kind)
+        stops = scored_stops(
+            route_of(self.document, commanded.origin), with_takeoff=kind is VehicleKind.MULTICOPTER
+        )
+        waypoints = [stop for stop in stops if stop.command in THROUGH]
+        reached = next((p for p in notes.phases if p.name in (PATTERN, CURVED)), None)
+        if not waypoints:
+            return ""
+        if reached is None:
+            return "no place of the mission was reached"
+        track = flown_track(score, Phase(name="", start_us=notes.phases[0].start_us, end_us=reached.end_us))
+        if track is None:
+            return NO_TRACK
+        return waypoint_verdict(
+            track,
+            np.array([stop.position_ned_m for stop in waypoints]),
+            max(commanded.acceptance_m + WAYPOINT_SLACK_M[kind], max_error_m or 0.0),
+            cut_short=notes.cut_short,
+        )
 
     def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
         notes, score = debriefing.flights[0] if debriefing.flights else (None, None)

@@ -10,6 +10,9 @@ from missions.vehicle.adapter import Mode
 from missions.vehicle.item_tracker import FlownOrder, ItemTracker, MissionModeWatch, mission_steps
 from missions.vehicle.vehicle import Vehicle
 
+CURVED: Final = "mission"
+"""Name of the phase of a mission whose way is not only straight lines, and so is not scored."""
+
 _NAMES: Final = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT", "GLOBAL_POSITION_INT")
 
 
@@ -40,7 +43,7 @@ class MissionWatch:
         )
         self._endless = order.endless
         self._scored_from = scored[0].index if scored else -1
-        self._phase = "mission" if has_curves(scored) else PATTERN
+        self._phase = CURVED if has_curves(scored) else PATTERN
         self._mode = MissionModeWatch(vehicle.adapter.modes[Mode.MISSION])
 
     @property

@@ -25,6 +25,8 @@ LAST_NAV: Final = dialect.MAV_CMD_NAV_LAST
 """Commands up to this one are flown; those beyond it happen on the way."""
 LANDINGS: Final = frozenset((dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH))
 """Commands that bring the vehicle to the ground, and with which a mission ends."""
+THROUGH: Final = frozenset((dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_SPLINE_WAYPOINT))
+"""Commands that name a place to pass."""
 
 _TAKEOFF: Final = dialect.MAV_CMD_NAV_TAKEOFF
 _DO_JUMP: Final = dialect.MAV_CMD_DO_JUMP
@@ -35,7 +37,6 @@ _CIRCLE_M: Final = 80.0
 _NO_MISSION: Final = 0xFFFF  # MISSION_CURRENT.seq
 _HEARTBEATS_AWAY: Final = 3
 _STARTED: Final = (dialect.MISSION_STATE_ACTIVE, dialect.MISSION_STATE_PAUSED)
-_THROUGH: Final = frozenset((dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_SPLINE_WAYPOINT))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,7 +131,7 @@ def mission_steps(
 
 def _step(index: int, item: MissionItem, home: GeodeticPosition, acceptance_m: float) -> MissionStep:
     placed = math.isfinite(item.x + item.y + item.z) and (item.x, item.y) != (0.0, 0.0)
-    through = item.command in _THROUGH
+    through = item.command in THROUGH
     if item.command == dialect.MAV_CMD_NAV_LOITER_UNLIM:  # no vehicle reports it as reached
         radius_m, stay_s = 1.5 * abs(item.param3 or _CIRCLE_M) + 20.0, 0.0
     elif through:

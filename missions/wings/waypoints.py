@@ -87,6 +87,7 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
     except VehicleTimeout:
         if options.search_time_s is None:
             raise
+        notes.cut_short = True
         await vehicle.land_along(flight.approach(vehicle), wait=False)  # the search time is over
     notes.begin("return", clock.stamp_us)
     await vehicle.wait_disarmed(600.0 + 2.0 * flight.away_s)

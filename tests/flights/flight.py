@@ -16,6 +16,7 @@ from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.payload import GroundTargetParameters, PayloadParameters
+from flightsim.sensors import SensorSuiteParameters
 from missions.telemetry import StatusTextAssembler
 from tests.rotations import yaw_rad
 
@@ -66,6 +67,7 @@ class Flight:
         model, launch: the vehicle, and how it gets into the air.
         payload: what it carries; None: nothing.
         targets: what there is to see.
+        sensors: of the vehicle; None: the usual ones.
 
     Attributes:
         heartbeats: (time s, custom_mode, base_mode, system_status).
@@ -86,6 +88,7 @@ class Flight:
         launch: str | None = None,
         payload: PayloadParameters | None = None,
         targets: tuple[GroundTargetParameters, ...] = (),
+        sensors: SensorSuiteParameters | None = None,
     ) -> None:
         specification = VehicleSpecification(
             flavour=flavour,
@@ -93,6 +96,7 @@ class Flight:
             model=model,
             launch=launch,
             payload=payload or PayloadParameters(),
+            sensors=sensors,
         )
         self.sitl = Sitl(
             SitlConfiguration(

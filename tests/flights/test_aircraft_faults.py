@@ -76,13 +76,10 @@ def holds(flavour: str, seed: int, *failures: tuple[int, int]) -> None:
         assert flight.text_time("irspeed", failed_s) < failed_s + 30.0  # it is reported
 
 
+@pytest.mark.slow  # the quick one in light turbulence is in test_fixed_wing_failsafes
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_motor_failed_in_turbulence(flavour: str) -> None:
     glides(flavour, 1)
-
-
-def test_airspeed_blocked_in_turbulence() -> None:
-    holds("px4", 2, (AIRSPEED, STUCK))
 
 
 @pytest.mark.slow

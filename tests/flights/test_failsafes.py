@@ -191,7 +191,9 @@ def test_without_gps_at_cruise_the_vehicle_sinks_level_and_disarms(flavour: str)
     assert flight.tilt_deg < 2.0
     flight.fly_until(lambda: flight.height_m < 1.0, 50.0, "the ground")
     assert flight.tilt_deg < 2.0
-    assert flight.speed_m_s < 1.2
+    # EK3_ABIAS_P_NSE lets the accelerometer's bias walk seven times as fast as EKF2_ACC_B_NOISE does, so the
+    # tilt is known less exactly: a tenth of a degree over 20 s is 0.3 m/s.
+    assert flight.speed_m_s < {"px4": 1.2, "ardupilot": 1.6}[flavour]
     flight.wait_disarmed(12.0)
     assert flight.tilt_deg < 3.0 and flight.speed_m_s < 0.05
 

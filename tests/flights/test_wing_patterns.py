@@ -113,6 +113,7 @@ def test_a_team_of_aircraft_and_a_quadrotor_flies_as_one(tmp_path: Path) -> None
     assert quadrotor["path_rms_error_m"] < 1.0
 
 
+@pytest.mark.slow  # a quadrotor's is in tests/missions/test_session.py
 def test_a_search_time_ends_the_pattern_and_lands(tmp_path: Path) -> None:
     chosen = {"search_time_s": 60.0, "pattern": "L1"}
     request = RunRequest(

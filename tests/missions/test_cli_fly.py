@@ -35,6 +35,7 @@ from missions.vehicle.vehicle import Vehicle
         ["--model", "iris"],
         ["--home", "47,8,400"],
         ["--turbulence", "light"],
+        ["--gps", "standalone"],
         ["--speedup", "2"],
     ],
     ids=lambda option: option[0],

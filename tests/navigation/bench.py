@@ -11,11 +11,12 @@ from flightsim import truth as t
 from flightsim.random_streams import RandomStreams
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 from tests.navigation.kinematic_flight import MAG_NED_GAUSS, RATE_HZ
+from tests.navigation.matched import MATCHED
 from tests.rotations import rotation_matrix
 
 Array = NDArray[np.float64]
 
-PARAMETERS = NavigationParameters(mag_ned_gauss=MAG_NED_GAUSS)
+PARAMETERS = NavigationParameters(mag_ned_gauss=MAG_NED_GAUSS, **MATCHED)
 
 
 def attitude_error(q_true: Array, q_estimated: Array) -> Array:

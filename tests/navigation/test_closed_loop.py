@@ -14,6 +14,7 @@ from flightsim.environment import Environment, Turbulence
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 from flightsim.world import World, WorldParameters
 from tests.navigation.bench import attitude_error
+from tests.navigation.matched import MATCHED
 from tests.slow import slow
 
 SEEDS = 8
@@ -32,7 +33,7 @@ def fly(seed: int, environment: Environment) -> tuple[np.ndarray, np.ndarray]:
         truth=truth,
         seeds=lambda name: world.streams.child("vehicle", 0, "sensor", name),
     )
-    nav = NavigationFilter(NavigationParameters(), readings=suite.readings, physics_rate_hz=RATE_HZ)
+    nav = NavigationFilter(NavigationParameters(**MATCHED), readings=suite.readings, physics_rate_hz=RATE_HZ)
     controller = MulticopterController(physics_rate_hz=RATE_HZ, nav=nav.state)
     setpoint = controller.setpoint
     nees, errors = [], []

@@ -96,8 +96,12 @@ def test_prediction_is_the_transition_and_the_noise() -> None:
     parameters = NavigationParameters(magnetometer_bias_turn_rad=1e15)
     t = STEPS * DT_S
     decay = np.ones(SIZE)
-    decay[s.GYRO_BIAS : s.GYRO_BIAS + 3] = np.exp(-t / parameters.gyro_bias_tau_s)
-    decay[s.ACCEL_BIAS : s.ACCEL_BIAS + 3] = np.exp(-t / parameters.accel_bias_tau_s)
+    decay[s.GYRO_BIAS : s.GYRO_BIAS + 3] = np.exp(
+        -t * parameters.gyro_bias_walk_rad_s_sqrt_s**2 / (2.0 * parameters.gyro_bias_rad_s**2)
+    )
+    decay[s.ACCEL_BIAS : s.ACCEL_BIAS + 3] = np.exp(
+        -t * parameters.accel_bias_walk_m_s2_sqrt_s**2 / (2.0 * parameters.accel_bias_m_s2**2)
+    )
     decay[s.GPS_ERROR : s.GPS_ERROR + 3] = np.exp(-t / parameters.gps_position_tau_s)
     decay[s.MAG_BIAS : s.MAG_BIAS + 3] = np.exp(-t / parameters.magnetometer_bias_tau_s)
     full = np.diag(decay) @ transition

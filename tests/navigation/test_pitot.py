@@ -16,8 +16,9 @@ from autopilot_bridge.navigation.earth import (
 from autopilot_bridge.navigation.pitot import AirspeedCheck, GustVariance, Pitot
 from flightsim.interface import SensorReadings
 from flightsim.random_streams import RandomStreams
+from tests.navigation.matched import MATCHED
 
-PARAMETERS = NavigationParameters(fixed_wing=True)
+PARAMETERS = NavigationParameters(fixed_wing=True, **MATCHED)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 from flightsim.vehicle import InitialState
 from flightsim.world import World, WorldParameters
 from tests.navigation.bench import attitude_error
+from tests.navigation.matched import MATCHED
 
 Array = NDArray[np.float64]
 
@@ -55,7 +56,7 @@ def fly(seed: int) -> tuple[Array, NavigationFilter]:
         seeds=lambda name: world.streams.child("vehicle", 0, "sensor", name),
     )
     nav = NavigationFilter(
-        NavigationParameters(fixed_wing=True), readings=suite.readings, physics_rate_hz=RATE_HZ
+        NavigationParameters(fixed_wing=True, **MATCHED), readings=suite.readings, physics_rate_hz=RATE_HZ
     )
     controller = FixedWingController(FixedWingParameters(), physics_rate_hz=RATE_HZ, nav=nav.state)
     rows = []

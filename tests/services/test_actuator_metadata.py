@@ -109,3 +109,13 @@ def test_choices_are_told_with_the_parameters() -> None:
     assert told == FUNCTIONS
     assert told[101] == "Motor 1" and told[208] == "Servo 8"
     assert "values" not in by_name["MPC_XY_CRUISE"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_parameters_are_described_in_their_own_words(kind: AirframeKind) -> None:
+    """parameter.schema.json: shortDesc is the description where there is one, else the name."""
+    entries = {entry["name"]: entry for entry in parameter_metadata(table(kind))["parameters"]}
+    assert len(entries) == len(table(kind))
+    for definition in table(kind):
+        assert entries[definition.name]["shortDesc"] == (definition.description or definition.name)
+    assert any(definition.description for definition in table(kind))

@@ -115,6 +115,17 @@ def test_px4_download_refuses_jumps_and_ends_in_silence(px4: Vehicle) -> None:
     assert upload(px4, plan(2)).type == 0
 
 
+def test_a_slow_download_goes_on_while_requests_come(px4: Vehicle) -> None:
+    """The timeout of 5 s counts from the last request, whenever the download began."""
+    upload(px4, plan(4))
+    px4.tick(100.0)
+    px4.tell(request_list())
+    for seq in range(4):
+        px4.tick(4.5)
+        assert names(px4.tell(request(seq))) == ["MISSION_ITEM_INT"]
+    assert px4.take_texts() == []
+
+
 def test_a_download_shows_one_plan_though_another_is_uploaded_meanwhile(px4: Vehicle) -> None:
     upload(px4, plan(4))
     px4.tell(request_list())

@@ -80,6 +80,7 @@ def test_a_fence_is_sent_and_read_back() -> None:
         (6, fence_point(0, 5, BACK), "Invalid fence point, bad count (5 vs 6)"),
         (6, fence_point(6, 6, BACK), "Invalid fence point, index past total (6 >= 6)"),
         (6, fence_point(1, 6, (91.0, 0.0)), "Invalid fence point, bad lat or lng"),
+        (6, fence_point(1, 6, (0.0, -180.5)), "Invalid fence point, bad lat or lng"),
         (6, fence_point(1, 6, (float("nan"), 0.0)), "Invalid fence point, bad lat or lng"),
     ],
 )

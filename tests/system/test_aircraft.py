@@ -114,6 +114,7 @@ def test_a_quadrotors_motor_fails_too() -> None:
     assert inject(mavlink.FAILURE_UNIT_SYSTEM_SERVO, mavlink.FAILURE_TYPE_OFF, 1) is Result.UNSUPPORTED
 
 
+@pytest.mark.slow  # the quick one, with a cub, is in tests/flights/test_aircraft_models.py
 @pytest.mark.parametrize("model", ["c172x"])
 def test_an_aircraft_of_the_jsbsim_package_takes_off_and_circles(model: str) -> None:
     sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(model=model),), seed=5))

@@ -60,6 +60,7 @@ class UlogWriter:
         """formats: topic="uint64_t timestamp;float[3] gyro_rad;"."""
         self.data = bytearray(bytes.fromhex("554c6f67011235") + b"\x01" + struct.pack("<Q", 1000))
         self._message("B", bytes(40))
+        self._header_end = len(self.data)
         self.topics = {}
         for name, fields in formats.items():
             self._message("F", f"{name}:{fields}".encode())
@@ -75,6 +76,13 @@ class UlogWriter:
     def add(self, name, layout, *values, instance=0):
         number = self.topics[name, instance]
         self._message("D", struct.pack("<H", number) + struct.pack(f"<{layout}", *values))
+
+    def parameter(self, name, value):
+        kind, layout = ("int32_t", "<i") if isinstance(value, int) else ("float", "<f")
+        key = f"{kind} {name}".encode()
+        body = bytes([len(key)]) + key + struct.pack(layout, value)
+        # Parameters stand among the definitions, before the first subscription.
+        self.data[self._header_end : self._header_end] = struct.pack("<HB", len(body), ord("P")) + body
 
     def text(self, level, time_us, message):
         self._message("L", struct.pack("<BQ", level + ord("0"), time_us) + message.encode())

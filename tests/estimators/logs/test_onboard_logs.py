@@ -297,6 +297,26 @@ def test_ulog_vehicle_modes_flights_and_date(ulg_log):
     assert ulg_log.start_unix_us == 1_700_000_000_000_000 - 200_000
 
 
+def test_single_imus_are_turned_as_the_board_is(ulog, tmp_path):
+    """The voted IMU comes corrected from the firmware; the others are turned, by 90 deg and 2 deg of roll."""
+    ulog.parameter("SENS_BOARD_ROT", 2)
+    ulog.parameter("SENS_BOARD_X_OFF", 2.0)
+    log = open_log(ulog.save(tmp_path / "flight.ulg"))
+    assert log.table("HIGHRES_IMU", instance=0)["ygyro"][0] == np.float32(-0.2)
+    second = log.table("HIGHRES_IMU", instance=1)  # 0.2 about x of the board
+    assert (second["xgyro"][0], second["ygyro"][0]) == pytest.approx((0.0, 0.2 * math.cos(math.radians(2.0))))
+    assert second["zgyro"][0] == pytest.approx(0.2 * math.sin(math.radians(2.0)))
+    assert "SENS_BOARD_*_OFF 2 0 0 deg" in log.report().remarks["board"]
+    assert b"SENS_BOARD_ROT" in log.table("PARAM_VALUE")["param_id"].tolist()
+
+
+def test_a_board_on_its_side_leaves_single_imus_out(ulog, tmp_path):
+    ulog.parameter("SENS_BOARD_ROT", 16)
+    log = open_log(ulog.save(tmp_path / "flight.ulg"))
+    assert set(log.table("HIGHRES_IMU")["id"].tolist()) == {0}
+    assert "left out" in log.report().remarks["board"]
+
+
 def test_damaged_ulog(ulog, tmp_path):
     whole = bytes(ulog.data)
     torn = tmp_path / "torn.ulg"

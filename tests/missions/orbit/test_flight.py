@@ -9,7 +9,7 @@ import pytest
 from autopilot_bridge.mavlink import decode
 from autopilot_bridge.tlog import TlogReader
 from missions.library import find_mission
-from missions.orbit.options import OrbitOptions
+from missions.orbit.options import GpsOff, OrbitOptions
 from missions.records import FlightRecords
 from missions.run import EPOCH_UNIX_US
 from missions.scenario import Scenario
@@ -58,6 +58,7 @@ def gps_times(folder, start_s, end_s):
                 "target_heading_rad": 2.0,
                 "entry_bearing_rad": math.radians(315.0),
                 "entry_heading_rad": math.radians(300.0),
+                "gps_off": GpsOff.PARAMETER,
             },
         ),
     ],

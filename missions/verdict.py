@@ -1,0 +1,134 @@
+"""Whether a flight has flown what was commanded, by the vehicle's own messages.
+
+A vehicle that reports the end of a mission may have flown something else. The judge is the track of
+GLOBAL_POSITION_INT, which a mission has on every vehicle; truth is for the score.
+"""
+
+import math
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from missions.kind import VehicleKind
+from missions.notes import PATTERN, FlightNotes, Phase
+from missions.waypoint_passes import approaches
+
+if TYPE_CHECKING:
+    from missions.score import FlightScore, Track
+
+Array = NDArray[np.float64]
+
+PATH_BOUND_M: Final = {VehicleKind.MULTICOPTER: 10.0, VehicleKind.FIXED_WING: 40.0}
+"""Farthest from the commanded path, by class of vehicle."""
+WAYPOINT_SLACK_M: Final = {VehicleKind.MULTICOPTER: 3.0, VehicleKind.FIXED_WING: 15.0}
+"""Beyond its acceptance radius: nearest approach to a waypoint that counts as a pass."""
+
+_AROUND_US: Final = 1_000_000  # before and after the phase: positions come at some Hz
+_GAP_S: Final = 2.0
+_PLACES: Final = 100
+_NAMED: Final = 3
+
+
+def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | None = None) -> str:
+    """Why the commanded path was not flown; "" if it was, or none was commanded.
+
+    The track must stay within a bound of the path, and pass every waypoint (of a path without waypoints: 100
+    places along it), in their order. What was not received is no evidence against the flight.
+
+    Args:
+        notes, score: of one vehicle.
+        max_error_m: bound of the user's in place of `PATH_BOUND_M`; waypoints get as much room.
+    """
+    commanded = notes.commanded
+    if commanded is None:
+        return ""
+    phase = notes.phase(PATTERN)
+    if phase is None:
+        return "the commanded path was not begun"
+    track = flown_track(score, phase)
+    if track is None:
+        return NO_TRACK
+    kind = VehicleKind(notes.kind)
+    bound_m = PATH_BOUND_M[kind] if max_error_m is None else max_error_m
+    points = commanded.points_ned_m
+    error_m = _largest_error_m(points, track.between(phase.start_us, phase.end_us))
+    if max_error_m is None and error_m > bound_m:  # the user's own bound is a check of its own
+        return (
+            f"the vehicle was up to {error_m:.1f} m off the commanded path by its own position; accepted: "
+            f"{bound_m:g} m (--max-error)"
+        )
+    if len(commanded.waypoints_ned_m):
+        near_m = max(commanded.acceptance_m + WAYPOINT_SLACK_M[kind], max_error_m or 0.0)
+        return waypoint_verdict(track, commanded.waypoints_ned_m, near_m, cut_short=notes.cut_short)
+    places = points[np.unique(np.linspace(0, len(points) - 1, _PLACES).astype(np.int64))]
+    missed = missed_places(track, places, bound_m, cut_short=notes.cut_short)
+    if not missed:
+        return ""
+    return (
+        f"{len(missed)} % of the commanded path were not flown: the vehicle's own position did not come "
+        f"within {bound_m:g} m of them (--max-error)"
+    )
+
+
+NO_TRACK: Final = "no position (GLOBAL_POSITION_INT) was received along the commanded path"
+
+
+def flown_track(score: "FlightScore", phase: Phase) -> "Track | None":
+    """The vehicle's own track over a phase; None: there is none."""
+    if score.estimate is None:
+        return None
+    track = score.estimate.between(phase.start_us - _AROUND_US, phase.end_us + _AROUND_US)
+    return track if len(track.time_s) > 1 else None
+
+
+def _largest_error_m(path_ned_m: Array, track: "Track") -> float:
+    """Of the positions that were received; a gap between two of them is followed along the line."""
+    from missions.score import path_errors_m
+
+    if not len(track.time_s):
+        return 0.0
+    times = [track.time_s]
+    for k in np.nonzero(np.diff(track.time_s) > _GAP_S)[0]:
+        length_m = float(np.linalg.norm(track.pos_ned_m[k + 1] - track.pos_ned_m[k]))
+        times.append(np.linspace(track.time_s[k], track.time_s[k + 1], math.ceil(length_m) + 2)[1:-1])
+    together = np.sort(np.concatenate(times))
+    filled = np.column_stack([np.interp(together, track.time_s, axis) for axis in track.pos_ned_m.T])
+    errors = path_errors_m(path_ned_m, filled)
+    received = np.isin(together, track.time_s)
+    return float(errors[received].max(initial=0.0)) if len(errors) else 0.0
+
+
+def waypoint_verdict(track: "Track", waypoints_ned_m: Array, near_m: float, *, cut_short: bool) -> str:
+    """Why not all waypoints were flown; "" if they were."""
+    missed = missed_places(track, waypoints_ned_m, near_m, cut_short=cut_short)
+    if not missed:
+        return ""
+    shown = ", ".join(f"{k + 1} ({miss_m:.1f} m)" for k, miss_m in missed[:_NAMED])
+    more = "" if len(missed) <= _NAMED else f" and {len(missed) - _NAMED} more"
+    return (
+        f"{len(missed)} of {len(waypoints_ned_m)} waypoints were not passed within {near_m:g} m by the "
+        f"vehicle's own position: number {shown}{more}"
+    )
+
+
+def missed_places(
+    track: "Track", places_ned_m: Array, near_m: float, *, cut_short: bool
+) -> list[tuple[int, float]]:
+    """Places (index, nearest approach) that a track did not pass in their order.
+
+    Those that may have been passed while no position was received are left out, and with `cut_short` those
+    after the last pass.
+    """
+    found = approaches(places_ned_m, near_m, track.pos_ned_m)
+    gaps = np.nonzero(np.diff(track.time_s) > _GAP_S)[0]
+    passed = [k for k, approach in enumerate(found) if approach.leg is not None]
+    missed = []
+    for k, approach in enumerate(found):
+        if approach.leg is not None or (cut_short and k > max(passed, default=-1)):
+            continue
+        before = max((found[j].leg or 0 for j in passed if j < k), default=0)
+        after = min((found[j].leg or 0 for j in passed if j > k), default=math.inf)
+        if not any(before <= gap <= after for gap in gaps):
+            missed.append((k, approach.miss_m))
+    return missed
