@@ -157,7 +157,7 @@ class Px4Commands(CommandHandlers):
         return self.commander.set_mode(FlightMode.MISSION).result
 
     def inject_failure(self, command: Command, source: Source) -> Result:
-        """INJECT_FAILURE: p1 FAILURE_UNIT, p2 FAILURE_TYPE, p3 instance (0: all); SYS_FAILURE_EN 0 denies it."""
+        """INJECT_FAILURE: p1 FAILURE_UNIT, p2 FAILURE_TYPE, p3 instance (0: all)."""
         unit, kind, instance = whole(command.p1), whole(command.p2), whole(command.p3, 0)
         if self.hooks.inject_failure is None:
             return Result.UNSUPPORTED
