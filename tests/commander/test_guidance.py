@@ -70,6 +70,20 @@ def test_arducopter_has_no_limit_of_attitude(axis: int) -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_mode_that_needs_no_position_goes_on_without_it(flavour: str) -> None:
+    """ArduCopter's EKF failsafe and PX4's position failsafe act in modes that need a position only."""
+    rig = hovering(flavour)
+    rig.commander.pilot.move(roll=0.0, pitch=0.0, throttle=0.0, yaw=0.0, time_us=rig.time_us)
+    assert rig.commander.set_mode(FlightMode.ALTITUDE).accepted
+    rig.judgement.position_valid = False
+    for _ in range(50):
+        rig.commander.pilot.move(roll=0.0, pitch=0.0, throttle=0.0, yaw=0.0, time_us=rig.time_us)
+        rig.run(0.2)
+    assert rig.commander.mode is FlightMode.ALTITUDE
+    assert not rig.happened(FailsafeActivated)
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_the_distance_of_a_reached_waypoint_is_reported(flavour: str) -> None:
     """Horizontal, from the waypoint; none for an item without a place."""
     rig = Rig(flavour, kind=AirframeKind.FIXED_WING)
