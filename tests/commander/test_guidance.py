@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander.events import FailsafeActivated, MissionItemReached
+from autopilot_bridge.commander.events import FailsafeActivated, MissionItemReached, SystemStatus
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.context import WaypointReached
 from autopilot_bridge.mission_plan import MissionItem
@@ -81,6 +82,12 @@ def test_a_mode_that_needs_no_position_goes_on_without_it(flavour: str) -> None:
         rig.run(0.2)
     assert rig.commander.mode is FlightMode.ALTITUDE
     assert not rig.happened(FailsafeActivated)
+
+
+def test_system_status_is_mavlinks() -> None:
+    """MAV_STATE of minimal.xml."""
+    names = {f"MAV_STATE_{status.name}": status.value for status in SystemStatus}
+    assert names.items() <= {entry.name: value for value, entry in mavlink.enums["MAV_STATE"].items()}.items()
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
