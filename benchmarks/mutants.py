@@ -87,6 +87,12 @@ class Mutant:
             raise ValueError(f"{self.key}: no such place; was the source changed after the sample was drawn?")
         return str(text)
 
+    def in_function(self) -> bool:
+        """Not executed at import."""
+        tree = parso.parse((ROOT / self.path).read_text(encoding="utf-8"))
+        leaf = tree.get_leaf_for_position((self.line, self.column))
+        return leaf.search_ancestor("funcdef", "lambdef") is not None
+
     def diff(self) -> list[str]:
         """The changed lines."""
         before = (ROOT / self.path).read_text(encoding="utf-8").splitlines()
@@ -97,19 +103,21 @@ class Mutant:
 def modules() -> list[str]:
     """Paths of the modules that are mutated, relative to the project."""
     found = [path for package in PACKAGES for path in (ROOT / package).rglob("*.py")]
-    found += [
-        path
-        for path in (ROOT / KERNEL_PACKAGE).rglob("*.py")
-        if "\n@kernel\n" in path.read_text(encoding="utf-8")
-    ]
+    found += filter(_has_kernels, (ROOT / KERNEL_PACKAGE).rglob("*.py"))
     return sorted(str(path.relative_to(ROOT)) for path in found)
 
 
 def is_plain(path: str) -> bool:
-    """Whether a module is tested without Numba: kernels, and the constants that they are made of. Numba would
-    compile a mutant of these for longer than the tests take."""
-    text = (ROOT / path).read_text(encoding="utf-8")
-    return "\n@kernel\n" in text or "def " not in text
+    """Whether a module is tested without Numba: kernels, and the constants beside them that they are made of.
+    Numba would compile a mutant of these for longer than the tests take."""
+    module = ROOT / path
+    if "def " in module.read_text(encoding="utf-8"):
+        return _has_kernels(module)
+    return any(map(_has_kernels, module.parent.glob("*.py")))
+
+
+def _has_kernels(module: Path) -> bool:
+    return "\n@kernel\n" in module.read_text(encoding="utf-8")
 
 
 def mutants_of(path: str) -> Iterator[Mutant]:

@@ -126,14 +126,15 @@ class TestMap:
 
     def tests_of(self, mutant: Mutant, budget_s: float) -> dict[str, float]:
         """Those that execute the line, the quickest first; for what is executed at import, and in the middle
-        of long statements, those that execute anything of the statement, the function or the module."""
+        of long statements, those that execute anything of the statement, the function or the module; where a
+        module executes nothing but definitions, those of the package."""
         lines = self._lines[mutant.path]
         for first, last in self._places(mutant):
             found = set().union(*(lines[line] for line in range(first, last + 1) if line in lines))
             if found:
                 break
         else:
-            return {}
+            found = set() if mutant.in_function() else self._tests_of_package(mutant)
         times_s = self._times_s[is_plain(mutant.path)]
         chosen: dict[str, float] = {}
         for test in sorted(found, key=lambda test: (times_s[test], test)):
@@ -141,6 +142,11 @@ class TestMap:
                 break
             chosen[test] = times_s[test]
         return chosen
+
+    def _tests_of_package(self, mutant: Mutant) -> set[str]:
+        """For modules that execute nothing but definitions."""
+        folder = f"tests/{mutant.path.split('/')[1]}/"
+        return {test for test in self._times_s[is_plain(mutant.path)] if test.startswith(folder)}
 
     @staticmethod
     def _places(mutant: Mutant) -> Iterator[tuple[int, int]]:

@@ -11,7 +11,7 @@ from estimators.errors import EstimatorError, EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Estimator, Need
 from estimators.messages import Message
-from estimators.needs import Supply, supplies
+from estimators.needs import NOT_STREAMED, Supply, supplies
 from estimators.runner import why_unheard
 
 if TYPE_CHECKING:
@@ -90,7 +90,8 @@ def replay(
     if not (fleet.team and lacking) and served:
         try:
             for time_us, message, inside in _messages(opened, fleet, system_id, Part(from_s, to_s, boot)):
-                if inside:
+                # A parameter is told once and holds from then on, also before the part that counts.
+                if inside or message.name in NOT_STREAMED:
                     fleet.take(time_us, message)
                 else:
                     fleet.pass_over(time_us, message)

@@ -1,9 +1,10 @@
 """`flightstack vehicle`: what is connected, its parameters, its logs, its health."""
 
+import math
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
@@ -13,6 +14,8 @@ from missions.cli_vehicle_params import params
 if TYPE_CHECKING:
     from missions.preflight.finding import Finding
     from missions.vehicle_client.client import VehicleClient
+
+_SHOWN_EVERY_S: Final = 0.2
 
 
 @click.group()
@@ -86,25 +89,21 @@ def list_logs(**given: Any) -> int:
 @connected
 def download(which: str, folder: Path, **given: Any) -> int:
     """Fetch logs. Those that are in the folder already, whole, are not fetched again."""
+    from autopilot_bridge.clock.pacing import wall_time_s
     from missions.vehicle_client import logs as client_logs
 
     terminal = sys.stderr.isatty()
-
-    def progress_of(number: int) -> Callable[[float], None]:
-        def tell(done: float) -> None:
-            if terminal and done == done:
-                click.echo(f"\rlog {number}: {100.0 * done:3.0f} %", nl=False, err=True)
-
-        return tell
 
     async def work(client: "VehicleClient") -> list[dict[str, Any]]:
         got = []
         shelf = client_logs.VehicleLogs(client)
         for entry in client_logs.chosen(await shelf.entries(), which):
             there = client_logs.fetched(folder, entry)
-            path = there or await shelf.download(entry, folder, progress_of(entry.id))
-            if terminal and there is None:
-                click.echo("", err=True)
+            line = DownloadLine(entry.id, entry.size_bytes, wall_time_s if terminal else None)
+            try:
+                path = there or await shelf.download(entry, folder, line)
+            finally:
+                line.end()
             got.append(
                 {"id": entry.id, "file": str(path), "bytes": entry.size_bytes, "fetched": there is None}
             )
@@ -120,6 +119,52 @@ def download(which: str, folder: Path, **given: Any) -> int:
     if given["as_json"]:
         print_json(got)
     return 0
+
+
+class DownloadLine:
+    """How far a log has come, how fast, and how long it will take, on a line of a terminal.
+
+    Args:
+        number: of the log.
+        size_bytes: of the log.
+        monotonic: wall clock in seconds; None: there is no terminal, and nothing is shown.
+    """
+
+    def __init__(self, number: int, size_bytes: int, monotonic: Callable[[], float] | None) -> None:
+        self._number, self._size_bytes = number, size_bytes
+        self._monotonic = monotonic
+        self._begun_s: float | None = None
+        self._shown_s = -math.inf
+
+    def __call__(self, done: float) -> None:
+        """Show it, five times a second at most.
+
+        Args:
+            done: share that has come, 0..1; NaN while it is not known.
+        """
+        if self._monotonic is None or not math.isfinite(done):
+            return
+        now_s = self._monotonic()
+        if self._begun_s is None:
+            self._begun_s = now_s
+        if now_s - self._shown_s < _SHOWN_EVERY_S and done < 1.0:
+            return
+        self._shown_s = now_s
+        passed_s = now_s - self._begun_s
+        text = f"log {self._number}: {100.0 * done:3.0f} % of {self._size_bytes * 1e-6:.1f} MB"
+        if passed_s > 1.0 and done > 0.0:
+            left_s = passed_s * (1.0 - done) / done
+            text += f", {1e-3 * done * self._size_bytes / passed_s:.0f} kB/s, {_duration(left_s)} left"
+        click.echo(f"\r{text:<60}", nl=False, err=True)
+
+    def end(self) -> None:
+        """Leave the line."""
+        if self._begun_s is not None:
+            click.echo("", err=True)
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
 
 
 @logs.command()

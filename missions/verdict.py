@@ -5,6 +5,7 @@ GLOBAL_POSITION_INT, which a mission has on every vehicle; truth is for the scor
 """
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 from missions.kind import VehicleKind
 from missions.notes import PATTERN, FlightNotes, Phase
-from missions.waypoint_passes import approaches
 
 if TYPE_CHECKING:
     from missions.score import FlightScore, Track
@@ -120,15 +120,68 @@ def missed_places(
     Those that may have been passed while no position was received are left out, and with `cut_short` those
     after the last pass.
     """
-    found = approaches(places_ned_m, near_m, track.pos_ned_m)
+    distances = [_distances_m(place, track.pos_ned_m) for place in places_ned_m]
+    chosen = _passed_in_order([_stays(distance <= near_m) for distance in distances])
     gaps = np.nonzero(np.diff(track.time_s) > _GAP_S)[0]
-    passed = [k for k, approach in enumerate(found) if approach.leg is not None]
     missed = []
-    for k, approach in enumerate(found):
-        if approach.leg is not None or (cut_short and k > max(passed, default=-1)):
+    for k, distance in enumerate(distances):
+        if k in chosen or (cut_short and k > max(chosen, default=-1)):
             continue
-        before = max((found[j].leg or 0 for j in passed if j < k), default=0)
-        after = min((found[j].leg or 0 for j in passed if j > k), default=math.inf)
+        before = max((leg for j, leg in chosen.items() if j < k), default=0)
+        after = min((leg for j, leg in chosen.items() if j > k), default=len(distance) - 1)
         if not any(before <= gap <= after for gap in gaps):
-            missed.append((k, approach.miss_m))
+            missed.append((k, float(distance[before : after + 1].min())))
     return missed
+
+
+def _distances_m(place_ned_m: Array, track_ned_m: Array) -> Array:
+    """Distance (n - 1,) of a place from each leg of a track."""
+    starts, legs = track_ned_m[:-1], np.diff(track_ned_m, axis=0)
+    offset = place_ned_m - starts
+    squared = np.maximum((legs**2).sum(axis=1), 1e-12)
+    along = np.clip(np.einsum("ij,ij->i", offset, legs) / squared, 0.0, 1.0)
+    distance: Array = np.linalg.norm(offset - along[:, None] * legs, axis=1)
+    return distance
+
+
+def _stays(near: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last leg of each stretch of a track that is near a place."""
+    within = np.nonzero(near)[0]
+    if not len(within):
+        return []
+    parts = np.split(within, np.nonzero(np.diff(within) > 1)[0] + 1)
+    return [(int(part[0]), int(part[-1])) for part in parts]
+
+
+def _passed_in_order(stays: list[list[tuple[int, int]]]) -> dict[int, int]:
+    """A leg for as many places as possible, legs not decreasing, each within a stay at its place.
+
+    The longest chain: `chains[n]` is the one of n + 1 places that ends at the earliest leg.
+    """
+    chains: list[_Pass] = []
+    for k, own in enumerate(stays):
+        longer = list(chains)
+        for n in range(len(chains), -1, -1):
+            before = chains[n - 1] if n else None
+            from_leg = before.leg if before is not None else 0
+            leg = min((max(from_leg, first) for first, last in own if last >= from_leg), default=None)
+            if leg is not None and (n == len(chains) or leg < chains[n].leg):
+                longer[n : n + 1] = [_Pass(place=k, leg=leg, before=before)]
+            if n and n == len(chains) and leg is not None and len(chains) == k:
+                break  # all places so far were passed: no shorter chain is of use
+        chains = longer
+    chosen: dict[int, int] = {}
+    link = chains[-1] if chains else None
+    while link is not None:
+        chosen[link.place] = link.leg
+        link = link.before
+    return chosen
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Pass:
+    """The last place of a chain of passes, the leg of the track there, and the pass before."""
+
+    place: int
+    leg: int
+    before: "_Pass | None"

@@ -1,7 +1,6 @@
 """Which of the waypoints a track has passed, and how close."""
 
 from bisect import bisect_right
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,35 +10,15 @@ from missions.notes import CommandedPath
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Approach:
-    """How a track came to one waypoint.
-
-    Attributes:
-        miss_m: least distance.
-        leg: of the track, between two samples, where it was passed within the radius; None: it was not.
-    """
-
-    miss_m: float
-    leg: int | None
-
-
 def waypoint_misses_m(commanded: CommandedPath, track_ned_m: Array) -> tuple[float, ...]:
-    """How close the track came to each waypoint, see `approaches`."""
-    found = approaches(commanded.waypoints_ned_m, commanded.acceptance_m, track_ned_m)
-    return tuple(approach.miss_m for approach in found)
-
-
-def approaches(waypoints_ned_m: Array, radius_m: float, track_ned_m: Array) -> tuple[Approach, ...]:
-    """How a track came to each waypoint; between two samples it is straight.
+    """How close the track came to each waypoint; between two samples it is straight.
 
     Waypoints count in their order: of all ways to assign passes (within the acceptance radius) to waypoints,
     the one that has most of them. So a waypoint that was missed, and that the track happens to cross later,
     spoils no other. One without a pass has its distance between its neighbours' passes.
 
     Args:
-        waypoints_ned_m: (m, 3).
-        radius_m: within which a waypoint is passed.
+        commanded: waypoints and acceptance radius.
         track_ned_m: (n, 3).
     """
     points = track_ned_m
@@ -54,17 +33,18 @@ def approaches(waypoints_ned_m: Array, radius_m: float, track_ned_m: Array) -> t
         nearest: Array = np.linalg.norm(offset - along[:, None] * legs, axis=1)
         return nearest
 
-    chosen = _passes_in_order([_passes(distances(w), radius_m) for w in waypoints_ned_m])
-    found: list[Approach] = []
-    for k, waypoint in enumerate(waypoints_ned_m):
+    waypoints = commanded.waypoints_ned_m
+    chosen = _passes_in_order([_passes(distances(w), commanded.acceptance_m) for w in waypoints])
+    misses: list[float] = []
+    for k, waypoint in enumerate(waypoints):
         distance = distances(waypoint)
         if k in chosen:
-            found.append(Approach(miss_m=float(distance[chosen[k]]), leg=chosen[k]))
+            misses.append(float(distance[chosen[k]]))
             continue
         before = max((leg for j, leg in chosen.items() if j < k), default=0)
         after = min((leg for j, leg in chosen.items() if j > k), default=len(distance) - 1)
-        found.append(Approach(miss_m=float(distance[before : after + 1].min()), leg=None))
-    return tuple(found)
+        misses.append(float(distance[before : after + 1].min()))
+    return tuple(misses)
 
 
 def _passes(distance: Array, radius_m: float) -> list[int]:

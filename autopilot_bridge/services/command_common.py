@@ -161,7 +161,6 @@ class CommandHandlers(ABC):
             mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self.request_capabilities,
             mavlink.MAV_CMD_GET_HOME_POSITION: self.get_home_position,
             mavlink.MAV_CMD_RUN_PREARM_CHECKS: self.run_prearm_checks,
-            mavlink.MAV_CMD_INJECT_FAILURE: self.inject_failure,
         }
 
     def execute(self, command: Command, source: Source) -> Result | None:
@@ -233,17 +232,6 @@ class CommandHandlers(ABC):
             return Result.TEMPORARILY_REJECTED
         self.commander.check_arming()
         return Result.ACCEPTED
-
-    def inject_failure(self, command: Command, source: Source) -> Result:
-        """INJECT_FAILURE: p1 FAILURE_UNIT, p2 FAILURE_TYPE, p3 instance (0: all)."""
-        unit, kind, instance = whole(command.p1), whole(command.p2), whole(command.p3, 0)
-        if self.hooks.inject_failure is None:
-            return Result.UNSUPPORTED
-        parameters = self.hooks.parameters
-        disabled = "SYS_FAILURE_EN" in parameters and not parameters.get("SYS_FAILURE_EN")
-        if disabled or unit is None or kind is None or instance is None:
-            return Result.DENIED
-        return self.hooks.inject_failure(unit, kind, instance)
 
     # places
 

@@ -42,6 +42,7 @@ class Px4Commands(CommandHandlers):
             mavlink.MAV_CMD_MISSION_START: self.start_mission,
             mavlink.MAV_CMD_DO_LAND_START: self.land_start,
             mavlink.MAV_CMD_DO_FLIGHTTERMINATION: self.refuse,
+            mavlink.MAV_CMD_INJECT_FAILURE: self.inject_failure,
             mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION: self.request_protocol_version,
             mavlink.MAV_CMD_DO_DIGICAM_CONTROL: self.silence,
             mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW: self.silence,
@@ -154,6 +155,16 @@ class Px4Commands(CommandHandlers):
         if start is None or not self.hooks.set_current_item(start):
             return Result.CANCELLED
         return self.commander.set_mode(FlightMode.MISSION).result
+
+    def inject_failure(self, command: Command, source: Source) -> Result:
+        """INJECT_FAILURE: p1 FAILURE_UNIT, p2 FAILURE_TYPE, p3 instance (0: all)."""
+        unit, kind, instance = whole(command.p1), whole(command.p2), whole(command.p3, 0)
+        if self.hooks.inject_failure is None:
+            return Result.UNSUPPORTED
+        enabled = bool(self.hooks.parameters.get("SYS_FAILURE_EN"))
+        if not enabled or unit is None or kind is None or instance is None:
+            return Result.DENIED
+        return self.hooks.inject_failure(unit, kind, instance)
 
     def refuse(self, command: Command, source: Source) -> Result:
         """DENIED, as the release does (flight termination is off by a circuit breaker)."""

@@ -38,7 +38,7 @@ class StudioSetup:
 
     cameras: tuple[CameraSetup, ...]
     scenery: Scenery = field(default_factory=Scenery)
-    width_px: int = 640
+    width_px: int = 1280
     rate_hz: float = 20.0
 
 

@@ -52,7 +52,7 @@ class VideoParameters:
     port: int | None = DEFAULT_PORT
     any_port: bool = True
     folder: Path | None = None
-    width_px: int = 640
+    width_px: int = 1280
     rate_hz: float = 20.0
 
     def __post_init__(self) -> None:

@@ -58,11 +58,13 @@ def open_ulog(path: Path) -> MappedSource:
         raise LogError(
             f"{path} can't be read as a PX4 .ulg: {type(error).__name__} {error}; is it whole?"
         ) from error
+    base_us = _base_us(log)
     topics: dict[tuple[str, int], Records] = {}
     parts: list[Part] = []
     names_taken: dict[str, int] = {}
     for number, data in enumerate(sorted(log.data_list, key=lambda item: (item.name, item.multi_id))):
         times = np.asarray(data.data[_TIME], dtype=np.uint64)
+        times = np.where(times < base_us, np.uint64(0), times - base_us)  # 0: a message without a time
         good = times < _MAX_TIME_US
         columns = _arrays({name: np.asarray(column)[good] for name, column in data.data.items()})
         if not columns or not np.any(good):
@@ -77,9 +79,10 @@ def open_ulog(path: Path) -> MappedSource:
     if not parts:
         raise LogError(f"{path} holds no messages; is it a PX4 .ulg, and whole?")
     size_bytes = path.stat().st_size
-    offset_us = _unix_offset_us(topics)
+    offset_us = _unix_offset_us(topics) if not base_us else int(base_us)
     facts = UlogFacts(
         texts=log.logged_messages,
+        base_us=int(base_us),
         parameters={str(name): float(value) for name, value in log.initial_parameters.items()},
         version=int(log.msg_info_dict.get("ver_sw_release", 0) or 0),
     )
@@ -133,6 +136,18 @@ def _arrays(columns: dict[str, Array]) -> dict[str, Array]:
             single |= {f"{name}[{index}]": part for index, part in parts.items()}
     named = {re.sub(r"\W+", "_", name).strip("_"): column for name, column in single.items()}
     return {name: column for name, column in named.items() if name.isidentifier()}
+
+
+def _base_us(log: ULog) -> np.uint64:
+    """Time of the file at vehicle time 0.
+
+    Simulated vehicles without lockstep count microseconds of the calendar: then it is the log's earliest.
+    """
+    if log.start_timestamp < _MAX_TIME_US:
+        return np.uint64(0)
+    stamps = (np.asarray(data.data[_TIME], dtype=np.uint64) for data in log.data_list)
+    firsts = [times[times >= _MAX_TIME_US].min() for times in stamps if np.any(times >= _MAX_TIME_US)]
+    return np.uint64(min([log.start_timestamp, *firsts]))
 
 
 def _unix_offset_us(topics: dict[tuple[str, int], Records]) -> int | None:

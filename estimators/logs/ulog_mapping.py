@@ -54,11 +54,13 @@ class UlogFacts:
 
     Attributes:
         texts: pyulog's logged messages.
+        base_us: time of the file at vehicle time 0.
         parameters: of the vehicle, as the log began.
         version: `ver_sw_release`; 0: not known.
     """
 
     texts: Iterable[Any]
+    base_us: int
     parameters: Mapping[str, float]
     version: int
 
@@ -80,7 +82,7 @@ def map_topics(topics: Topics, facts: UlogFacts, unix_offset_us: int | None) -> 
         *_gps(topics),
         *_state(topics),
         *_truth(topics),
-        *_texts(facts.texts),
+        *_texts(facts.texts, facts.base_us),
         *_vehicle(topics, facts),
     ]
     if unix_offset_us is not None:
@@ -375,8 +377,8 @@ def _truth(topics: Topics) -> list[Part]:
     ]
 
 
-def _texts(texts: Iterable[Any]) -> list[Part]:
-    rows = [(int(item.timestamp), _severity(item.log_level), str(item.message)) for item in texts]
+def _texts(texts: Iterable[Any], base_us: int) -> list[Part]:
+    rows = [(int(item.timestamp) - base_us, _severity(item.log_level), str(item.message)) for item in texts]
     if not rows:
         return []
     text = np.array([message.encode("ascii", "replace")[:50] for _, _, message in rows], dtype="S50")

@@ -7,7 +7,14 @@ map with targets' signatures in it. All read the vehicle's truth and give measur
 from flightsim.payload.camera import Camera, CameraParameters
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal, gimbal_from_camera
 from flightsim.payload.camera_view import CameraView, TargetView
-from flightsim.payload.detection import CameraFrame, Detection, DetectionModel, ResolutionDetection
+from flightsim.payload.detection import (
+    CameraFrame,
+    Detection,
+    DetectionModel,
+    PictureDetection,
+    ResolutionDetection,
+    SeenTargets,
+)
 from flightsim.payload.gimbal import LEVEL, Gimbal, GimbalFlags, GimbalParameters
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
@@ -59,9 +66,11 @@ __all__ = [
     "MainField",
     "Payload",
     "PayloadParameters",
+    "PictureDetection",
     "PinholeModel",
     "RandomWalk",
     "ResolutionDetection",
+    "SeenTargets",
     "Signature",
     "Static",
     "SurveyMagnetometer",

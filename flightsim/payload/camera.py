@@ -15,7 +15,13 @@ from flightsim.home import Home
 from flightsim.payload import camera_kernel as k
 from flightsim.payload.camera_model import PinholeModel
 from flightsim.payload.camera_view import CameraView, TargetView, Vector
-from flightsim.payload.detection import CameraFrame, Detection, DetectionModel, ResolutionDetection
+from flightsim.payload.detection import (
+    CameraFrame,
+    Detection,
+    DetectionModel,
+    PictureDetection,
+    SeenTargets,
+)
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.targets import NO_TAG, GroundTargets
@@ -35,7 +41,10 @@ class CameraParameters:
         model: its geometry.
         rate_hz: frames per second.
         latency_s: from exposure to the detections; rounded to physics steps.
+        exposure_s: time in which a picture is taken; motion blurs it for the detector.
         pixel_noise_px: one sigma of a detection's place, each axis.
+        quantum_px: step of a detection's place; the middle of four corners in whole pixels has steps of a
+            quarter.
         size_noise: one sigma of a detection's size, as a share of it.
         tag_range: tell the distance of tagged targets from their apparent size, as AprilTag detectors do. The
             size is then as good as the pixels: `pixel_noise_px` / sqrt(2) for the mean side of four corners.
@@ -55,10 +64,12 @@ class CameraParameters:
     model: PinholeModel = field(default_factory=PinholeModel)
     rate_hz: int = 10
     latency_s: float = 0.1
+    exposure_s: float = 0.004
     pixel_noise_px: float = 1.0
+    quantum_px: float = 0.25
     size_noise: float = 0.1
     tag_range: bool = False
-    detection: DetectionModel = field(default_factory=ResolutionDetection)
+    detection: DetectionModel = field(default_factory=PictureDetection)
     max_range_m: float = 2000.0
     min_depression_rad: float = math.radians(3.0)
     false_detections_per_frame: float = 0.0
@@ -78,7 +89,9 @@ class CameraParameters:
             raise ValueError(f"max_zoom = {self.max_zoom!r} is not accepted: a number from 1 is")
         require_not_negative(
             latency_s=self.latency_s,
+            exposure_s=self.exposure_s,
             pixel_noise_px=self.pixel_noise_px,
+            quantum_px=self.quantum_px,
             size_noise=self.size_noise,
             min_depression_rad=self.min_depression_rad,
             false_detections_per_frame=self.false_detections_per_frame,
@@ -108,6 +121,7 @@ class Camera:
     """
 
     __slots__ = (
+        "_before_us",
         "_clutter",
         "_constants",
         "_countdown",
@@ -117,15 +131,20 @@ class Camera:
         "_home_frame",
         "_interval_steps",
         "_latency_us",
+        "_no_noise",
         "_normals",
         "_number",
+        "_q_before",
         "_q_frd_from_mount",
         "_row",
+        "_step_s",
         "_targets",
         "_truth",
         "_uniforms",
+        "_vehicle_before_ned_m",
         "_vehicle_ned_m",
         "_view",
+        "_view_before",
         "_waiting",
         "_zoom",
         "focus_distance_m",
@@ -182,6 +201,13 @@ class Camera:
         self._constants[k.POSITION_FRD_M] = p.position_frd_m
         self._constants[k.PIXEL_NOISE] = p.pixel_noise_px
         self._constants[k.SIZE_NOISE] = p.size_noise
+        self._constants[k.QUANTUM_PX] = p.quantum_px
+        self._step_s = 1.0 / physics_rate_hz
+        self._q_before: Array = np.zeros((2, 4))
+        self._vehicle_before_ned_m: Array = np.zeros(3)
+        self._before_us = -1
+        self._view_before: Array = np.zeros((len(targets), k.VIEW))
+        self._no_noise: Array = np.zeros((len(targets), 3))
         self._vehicle_ned_m: Array = np.zeros(3)
         self._view: Array = np.zeros((len(targets), k.VIEW))
         self._clutter = np.random.Generator(np.random.PCG64(seeds("camera")))
@@ -256,6 +282,8 @@ class Camera:
         """One physics step; the frame that is delivered on it, if there is one."""
         if self._countdown:
             self._countdown -= 1
+            if self._countdown == 0:
+                self._note_pose(time_us)
         else:
             self._countdown = self._interval_steps - 1
             self._waiting.append(self._expose(time_us))
@@ -303,7 +331,15 @@ class Camera:
             return []
         visible = np.flatnonzero(~np.isnan(view[:, k.SIZE_PX]))
         probability = self.parameters.detection.probability(
-            view[visible, k.SIZE_PX], view[visible, k.RANGE_M]
+            SeenTargets(
+                size_px=view[visible, k.SIZE_PX],
+                range_m=view[visible, k.RANGE_M],
+                sine=view[visible, k.SINE],
+                blur_px=self._blur_px(time_us)[visible],
+                edge_px=view[visible, k.EDGE_PX],
+                covered=_covered(view[visible]),
+                tagged=targets.tag_ids[visible] != NO_TAG,
+            )
         )
         found = []
         for i in visible[uniforms[visible] < probability].tolist():
@@ -315,6 +351,35 @@ class Camera:
                 )
             found.append(self._detection(time_us, u_px, v_px, size_rad, tag, distance_m))
         return found
+
+    def _note_pose(self, time_us: int) -> None:
+        """Keep the pose of the step before an exposure: the difference is the motion that blurs."""
+        self._before_us = time_us
+        self._q_before[0] = self._truth[t.Q_NED_FROM_FRD]
+        self._q_before[1] = self._q_frd_from_mount if self._gimbal is None else self._gimbal.q_frd_from_gimbal
+        self._vehicle_before_ned_m[:] = self._home_frame.position_ned_m(self._truth)
+
+    def _blur_px(self, time_us: int) -> Array:
+        """Ways (n,) of the targets in the picture during the exposure; 0 where it isn't known."""
+        view, before = self._view, self._view_before
+        passed_s = (time_us - self._before_us) * 1e-6
+        if self._before_us < 0 or not 0.0 < passed_s < 1.5 * self._step_s:
+            return np.zeros(len(view))
+        k.look(
+            self._q_before[0],
+            self._q_before[1],
+            self._vehicle_before_ned_m,
+            self._targets.positions_ned_m,
+            self._targets.sizes_m,
+            self._constants,
+            self._no_noise,
+            before,
+        )
+        moved_px = np.hypot(
+            view[:, k.TRUE_U_PX] - before[:, k.TRUE_U_PX], view[:, k.TRUE_V_PX] - before[:, k.TRUE_V_PX]
+        )
+        blur_px: Array = np.where(np.isnan(before[:, k.SIZE_PX]), 0.0, moved_px)
+        return blur_px * (self.parameters.exposure_s / passed_s)
 
     def _tag_range(self, size_px: float, size_m: float, normal: float) -> tuple[float, float]:
         """Apparent size and distance of a tag, from its corners with their noise."""
@@ -353,3 +418,14 @@ class Camera:
         angle_x_rad = math.atan2(u_px - u0_px, self._focal_px)
         angle_y_rad = math.atan2(v_px - v0_px, self._focal_px)
         return Detection(time_us, u_px, v_px, angle_x_rad, angle_y_rad, size_rad, target_id, distance_m)
+
+
+def _covered(view: Array) -> NDArray[np.bool_]:
+    """Which of the visible targets (n, VIEW) another one, which is nearer, overlaps in the picture."""
+    if len(view) < 2:
+        return np.zeros(len(view), dtype=np.bool_)
+    u, v, size = view[:, k.TRUE_U_PX], view[:, k.TRUE_V_PX], view[:, k.SIZE_PX]
+    apart_px = np.hypot(u[:, None] - u, v[:, None] - v)
+    nearer = view[None, :, k.RANGE_M] < view[:, None, k.RANGE_M]
+    overlaps = nearer & (apart_px < 0.5 * (size[:, None] + size))
+    return np.asarray(np.any(overlaps, axis=1), dtype=np.bool_)

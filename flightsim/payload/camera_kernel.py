@@ -20,7 +20,8 @@ MIN_SINE: Final = 4  # of the depression
 POSITION_FRD_M: Final = slice(5, 8)
 PIXEL_NOISE: Final = 8
 SIZE_NOISE: Final = 9
-CONSTANTS: Final = 10
+QUANTUM_PX: Final = 10
+CONSTANTS: Final = 11
 
 # one row for each target
 U_PX: Final = 0  # as measured
@@ -28,7 +29,11 @@ V_PX: Final = 1
 SIZE_RAD: Final = 2  # as measured
 SIZE_PX: Final = 3  # true; NaN: not visible
 RANGE_M: Final = 4
-VIEW: Final = 5
+SINE: Final = 5  # of the line of sight's depression below the horizon
+EDGE_PX: Final = 6  # from the true place to the nearest edge of the picture
+TRUE_U_PX: Final = 7
+TRUE_V_PX: Final = 8
+VIEW: Final = 9
 
 _MIN_RANGE_M: Final = 1e-6
 
@@ -61,6 +66,7 @@ def look(
             sight[axis] = targets_ned_m[i, axis] - eye[axis]
         range_m = max(_MIN_RANGE_M, math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2))
         out[i, RANGE_M] = range_m
+        out[i, SINE] = sight[2] / range_m
         if range_m > constants[MAX_RANGE_M] or sight[2] < constants[MIN_SINE] * range_m:
             continue
         rotate_inverse(q_ned_from_frd, sight, body)
@@ -71,8 +77,14 @@ def look(
         v_px = 0.5 * height_px + focal_px * gimbal[2] / gimbal[0]
         if not (0.0 <= u_px < width_px and 0.0 <= v_px < height_px):
             continue
+        out[i, TRUE_U_PX], out[i, TRUE_V_PX] = u_px, v_px
+        out[i, EDGE_PX] = min(u_px, v_px, width_px - u_px, height_px - v_px)
         u_px += constants[PIXEL_NOISE] * normals[i, 0]
         v_px += constants[PIXEL_NOISE] * normals[i, 1]
+        quantum_px = constants[QUANTUM_PX]
+        if quantum_px > 0.0:
+            u_px = math.floor(u_px / quantum_px + 0.5) * quantum_px
+            v_px = math.floor(v_px / quantum_px + 0.5) * quantum_px
         if not (0.0 <= u_px < width_px and 0.0 <= v_px < height_px):
             continue
         size_rad = 2.0 * math.atan(0.5 * sizes_m[i] / range_m)

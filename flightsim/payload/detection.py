@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_not_negative, require_probability
+from flightsim.checks import require_not_negative, require_positive, require_probability
 from flightsim.payload.targets import NO_TAG
 
 Array = NDArray[np.float64]
@@ -57,11 +57,83 @@ class CameraFrame:
     detections: tuple[Detection, ...]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeenTargets:
+    """Targets in one picture, as far as their detection depends on it; arrays (n,).
+
+    Attributes:
+        size_px: side of a tag, or diameter, as if seen from right above.
+        range_m: distance.
+        sine: of the depression of the line of sight: how much a tag on the ground is foreshortened.
+        blur_px: way of the target in the picture during the exposure.
+        edge_px: from its middle to the nearest edge of the picture.
+        covered: another target stands before it.
+        tagged: it is a tag, and no ball.
+    """
+
+    size_px: Array
+    range_m: Array
+    sine: Array
+    blur_px: Array
+    edge_px: Array
+    covered: NDArray[np.bool_]
+    tagged: NDArray[np.bool_]
+
+
 class DetectionModel(Protocol):
     """How likely a target in the image is detected."""
 
-    def probability(self, size_px: Array, range_m: Array) -> Array:
-        """Probabilities (n,) from the size in the image and the distance of each target."""
+    def probability(self, seen: SeenTargets) -> Array:
+        """Probabilities (n,)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PictureDetection:
+    """Detection as OpenCV's detectors do it in pictures of the size of the model: a logistic curve over the
+    size.
+
+    Tags of the family 36h11 by `cv2.aruco`, balls by their colour. A tag on the ground is foreshortened, so
+    the size that counts is size_px * sine^foreshortening; blur b asks for a size of sqrt(half_size_px^2 +
+    (blur_factor b)^2) where half of the tags are read. What touches the edge of the picture, or is covered
+    by another target, is not read. The defaults are fits to rendered pictures, by `python
+    benchmarks/camera_detection.py`.
+
+    Attributes:
+        max_probability: of a target that fills many pixels.
+        half_size_px, slope_px: of a tag seen from above: size with half of that left, and width of the fall.
+        foreshortening: exponent.
+        blur_factor: of motion, in pixels of size for each pixel of blur.
+        ball_half_size_px, ball_slope_px: of a ball; it isn't foreshortened, and blur doesn't hide it.
+    """
+
+    max_probability: float = 0.998
+    half_size_px: float = 10.7
+    slope_px: float = 1.03
+    foreshortening: float = 0.742
+    blur_factor: float = 3.4
+    ball_half_size_px: float = 2.01
+    ball_slope_px: float = 0.042
+
+    def __post_init__(self) -> None:
+        require_probability(max_probability=self.max_probability)
+        require_not_negative(
+            half_size_px=self.half_size_px,
+            foreshortening=self.foreshortening,
+            blur_factor=self.blur_factor,
+            ball_half_size_px=self.ball_half_size_px,
+        )
+        require_positive(slope_px=self.slope_px, ball_slope_px=self.ball_slope_px)
+
+    def probability(self, seen: SeenTargets) -> Array:
+        """The curve at each target."""
+        across_px = seen.size_px * np.maximum(seen.sine, 0.0) ** self.foreshortening
+        half_px = np.hypot(self.half_size_px, self.blur_factor * seen.blur_px)
+        tag = (across_px - half_px) / self.slope_px
+        ball = (seen.size_px - self.ball_half_size_px) / self.ball_slope_px
+        share = 0.5 * (1.0 + np.tanh(0.5 * np.where(seen.tagged, tag, ball)))
+        whole = (seen.edge_px >= 0.5 * seen.size_px) & ~seen.covered
+        value: Array = np.where(whole, self.max_probability * share, 0.0)
+        return value
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,9 +161,9 @@ class ResolutionDetection:
         """The same probability for every target in the image."""
         return cls(max_probability=probability, half_size_px=0.0, slope_px=0.0)
 
-    def probability(self, size_px: Array, range_m: Array) -> Array:
+    def probability(self, seen: SeenTargets) -> Array:
         """The curve at each size."""
-        above = size_px - self.half_size_px
+        above = seen.size_px - self.half_size_px
         if self.slope_px == 0.0:
             return np.where(above >= 0.0, self.max_probability, 0.0)
         share: Array = 0.5 * (1.0 + np.tanh(0.5 * above / self.slope_px))

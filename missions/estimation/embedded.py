@@ -129,10 +129,15 @@ class FlightEstimators:
                 settings=self._settings,
                 picture=picture,
                 wall_time_s=wall_time_s,
-                failure=self._tap.failure if self._tap is not None else "",
+                failure=self._failure,
             ),
             summary_file=False,
         )
+
+    @property
+    def _failure(self) -> str:
+        failure = "" if self._tap is None else self._tap.failure
+        return failure or ("" if self._watch is None else self._watch.starvation)
 
     async def _serve(self, clock: "Clock") -> None:
         assert self._watch is not None

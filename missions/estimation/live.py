@@ -137,6 +137,11 @@ class _Process:
         self.stopped = True
         self._stop.set()
 
+    @property
+    def starvation(self) -> str:
+        """What the estimator had to do without for too long; "" if nothing."""
+        return self._watch.starvation
+
     def figures(self) -> dict[str, Any]:
         """What became of the bytes of the link, and what was sent."""
         return {
@@ -290,7 +295,8 @@ def estimate(
             recorder.close()
     finally:
         link.close()
-    reason = process.reason or recorder.failure  # a full disk may refuse no more than the last of the log
+    # A full disk may refuse no more than the last of the log.
+    reason = process.reason or recorder.failure or process.starvation
     interrupted = process.stopped and request.duration_s is not None
     return report(
         ReportRequest(

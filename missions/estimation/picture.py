@@ -44,7 +44,7 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
         (c, column)
         for c in compared
         for column in c.estimates
-        if (c, column) not in shown and column not in _NOT_DRAWN
+        if (c, column) not in shown and column not in _NOT_DRAWN and np.isfinite(c.estimates[column]).any()
     ]
     left_out = max(0, len(alone) - _MOST_ALONE)
     alone = alone[:_MOST_ALONE]

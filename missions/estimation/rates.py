@@ -14,6 +14,9 @@ CHECK_PERIOD_S: Final = 2.0
 """Vehicle time over which rates are measured; an autopilot answers a request within it."""
 _MARGIN: Final = 1.25
 """What would just do is asked for with so much to spare."""
+_STARVED_SHARE: Final = 0.1
+_STARVED_S: Final = 6.0
+"""Without what it needs for so long, and for a tenth of its time, an estimator has not done its work."""
 _ROUNDS: Final = 3
 """How often each alternative of what would only be nice to have is asked for."""
 
@@ -41,6 +44,8 @@ class RateWatch:
     Attributes:
         lacking: what is missing at the newest look, in words.
         enough: rates have been measured, and nothing is missing.
+        measured_s: vehicle time that was measured since there was enough for the first time.
+        starved_s: the part of it in which something was missing.
     """
 
     def __init__(self, needs: Sequence[Need], heard: Mapping[tuple[int, int], int]) -> None:
@@ -51,6 +56,19 @@ class RateWatch:
         self._asked: Counter[tuple[int, int]] = Counter()
         self.lacking: list[str] = []
         self.enough = False
+        self.measured_s = 0.0
+        self.starved_s = 0.0
+        self._missed = ""
+
+    @property
+    def starvation(self) -> str:
+        """Why the estimator could not do its work: messages that came, and then did not; "" if they came.
+
+        What never came in the needed rate is in the log, and is found there.
+        """
+        if self.starved_s < _STARVED_S or self.starved_s < _STARVED_SHARE * self.measured_s:
+            return ""
+        return f"starved for {self.starved_s:.0f} s of {self.measured_s:.0f} s: {self._missed}"
 
     def restart(self) -> None:
         """Begin the measurement anew, where time has changed its base."""
@@ -84,6 +102,11 @@ class RateWatch:
                 asked = self._to_ask(system_id, index, need, rate_hz)
                 requests += [(system_id, name, asked_hz) for name, asked_hz in asked]
         self.enough = not self.lacking
+        if self.enough or self.measured_s:
+            self.measured_s += elapsed_s
+        if self.lacking and self.measured_s:
+            self.starved_s += elapsed_s
+            self._missed = self._missed or "; ".join(self.lacking)
         return requests
 
     def _rate_of(

@@ -39,7 +39,7 @@ class OrbitMission(Mission[OrbitOptions]):
                     speed_m_s=options.target_speed_m_s,
                     course_rad=options.target_heading_rad,
                     range_m=WANDERING_M,
-                    size_m=4.0,
+                    size_m=options.tag_size_m,
                 ),
             ),
             camera=True,

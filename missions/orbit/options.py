@@ -23,6 +23,12 @@ class AttitudeFrom(StrEnum):
     """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
 
 
+_TAG_PX: Final = 24.0  # as seen from above; half the tags of 11 pixels are read
+_FORESHORTENING: Final = 0.742  # size that counts: times the sine of the depression to this power
+_FOCAL_PX: Final = 1108.5  # of the embedded camera, 1280 pixels over 60 degrees
+_LEAST_TAG_M: Final = 4.0
+
+
 class GpsOff(StrEnum):
     """How GPS is switched off for the orbit."""
 
@@ -119,6 +125,16 @@ class OrbitOptions(MissionOptions):
     def height_over_target_m(self) -> float:
         """Of this vehicle."""
         return self.own_altitude_m - self.target_ground_m
+
+    @property
+    def tag_size_m(self) -> float:
+        """Side of the embedded world's tag: one that its camera reads from the orbit, and from somewhat
+        farther.
+        """
+        height_m = self.height_over_target_m
+        range_m = math.hypot(height_m, self.radius_m)
+        foreshortened = max(height_m / range_m, math.sin(LEAST_DEPRESSION_RAD)) ** _FORESHORTENING
+        return max(_LEAST_TAG_M, _TAG_PX * range_m / (_FOCAL_PX * foreshortened))
 
     @property
     def entry_course_rad(self) -> float:

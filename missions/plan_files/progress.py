@@ -2,6 +2,7 @@
 
 from typing import Any, Final
 
+from autopilot_bridge.mavlink import dialect
 from missions.errors import MissionError, VehicleTimeout
 from missions.notes import PATTERN
 from missions.plan_files.document import MissionDocument
@@ -109,6 +110,8 @@ class MissionWatch:
             raise MissionError(f"the vehicle disarmed at {self._here()}; {vehicle.heard()}")
         if message.custom_mode == modes[Mode.RETURN] and self._flown and self.lands:
             return True  # the mission's own return
+        if self._flown and self.lands and vehicle.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND:
+            return False  # PX4 holds from the touch-down on, and disarms after that
         if not self._mode.left(message.custom_mode):
             return False
         # After the last item PX4 holds and ArduPilot's plane returns; a return may be the last item.

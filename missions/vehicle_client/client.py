@@ -73,6 +73,18 @@ class VehicleClient:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
+    @asynccontextmanager
+    async def quiet(self) -> AsyncIterator[None]:
+        """A block in which nothing is kept, for transfers of many messages.
+
+        MAVSDK would turn each of them into text for us: more than half of a download's processor time here.
+        """
+        await self.stop()
+        try:
+            yield
+        finally:
+            self.start()
+
     async def _keep_messages(self) -> None:
         async for message in self.direct.subscribe_message(""):
             if message.component_id != _AUTOPILOT or message.system_id != self.system_id:

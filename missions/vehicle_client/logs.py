@@ -60,9 +60,10 @@ class VehicleLogs:
         for _ in range(_TRIES):
             part.unlink(missing_ok=True)  # MAVSDK writes no file that is there
             try:
-                async for _result, data in self._plugin.download_log_file(entry, str(part)):
-                    if data is not None:
-                        progress(float(data.progress))
+                async with self._client.quiet():
+                    async for _result, data in self._plugin.download_log_file(entry, str(part)):
+                        if data is not None:
+                            progress(float(data.progress))
                 failure = ""
                 break
             except LogFilesError as error:

@@ -8,6 +8,7 @@ from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from missions import telemetry
 from missions.errors import MissionError
 from missions.notes import PATTERN
+from missions.planning.flyable import FlyablePath
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 from missions.vehicle.guided import AnySetpoint
 from missions.vehicle.setpoint import Setpoint
@@ -74,6 +75,30 @@ async def _to_the_start(vehicle: Vehicle, flight: PatternFlight, effect: TurnEff
     )
 
 
+def path_point(
+    route: FlyablePath, arc_m: float, speed_m_s: float, lead_s: float, height_m: float
+) -> Setpoint:
+    """The point of a path where the aircraft is, and as velocity the direction of the path a moment ahead.
+
+    PX4's guidance demands V * 4 pi damping / period * sin(angle to that direction). In a bend, the direction
+    of the path so long ahead makes this the acceleration of the bend. It is not sent as an acceleration,
+    since PX4 1.16.1 takes the curvature from it with the wrong sign on an aircraft.
+
+    Args:
+        route: of the pattern.
+        arc_m: where along it the aircraft is.
+        speed_m_s: over ground.
+        lead_s: period / (4 pi damping) of the guidance.
+        height_m: above home.
+    """
+    (north, east), _, _ = route.at(arc_m)
+    _, course, _ = route.at(arc_m + lead_s * speed_m_s)
+    return Setpoint(
+        position_ned_m=(north, east, -height_m),
+        velocity_ned_m_s=(speed_m_s * math.cos(course), speed_m_s * math.sin(course), 0.0),
+    )
+
+
 def _measure(vehicle: Vehicle, effect: TurnEffect) -> None:
     position, attitude = vehicle.latest(telemetry.Position), vehicle.latest(telemetry.Attitude)
     if position is not None and attitude is not None:
@@ -85,8 +110,9 @@ async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
     """How long before it a bend is commanded; for banks, as quick as the aircraft's own guidance is tuned."""
     bank_max_rad = _BANK_SHARE * flight.limits.bank_max_rad
     if not vehicle.adapter.roll_alone:
-        roll_s = min(3.0, max(0.1, await vehicle.parameter_or("FW_R_TC", 0.4)))
-        return PathRollParameters(lead_s=roll_s, bank_max_rad=bank_max_rad)
+        period_s = max(1.0, await vehicle.parameter_or("NPFG_PERIOD", 10.0))
+        damping = max(0.1, await vehicle.parameter_or("NPFG_DAMPING", 0.7))
+        return PathRollParameters(lead_s=period_s / (4.0 * math.pi * damping), bank_max_rad=bank_max_rad)
     period_s = max(1.0, await vehicle.parameter_or("NAVL1_PERIOD", 17.0))
     roll_s = min(3.0, max(0.1, await vehicle.parameter_or("RLL2SRV_TCONST", 0.5)))
     return PathRollParameters(
@@ -125,19 +151,12 @@ class _Stream:
         return False
 
     def point(self, _time_s: float) -> AnySetpoint | None:
-        """For PX4: the path's nearest point, its direction as velocity, its bend as acceleration."""
+        """For PX4: a point of the path."""
         if not self._go_on():
             return None
-        place, route = self._place, self._flight.route
-        speed = place.ground_speed_m_s
-        (north, east), course, _ = route.at(place.arc_m)
-        _, _, bend = route.at(place.arc_m + self._lead_s * speed)
-        push = speed * speed * bend
-        return Setpoint(
-            position_ned_m=(north, east, -self._flight.options.own_altitude_m),
-            velocity_ned_m_s=(speed * math.cos(course), speed * math.sin(course), 0.0),
-            acceleration_ned_m_s2=(-push * math.sin(course), push * math.cos(course), 0.0),
-        )
+        place = self._place
+        height_m = self._flight.options.own_altitude_m
+        return path_point(self._flight.route, place.arc_m, place.ground_speed_m_s, self._lead_s, height_m)
 
     def roll(self, _time_s: float) -> AnySetpoint | None:
         """For ArduPilot's plane, which takes no path: the bank that follows it."""

@@ -161,10 +161,15 @@ def test_follow_me(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest
 
 
 @compatibility(feature="failure")
-def test_failure(mavsdk: Session, vehicle: str) -> None:
+def test_failure(mavsdk: Session, vehicle: str, request: pytest.FixtureRequest) -> None:
     from mavsdk.plugins.failure import FailureType, FailureUnit
 
     land(mavsdk)
+    if vehicle == "ardupilot":
+        arguments = (FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
+        assert rejected(mavsdk, "failure", "inject", *arguments) == "UNSUPPORTED"
+        not_offered(request, "the firmware has no such command; its SIM_ parameters switch failures")
+        return
     mavsdk.call("failure", "inject", FailureUnit.SENSOR_GPS, FailureType.OFF, 0)
     mavsdk.first("telemetry", "health", lambda health: not health.is_global_position_ok)
     mavsdk.call("failure", "inject", FailureUnit.SENSOR_GPS, FailureType.OK, 0)

@@ -52,6 +52,8 @@ def test_auto_from_take_off_to_auto_disarm() -> None:
         client.next("PARAM_VALUE", lambda m: m.param_id == "RTL_AUTOLAND" and m.param_value == 3)
         client.arm()
         for seq in range(1, len(items)):
+            if items[seq + 1 : seq + 2] and items[seq + 1].command == mavlink.MAV_CMD_DO_LAND_START:
+                continue  # of a waypoint and the DO_ item behind it the firmware reports the latter alone
             client.next("MISSION_ITEM_REACHED", lambda m, seq=seq: m.seq == seq)
         client.landed_and_disarmed()
         place = client.next("GLOBAL_POSITION_INT")

@@ -61,7 +61,7 @@ class Flight:
             mavlink.VIDEO_STREAM_TYPE_RTSP,
             mavlink.VIDEO_STREAM_ENCODING_H264,
         )
-        assert (asked.resolution_h, asked.resolution_v) == (640, 360)
+        assert (asked.resolution_h, asked.resolution_v) == (1280, 720)
         return str(asked.uri)
 
 
@@ -123,7 +123,7 @@ def test_video_capture_shows_the_target_where_the_detector_says(flight: Flight) 
     picture = picture_where(capture, lambda p: 0 in tags(p), "tag 0")
     seen += flight.heard("LANDING_TARGET")
     height, width = picture.shape[:2]
-    assert (width, height) == (640, 360)
+    assert (width, height) == (1280, 720)
     middle = tags(picture)[0]
     focal_px = 0.5 * width / math.tan(math.radians(30.0))
     told = [

@@ -132,6 +132,7 @@ def test_the_distance_outside_is_measured_from_home(bearing_rad: float) -> None:
         HOME_AWAY[2] - 10.0,
     )
     parameters = FenceParameters(enabled=True, radius_m=50.0)
+    assert (watch.breaches, watch.breach_time_us) == (0, 0)  # FENCE_STATUS before the first breach
     watch.update(place, HOME_AWAY, FRAME, parameters, time_us=1, armed=True, airborne=True, landing=False)
     assert watch.distance_m == pytest.approx(12.0, abs=1e-9)
 

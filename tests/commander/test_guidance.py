@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander.events import FailsafeActivated, MissionItemReached
+from autopilot_bridge.commander.events import FailsafeActivated, MissionItemReached, SystemStatus
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.flight.context import WaypointReached
 from autopilot_bridge.mission_plan import MissionItem
@@ -67,6 +68,26 @@ def test_arducopter_has_no_limit_of_attitude(axis: int) -> None:
     for later_us in range(20_000, 2_000_000, 20_000):
         rig.commander.update(rig.time_us + later_us)
     assert not [event for event in rig.commander.drain_events() if isinstance(event, FailsafeActivated)]
+
+
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_a_mode_that_needs_no_position_goes_on_without_it(flavour: str) -> None:
+    """ArduCopter's EKF failsafe and PX4's position failsafe act in modes that need a position only."""
+    rig = hovering(flavour)
+    rig.commander.pilot.move(roll=0.0, pitch=0.0, throttle=0.0, yaw=0.0, time_us=rig.time_us)
+    assert rig.commander.set_mode(FlightMode.ALTITUDE).accepted
+    rig.judgement.position_valid = False
+    for _ in range(50):
+        rig.commander.pilot.move(roll=0.0, pitch=0.0, throttle=0.0, yaw=0.0, time_us=rig.time_us)
+        rig.run(0.2)
+    assert rig.commander.mode is FlightMode.ALTITUDE
+    assert not rig.happened(FailsafeActivated)
+
+
+def test_system_status_is_mavlinks() -> None:
+    """MAV_STATE of minimal.xml."""
+    names = {f"MAV_STATE_{status.name}": status.value for status in SystemStatus}
+    assert names.items() <= {entry.name: value for value, entry in mavlink.enums["MAV_STATE"].items()}.items()
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

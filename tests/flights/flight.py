@@ -233,8 +233,12 @@ class Flight:
         self.fly_until(lambda: self.mode == name, limit_s, f"mode {name}")
 
     def inject(self, unit: int, failure: int) -> None:
-        """MAV_CMD_INJECT_FAILURE, and see it accepted."""
-        assert self.result(dialect.MAV_CMD_INJECT_FAILURE, unit, failure, 0) == 0
+        """Switch a failure of every instance: by command, where the firmware has one (PX4)."""
+        if self.flavour == "px4":
+            assert self.result(dialect.MAV_CMD_INJECT_FAILURE, unit, failure, 0) == 0
+        else:
+            assert self.vehicle.failures.inject(unit, failure, 0) == 0
+            self.fly(0.5)
 
     def repeat(self, rate_hz: float, make: Callable[[float], Any]) -> None:
         """Send what `make` gives for the vehicle time, at a rate, from now on."""

@@ -1,6 +1,7 @@
 """Camera and detector: projection against OpenCV and the paper, what is visible, statistics, streams."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pymap3d
@@ -25,8 +26,10 @@ from flightsim.payload import (
     GroundTargetParameters,
     GroundTargets,
     HomeFrame,
+    PictureDetection,
     PinholeModel,
     ResolutionDetection,
+    SeenTargets,
     Static,
     camera_from_gimbal,
     gimbal_from_camera,
@@ -43,8 +46,23 @@ SURE = {
     "pixel_noise_px": 0.0,
     "size_noise": 0.0,
     "latency_s": 0.0,
+    "quantum_px": 0.0,
     "detection": ResolutionDetection.constant(1.0),
 }
+
+
+def seen(size_px: Array) -> SeenTargets:
+    """Tags right below, in the middle of the picture."""
+    n = size_px.size
+    return SeenTargets(
+        size_px=size_px,
+        range_m=np.full(n, 100.0),
+        sine=np.ones(n),
+        blur_px=np.zeros(n),
+        edge_px=np.full(n, 300.0),
+        covered=np.zeros(n, dtype=np.bool_),
+        tagged=np.ones(n, dtype=np.bool_),
+    )
 
 
 def place(truth: Array, north_m: float, east_m: float, height_m: float, *, home: Home = HOME) -> None:
@@ -276,24 +294,74 @@ def test_frame_rate_and_latency() -> None:
     assert bench.camera.frame is not None and bench.camera.frame.number == len(delivered) - 1
 
 
-@pytest.mark.parametrize("size_m", [0.2, 0.4, 0.6, 2.0])
-def test_detection_follows_its_curve(size_m: float) -> None:
+@pytest.mark.parametrize(
+    ("size_m", "tag", "half_px", "slope_px"),
+    [(0.1, NO_TAG, 2.01, 0.042), (0.5, NO_TAG, 2.01, 0.042), (0.9, 3, 10.7, 1.03), (1.05, 3, 10.7, 1.03)],
+)
+def test_detection_follows_its_curve(size_m: float, tag: int, half_px: float, slope_px: float) -> None:
     model = PinholeModel()
     pixels = model.focal_px * 2.0 * math.atan(0.5 * size_m / 100.0)
-    curve = 0.96 / (1.0 + math.exp(-(pixels - 4.0) / 0.7))
+    curve = 0.998 / (1.0 + math.exp(-(pixels - half_px) / slope_px))
     frames = 3000
-    rate = len(Bench((0.0, 0.0), size_m=size_m).detections(frames)) / frames
+    rate = len(Bench((0.0, 0.0), size_m=size_m, tags=(tag,)).detections(frames)) / frames
     assert rate == pytest.approx(curve, abs=4.0 * math.sqrt(max(curve * (1.0 - curve), 1e-3) / frames))
 
 
 def test_detection_curves() -> None:
     sizes = np.linspace(0.0, 30.0, 301)
-    smooth = ResolutionDetection().probability(sizes, sizes)
+    smooth = ResolutionDetection().probability(seen(sizes))
     assert np.all(np.diff(smooth) >= 0.0) and smooth[-1] == pytest.approx(0.96)
-    assert ResolutionDetection().probability(np.array([4.0]), sizes[:1])[0] == pytest.approx(0.48)
-    step = ResolutionDetection(slope_px=0.0).probability(sizes, sizes)
+    assert ResolutionDetection().probability(seen(np.array([4.0])))[0] == pytest.approx(0.48)
+    step = ResolutionDetection(slope_px=0.0).probability(seen(sizes))
     np.testing.assert_array_equal(step, np.where(sizes >= 4.0, 0.96, 0.0))
-    np.testing.assert_array_equal(ResolutionDetection.constant(0.5).probability(sizes, sizes), 0.5)
+    np.testing.assert_array_equal(ResolutionDetection.constant(0.5).probability(seen(sizes)), 0.5)
+
+
+def test_detection_in_pictures_falls_with_foreshortening_blur_edges_and_cover() -> None:
+    model = PictureDetection()
+    (clear,) = model.probability(seen(np.array([30.0])))
+    assert clear == pytest.approx(0.998, abs=1e-3)
+    changes: list[dict[str, object]] = [
+        {"sine": np.array([math.sin(math.radians(10.0))])},
+        {"blur_px": np.array([12.0])},
+        {"edge_px": np.array([14.0])},
+        {"covered": np.array([True])},
+    ]
+    for change in changes:
+        assert model.probability(replace(seen(np.array([30.0])), **change))[0] < 0.2, change
+    ball = replace(seen(np.array([6.0])), tagged=np.array([False]), sine=np.array([0.1]))
+    assert model.probability(ball)[0] > 0.95
+
+
+def test_a_target_behind_another_and_one_cut_by_the_edge_are_not_seen() -> None:
+    alone = Bench((0.0, 0.0), size_m=3.0, pixel_noise_px=0.0)
+    assert len(alone.detections(200)) > 190
+    pair = Bench((0.0, 0.0), (0.0, 0.5), size_m=3.0, pixel_noise_px=0.0)
+    place(pair.truth, 0.0, -40.0, 60.0)
+    pair.truth[t.Q_NED_FROM_FRD] = attitude(40.0, 0.0, 0.0)
+    counts = [len(frame.detections) for frame in pair.frames(50)]
+    assert max(counts) <= 1
+
+
+def test_motion_during_the_exposure_blurs() -> None:
+    """A tag 24 pixels large is read from a camera at rest, and not from one that turns by 3 rad/s."""
+    rates = {}
+    for turn_rad_s in (0.0, 3.0):
+        bench = Bench((0.0, 0.0), size_m=2.2, tags=(1,), pixel_noise_px=0.0)
+        found = 0
+        for step in range(1, 3000):
+            angle = 0.2 * math.sin(turn_rad_s / 0.2 * step * 0.004)
+            bench.truth[t.Q_NED_FROM_FRD] = attitude(math.degrees(angle), 0.0, 0.0)
+            frame = bench.camera.step(step * STEP_US)
+            found += 0 if frame is None else len(frame.detections)
+        rates[turn_rad_s] = found
+    assert rates[0.0] > 100
+    assert rates[3.0] < 0.85 * rates[0.0]
+
+
+def test_places_are_quantised() -> None:
+    places = [d.u_px / 0.25 for d in Bench((1.0, 1.3), size_m=4.0, tags=(1,), latency_s=0.0).detections(50)]
+    np.testing.assert_allclose(places, np.round(places), atol=1e-9)
 
 
 def test_pixel_and_size_noise() -> None:

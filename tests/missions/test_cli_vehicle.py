@@ -3,6 +3,7 @@
 import asyncio
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import click
@@ -11,7 +12,7 @@ import pytest
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
 from missions import cli, cli_vehicle_params
-from missions.cli_vehicle import _verdict
+from missions.cli_vehicle import DownloadLine, _verdict
 from missions.cli_vehicle_link import confirm
 
 
@@ -70,3 +71,59 @@ def test_rounding_of_a_table_of_defaults_is_no_difference() -> None:
     found = parameters.differences(vehicle, table, rounded=True)
     assert [difference.name for difference in found] == ["OTHER", "WHOLE"]
     assert len(parameters.differences(vehicle, table)) == 4  # a file has all digits
+
+
+def test_a_download_shows_how_far_and_how_fast_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    now_s = [100.0]
+    line = DownloadLine(7, 62_000_000, lambda: now_s[0])
+    line(float("nan"))
+    for passed_s, done in ((0.0, 0.0), (0.1, 0.01), (10.0, 0.05), (100.0, 0.5), (200.0, 1.0)):
+        now_s[0] = 100.0 + passed_s
+        line(done)
+    line.end()
+    shown = [text.rstrip() for text in capsys.readouterr().err.split("\r")[1:]]
+    assert shown == [
+        "log 7:   0 % of 62.0 MB",
+        "log 7:   5 % of 62.0 MB, 310 kB/s, 3 min left",
+        "log 7:  50 % of 62.0 MB, 310 kB/s, 2 min left",
+        "log 7: 100 % of 62.0 MB, 310 kB/s, 0 s left",
+    ]
+
+
+def test_a_download_in_a_pipe_shows_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    line = DownloadLine(7, 62_000_000, None)
+    line(0.5)
+    line.end()
+    assert capsys.readouterr().err == ""
+
+
+def test_nothing_else_is_decoded_while_a_log_comes(tmp_path: Path) -> None:
+    """MAVSDK would hand us each of some 700,000 messages of a log as text."""
+    from missions.vehicle_client.client import VehicleClient
+    from missions.vehicle_client.logs import VehicleLogs
+
+    seen = []
+
+    class Client(VehicleClient):
+        def __init__(self) -> None:
+            self.system_id, self.messages, self.keeping = 1, {}, True
+
+        def start(self) -> None:
+            self.keeping = True
+
+        async def stop(self) -> None:
+            self.keeping = False
+
+    class Plugin:
+        async def download_log_file(self, entry: Any, path: str) -> Any:
+            seen.append(client.keeping)
+            Path(path).write_bytes(b"ULog\x01\x12\x35" + bytes(9))
+            yield None, SimpleNamespace(progress=1.0)
+
+    client = Client()
+    shelf = VehicleLogs.__new__(VehicleLogs)
+    shelf._client, shelf._system_id, shelf._plugin = client, 1, Plugin()
+    entry = SimpleNamespace(id=3, date="", size_bytes=16)
+    path = asyncio.run(shelf.download(entry, tmp_path, lambda done: None))
+    assert path.name == "log_3_undated.ulg"
+    assert seen == [False] and client.keeping

@@ -1,5 +1,6 @@
 """Whether what was commanded was flown, by the vehicle's own positions."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -57,6 +58,21 @@ def test_a_track_beside_the_path_is_outside_the_bound_of_its_kind() -> None:
     assert "up to 12.0 m off the commanded path by its own position; accepted: 10 m (--max-error)" in text
     assert path_verdict(notes_of(kind=VehicleKind.FIXED_WING), along(east_m=12.0)) == ""
     assert path_verdict(notes_of(), along(east_m=12.0), max_error_m=15.0) == ""
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_closed_path_is_flown_with_a_rest_before_and_after_it(seed) -> None:
+    """Places near each other are passed in their order also where the vehicle wanders about them."""
+    angle = np.concatenate((np.zeros(30), np.linspace(0.0, 2.0 * np.pi, 300), np.full(60, 2.0 * np.pi)))
+    circle = np.column_stack((30.0 * np.cos(angle), 30.0 * np.sin(angle), np.full_like(angle, -10.0)))
+    wander = np.random.default_rng(seed).normal(0.0, 0.3, circle.shape)
+    times = 0.1 * np.arange(len(angle))
+    notes = notes_of()
+    notes.commanded = replace(notes.commanded, points_ned_m=circle[30:330])
+    track = Track(time_s=times, pos_ned_m=circle + wander, yaw_rad=np.zeros_like(times))
+    assert path_verdict(notes, SimpleNamespace(estimate=track)) == ""
+    still = Track(time_s=times, pos_ned_m=circle[:1] + wander, yaw_rad=np.zeros_like(times))
+    assert "of the commanded path were not flown" in path_verdict(notes, SimpleNamespace(estimate=still))
 
 
 def test_a_path_that_was_not_begun_or_not_seen_is_no_flight() -> None:

@@ -15,6 +15,7 @@ from missions.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.library import PatternMission, find_mission
 from missions.options import FlightOptions, Via
+from missions.patterns import named_lissajous
 from missions.planning.flyable import FlyablePath, flyable_path
 from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import roll_in_m
@@ -22,6 +23,7 @@ from missions.vehicle.arduplane import ArduPlane
 from missions.vehicle.px4_plane import Px4Plane
 from missions.wings.entry import with_leads
 from missions.wings.pattern import check_wings
+from missions.wings.setpoints import path_point
 from missions.wings.waypoints import turn_in_m, waypoints_of
 
 STOCK_PLANE = {"AIRSPEED_CRUISE": 22.0, "ROLL_LIMIT_DEG": 65.0, "NAVL1_PERIOD": 15.0, "RLL2SRV_TCONST": 0.25}
@@ -110,3 +112,29 @@ def test_setpoints_bend_as_tightly_as_the_aircraft_can_bank() -> None:
     assert check_wings(mission.curve(options), options, limits) == limits.turn_radius_m(22.0)
     with pytest.raises(PlanError, match=r"its path guidance \(NAVL1_PERIOD\)"):
         mission.check(replace(options, via=Via.WAYPOINTS), limits)
+
+
+@pytest.mark.parametrize("lead_share", [0.0, 1.0])
+def test_points_for_px4_lead_by_what_its_guidance_needs(lead_share: float) -> None:
+    """The law of T. Stastny and R. Siegwart (2019) near a path: pi e / (V T damping) towards it."""
+    speed, period, damping, radius = 14.0, 10.0, 0.7, 150.0
+    gain = 4.0 * math.pi * damping / period
+    route = flyable_path(named_lissajous("L1", width_m=2 * radius, height_m=2 * radius), 50.0, 10.0)
+    arc, off = 0.0, []
+    (north, east), course, _ = route.at(0.0)
+    for _ in range(600):
+        arc = route.nearest(north, east, from_arc_m=arc, ahead_m=30.0)
+        point = path_point(route, arc, speed, lead_share / gain, 100.0)
+        assert point.acceleration_ned_m_s2 is None  # PX4 1.16.1 bends the wrong way by it
+        assert point.position_ned_m is not None and point.velocity_ned_m_s is not None
+        off.append(math.dist((north, east), point.position_ned_m[:2]))
+        along = math.atan2(point.velocity_ned_m_s[1], point.velocity_ned_m_s[0])
+        across = (east - point.position_ned_m[1]) * math.cos(along)
+        across -= (north - point.position_ned_m[0]) * math.sin(along)
+        bearing = along - math.pi * across / (speed * period * damping)
+        course += gain * math.sin(bearing - course) * 0.1
+        north, east = north + speed * math.cos(course) * 0.1, east + speed * math.sin(course) * 0.1
+    if lead_share:
+        assert max(off) < 1.0
+    else:
+        assert max(off) > 2.5  # what the lead is for

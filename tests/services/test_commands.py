@@ -406,6 +406,12 @@ def test_failures_reach_the_hook() -> None:
     assert rig.failures == [(4, 1, 0)]
 
 
+def test_ardupilot_has_no_command_for_failures() -> None:
+    rig = rig_of("ardupilot", "ready")
+    assert rig.long(420, 4, 1, 0) == [3]
+    assert rig.failures == []
+
+
 def test_cancel_is_tolerated() -> None:
     if not hasattr(mavlink, "MAVLink_command_cancel_message"):
         pytest.skip("this release of the dialect has no COMMAND_CANCEL")

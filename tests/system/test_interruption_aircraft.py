@@ -18,7 +18,9 @@ OCCUPANCY = (
     *("occupancy", "--vehicles", "2", "--model", "aerosonde,iris", "--size", "800", "--altitude", "40"),
     *("--no-picture", "--speedup", "60"),
 )
-COMMAND_LONG, HEARTBEAT = (definition(name).message_id for name in ("COMMAND_LONG", "HEARTBEAT"))
+COMMAND_LONG, HEARTBEAT, PARAM_SET = (
+    definition(name).message_id for name in ("COMMAND_LONG", "HEARTBEAT", "PARAM_SET")
+)
 PX4_OFFBOARD, PX4_MISSION, PX4_RETURN, PLANE_TAKEOFF = 6 << 16, 0x04040000, 0x05040000, 13
 
 
@@ -40,6 +42,10 @@ def in_mode(custom_mode: int) -> Callable[[Frame], bool]:
 
 
 def gps_switched_off(frame: Frame) -> bool:
+    """By command (PX4) or by the simulator's parameter (ArduPilot)."""
+    if frame.message_id == PARAM_SET:
+        change = decode(frame)
+        return bool(change.param_id == "SIM_GPS_DISABLE" and change.param_value == 1.0)
     if frame.message_id != COMMAND_LONG:
         return False
     command = decode(frame)

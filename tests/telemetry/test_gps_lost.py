@@ -26,9 +26,10 @@ def test_a_silent_receiver_is_shown_as_none(flavour: str, timeout_s: float) -> N
 
     command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, 200_000)
     assert fixes(12.0)[-1][0] >= 3
-    command(mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SENSOR_GPS, mavlink.FAILURE_TYPE_OFF)
+    fail = sitl.vehicles[0].failures.inject
+    fail(mavlink.FAILURE_UNIT_SENSOR_GPS, mavlink.FAILURE_TYPE_OFF, 0)
     assert fixes(timeout_s - 0.3)[-1][0] >= 3
     fixes(0.8)
     assert set(fixes(3.0)) == {(0, 0, 0)}
-    command(mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SENSOR_GPS, mavlink.FAILURE_TYPE_OK)
+    fail(mavlink.FAILURE_UNIT_SENSOR_GPS, mavlink.FAILURE_TYPE_OK, 0)
     assert fixes(12.0)[-1][0] >= 3

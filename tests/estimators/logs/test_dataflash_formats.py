@@ -5,8 +5,10 @@ import pytest
 from pymavlink import DFReader
 
 from estimators.airborne import airborne_spans
+from estimators.attitude import AttitudeEstimator
 from estimators.logs import LogError, open_log
 from estimators.logs.ardupilot_firmware import firmware_of, mode_names, mode_number
+from estimators.replay import replay
 from tests.estimators.logs.onboard_logs import DataflashWriter
 
 WEEK, WEEK_MS = 1777, 56_674_000
@@ -74,6 +76,15 @@ def test_milliseconds_and_messages_without_a_time(tmp_path):
     assert log.table("PARAM_VALUE")["param_id"][0] == b"AHRS_TRIM_X"
     theirs = counts(DFReader.DFReader_binary(str(tmp_path / "1.bin")))
     assert {name: len(log.table(name)) for name in theirs} == theirs
+
+
+def test_a_part_of_a_log_has_the_parameters_from_before_it(tmp_path):
+    log = open_log(copter_of_2014(tmp_path / "1.bin"))
+    done = replay(log, AttitudeEstimator, from_s=70.0, to_s=75.0)
+    runner = done.fleet.runners[1]
+    assert "board trim corrected: roll +2.86 deg" in runner.remarks["note"]
+    times = runner.tables["AttitudeEstimate"].time_us
+    assert times[0] >= 70_000_000 and times[-1] < 75_000_000
 
 
 def test_vehicle_modes_and_the_flight_of_2014(tmp_path):

@@ -3,6 +3,7 @@
 import contextlib
 import math
 import random
+import struct
 
 import numpy as np
 import pytest
@@ -308,6 +309,20 @@ def test_single_imus_are_turned_as_the_board_is(ulog, tmp_path):
     assert second["zgyro"][0] == pytest.approx(0.2 * math.sin(math.radians(2.0)))
     assert "SENS_BOARD_*_OFF 2 0 0 deg" in log.report().remarks["board"]
     assert b"SENS_BOARD_ROT" in log.table("PARAM_VALUE")["param_id"].tolist()
+
+
+def test_times_of_the_calendar_count_from_the_beginning(tmp_path):
+    """A simulated vehicle without lockstep stamps its messages with Unix time."""
+    start_us = 1_600_000_000_000_000
+    writer = UlogWriter(vehicle_attitude="uint64_t timestamp;float[4] q;")
+    writer.data[8:16] = struct.pack("<Q", start_us)
+    writer.subscribe("vehicle_attitude")
+    for tick in range(100):
+        writer.add("vehicle_attitude", "Q4f", start_us - 500 + 10_000 * tick, 1.0, 0.0, 0.0, 0.0)
+    log = open_log(writer.save(tmp_path / "flight.ulg"))
+    attitude = log.table("ATTITUDE")
+    assert (len(attitude), attitude.time_us[0], attitude.time_us[-1]) == (100, 0, 990_000)
+    assert log.start_unix_us == start_us - 500
 
 
 def test_a_board_on_its_side_leaves_single_imus_out(ulog, tmp_path):

@@ -1,5 +1,6 @@
 """Mission files on an autopilot that reports items as firmware does, over links that lose messages."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ from missions.errors import MissionError
 from missions.plan_files.document import MissionDocument
 from missions.plan_files.flight import fly_document
 from missions.plan_files.options import FileOptions
-from tests.missions.conftest import HOME, PX4_RTL
+from tests.missions.conftest import HOME, PX4_HOLD, PX4_RTL
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 LOST = {
@@ -88,3 +89,33 @@ def test_a_mission_that_is_left_on_the_way_fails(flown, flavour) -> None:
 
     with pytest.raises(MissionError, match=r"left the mission for mode R\w+ at item [56] "):
         fly_losing(flown, flavour, (), then=leave)
+
+
+def test_a_vehicle_that_holds_on_the_ground_before_it_disarms_has_landed(flown) -> None:
+    """PX4 1.16.1: the mission is over at the touch-down, disarmed some seconds later."""
+    land = replace(document().items[-1], command=21, frame=6, x=HOME.lat_deg, y=HOME.lon_deg)
+    landing = replace(document(), items=(*document().items[:-1], land))
+
+    async def script(vehicle, autopilot):
+        fly_mission, down_us = autopilot._fly_mission, []
+
+        def come_down():
+            if autopilot.current < len(landing.items) - 1:
+                return fly_mission()
+            return (0.0, 0.0, 1.5)
+
+        fly = autopilot._fly
+
+        def touch_down(dt):
+            fly(dt)
+            if autopilot.kind == "mission" and autopilot.pos[2] >= 0.0 and autopilot.current == 6:
+                autopilot.mode = PX4_HOLD
+                down_us.append(autopilot.time_us)
+            if down_us and autopilot.time_us > down_us[0] + 6_000_000:
+                autopilot.armed = False
+
+        autopilot._fly_mission, autopilot._fly = come_down, touch_down
+        await fly_document(vehicle, FileOptions(), landing)
+        return vehicle.notes
+
+    assert flown(script).phases[-1].name == "return"
