@@ -1,6 +1,6 @@
 """How well the navigation filter's covariance describes its errors: whole flights over seeds, in a table.
 
-    python -m benchmarks.consistency [--seeds 20] [--cases standalone]
+    python -m benchmarks.consistency [--seeds 20] [--cases standalone] [--processes 2]
 
 Takes off and flies a three-dimensional curve with every seed, on both flavours: with the firmware's default
 parameters and with parameters that match the simulated sensors, by a receiver with corrections and by a
@@ -10,6 +10,8 @@ is per degree of freedom: 1 where the covariance describes the errors, less wher
 
 import argparse
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -35,6 +37,7 @@ def main() -> None:
     )
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--cases", default="", help="only cases whose name contains this")
+    parser.add_argument("--processes", type=int, default=2)
     arguments = parser.parse_args()
     seeds = arguments.seeds
     low, high = chi2.ppf([0.025, 0.975], 3 * seeds) / (3 * seeds)
@@ -45,11 +48,12 @@ def main() -> None:
     write("RMS errors: attitude deg, velocity m/s, position m (3 axes); distance from the curve m RMS\n\n")
     write(f"| flavour, case | {' | '.join(PARTS)} | attitude | velocity | position | off curve |\n")
     write("|---|---|---|---|---|---|---|---|\n")
+    pool = ProcessPoolExecutor(arguments.processes)
     for flavour in ("px4", "ardupilot"):
         for name, case in CASES.items():
             if arguments.cases not in f"{flavour}, {name}":
                 continue
-            flights = [fly_consistency(seed, flavour=flavour, case=case) for seed in range(seeds)]
+            flights = list(pool.map(partial(fly_consistency, flavour=flavour, case=case), range(seeds)))
             nees = np.mean([flight.nees.mean(axis=0) / 3.0 for flight in flights], axis=0)
             squares = np.mean([(flight.errors**2).mean(axis=0) for flight in flights], axis=0)
             attitude, velocity, position = (np.sqrt(squares[part].sum()) for part in PARTS.values())
