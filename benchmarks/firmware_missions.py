@@ -161,7 +161,7 @@ class Campaign:
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
-    """End a flight as a user does, who waits for the vehicle to be left safely; then at once."""
+    """End a flight as a user does: wait until the vehicle is left safely; then end it at once."""
     process.terminate()
     try:
         process.wait(_END_S)

@@ -26,7 +26,7 @@ _CLEAR_SPEED_M_S: Final = 5.0
 _GROUND_TYPES: Final = (5, 10, 11, 12)
 """MAV_TYPE_ANTENNA_TRACKER, _GROUND_ROVER, _SURFACE_BOAT, _SUBMARINE."""
 _HOLD_US: Final = 2_500_000
-"""How long a state counts that is not told again: one lost message of a 1 Hz stream doesn't end it."""
+"""How long a state counts that is not reported again: one lost message of a 1 Hz stream doesn't end it."""
 _AUTOPILOT: Final = 1
 
 Samples = tuple[NDArray[np.int64], NDArray[Any]]
@@ -48,7 +48,7 @@ def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple
 
     Returns:
         Spans, and what they are taken from; no spans and the reason where there is evidence and none of it
-        shows the vehicle in the air; all time where the log tells nothing of it ("all of the log").
+        shows the vehicle in the air; all time where the log has no evidence of it ("all of the log").
     """
 
     def column(name: str, field: str) -> Samples | None:
@@ -63,17 +63,17 @@ def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple
 
     heights = column("GLOBAL_POSITION_INT", "relative_alt")
     landed = column("EXTENDED_SYS_STATE", "landed_state")
-    told = spans_of(landed, lambda state: np.isin(state, _IN_AIR))
+    reported = spans_of(landed, lambda state: np.isin(state, _IN_AIR))
     types, modes = column("HEARTBEAT", "type"), column("HEARTBEAT", "base_mode")
     armed = spans_of(modes, lambda mode: (mode & _ARMED) != 0)
     if types is not None and np.isin(types[1], _GROUND_TYPES).any():
         if armed:
             return armed, "armed"
         return [ALWAYS], "all of the log (a vehicle that does not fly, never armed)"
-    if told:
+    if reported:
         if heights is not None:
-            told = [_off_the_ground(span, *heights) for span in told]
-        return told, "EXTENDED_SYS_STATE"
+            reported = [_off_the_ground(span, *heights) for span in reported]
+        return reported, "EXTENDED_SYS_STATE"
     if landed is None and modes is None:
         return [ALWAYS], "all of the log"
     hud = {field: column("VFR_HUD", field) for field in ("airspeed", "groundspeed", "throttle")}

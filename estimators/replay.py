@@ -90,7 +90,7 @@ def replay(
     if not (fleet.team and lacking) and served:
         try:
             for time_us, message, inside in _messages(opened, fleet, system_id, Part(from_s, to_s, boot)):
-                # A parameter is told once and holds from then on, also before the part that counts.
+                # A parameter is logged once and holds from then on, also before the part that counts.
                 if inside or message.name in NOT_STREAMED:
                     fleet.take(time_us, message)
                 else:

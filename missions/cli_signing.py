@@ -18,7 +18,8 @@ def key_option(**attributes: Any) -> Callable[[Callable[..., Any]], Callable[...
         "--signing-key",
         type=click.Path(path_type=Path, dir_okay=False),
         metavar="FILE",
-        help="Sign with the key in it (32 bytes, 64 hex digits, or a passphrase), and believe nobody else.",
+        help="Sign with the key in it (32 bytes, 64 hex digits, or a passphrase), and accept only frames "
+        "that are signed with it.",
         **attributes,
     )
 

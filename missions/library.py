@@ -258,7 +258,7 @@ def _require_room(options: FlightOptions, side_m: float, spacings: float, limits
     if not options.chosen("spacing_m") and side_m < spacings * spacing_m:
         raise PlanError(
             f"--size {side_m:g} m has no room for the aircraft's turns: at {options.speed_m_s:g} m/s in "
-            f"{limits.wind_m_s:g} m/s of wind tracks must be {spacing_m:g} m apart; ask for "
+            f"{limits.wind_m_s:.3g} m/s of wind tracks must be {spacing_m:g} m apart; ask for "
             f"--size {spacings * spacing_m:g} or more, or less --speed"
         )
 

@@ -92,7 +92,7 @@ class Flight:
 
     @property
     def elapsed_s(self) -> float:
-        """Vehicle time since the run began: since boot of an embedded one, else since it was first heard."""
+        """Vehicle time since the run began: since boot of an embedded one, else since its first message."""
         if self.clock is None:
             return 0.0
         begun_us = self.vehicles[0].first_heard_us if self.elsewhere else self.started_us

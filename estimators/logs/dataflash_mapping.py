@@ -249,7 +249,7 @@ def _fixes(tables: Mapping[str, Records]) -> Records | None:
 
 
 def _home(tables: Mapping[str, Records]) -> list[Part]:
-    """Its place in the local frame is not told."""
+    """Its place in the local frame is not reported."""
     places = tables.get("ORGN")
     if places is None or not places.has("Type", "Lat", "Lng", "Alt"):
         return []

@@ -142,9 +142,9 @@ def _armed_events(tables: Mapping[str, Records]) -> tuple[Array, Array]:
         times.append(arm.time_us)
         states.append((arm.columns["ArmState"] != 0).astype(np.int64))
     if events is not None and events.has("Id"):
-        told = events.where(np.isin(events.columns["Id"], (_EV_ARMED, _EV_DISARMED)))
-        times.append(told.time_us)
-        states.append((told.columns["Id"] == _EV_ARMED).astype(np.int64))
+        reported = events.where(np.isin(events.columns["Id"], (_EV_ARMED, _EV_DISARMED)))
+        times.append(reported.time_us)
+        states.append((reported.columns["Id"] == _EV_ARMED).astype(np.int64))
     if not times:
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     all_times, all_states = np.concatenate(times), np.concatenate(states)
@@ -184,15 +184,17 @@ def _landed(tables: Mapping[str, Records]) -> list[Part]:
     events = tables.get("EV")
     if events is None or not events.has("Id"):
         return []
-    told = events.where(np.isin(events.columns["Id"], (_EV_ARMED, _EV_DISARMED, _EV_LANDED, _EV_NOT_LANDED)))
-    codes = told.columns["Id"]
+    reported = events.where(
+        np.isin(events.columns["Id"], (_EV_ARMED, _EV_DISARMED, _EV_LANDED, _EV_NOT_LANDED))
+    )
+    codes = reported.columns["Id"]
     if not np.isin(codes, (_EV_LANDED, _EV_NOT_LANDED)).any():
         return []
     in_air = (codes == _EV_NOT_LANDED).astype(np.int64)
     before = 1.0 if codes[0] in (_EV_LANDED, _EV_DISARMED) else 0.0
-    times = np.union1d(each_second(tables.values()), told.time_us)
+    times = np.union1d(each_second(tables.values()), reported.time_us)
     state = np.where(
-        newest(told.time_us, in_air, times, before) != 0,
+        newest(reported.time_us, in_air, times, before) != 0,
         dialect.MAV_LANDED_STATE_IN_AIR,
         dialect.MAV_LANDED_STATE_ON_GROUND,
     )

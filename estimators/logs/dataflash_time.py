@@ -157,7 +157,7 @@ def _px4_times(tables: Sequence[RawTable]) -> list[Array | None] | None:
 
 
 def _without_clock(tables: Sequence[RawTable]) -> LogTimes:
-    """Times where only GPS has told any: linear in the file between its messages; else by counting."""
+    """Times where only GPS messages have one: linear in the file between its messages; else by counting."""
     known = _gps_seconds(tables)
     if known is None:
         busiest = max(tables, key=lambda table: len(table.positions))

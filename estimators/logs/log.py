@@ -151,7 +151,7 @@ class Log:
 
     @cached_property
     def clock(self) -> LogClock:
-        """The clock in which times of the log are told and asked for."""
+        """The clock of all times that are printed and given for the log."""
         return make_clock(self.source)
 
     def inside(

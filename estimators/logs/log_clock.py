@@ -1,7 +1,7 @@
-"""The one clock that times of a log are told in: the time since boot of its first vehicle.
+"""The one clock of all times of a log: the time since boot of its first vehicle.
 
 Messages of other systems have the vehicle's newest time at their place in the file, so that one time is one
-moment for all of them. A log without a vehicle that tells its time is timed by its records.
+moment for all of them. A log without a vehicle that reports its time is timed by its records.
 """
 
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class LogClock:
 
 
 def make_clock(source: LogSource) -> LogClock:
-    """The clock of a log: of the lowest system id whose autopilot tells its time."""
+    """The clock of a log: of the lowest system id whose autopilot reports its time."""
     times = source.time_us
     system_id = min(
         (

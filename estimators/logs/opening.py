@@ -21,7 +21,7 @@ def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
 
     Args:
         path: a telemetry log (.tlog), a capture of a MAVLink stream, an ArduPilot onboard log (.bin, or .log
-            in text form), or a PX4 .ulg; told by its content, whatever its name is.
+            in text form), or a PX4 .ulg; recognised by its content, whatever its name is.
         dialect: of a telemetry log: a dialect of pymavlink's by name ("common"), or the path of an XML
             definition file; None: every message of MAVLink's public definitions.
 

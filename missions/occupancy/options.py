@@ -212,9 +212,9 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
         larger_m = 10.0 * math.ceil(0.1 * radius_m / options.neighbourhood)
         raise PlanError(
             f"--cell {options.cell_m:g} m is too small for an aircraft whose turns have a radius of "
-            f"{radius_m:.0f} m at {speed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind: the cells beside it "
-            f"are out of reach; ask for --cell {larger_m:g} or more, a larger --neighbourhood, or less "
-            "--speed"
+            f"{radius_m:.0f} m at {speed_m_s:g} m/s in {limits.wind_m_s:.3g} m/s of wind: the cells "
+            f"beside it are out of reach; ask for --cell {larger_m:g} or more, a larger --neighbourhood, "
+            "or less --speed"
         )
 
 

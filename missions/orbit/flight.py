@@ -195,7 +195,7 @@ class OrbitFlight:
                 await guided.follow(lambda _t: self._fly_on(entered_us) if self._now_us < back_us else None)
         except BaseException:
             if not self._look_out.with_gps:
-                with suppress(MissionError):  # what went wrong first is told
+                with suppress(MissionError):  # the first error is the one that is reported
                     await self._regain_gps()
             raise
 

@@ -79,7 +79,7 @@ class GpsSwitch:
                 await self._vehicle.command(_INJECT, float(_GPS), float(dialect.FAILURE_TYPE_OFF), 0.0)
             await self._vehicle.set_parameters(self._values)
         except MissionError:
-            with suppress(MissionError):  # what went wrong first is told
+            with suppress(MissionError):  # the first error is the one that is reported
                 await self.on()
             raise
 
@@ -107,7 +107,7 @@ class GpsSwitch:
 
 
 async def _refusal(vehicle: Vehicle) -> str:
-    """How the vehicle refuses to inject failures, in words; "" when it does not. GPS is told to be sound."""
+    """How the vehicle refuses to inject failures, in words; "" when it does not. It asks for a sound GPS."""
     try:
         result = await vehicle.try_command(_INJECT, float(_GPS), float(dialect.FAILURE_TYPE_OK), 0.0)
     except VehicleTimeout:

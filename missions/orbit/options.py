@@ -170,7 +170,7 @@ class OrbitOptions(MissionOptions):
             raise PlanError(
                 f"an orbit of radius {self.radius_m:g} m can't be held: at {airspeed_m_s:g} m/s of "
                 "airspeed, in "
-                f"{limits.wind_m_s:g} m/s of wind and around a target that moves at "
+                f"{limits.wind_m_s:.3g} m/s of wind and around a target that moves at "
                 f"{self.target_speed_m_s:g} m/s, "
                 f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter}) make "
                 "a circle of "

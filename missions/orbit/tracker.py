@@ -25,9 +25,9 @@ _LEAST_HEIGHT_M: Final = 2.0
 class TargetStatus(StrEnum):
     """What is known of the target."""
 
-    EXPECTED = "expected"  # never seen: only what somebody else said of it
-    SEEN = "seen"
-    LOST = "lost"  # was seen; for a while now it was not
+    EXPECTED = "expected"  # not acquired yet: known from another source only
+    SEEN = "seen"  # acquired by detections that follow one another
+    LOST = "lost"  # was acquired; for a while now there was no detection
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,13 +36,19 @@ class TrackerParameters:
 
     Attributes:
         target: the filter's.
-        lost_after_s: without an accepted detection the target counts as lost.
+        acquired_after: so many accepted detections, none `lost_after_s` after the one before it, make the
+            target acquired. Beyond the range of its detector a camera still reads a tag now and then; one
+            such detection is no acquisition, and silence after it is no loss.
+        lost_after_s: without an accepted detection an acquired target counts as lost.
     """
 
     target: RelativeTargetParameters = field(default_factory=RelativeTargetParameters)
+    acquired_after: int = 3
     lost_after_s: float = 3.0
 
     def __post_init__(self) -> None:
+        if self.acquired_after < 1:
+            raise ValueError(f"acquired_after = {self.acquired_after} is not possible; it must be 1 or more")
         if not self.lost_after_s > 0.0:
             raise ValueError(f"lost_after_s = {self.lost_after_s} is not possible; it must be more than 0")
 
@@ -56,7 +62,7 @@ class TargetTracker:
 
     Attributes:
         target: the filter.
-        losses: how often the target was lost.
+        losses: how often an acquired target was lost.
     """
 
     def __init__(self, attitude: AttitudeSource, parameters: TrackerParameters | None = None) -> None:
@@ -68,7 +74,8 @@ class TargetTracker:
         self._images: dict[int, list[Detection]] = {}
         self._height_m = math.nan
         self._seen_us: int | None = None
-        self._lost = False
+        self._sightings_us: deque[int] = deque(maxlen=self.parameters.acquired_after)
+        self._status = TargetStatus.EXPECTED
 
     # what comes in
 
@@ -81,9 +88,11 @@ class TargetTracker:
         drift_ne_m_s: tuple[float, float],
         drift_std_m_s: float,
     ) -> None:
-        """Begin with what somebody else says of the target (equation 33)."""
+        """Begin with what another source says of the target (equation 33); detections so far still count
+        towards its acquisition.
+        """
         self._seen_us = None
-        self._lost = False
+        self._status = TargetStatus.EXPECTED
         self.target.start(
             time_us,
             offset_ne_m=offset_ne_m,
@@ -128,10 +137,9 @@ class TargetTracker:
         self.target.move(time_us, (level * math.cos(heading), level * math.sin(heading)))
         for image_us in sorted(self._images):
             self._look(image_us, self._images.pop(image_us), time_us)
-        if self._seen_us is not None:
-            lost = time_us - self._seen_us > self.parameters.lost_after_s * 1e6
-            self.losses += lost and not self._lost
-            self._lost = lost
+        if self._status is TargetStatus.SEEN and time_us - self._sightings_us[-1] > self._lost_after_us:
+            self._status = TargetStatus.LOST
+            self.losses += 1
 
     def _look(self, image_us: int, detections: list[Detection], now_us: int) -> None:
         if not now_us - _OLD_IMAGE_US < image_us <= now_us or not self._height_m > _LEAST_HEIGHT_M:
@@ -146,6 +154,15 @@ class TargetTracker:
 
         if self.target.see(image_us, min(lines, key=distance), self._height_m):
             self._seen_us = image_us
+            self._sight(image_us)
+
+    def _sight(self, image_us: int) -> None:
+        """Count an accepted detection towards the acquisition."""
+        if self._sightings_us and image_us - self._sightings_us[-1] > self._lost_after_us:
+            self._sightings_us.clear()
+        self._sightings_us.append(image_us)
+        if len(self._sightings_us) == self.parameters.acquired_after:
+            self._status = TargetStatus.SEEN
 
     def _gimbal_at(self, time_us: int) -> GimbalAttitude | None:
         later: GimbalAttitude | None = None
@@ -165,9 +182,11 @@ class TargetTracker:
     @property
     def status(self) -> TargetStatus:
         """What is known of the target."""
-        if self._seen_us is None:
-            return TargetStatus.EXPECTED
-        return TargetStatus.LOST if self._lost else TargetStatus.SEEN
+        return self._status
+
+    @property
+    def _lost_after_us(self) -> float:
+        return self.parameters.lost_after_s * 1e6
 
     def unseen_s(self, time_us: int) -> float:
         """How long it was not seen; infinite if it never was."""

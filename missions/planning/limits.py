@@ -156,8 +156,8 @@ class FixedWingLimits(_Limits):
             )
         if airspeed_m_s <= 1.2 * self.wind_m_s:
             raise PlanError(
-                f"airspeed {airspeed_m_s:g} m/s leaves no way forward in {self.wind_m_s:g} m/s of wind; "
-                "fly faster, or wait for less wind"
+                f"airspeed {airspeed_m_s:g} m/s leaves no way forward in {self.wind_m_s:.3g} m/s of wind "
+                "at the height of the flight; fly faster, or wait for less wind"
             )
 
     def true_airspeed_m_s(self, airspeed_m_s: float) -> float:

@@ -63,7 +63,7 @@ def check_turns(
     reason = f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter})"
     if radius_m > limits.turn_radius_m(airspeed_m_s):
         reason = f"its path guidance ({limits.guidance_parameter})"
-    needs = f"{radius_m:.0f} m at {airspeed_m_s:g} m/s in {limits.wind_m_s:g} m/s of wind with {reason}"
+    needs = f"{radius_m:.0f} m at {airspeed_m_s:g} m/s in {limits.wind_m_s:.3g} m/s of wind with {reason}"
     if isinstance(curve, Polyline):
         short = _shortest_leg(curve, radius_m, roll_in_m(airspeed_m_s, limits))
         if short[0] > 1.0:

@@ -362,7 +362,7 @@ class VehicleView:
         """
         value = predicate()
         if value:
-            await asyncio.sleep(0)  # who asks over and over lets the clock go on all the same
+            await asyncio.sleep(0)  # a caller that polls in a loop lets the clock go on, too
             return value
         changed = asyncio.Event()
         stops = [self.connection.listen(name, lambda _frame: changed.set()) for name in on]

@@ -93,7 +93,7 @@ class Vehicle(FixedWingFlight):
         """Wait; for the last seconds have the autopilot run its checks, so that it says what it lacks.
 
         Raises:
-            VehicleTimeout: it is not ready; says why, as far as the autopilot tells.
+            VehicleTimeout: it is not ready; with the reasons that the autopilot reports.
         """
 
         async def wait(seconds: float) -> None:

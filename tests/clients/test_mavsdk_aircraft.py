@@ -119,7 +119,7 @@ async def go_places(pilot: Pilot) -> None:
     await pilot.action.goto_location(lat, lon, alt_m + 60.0, NAN)
     await pilot.near(place, radius_m, 60.0)
     await pilot.action.goto_location_fixedwing(lat, lon, alt_m + 60.0, 180.0)
-    await pilot.near(place, 180.0, 60.0)
+    await pilot.near(place, radius_m, 60.0)  # PX4 1.16.1 does not read the radius
     place = pilot.runway.along(300.0, 100.0)
     lat, lon, _ = pilot.runway.geodetic(place, 0.0)
     await pilot.action.do_orbit(

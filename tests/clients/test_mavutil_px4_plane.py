@@ -67,11 +67,11 @@ def test_mission_from_take_off_to_auto_disarm() -> None:
 
 
 @pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", vehicle="px4-plane")
-def test_reposition_with_a_radius(flying: AircraftClient) -> None:
+def test_reposition_does_not_read_a_radius(flying: AircraftClient) -> None:
     place = flying.runway.along(300.0, -200.0)
     lat, lon, height_m = flying.geodetic(place, flying.runway.alt_m + 80.0)
     flying.command(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, -120.0, NAN, lat, lon, height_m)
-    flying.circles(place, -120.0, 80.0)
+    flying.circles(place, flying.parameter("NAV_LOITER_RAD"), 80.0)
     flying.sees_mode("LOITER")
 
 

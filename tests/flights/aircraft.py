@@ -187,14 +187,18 @@ class AircraftFlight(Flight):
             )
         )
 
-    def reposition(self, north_m: float, east_m: float, height_m: float, radius_m: float = 0.0) -> int | None:
-        """DO_REPOSITION with a change of mode; a negative radius circles counter-clockwise."""
+    def circle(self, north_m: float, east_m: float, height_m: float, radius_m: float = 0.0) -> int | None:
+        """Circle a place; a negative radius is counter-clockwise, 0 leaves the radius to the firmware.
+
+        PX4 gets DO_ORBIT where a radius is given, since it does not read that of DO_REPOSITION; ArduPilot
+        gets DO_REPOSITION with a change of mode.
+        """
         if self.flavour == "px4":
-            home_alt_m = self.newest["HOME_POSITION"].altitude * 1e-3
-            lat, lon = self.geodetic(north_m, east_m)
-            return self.result(
-                dialect.MAV_CMD_DO_REPOSITION, -1, 1, radius_m, math.nan, lat, lon, home_alt_m + height_m
-            )
+            alt_m = self.newest["HOME_POSITION"].altitude * 1e-3 + height_m
+            place = (*self.geodetic(north_m, east_m), alt_m)
+            if radius_m != 0.0:
+                return self.result(dialect.MAV_CMD_DO_ORBIT, radius_m, math.nan, 0, math.nan, *place)
+            return self.result(dialect.MAV_CMD_DO_REPOSITION, -1, 1, 0, math.nan, *place)
         clockwise = math.nan if radius_m >= 0.0 else 1.0
         return self.command_int(
             dialect.MAV_CMD_DO_REPOSITION, (0, 1, abs(radius_m), clockwise), north_m, east_m, height_m
@@ -239,7 +243,7 @@ class AircraftFlight(Flight):
         """Take off, and circle at a place and height."""
         self.start()
         self.fly_until(lambda: self.height_over_home_m > 18.0, 40.0, "climb")
-        assert self.reposition(*place, height_m, 100.0) == 0, self.texts
+        assert self.circle(*place, height_m, 100.0) == 0, self.texts
         self.fly_until(
             lambda: abs(self.height_over_home_m - height_m) < 3.0 and self.distance_m(*place) < 130.0,
             90.0,

@@ -109,7 +109,7 @@ def test_a_speed_below_the_lowest_is_not_flown() -> None:
 
 def test_a_climb_beyond_its_power_is_flown_at_its_speed() -> None:
     flight = circling("ardupilot", 1, 60.0)
-    assert flight.reposition(150.0, 150.0, 600.0, 100.0) == 0
+    assert flight.circle(150.0, 150.0, 600.0, 100.0) == 0
     watch = Watch(flight)
     flight.fly(40.0, watch.look)
     watch.check_controlled()

@@ -19,7 +19,7 @@ def takes_off_and_circles(flavour: str, model: str, height_m: float) -> None:
     flight.fly_until(lambda: flight.height_over_home_m > 20.0, 90.0, "climb")
     radius_m = abs(flight.vehicle.autopilot.context.fixed_wing.loiter_radius_m)
     place = flight.on_runway(2.0 * radius_m, 0.5 * radius_m)
-    assert flight.reposition(*place, height_m, radius_m) == 0, flight.texts
+    assert flight.circle(*place, height_m, radius_m) == 0, flight.texts
     slowest = [math.inf]
 
     def look() -> bool:
@@ -66,7 +66,7 @@ def test_a_glider_is_launched_and_circles_down(flavour: str) -> None:
     flight.start()
     flight.fly_until(lambda: flight.height_over_home_m > 120.0, 60.0, "release")
     radius_m = abs(flight.vehicle.autopilot.context.fixed_wing.loiter_radius_m)
-    assert flight.reposition(*flight.on_runway(500.0, radius_m), 150.0, radius_m) == 0
+    assert flight.circle(*flight.on_runway(500.0, radius_m), 150.0, radius_m) == 0
     place = flight.on_runway(500.0, radius_m)
     flight.fly(60.0)
     radii, speeds, heights = [], [], []

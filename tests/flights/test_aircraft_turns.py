@@ -23,7 +23,7 @@ PLACE = (150.0, 150.0)
 def test_circle(flavour: str, radius_m: float) -> None:
     flight = AircraftFlight(flavour, seed=2, environment=LIGHT)
     flight.take_off(80.0)
-    assert flight.reposition(*PLACE, 80.0, radius_m) == 0
+    assert flight.circle(*PLACE, 80.0, radius_m) == 0
     flight.fly(30.0)
     radii: list[float] = []
     heights: list[float] = []

@@ -65,7 +65,7 @@ def test_takes_off_from_the_runway_and_circles(flavour: str) -> None:
     assert max(line) < 4.0  # it holds the centre line
     assert max(height) > 20.0 and flight.actuators_finite
     place = (250.0, 100.0)
-    assert flight.reposition(*place, 70.0, 110.0) == 0
+    assert flight.circle(*place, 70.0, 110.0) == 0
     flight.fly(60.0)
     radii, altitudes, courses = [], [], []
 
@@ -86,7 +86,7 @@ def test_takes_off_from_the_runway_and_circles(flavour: str) -> None:
 def test_circles_to_the_left(flavour: str) -> None:
     flight = AircraftFlight(flavour)
     flight.take_off(60.0)
-    assert flight.reposition(100.0, 200.0, 60.0, -120.0) == 0
+    assert flight.circle(100.0, 200.0, 60.0, -120.0) == 0
     flight.fly(50.0)
     angles = []
     flight.fly(

@@ -166,10 +166,10 @@ def test_geofence(flavour: str) -> None:
         else {"FENCE_ENABLE": 1, "FENCE_TYPE": 2, "FENCE_RADIUS": 400.0, "FENCE_ACTION": 1}
     )
     flight = circling(flavour, 60.0, **fence)
-    assert flight.reposition(900.0, 0.0, 60.0) == 0
+    assert flight.circle(900.0, 0.0, 60.0) == 0
     if flavour == "px4":  # which refuses a place that is outside already
         set_real(flight, "GF_MAX_HOR_DIST", 400.0)
-        assert flight.reposition(1200.0, 0.0, 60.0) == 1
+        assert flight.circle(1200.0, 0.0, 60.0) == 1
     flight.fly_until(lambda: flight.mode == "return", 45.0, "return")
     flight.fly(1.2)
     assert status(flight) == CRITICAL

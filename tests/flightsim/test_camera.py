@@ -395,16 +395,18 @@ def test_streams_of_targets_and_clutter_are_their_own() -> None:
     def of_first(bench: Bench) -> list[Detection]:
         return [d for d in bench.detections(200) if d.target_id == 1]
 
-    alone = of_first(Bench((0.0, 5.0), tags=(1,), latency_s=0.0))
+    alone = of_first(Bench((0.0, 5.0), tags=(1,), size_m=1.2, latency_s=0.0))
     assert 150 < len(alone) < 200
-    crowd = Bench((0.0, 5.0), (10.0, -5.0), tags=(1, 2), latency_s=0.0, false_detections_per_frame=2.0)
+    crowd = Bench(
+        (0.0, 5.0), (10.0, -5.0), tags=(1, 2), size_m=1.2, latency_s=0.0, false_detections_per_frame=2.0
+    )
     assert of_first(crowd) == alone
-    away = Bench((0.0, 5.0), tags=(1,), latency_s=0.0)
+    away = Bench((0.0, 5.0), tags=(1,), size_m=1.2, latency_s=0.0)
     place(away.truth, 0.0, 500.0, 100.0)
     assert away.frames(50)[-1].detections == ()
     place(away.truth, 0.0, 0.0, 100.0)
     assert away.detections(150) == [d for d in alone if d.time_us >= 50 * FRAME_STEPS * STEP_US]
-    assert of_first(Bench((0.0, 5.0), tags=(1,), latency_s=0.0, seed=2)) != alone
+    assert of_first(Bench((0.0, 5.0), tags=(1,), size_m=1.2, latency_s=0.0, seed=2)) != alone
 
 
 @pytest.mark.parametrize(

@@ -129,9 +129,11 @@ def test_each_option_of_a_flight_is_under_a_heading() -> None:
 
 def test_the_pace_on_a_link_is_that_of_the_vehicle_since_it_was_heard() -> None:
     pace = Pace()
-    told = [pace.factor(wall_s, 0.5 * wall_s) for wall_s in (0.0, 0.3)]  # nothing heard: this machine's time
+    told = [
+        pace.factor(wall_s, 0.5 * wall_s) for wall_s in (0.0, 0.3)
+    ]  # nothing received: this machine's time
     assert told == [None, None]
-    # the vehicle tells that it booted an hour ago: elapsed time begins anew
+    # the vehicle reports that it booted an hour ago: elapsed time begins anew
     told = [pace.factor(0.5 + wall_s, 0.01 + 2.0 * wall_s) for wall_s in (0.0, 0.2, 0.6, 10.0)]
     assert told[:2] == [None, None]
     assert told[2:] == [pytest.approx(2.0), pytest.approx(2.0)]

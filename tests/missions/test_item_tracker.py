@@ -102,7 +102,7 @@ def test_losses_and_repeats_of_the_newest_never_lead_ahead_with_jumps(items, coa
 @given(missions(), st.booleans(), st.sampled_from(["reached", "position"]))
 def test_one_kind_of_message_is_enough_to_see_the_end(items, coalesced, kind) -> None:
     tracker = tracker_of(items)
-    tracker.on_current(1, 0)  # off the ground: no place tells that
+    tracker.on_current(1, 0)  # off the ground: no position shows that
     sent = [message for message in messages(items, coalesced) if message[0] == kind]
     for time_us, (_, values, _) in enumerate(sent):
         deliver(tracker, kind, values, time_us)

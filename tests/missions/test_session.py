@@ -351,7 +351,8 @@ def test_a_flight_from_the_command_line(embedded, tmp_path, capsys):
     assert err == ""  # quiet in a pipe
     lines = out.splitlines()
     assert lines[0].startswith("completed: lissajous with px4")
-    assert lines[1].startswith("path error 0.0")
+    assert lines[1].startswith("still air")
+    assert lines[2].startswith("path error 0.0")
     assert lines[-1] == f"run: {tmp_path / 'run'}"
 
 
@@ -442,7 +443,7 @@ def test_warnings_are_told_once(embedded, tmp_path, capsys):
         (["fly", "lissajous", "--connect", "nonsense"], "connection 'nonsense'"),
         (["fly", "lissajous", "--connect", "udpin:127.0.0.1:1", "--vehicles", "2"], "1 connections for 2"),
         (["fly", "lissajous", "--rate", "1"], "--rate 1 Hz"),
-        (["fly", "lissajous", "--arg", "x"], "--arg 'x' is not NAME=VALUE"),
+        (["fly", "lissajous", "--arg", "x"], "--arg is for a mission of your own, not for lissajous"),
         (["fly", "lissajous", "--no-such"], "--no-such"),
         (["fly"], "Missing argument"),
         (["walk"], "no command 'walk'; there are fly, sitl"),

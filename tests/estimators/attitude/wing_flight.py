@@ -62,10 +62,10 @@ def fly_turns(seed: int) -> FlightErrors:
     flight.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, dialect.MAVLINK_MSG_ID_SCALED_PRESSURE, 5e5)
     flight.take_off(100.0)
     for radius_m, height_m in ((_RADIUS_M, 100.0), (-_RADIUS_M, 110.0)):
-        assert flight.reposition(150.0, 150.0, height_m, radius_m) == 0
+        assert flight.circle(150.0, 150.0, height_m, radius_m) == 0
         flight.fly(25.0)
     _steps_of_bank(flight)
-    assert flight.reposition(150.0, 150.0, 100.0, 100.0) == 0
+    assert flight.circle(150.0, 150.0, 100.0, 100.0) == 0
     flight.fly(20.0)
     return seen.errors(flavour, str(turbulence))
 

@@ -177,7 +177,7 @@ def test_a_text_log_of_2013_has_the_times_of_its_gps(tmp_path):
     path.write_text("\n".join(lines))
     log = open_log(path)
     assert log.source.remarks["times"] == "interpolated between GPS times"
-    assert log.start_unix_us is None  # the week is not told
+    assert log.start_unix_us is None  # the week is not known
     assert log.duration_s == pytest.approx(20.0, abs=0.3)
     assert log.rate_hz("HIGHRES_IMU") == pytest.approx(50.0, rel=0.02)
 

@@ -11,6 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from autopilot_bridge.geodesy import LocalFrame
+from autopilot_bridge.mavlink import decode, definition
+from autopilot_bridge.tlog import TlogReader
 from flightsim.payload import DipoleSignature, MagneticMap
 from missions import cli
 from missions.embedded.scenario import magnetic_field_of
@@ -18,9 +21,11 @@ from missions.errors import PlanError
 from missions.occupancy.mission import MAP_NAME, OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
+from missions.records import FlightRecords
 from missions.request import RunRequest
 from missions.scenario import Scenario, Setting
 from missions.session import fly
+from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 
 SMALL = OccupancyOptions(
     vehicles=2,
@@ -86,31 +91,65 @@ def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_rep
     assert not (again.folder / MAP_NAME).exists()
 
 
+def true_field(found, options=SMALL, *, target=True):
+    """The field of the flown world, made again, with its target or without."""
+    scenario = unpublished(OccupancyMission().scenario(options, Setting(seed=1, folder=found.folder)))
+    if not target:
+        scenario = replace(scenario, survey=replace(scenario.survey, target_ne_m=None))
+    home = MagneticMap.load(found.folder / MAP_NAME).home
+    return magnetic_field_of(scenario, home=home, seed=1, decimal_year=2026.0)
+
+
+def flown_readings(folder, home, system_id):
+    """Readings that a vehicle sent at search height, and where it truly was: (north m, east m, height m, nT)
+    of each.
+    """
+    truth = FlightRecords.from_tlog(folder / "flight.tlog").table("HIL_STATE_QUATERNION", system_id)
+    sent = [
+        decode(frame)
+        for _, frame in TlogReader(folder / "flight.tlog")
+        if (frame.message_id, frame.system_id) == (definition("NAMED_VALUE_FLOAT").message_id, system_id)
+        and frame.component_id == SURVEY_MAGNETOMETER_COMPONENT
+    ]
+    per_lat, per_lon = LocalFrame(home).metres_per_degree
+    places = np.column_stack(
+        (
+            (truth["lat"] * 1e-7 - home.lat_deg) * per_lat,
+            (truth["lon"] * 1e-7 - home.lon_deg) * per_lon,
+            truth["alt"] * 1e-3 - home.alt_m,
+        )
+    )
+    time_us = [m.time_boot_ms * 1e3 for m in sent]
+    at = np.column_stack([np.interp(time_us, truth["time_usec"], axis) for axis in places.T])
+    return np.column_stack((at, [m.value for m in sent]))[at[:, 2] > 12.0]
+
+
 def test_the_field_is_not_the_published_map(found):
-    """What the magnetometers read differs from the map by the error that the map states, away from the
-    target.
+    """Where the vehicles flew, their magnetometers read the true field, which differs from the map by the
+    error that the map states, and by the target.
     """
     published = MagneticMap.load(found.folder / MAP_NAME)
     assert published.error_nt == pytest.approx(found.summary["map_error_nt"], abs=1e-3)
-    truth = magnetic_field_of(
-        unpublished(OccupancyMission().scenario(SMALL, Setting(seed=1, folder=found.folder))),
-        home=published.home,
-        seed=1,
-        decimal_year=2026.0,
-    )
-    assert truth is not None
-    north_m, east_m = (axis.ravel() for axis in np.meshgrid(np.arange(-550.0, -250.0, 20.0), [-500.0, 500.0]))
-    difference_nt = truth.total_at_nt(north_m, east_m, published.height_m) - published.interpolate(
-        north_m, east_m
-    )
-    assert 0.2 < np.sqrt(np.mean(difference_nt**2)) < 3.0 * published.error_nt
+    field, background = true_field(found), true_field(found, target=False)
+    map_errors_nt, away_nt = [], []
+    for system_id in (1, 2):
+        readings = flown_readings(found.folder, published.home, system_id)
+        assert len(readings) > 500
+        sensor_nt = readings[:, 3] - [field.total_nt(*place) for place in readings[:, :3]]
+        assert abs(sensor_nt.mean()) < 1.5  # heading error and drift of the magnetometer
+        assert sensor_nt.std() < 0.5
+        on_map_nt = published.interpolate(*readings[:, :3].T)
+        assert np.all(np.isfinite(on_map_nt))
+        map_errors_nt.append([background.total_nt(*place) for place in readings[:, :3]] - on_map_nt)
+        away = np.hypot(readings[:, 0] - 110.0, readings[:, 1] - 30.0) > 250.0
+        away_nt.append((readings[:, 3] - on_map_nt)[away])
+    error_nt = np.sqrt(np.mean(np.concatenate(map_errors_nt) ** 2))
+    assert 0.3 * published.error_nt < error_nt < 3.0 * published.error_nt
+    differential_nt = np.concatenate(away_nt)
+    assert len(differential_nt) > 100
+    assert differential_nt.std() > 1.0  # the magnetometer's own noise is 0.2 nT
     dipole = replace(SMALL, moment_a_m2=2e4)
-    seen = magnetic_field_of(
-        unpublished(OccupancyMission().scenario(dipole, Setting(seed=1, folder=found.folder))),
-        home=published.home,
-        seed=1,
-        decimal_year=2026.0,
-    )
+    seen = true_field(found, dipole)
     assert isinstance(seen.signatures[0], DipoleSignature)
     assert np.linalg.norm(seen.signatures[0].moment_ned_a_m2) == pytest.approx(2e4)
 

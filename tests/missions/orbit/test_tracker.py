@@ -62,6 +62,28 @@ def test_expected_seen_lost_and_seen_again():
     assert 0 < rig.tracker.target.accepted <= 30
 
 
+def test_one_detection_at_the_limit_of_the_camera_is_no_acquisition_and_silence_after_it_no_loss():
+    rig = Rig()
+    detect, left = rig.tracker.detect, [0]
+
+    def limited(found):
+        if left[0] > 0:
+            left[0] -= 1
+            detect(found)
+
+    rig.tracker.detect = limited
+    for count in (1, 2):
+        left[0] = count
+        assert rig.run(6.0).status is TargetStatus.EXPECTED
+        assert left[0] == 0
+    assert rig.tracker.target.accepted == 3  # the last two came more than 3 s after the first
+    assert rig.tracker.losses == 0
+    left[0] = 3
+    assert rig.run(2.0).status is TargetStatus.SEEN
+    assert rig.run(4.0).status is TargetStatus.LOST
+    assert rig.tracker.losses == 1
+
+
 def test_a_target_is_seen_while_its_expected_place_is_still_renewed():
     """As with GPS: the place somebody tells is taken anew every step, and images come later than that."""
     rig = Rig()
@@ -154,5 +176,7 @@ def test_attitude_is_interpolated_and_gets_old():
 
 
 def test_parameters_are_checked():
+    with pytest.raises(ValueError, match="acquired_after = 0"):
+        TrackerParameters(acquired_after=0)
     with pytest.raises(ValueError, match="lost_after_s = 0"):
         TrackerParameters(lost_after_s=0.0)
