@@ -15,7 +15,6 @@ _EK3_STEP_S: Final = 0.012  # EKF_TARGET_DT of ArduPilot 4.6.3
 _VERTICAL_TO_HORIZONTAL: Final = 1.5  # both firmwares: of a receiver's errors
 
 _PX4_FIELDS: Final = (
-    FieldMap("gyro_bias_rad_s", "EKF2_GBIAS_INIT", low=1e-4, high=0.2),
     FieldMap("accel_bias_m_s2", "EKF2_ABIAS_INIT", low=1e-3, high=0.5),
     FieldMap("barometer_noise_m", "EKF2_BARO_NOISE", low=0.01, high=15.0),
     FieldMap("magnetometer_noise_gauss", "EKF2_MAG_NOISE", low=1e-3, high=1.0),

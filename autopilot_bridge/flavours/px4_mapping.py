@@ -166,7 +166,10 @@ NAVIGATION: Final = (
     FieldMap("no_aid_noise_m", "EKF2_NOAID_NOISE", low=0.5, high=50.0),
 )
 
-NAVIGATION_RATIOS: Final = (RatioMap(("gps_check_time_s",), "EKF2_REQ_GPS_H"),)
+NAVIGATION_RATIOS: Final = (
+    RatioMap(("gps_check_time_s",), "EKF2_REQ_GPS_H"),
+    RatioMap(("gyro_bias_rad_s",), "EKF2_GBIAS_INIT"),
+)
 _GPS_POSITION_OR_VELOCITY: Final = 1 | 4  # of EKF2_GPS_CTRL
 
 
@@ -262,7 +265,7 @@ def controller_parameters(store: ParameterStore) -> MulticopterParameters:
 
 
 def navigation_parameters(store: ParameterStore) -> NavigationParameters:
-    """EKF2_*: noise, gates, checks and time-outs; EKF2_REQ_GPS_H relative to PX4's default.
+    """EKF2_*: noise, gates, checks and time-outs; EKF2_REQ_GPS_H, EKF2_GBIAS_INIT relative to PX4's default.
 
     GPS is fused as a whole: with neither position nor velocity in EKF2_GPS_CTRL not at all.
     """

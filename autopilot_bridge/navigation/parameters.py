@@ -38,8 +38,10 @@ class NavigationParameters:
     Attributes:
         covariance_rate_hz: rate of covariance prediction and measurement updates; divides the physics rate.
         gyro_noise_rad_s_sqrt_hz: angular random walk (EKF2_GYR_NOISE per step of 10 ms).
-        gyro_bias_rad_s, gyro_bias_walk_rad_s_sqrt_s: bias, 1-sigma at the start (EKF2_GBIAS_INIT), and its
-            random walk (EKF2_GYR_B_NOISE); a Gauss-Markov process that never exceeds the first.
+        gyro_bias_rad_s, gyro_bias_walk_rad_s_sqrt_s: bias, 1-sigma at the start, and its random walk
+            (EKF2_GYR_B_NOISE); a Gauss-Markov process that never exceeds the first. The first is what the
+            calibration at boot leaves: ArduPilot repeats it until two means agree within 0.1 deg/s. The
+            0.1 rad/s of EKF2_GBIAS_INIT would take the swing of an aircraft parked in gusts for a bias.
         gyro_scale_error, gyro_cross_axis_error: 1-sigma, fractions; they add uncertainty per angle turned.
         gyro_scale_tilt_rad: usual amplitude of tilting, over which its scale error adds up.
         accel_noise_m_s2_sqrt_hz, accel_bias_m_s2, accel_bias_walk_m_s2_sqrt_s: as for the gyro
@@ -129,7 +131,7 @@ class NavigationParameters:
 
     covariance_rate_hz: int = 25
     gyro_noise_rad_s_sqrt_hz: float = 1.5e-3
-    gyro_bias_rad_s: float = 0.1
+    gyro_bias_rad_s: float = 1.75e-3
     gyro_bias_walk_rad_s_sqrt_s: float = 1e-4
     gyro_scale_error: float = 0.0033
     gyro_cross_axis_error: float = 0.001

@@ -26,7 +26,7 @@ TUNED: Final[Mapping[str, Mapping[str, float]]] = {
     "px4": {
         "EKF2_GYR_NOISE": 2.5e-3,
         "EKF2_GYR_B_NOISE": 1.2e-4,
-        "EKF2_GBIAS_INIT": 1.1e-3,
+        "EKF2_GBIAS_INIT": 0.063,  # relative to 0.1: 1.1e-3 rad/s
         "EKF2_ACC_NOISE": 0.018,
         "EKF2_ACC_B_NOISE": 1.8e-3,
         "EKF2_ABIAS_INIT": 0.025,

@@ -50,6 +50,16 @@ def fly_to_the_ground(flight: AircraftFlight, limit_s: float = 300.0) -> float:
     return sink_m_s[0]
 
 
+@pytest.mark.parametrize("seed", [4, 6, 7])
+def test_gusts_that_swing_a_parked_aircraft_are_not_taken_for_the_gyros_bias(seed: int) -> None:
+    """A rate of a few degrees per second at rest is no bias that a gyro has after its calibration."""
+    air = Environment(wind_ned_m_s=(-3.0, -5.2, 0.0), turbulence=Turbulence.MODERATE)
+    flight = AircraftFlight("ardupilot", environment=air, seed=seed)
+    flight.fly(25.0)
+    error_rad = math.remainder(flight.newest["ATTITUDE"].yaw - flight.yaw_rad, 2.0 * math.pi)
+    assert abs(math.degrees(error_rad)) < 5.0
+
+
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_takes_off_from_the_runway_and_circles(flavour: str) -> None:
     flight = AircraftFlight(flavour, environment=WIND)

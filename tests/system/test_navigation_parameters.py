@@ -22,7 +22,7 @@ NOISE = [
     ("px4", "EKF2_GYR_NOISE", 0.03, "gyro_noise_rad_s_sqrt_hz", 0.003),
     ("px4", "EKF2_ACC_B_NOISE", 0.006, "accel_bias_walk_m_s2_sqrt_s", 6e-4),
     ("px4", "EKF2_GYR_B_NOISE", 0.002, "gyro_bias_walk_rad_s_sqrt_s", 2e-4),
-    ("px4", "EKF2_GBIAS_INIT", 0.05, "gyro_bias_rad_s", 0.05),
+    ("px4", "EKF2_GBIAS_INIT", 0.05, "gyro_bias_rad_s", 0.5 * 1.75e-3),
     ("px4", "EKF2_ABIAS_INIT", 0.1, "accel_bias_m_s2", 0.1),
     ("ardupilot", "EK3_POSNE_M_NSE", 1.0, "gps_position_noise_m", (1.0, 1.5)),
     ("ardupilot", "EK3_VELNE_M_NSE", 0.6, "gps_velocity_noise_m_s", (0.6, 0.5)),
