@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from flightsim.environment import Environment, Turbulence
+from flightsim.wind_profile import WindProfile
 from tests.flights.aircraft import AircraftFlight
 from tests.flights.aircraft_figures import (
     SETTLED_AFTER_M,
@@ -50,7 +51,10 @@ def fly_case(case: Case, turbulence: Turbulence = Turbulence.MODERATE) -> Missio
     """Fly a mission to its touch."""
     heading_deg = 353.0 if case.flavour == "ardupilot" else 0.0
     wind = Environment.from_wind(
-        speed_m_s=6.0, from_deg=heading_deg + case.wind_from_deg, turbulence=turbulence
+        speed_m_s=6.0,
+        from_deg=heading_deg + case.wind_from_deg,
+        turbulence=turbulence,
+        profile=WindProfile(),  # 6 m/s at all heights; of the profile see README, Limits
     )
     flight = AircraftFlight(
         case.flavour,
