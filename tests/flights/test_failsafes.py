@@ -270,7 +270,7 @@ def test_a_weak_motor_is_carried_and_a_dead_one_breaks_no_software(flavour: str)
 
 def test_a_crashed_arducopter_is_disarmed() -> None:
     flight = hovering("ardupilot", height_m=8.0)
-    flight.vehicle.vehicle.set_motor_effectiveness(1, 0.0)
+    flight.vehicle.vehicle.set_motor_effectiveness(3, 0.0)  # it tumbles, and comes to rest on its back
     flight.wait_disarmed(15.0)
     assert flight.height_m < 1.0 and flight.tilt_deg > 90.0
     assert flight.text_time("Crash: Disarming: AngErr=") < math.inf
