@@ -7,7 +7,8 @@ stream (1280 pixels over 60 degrees), off the middle by some pixels. Tags are re
 found by their colour. Motion blur is a line of that length in any direction. For tags by size and
 depression, tags by size and blur, and balls by size, the share that is found is printed above what
 `PictureDetection` says; then the constants that fit best (maximum likelihood), the error of the places, and
-how many detections were of something else.
+how many detections were of something else. Large tags at flat angles come first: they show the depression
+below which none is read, and are not part of the fit.
 """
 
 import argparse
@@ -33,6 +34,8 @@ FOCAL_PX: Final = PinholeModel().focal_px
 CROP: Final = PinholeModel(width_px=320, height_px=240, horizontal_fov_rad=2.0 * math.atan(160.0 / FOCAL_PX))
 SIZE_M: Final = 2.0
 TAG_SIZES_PX: Final = (10.0, 12.0, 14.0, 16.0, 20.0, 24.0, 28.0, 36.0)
+FLAT_SIZES_PX: Final = (50.0, 70.0, 100.0)
+FLAT_DEPRESSIONS_DEG: Final = (5.0, 6.0, 7.0, 8.0, 10.0)
 DEPRESSIONS_DEG: Final = (15.0, 20.0, 35.0, 50.0, 90.0)
 BLURS_PX: Final = (1.0, 2.0, 4.0)
 BLURRED_FROM_DEG: Final = 50.0
@@ -255,6 +258,9 @@ def main() -> None:
         sys.stdout.flush()
 
     count = range(given.pictures)
+    for depression_deg in FLAT_DEPRESSIONS_DEG:
+        trials = [bench.trial(size, depression_deg) for size in FLAT_SIZES_PX for _ in count]
+        sys.stdout.write(table(f"tags at {depression_deg:g} deg of depression", trials))
     for depression_deg in DEPRESSIONS_DEG:
         run(
             f"tags at {depression_deg:g} deg of depression",

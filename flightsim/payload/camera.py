@@ -323,6 +323,7 @@ class Camera:
             vehicle,
             targets.positions_ned_m,
             targets.sizes_m,
+            targets.tagged,
             self._constants,
             normals,
             view,
@@ -338,7 +339,7 @@ class Camera:
                 blur_px=self._blur_px(time_us)[visible],
                 edge_px=view[visible, k.EDGE_PX],
                 covered=_covered(view[visible]),
-                tagged=targets.tag_ids[visible] != NO_TAG,
+                tagged=targets.tagged[visible],
             )
         )
         found = []
@@ -371,6 +372,7 @@ class Camera:
             self._vehicle_before_ned_m,
             self._targets.positions_ned_m,
             self._targets.sizes_m,
+            self._targets.tagged,
             self._constants,
             self._no_noise,
             before,

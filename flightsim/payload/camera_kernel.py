@@ -30,12 +30,33 @@ SIZE_RAD: Final = 2  # as measured
 SIZE_PX: Final = 3  # true; NaN: not visible
 RANGE_M: Final = 4
 SINE: Final = 5  # of the line of sight's depression below the horizon
-EDGE_PX: Final = 6  # from the true place to the nearest edge of the picture
+EDGE_PX: Final = 6  # from the target's outline to the nearest edge of the picture; negative: cut off
 TRUE_U_PX: Final = 7
 TRUE_V_PX: Final = 8
 VIEW: Final = 9
 
 _MIN_RANGE_M: Final = 1e-6
+
+
+@kernel
+def _outline_edge_px(
+    sight: Array, half_m: float, q_ned_from_frd: Array, q_frd_from_gimbal: Array, constants: Array
+) -> float:
+    """From the corners of a tag, flat on the ground and north up, to the nearest edge of the picture."""
+    corner, body, gimbal = np.zeros(3), np.zeros(3), np.zeros(3)
+    focal_px, width_px, height_px = constants[FOCAL_PX], constants[WIDTH_PX], constants[HEIGHT_PX]
+    nearest_px = math.inf
+    for i in range(4):
+        corner[0] = sight[0] + (half_m if i & 1 else -half_m)
+        corner[1] = sight[1] + (half_m if i & 2 else -half_m)
+        corner[2] = sight[2]
+        rotate_inverse(q_ned_from_frd, corner, body)
+        rotate_inverse(q_frd_from_gimbal, body, gimbal)
+        if gimbal[0] <= 0.0:
+            return -math.inf
+        right_px, down_px = focal_px * gimbal[1] / gimbal[0], focal_px * gimbal[2] / gimbal[0]
+        nearest_px = min(nearest_px, 0.5 * width_px - abs(right_px), 0.5 * height_px - abs(down_px))
+    return nearest_px
 
 
 @kernel
@@ -45,11 +66,12 @@ def look(
     vehicle_ned_m: Array,
     targets_ned_m: Array,
     sizes_m: Array,
+    tagged: NDArray[np.bool_],
     constants: Array,
     normals: Array,
     out: Array,
 ) -> int:
-    """Rows (n, VIEW) of `out` for targets (n, 3); returns how many are visible.
+    """Rows (n, VIEW) of `out` for targets (n, 3), tags where `tagged`; returns how many are visible.
 
     Visible is what lies before the camera, in the image as it is and as it is measured, near enough, and far
     enough below the horizon. `normals` is (n, 3): noise of u, v and size.
@@ -78,7 +100,13 @@ def look(
         if not (0.0 <= u_px < width_px and 0.0 <= v_px < height_px):
             continue
         out[i, TRUE_U_PX], out[i, TRUE_V_PX] = u_px, v_px
-        out[i, EDGE_PX] = min(u_px, v_px, width_px - u_px, height_px - v_px)
+        size_rad = 2.0 * math.atan(0.5 * sizes_m[i] / range_m)
+        if tagged[i]:
+            out[i, EDGE_PX] = _outline_edge_px(
+                sight, 0.5 * sizes_m[i], q_ned_from_frd, q_frd_from_gimbal, constants
+            )
+        else:
+            out[i, EDGE_PX] = min(u_px, v_px, width_px - u_px, height_px - v_px) - 0.5 * focal_px * size_rad
         u_px += constants[PIXEL_NOISE] * normals[i, 0]
         v_px += constants[PIXEL_NOISE] * normals[i, 1]
         quantum_px = constants[QUANTUM_PX]
@@ -87,7 +115,6 @@ def look(
             v_px = math.floor(v_px / quantum_px + 0.5) * quantum_px
         if not (0.0 <= u_px < width_px and 0.0 <= v_px < height_px):
             continue
-        size_rad = 2.0 * math.atan(0.5 * sizes_m[i] / range_m)
         out[i, U_PX] = u_px
         out[i, V_PX] = v_px
         out[i, SIZE_PX] = focal_px * size_rad

@@ -66,7 +66,7 @@ class SeenTargets:
         range_m: distance.
         sine: of the depression of the line of sight: how much a tag on the ground is foreshortened.
         blur_px: way of the target in the picture during the exposure.
-        edge_px: from its middle to the nearest edge of the picture.
+        edge_px: from its outline to the nearest edge of the picture; negative: the edge cuts it off.
         covered: another target stands before it.
         tagged: it is a tag, and no ball.
     """
@@ -94,14 +94,16 @@ class PictureDetection:
 
     Tags of the family 36h11 by `cv2.aruco`, balls by their colour. A tag on the ground is foreshortened, so
     the size that counts is size_px * sine^foreshortening; blur b asks for a size of sqrt(half_size_px^2 +
-    (blur_factor b)^2) where half of the tags are read. What touches the edge of the picture, or is covered
-    by another target, is not read. The defaults are fits to rendered pictures, by `python
-    benchmarks/camera_detection.py`.
+    (blur_factor b)^2) where half of the tags are read. A target that the edge of the picture cuts off, or
+    that another one covers, is not detected. A tag is not read below min_depression_rad: `cv2.aruco` drops
+    quadrilaterals with two corners closer than a twentieth of the outline. The defaults are fits to rendered
+    pictures, by `python benchmarks/camera_detection.py`.
 
     Attributes:
         max_probability: of a target that fills many pixels.
         half_size_px, slope_px: of a tag seen from above: size with half of that left, and width of the fall.
         foreshortening: exponent.
+        min_depression_rad: of the line of sight to a tag.
         blur_factor: of motion, in pixels of size for each pixel of blur.
         ball_half_size_px, ball_slope_px: of a ball; it isn't foreshortened, and blur doesn't hide it.
     """
@@ -110,6 +112,7 @@ class PictureDetection:
     half_size_px: float = 10.7
     slope_px: float = 1.03
     foreshortening: float = 0.742
+    min_depression_rad: float = math.radians(6.4)
     blur_factor: float = 3.4
     ball_half_size_px: float = 2.01
     ball_slope_px: float = 0.042
@@ -119,6 +122,7 @@ class PictureDetection:
         require_not_negative(
             half_size_px=self.half_size_px,
             foreshortening=self.foreshortening,
+            min_depression_rad=self.min_depression_rad,
             blur_factor=self.blur_factor,
             ball_half_size_px=self.ball_half_size_px,
         )
@@ -131,7 +135,8 @@ class PictureDetection:
         tag = (across_px - half_px) / self.slope_px
         ball = (seen.size_px - self.ball_half_size_px) / self.ball_slope_px
         share = 0.5 * (1.0 + np.tanh(0.5 * np.where(seen.tagged, tag, ball)))
-        whole = (seen.edge_px >= 0.5 * seen.size_px) & ~seen.covered
+        whole = (seen.edge_px >= 0.0) & ~seen.covered
+        whole &= ~seen.tagged | (seen.sine >= math.sin(self.min_depression_rad))
         value: Array = np.where(whole, self.max_probability * share, 0.0)
         return value
 

@@ -76,10 +76,19 @@ class GroundTargets:
         positions_ned_m, velocities_ned_m_s: (n, 3).
         sizes_m: (n,).
         tag_ids: (n,).
+        tagged: (n,), what has a tag.
         time_us: of the last `step`.
     """
 
-    __slots__ = ("positions_ned_m", "sizes_m", "tag_ids", "targets", "time_us", "velocities_ned_m_s")
+    __slots__ = (
+        "positions_ned_m",
+        "sizes_m",
+        "tag_ids",
+        "tagged",
+        "targets",
+        "time_us",
+        "velocities_ned_m_s",
+    )
 
     def __init__(
         self,
@@ -98,6 +107,7 @@ class GroundTargets:
         self.velocities_ned_m_s: Array = np.zeros((count, 3))
         self.sizes_m: Array = np.array([p.size_m for p in parameters], dtype=np.float64)
         self.tag_ids = np.array([p.tag_id for p in parameters], dtype=np.int64)
+        self.tagged: NDArray[np.bool_] = self.tag_ids != NO_TAG
         self.targets = tuple(
             GroundTarget(
                 p,

@@ -232,6 +232,19 @@ class Client:
             self.next("EKF_STATUS_REPORT", lambda m: m.flags & EKF_READY == EKF_READY)
         self.next("GLOBAL_POSITION_INT")
 
+    def take_off(self, height_m: float) -> None:
+        """Fly a multicopter straight up, in GUIDED or by the mode that PX4 takes off in."""
+        self.ready()
+        if self.flavour == "ardupilot":
+            self.set_mode("GUIDED")
+            self.arm()
+            self.command(mavlink.MAV_CMD_NAV_TAKEOFF, *(0.0,) * 6, height_m)
+        else:
+            home = self.next("HOME_POSITION")
+            self.arm()
+            self.command(mavlink.MAV_CMD_NAV_TAKEOFF, *(math.nan,) * 6, home.altitude * 1e-3 + height_m)
+        self.next("GLOBAL_POSITION_INT", lambda m: m.relative_alt * 1e-3 > height_m - 0.8)
+
     def send_position(self, north_m: float, east_m: float, height_m: float) -> None:
         """SET_POSITION_TARGET_LOCAL_NED, position only."""
         self.link.mav.set_position_target_local_ned_send(

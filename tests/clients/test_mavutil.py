@@ -38,35 +38,10 @@ def client(request: pytest.FixtureRequest) -> Iterator[Client]:
         yield Client(request.param, f"udpin:127.0.0.1:{port}", speedup=SPEEDUP)
 
 
-def take_off(client: Client, height_m: float) -> None:
-    client.ready()
-    if client.flavour == "ardupilot":
-        set_mode(client, "offboard")  # GUIDED
-        client.arm()
-        client.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height_m)
-    else:
-        home = client.until("home", lambda m: m.get_type() == "HOME_POSITION")
-        client.arm()
-        client.command(
-            mavlink.MAV_CMD_NAV_TAKEOFF,
-            0,
-            0,
-            0,
-            math.nan,
-            math.nan,
-            math.nan,
-            home.altitude * 1e-3 + height_m,
-        )
-    client.until(
-        "height",
-        lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.relative_alt * 1e-3 > height_m - 0.8,
-    )
-
-
 @pytest.mark.parametrize("client", ["px4", slow("ardupilot")], indirect=True)
 @pytest.mark.compatibility(client="pymavlink (mavutil)", feature="setpoints, modes", parameter="client")
 def test_offboard_positions_and_return(client: Client) -> None:
-    take_off(client, 10.0)
+    client.take_off(10.0)
     if client.flavour == "px4":
         hover = (0.0, 0.0, 12.0)
         client.stream_for(0.5, lambda: client.send_position(*hover))  # OFFBOARD wants to see a stream first

@@ -1,11 +1,10 @@
-"""Camera and gimbal beside the autopilot, as MAVSDK's plugins and a mavutil script find and use them.
-
-Both clients share one vehicle, each on a link of its own.
+"""Camera and gimbal beside the autopilot, as MAVSDK's plugins and a mavutil script find and use them: on an
+aircraft that is parked, and on a multicopter that hovers over a target.
 """
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from typing import Any
 
 import pytest
@@ -15,17 +14,31 @@ from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import free_port, running_sitl
 
 SPEEDUP = 8.0
-OPTIONS = ("--model", "aerosonde", "--camera", "--target", "3,0", "--video", "0")
 CAMERA, GIMBAL = 100, 154
+HEIGHT_M = 15.0
+TARGET = "8,1"  # m; a gimbal that looks down by 60 degrees from that height has it in the picture
 
 
 @pytest.fixture(scope="module", params=["px4", "ardupilot"])
-def vehicle(request: pytest.FixtureRequest) -> Iterator[tuple[str, int, int]]:
-    """A flavour, and the ports of its two links."""
-    first_port, second_port = free_port(), free_port()
-    links = [f"udpout:127.0.0.1:{first_port}", f"udpout:127.0.0.1:{second_port}"]
-    with running_sitl(request.param, links, speedup=SPEEDUP, options=OPTIONS):
-        yield request.param, first_port, second_port
+def parked(request: pytest.FixtureRequest) -> Iterator[int]:
+    """The port of an aircraft's link."""
+    port = free_port()
+    options = ("--model", "aerosonde", "--camera", "--video", "0")
+    with running_sitl(request.param, [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP, options=options):
+        yield port
+
+
+@pytest.fixture(scope="module", params=["px4", "ardupilot"])
+def hovering(request: pytest.FixtureRequest) -> Iterator[tuple[Client, int]]:
+    """A mavutil client of a multicopter beside a target, and the port of the multicopter's other link."""
+    port, other_port = free_port(), free_port()
+    links = [f"udpout:127.0.0.1:{port}", f"udpout:127.0.0.1:{other_port}"]
+    options = ("--camera", "--target", TARGET, "--video", "0")
+    with running_sitl(request.param, links, speedup=SPEEDUP, options=options):
+        client = Client(request.param, f"udpin:127.0.0.1:{port}", speedup=SPEEDUP)
+        client.take_off(HEIGHT_M)
+        yield client, other_port
+        client.link.close()
 
 
 async def use_gimbal(system: Any) -> None:
@@ -103,13 +116,11 @@ async def use_camera(system: Any) -> None:
 
 async def use_lens_and_video(system: Any) -> None:
     from mavsdk.asyncio.plugins.camera import CameraAsync
-    from mavsdk.asyncio.plugins.gimbal import GimbalAsync
-    from mavsdk.plugins.camera import CameraError, Mode, Option, Setting
-    from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode
+    from mavsdk.plugins.camera import Mode, Option, Setting
 
     from tests.clients.mavsdk_waiting import first
 
-    camera, gimbal = CameraAsync(system), GimbalAsync(system)
+    camera = CameraAsync(system)
     await first(camera.subscribe_camera_list(), lambda known: known.cameras, "camera")
     await camera.zoom_range(CAMERA, 50.0)
     await camera.zoom_in_start(CAMERA)
@@ -135,56 +146,84 @@ async def use_lens_and_video(system: Any) -> None:
     assert chosen.option.option_id == "75"
     await camera.stop_video_streaming(CAMERA, 1)
     await camera.start_video_streaming(CAMERA, 1)
+    await camera.format_storage(CAMERA, 1)
+    await camera.reset_settings(CAMERA)
 
+
+async def track_target(system: Any) -> None:
+    from mavsdk.asyncio.plugins.camera import CameraAsync
+    from mavsdk.asyncio.plugins.gimbal import GimbalAsync
+    from mavsdk.plugins.camera import CameraError
+    from mavsdk.plugins.gimbal import ControlMode, GimbalMode, SendMode
+
+    from tests.clients.mavsdk_waiting import first
+
+    camera, gimbal = CameraAsync(system), GimbalAsync(system)
+    await first(camera.subscribe_camera_list(), lambda known: known.cameras, "camera")
     found = await first(gimbal.subscribe_gimbal_list(), lambda known: known.gimbals, "gimbal")
     number = found.gimbals[0].gimbal_id
     await gimbal.take_control(number, ControlMode.PRIMARY)
+    await gimbal.set_angles(number, 0.0, -60.0, 0.0, GimbalMode.YAW_LOCK, SendMode.ONCE)
     with pytest.raises(CameraError):
         await camera.track_point(CAMERA, 0.01, 0.99, 0.001)  # nothing is there
-    await gimbal.set_angles(number, 0.0, -6.0, 0.0, GimbalMode.YAW_FOLLOW, SendMode.ONCE)
     for _ in range(50):
         try:
             await camera.track_rectangle(CAMERA, 0.2, 0.2, 0.8, 0.8)
             break
-        except CameraError:  # not there yet, or not detected in this very frame
+        except CameraError:  # the gimbal is still on its way, or this very frame has no detection
             await asyncio.sleep(0.1)
     else:
         raise AssertionError("the target was not tracked")
     await camera.track_stop(CAMERA)
     await gimbal.release_control(number)
-    await camera.format_storage(CAMERA, 1)
-    await camera.reset_settings(CAMERA)
 
 
-@pytest.mark.compatibility(client="MAVSDK asyncio", feature="camera, gimbal", plane=True)
-def test_mavsdk_uses_gimbal_and_camera(vehicle: tuple[str, int, int]) -> None:
+def with_mavsdk(port: int, *uses: Callable[[Any], Awaitable[None]]) -> None:
+    """Run each on a system of MAVSDK's."""
     pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
     from tests.clients.mavsdk_waiting import ground_station
 
-    async def use(url: str) -> None:
-        async with ground_station(url) as system:
-            await use_gimbal(system)
-            await use_camera(system)
-            await use_lens_and_video(system)
+    async def use_all() -> None:
+        async with ground_station(f"udpin://127.0.0.1:{port}") as system:
+            for use in uses:
+                await use(system)
 
-    _, port, _ = vehicle
-    asyncio.run(use(f"udpin://127.0.0.1:{port}"))
+    asyncio.run(use_all())
 
 
-@pytest.mark.compatibility(client="pymavlink (mavutil)", feature="LANDING_TARGET of the camera", plane=True)
-def test_mavutil_sees_a_target(vehicle: tuple[str, int, int]) -> None:
-    flavour, _, port = vehicle
-    client = Client(flavour, f"udpin:127.0.0.1:{port}", speedup=SPEEDUP)
-    client.until("gimbal", lambda m: m.get_type() == "HEARTBEAT" and m.get_srcComponent() == GIMBAL)
+@pytest.mark.compatibility(client="MAVSDK asyncio", feature="camera, gimbal", parameter="parked", plane=True)
+def test_mavsdk_uses_gimbal_and_camera(parked: int) -> None:
+    with_mavsdk(parked, use_gimbal, use_camera, use_lens_and_video)
+
+
+@pytest.mark.compatibility(client="MAVSDK asyncio", feature="camera tracking", parameter="hovering")
+def test_mavsdk_tracks_a_target(hovering: tuple[Client, int]) -> None:
+    _, port = hovering
+    with_mavsdk(port, track_target)
+
+
+@pytest.mark.compatibility(
+    client="pymavlink (mavutil)", feature="LANDING_TARGET of the camera", parameter="hovering"
+)
+def test_mavutil_sees_a_target(hovering: tuple[Client, int]) -> None:
+    client, _ = hovering
     client.link.mav.command_long_send(
-        1, GIMBAL, mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, 0, -6.0, 0.0, 0, 0, 0, 0, GIMBAL
+        1,
+        GIMBAL,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        0,
+        -60.0,
+        0.0,
+        0,
+        0,
+        mavlink.GIMBAL_MANAGER_FLAGS_YAW_LOCK,
+        0,
+        GIMBAL,
     )
     ack = client.until(
         "gimbal's answer", lambda m: m.get_type() == "COMMAND_ACK" and m.get_srcComponent() == GIMBAL
     )
     assert ack.result == mavlink.MAV_RESULT_ACCEPTED
-    # it lies just in front of the nose: flatter than a few degrees, a camera doesn't tell it from the ground
     seen = client.until("target", lambda m: m.get_type() == "LANDING_TARGET" and abs(m.angle_y) < 0.1)
     assert (seen.get_srcComponent(), seen.frame) == (CAMERA, mavlink.MAV_FRAME_BODY_FRD)
     assert abs(seen.angle_x) < math.radians(12.0)
-    client.link.close()

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import numpy as np
 import pytest
 from PIL import ExifTags, Image
 from pymavlink.dialects.v20 import all as mavlink
@@ -17,7 +16,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from tests.clients.forked_process import flightstack_done
 from tests.clients.mavutil_client import Client
 from tests.clients.sitl_process import SitlProcess, free_port, running_sitl
-from tests.clients.video_client import picture_where, tags, watch, yellow
+from tests.clients.video_client import picture_where, plate_middle, tags, watch, yellow
 
 CAMERA, GIMBAL = 100, 154
 SPEEDUP = 4.0
@@ -99,11 +98,7 @@ def flight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Flight]:
     )
     with running_sitl("px4", [f"udpout:127.0.0.1:{port}"], speedup=SPEEDUP, options=options) as sitl:
         client = Client("px4", f"udpin:127.0.0.1:{port}", speedup=SPEEDUP)
-        client.ready()
-        home = client.next("HOME_POSITION")
-        client.arm()
-        client.command(mavlink.MAV_CMD_NAV_TAKEOFF, *(math.nan,) * 6, 1e-3 * home.altitude + HEIGHT_M)
-        client.next("GLOBAL_POSITION_INT", lambda m: m.relative_alt > 970 * HEIGHT_M)
+        client.take_off(HEIGHT_M)
         flight = Flight(sitl, client, pictures)
         pitchyaw = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW
         pointed = flight.ask(GIMBAL, pitchyaw, -60.0, 0.0, math.nan, math.nan, 0, 0, GIMBAL)
@@ -132,8 +127,7 @@ def test_video_capture_shows_the_target_where_the_detector_says(flight: Flight) 
     ]
     # the picture is as late as its stream: one of the messages is of its moment
     assert min(math.dist(middle, place) for place in told) < 5.0
-    v, u = np.nonzero(yellow(picture))
-    assert (u.mean(), v.mean()) == pytest.approx(tuple(middle), abs=4.0)
+    assert plate_middle(yellow(picture)) == pytest.approx(tuple(middle), abs=4.0)
     capture.release()
 
 

@@ -39,7 +39,7 @@ def picture_where(capture: Any, found: Callable[[Picture], bool], what: str) -> 
 
 
 def tags(picture: Picture) -> dict[int, NDArray[np.float64]]:
-    """Middle of each tag that OpenCV reads in a picture, pixels from its corner."""
+    """Middle of each tag that OpenCV reads in a picture, pixels from the picture's corner."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.adaptiveThreshWinSizeMax = 53
     family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
@@ -47,9 +47,29 @@ def tags(picture: Picture) -> dict[int, NDArray[np.float64]]:
     if ids is None:
         return {}
     return {
-        int(number): quad.reshape(4, 2).mean(axis=0) + 0.5
+        int(number): crossing(quad.reshape(4, 2)) + 0.5
         for number, quad in zip(ids.ravel(), corners, strict=True)
     }
+
+
+def crossing(quad: NDArray[Any]) -> NDArray[np.float64]:
+    """Where the diagonals of a square (4, 2) cross: its middle, whatever the perspective."""
+    a, b, c, d = quad.astype(np.float64)
+    along, _ = np.linalg.solve(np.column_stack((c - a, b - d)), b - a)
+    middle: NDArray[np.float64] = a + along * (c - a)
+    return middle
+
+
+def plate_middle(colour: NDArray[np.bool_]) -> tuple[float, float]:
+    """Middle of the plate whose margin has a colour, pixels from the picture's corner."""
+    outlines, _ = cv2.findContours(colour.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    hull = cv2.convexHull(max(outlines, key=cv2.contourArea))
+    for tolerance in np.linspace(0.01, 0.1, 19):
+        quad = cv2.approxPolyDP(hull, tolerance * cv2.arcLength(hull, True), True)
+        if len(quad) == 4:
+            u, v = (crossing(quad.reshape(4, 2)) + 0.5).tolist()
+            return u, v
+    raise AssertionError("what has the colour is no square")
 
 
 def yellow(picture: Picture) -> NDArray[np.bool_]:

@@ -324,7 +324,8 @@ def test_detection_in_pictures_falls_with_foreshortening_blur_edges_and_cover() 
     changes: list[dict[str, object]] = [
         {"sine": np.array([math.sin(math.radians(10.0))])},
         {"blur_px": np.array([12.0])},
-        {"edge_px": np.array([14.0])},
+        {"sine": np.array([math.sin(math.radians(6.0))]), "size_px": np.array([200.0])},
+        {"edge_px": np.array([-1.0])},
         {"covered": np.array([True])},
     ]
     for change in changes:

@@ -19,6 +19,8 @@ PICTURES = 12
         (16.0, 50.0, 0.0),
         (24.0, 50.0, 2.0),
         (20.0, 50.0, 6.0),
+        (100.0, 4.0, 0.0),  # too flat, however large
+        (100.0, 10.0, 0.0),
     ],
 )
 def test_tags_are_read_as_often_as_the_model_says(

@@ -14,6 +14,7 @@ from flightsim.payload import (
     CameraView,
     GroundTargetParameters,
     GroundTargets,
+    PictureDetection,
     PinholeModel,
     ResolutionDetection,
     Static,
@@ -26,6 +27,7 @@ from tests.rotations import rotation_matrix
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 MODEL = PinholeModel()
 SHARP = {"pixel_noise_px": 0.0, "size_noise": 0.0, "latency_s": 0.0}
+SURE = ResolutionDetection.constant(1.0)
 
 
 def quaternion(roll_deg: float, pitch_deg: float, yaw_deg: float) -> tuple[float, ...]:
@@ -34,7 +36,15 @@ def quaternion(roll_deg: float, pitch_deg: float, yaw_deg: float) -> tuple[float
     return tuple(q.tolist())
 
 
-def camera_at(place_ned_m, attitude_deg, targets, *, zoom=1.0, time_us=4000):
+def camera_at(
+    place_ned_m,
+    attitude_deg,
+    targets,
+    *,
+    zoom=1.0,
+    time_us=4000,
+    detection=SURE,
+):
     """A camera along the body's x axis of a vehicle there, what it detects, and its view."""
     truth = np.zeros(t.TRUTH_SIZE)
     lat_deg, lon_deg = HOME.offset(place_ned_m[0], place_ned_m[1])
@@ -45,7 +55,7 @@ def camera_at(place_ned_m, attitude_deg, targets, *, zoom=1.0, time_us=4000):
         CameraParameters(
             mount_pitch_rad=0.0,
             position_frd_m=(0.2, 0.0, 0.1),
-            detection=ResolutionDetection.constant(1.0),
+            detection=detection,
             **SHARP,
         ),
         truth=truth,
@@ -111,6 +121,29 @@ def test_a_tag_is_read_by_opencv_where_the_detection_says(place, attitude, targe
     # corners of a tag in OpenCV's pixels, whose first has its middle at 0
     centre = corners[0].reshape(4, 2).mean(axis=0) + 0.5
     assert centre == pytest.approx((found.u_px, found.v_px), abs=1.5)
+
+
+@pytest.mark.parametrize(("attitude", "axis"), [((0.0, -20.0, 0.0), 0), ((25.0, -30.0, 60.0), 1)])
+def test_a_tag_is_read_until_the_edge_of_the_picture_cuts_it_off(attitude, axis):
+    """A large, flat tag moves out of the picture: the model loses it where OpenCV does, within a cell."""
+    size_m, read, said = 3.0, [], []
+    heading_rad = math.radians(attitude[2])
+    ahead = 10.0 / math.tan(math.radians(-attitude[1]))
+    offsets_m = np.arange(0.0, 30.0, 0.2)
+    for offset_m in offsets_m:
+        forward, right = (ahead - offset_m, 0.0) if axis == 0 else (ahead, offset_m)
+        north = forward * math.cos(heading_rad) - right * math.sin(heading_rad)
+        east = forward * math.sin(heading_rad) + right * math.cos(heading_rad)
+        tag = GroundTargetParameters(motion=Static(north_m=north, east_m=east), size_m=size_m, tag_id=3)
+        frame, view = camera_at(
+            (0.0, 0.0, -10.0), attitude, [tag], detection=PictureDetection(max_probability=1.0)
+        )
+        _, ids, _ = tag_detector().detectMarkers(Renderer(MODEL).render(view))
+        read.append(ids is not None)
+        said.append(bool(frame.detections))
+    lost_m = [offsets_m[np.flatnonzero(seen).max()] for seen in (read, said)]
+    assert lost_m[0] > 3.0
+    assert lost_m[1] == pytest.approx(lost_m[0], abs=size_m / 8 + 0.2)
 
 
 def test_the_top_of_a_tag_points_north():
