@@ -1,7 +1,7 @@
-"""Grippers, winches, servos, relays, motor tests, tunes: what a vehicle without much of it answers.
+"""Grippers, winches, servos, relays, motor tests and tunes, for a vehicle with few of these devices.
 
-The simulated vehicle carries none of these devices: commands are taken and refused as the firmware does with
-its default configuration, and drive nothing.
+The simulated vehicle carries none of these devices. It accepts and refuses their commands as the firmware
+does with its default configuration, and the commands drive nothing.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ _GRIPPER_ACTIONS: Final = (mavlink.GRIPPER_ACTION_RELEASE, mavlink.GRIPPER_ACTIO
 
 
 class Tunes(Microservice):
-    """Tunes are taken, and nobody hears them. The dialect lacks PLAY_TUNE_V2: it is dropped as unknown."""
+    """Accepts tunes and plays nothing. The dialect lacks PLAY_TUNE_V2: that message is dropped as unknown."""
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
         """Take PLAY_TUNE."""
@@ -30,7 +30,7 @@ class Tunes(Microservice):
 
 
 class Px4Actuators(Microservice):
-    """PX4's answers. Those of an action that takes time come in the end (the gripper)."""
+    """PX4's answers. An action that takes time (the gripper) is acknowledged when it ends."""
 
     unhurried = True
 
@@ -48,7 +48,7 @@ class Px4Actuators(Microservice):
         """DO_GRIPPER, DO_WINCH, DO_SET_ACTUATOR, ACTUATOR_TEST, CONFIGURE_ACTUATOR, DO_AUTOTUNE_ENABLE."""
         return {
             mavlink.MAV_CMD_DO_GRIPPER: self._gripper,
-            mavlink.MAV_CMD_DO_WINCH: lambda command, source: None,  # no winch: nobody answers
+            mavlink.MAV_CMD_DO_WINCH: lambda command, source: None,  # no winch: no acknowledgement
             mavlink.MAV_CMD_DO_SET_ACTUATOR: lambda command, source: Result.ACCEPTED,
             mavlink.MAV_CMD_ACTUATOR_TEST: self._test,
             mavlink.MAV_CMD_CONFIGURE_ACTUATOR: lambda command, source: None,
@@ -56,7 +56,7 @@ class Px4Actuators(Microservice):
         }
 
     def tick(self, time_us: int) -> None:
-        """A gripper that has come to its end is acknowledged."""
+        """Acknowledge a gripper action that has ended."""
         while self._moving and time_us >= self._moving[0][0]:
             _, source = self._moving.pop(0)
             source.channel.send(
@@ -74,7 +74,7 @@ class Px4Actuators(Microservice):
         """DO_GRIPPER: p2 GRIPPER_ACTIONS; acknowledged when it is done, after PD_GRIPPER_TO seconds."""
         if self._parameters.get("PD_GRIPPER_TYPE") < 0 or whole(command.p2) not in _GRIPPER_ACTIONS:
             return Result.FAILED
-        if all(asker != source for _, asker in self._moving):  # else: asked again, it is on its way
+        if all(asker != source for _, asker in self._moving):  # else: a repeated request
             seconds = min(10.0, max(0.0, self._parameters.get("PD_GRIPPER_TO")))
             self._moving.append((self._commander.time_us + round(seconds * 1e6), source))
             self._moving.sort(key=lambda entry: entry[0])
@@ -90,7 +90,7 @@ class Px4Actuators(Microservice):
 
 
 class ArdupilotActuators(Microservice):
-    """What ArduPilot's vehicles answer alike."""
+    """The answers that are the same for all ArduPilot vehicles."""
 
     unhurried = True
 
@@ -120,7 +120,7 @@ class ArdupilotActuators(Microservice):
         return Result.ACCEPTED
 
     def _relay(self, command: Command, source: Source) -> Result:
-        """DO_SET_RELAY: p1 relay from 0, p2 off or on; relays without RELAYn_FUNCTION 1 are not there."""
+        """DO_SET_RELAY: p1 relay from 0, p2 off or on; a relay without RELAYn_FUNCTION 1 does not exist."""
         relay, state = whole(command.p1), whole(command.p2)
         if relay is None or state is None or not 0 <= relay < self._RELAYS:
             return Result.FAILED
@@ -137,7 +137,7 @@ class ArdupilotActuators(Microservice):
 
 
 class ArducopterActuators(ArdupilotActuators):
-    """What a copter answers besides."""
+    """The additional answers of a copter."""
 
     _MODES: Final = {
         4: FlightMode.RETURN,
@@ -164,7 +164,7 @@ class ArducopterActuators(ArdupilotActuators):
 
     @property
     def commands(self) -> Mapping[int, Handler]:
-        """Besides: DO_WINCH, DO_MOTOR_TEST, DO_AUX_FUNCTION."""
+        """The commands of the base class, and DO_WINCH, DO_MOTOR_TEST, DO_AUX_FUNCTION."""
         return {
             **super().commands,
             mavlink.MAV_CMD_DO_WINCH: lambda command, source: Result.FAILED,
@@ -173,7 +173,7 @@ class ArducopterActuators(ArdupilotActuators):
         }
 
     def tick(self, time_us: int) -> None:
-        """The end of a motor test."""
+        """End a motor test when its time is over."""
         if self._test_end_us is not None and (time_us >= self._test_end_us or self._commander.armed):
             self._test_end_us = None
             self._parts.announce(_INFO, "finished motor test")
@@ -210,11 +210,11 @@ class ArducopterActuators(ArdupilotActuators):
 
 
 class ArduplaneActuators(ArdupilotActuators):
-    """What a plane answers besides."""
+    """The additional answers of a plane."""
 
     @property
     def commands(self) -> Mapping[int, Handler]:
-        """Besides: DO_MOTOR_TEST, DO_AUTOTUNE_ENABLE."""
+        """The commands of the base class, and DO_MOTOR_TEST, DO_AUTOTUNE_ENABLE."""
         return {
             **super().commands,
             mavlink.MAV_CMD_DO_MOTOR_TEST: lambda command, source: Result.FAILED,  # for quadplanes
@@ -222,6 +222,6 @@ class ArduplaneActuators(ArdupilotActuators):
         }
 
     def _autotune(self, command: Command, source: Source) -> Result:
-        """DO_AUTOTUNE_ENABLE: taken; the gains stay as they are."""
+        """DO_AUTOTUNE_ENABLE: accepted; the gains are not changed."""
         self._parts.announce(_INFO, f"{'Started' if flags(command.p1) else 'Stopped'} autotune")
         return Result.ACCEPTED

@@ -1,4 +1,4 @@
-"""AVAILABLE_MODES: what modes there are and what they are called (standard modes protocol; PX4)."""
+"""AVAILABLE_MODES: the modes of the vehicle and their names (standard modes protocol; PX4)."""
 
 from collections.abc import Callable, Mapping
 
@@ -13,7 +13,7 @@ class AvailableModes(Microservice):
     """Answers requests for AVAILABLE_MODES.
 
     Args:
-        flavour: whose modes.
+        flavour: the firmware with these modes.
     """
 
     def __init__(self, flavour: Flavour) -> None:
@@ -24,7 +24,7 @@ class AvailableModes(Microservice):
         return {mavlink.MAVLINK_MSG_ID_AVAILABLE_MODES: self._send}
 
     def _send(self, channel: Channel, index: float) -> None:
-        """One mode by index from 1, or all of them for 0."""
+        """Send the mode with this index (from 1), or all modes for 0."""
         for number, mode in enumerate(self._modes, start=1):
             if index in (0, number):
                 channel.send(

@@ -1,8 +1,8 @@
-"""PREFLIGHT_CALIBRATION and the conversation about the accelerometer, as ArduPilot holds it.
+"""PREFLIGHT_CALIBRATION and the accelerometer calibration dialogue of ArduPilot.
 
-Source: ArduPilot 4.6, GCS_MAVLink and AP_AccelCal: the vehicle asks for a position with a COMMAND_LONG
-ACCELCAL_VEHICLE_POS and a text, and a ground station answers with the same command when the vehicle lies so.
-A simulated vehicle can't be turned by hand; it believes the ground station, and takes its time to measure.
+Source: ArduPilot 4.6, GCS_MAVLink and AP_AccelCal: the vehicle requests a position with a COMMAND_LONG
+ACCELCAL_VEHICLE_POS and a text, and a ground station answers with the same command when the vehicle is in it.
+A simulated vehicle can't be turned by hand; it accepts the ground station's answer, and measures for a while.
 """
 
 import math
@@ -31,20 +31,20 @@ _POSITIONS: Final = (
 _MEASURE_US: Final = 1_500_000
 _ASK_AGAIN_US: Final = 1_000_000
 _PATIENCE_US: Final = 300_000_000
-"""Without an answer for so long the ground station has gone; the vehicle would never arm again."""
+"""Without an answer for this time the calibration ends; otherwise the vehicle could never arm again."""
 _FULL, _TRIM, _SIMPLE, _FORCED = 1, 2, 4, 76  # param5
 _GYRO, _BAROMETER = 1, 1  # param1, param3
 
 
 class ArdupilotCalibration(Microservice):
-    """Calibrations of an ArduPilot vehicle but for the compass. Nothing is changed by them."""
+    """All calibrations of an ArduPilot vehicle except the compass. They change nothing."""
 
     unhurried = True
 
     def __init__(self, parts: AutopilotParts) -> None:
         self._parts = parts
         self._commander = parts.commander
-        self._position: int | None = None  # index of the position asked for
+        self._position: int | None = None  # index of the requested position
         self._measured_us: int | None = None
         self._asked_us = 0
         self._begun_us = 0
@@ -58,7 +58,7 @@ class ArdupilotCalibration(Microservice):
         }
 
     def handle(self, message: object, source: Source, time_us: int) -> bool:
-        """A COMMAND_ACK is "any key", as old ground stations press it."""
+        """A COMMAND_ACK stands for "any key": old ground stations confirm a position with it."""
         if self._position is None or not isinstance(message, mavlink.MAVLink_command_ack_message):
             return False
         if message.command in (0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS) and self._measured_us is None:
@@ -66,7 +66,7 @@ class ArdupilotCalibration(Microservice):
         return True
 
     def tick(self, time_us: int) -> None:
-        """Measure, ask, ask again."""
+        """Measure; request the next position, and repeat the request."""
         if self._position is None:
             return
         if not self._commander.situation.health.accelerometer:
@@ -113,7 +113,7 @@ class ArdupilotCalibration(Microservice):
         return Result.ACCEPTED
 
     def _trim(self) -> Result:
-        """Level as it stands, unless it stands too far from level (10 degrees)."""
+        """Trim the level attitude; fails when the vehicle is tilted by more than 10 degrees."""
         roll, pitch, _ = self._commander.context.nav[nav.EULER_RAD].tolist()
         if not self._commander.situation.health.accelerometer:
             return Result.FAILED
@@ -123,10 +123,10 @@ class ArdupilotCalibration(Microservice):
         self._parts.announce(_INFO, f"Trim OK: roll={roll:.2f} pitch={pitch:.2f} yaw=0.00")
         return Result.ACCEPTED
 
-    # the accelerometer, position by position
+    # the accelerometer, one position after the other
 
     def _vehicle_position(self, command: Command, source: Source) -> Result:
-        """ACCELCAL_VEHICLE_POS: the vehicle lies as it was asked for."""
+        """ACCELCAL_VEHICLE_POS: the vehicle is in the requested position."""
         if self._position is None or self._measured_us is not None:
             return Result.FAILED
         if whole(command.p1) != _POSITIONS[self._position][0]:

@@ -1,7 +1,7 @@
 """The onboard calibration of the compass as ArduPilot does it: start, progress, report, accept or cancel.
 
 Source: MAVLink's DO_START_MAG_CAL, DO_ACCEPT_MAG_CAL, DO_CANCEL_MAG_CAL, MAG_CAL_PROGRESS, MAG_CAL_REPORT.
-A simulated hand turns the vehicle through all directions; the compass is not really turned, so no offset is
+A simulated user turns the vehicle through all directions. The compass is not really turned, so no offset is
 found or changed.
 """
 
@@ -52,7 +52,7 @@ class CompassCalibration(Microservice):
         }
 
     def tick(self, time_us: int) -> None:
-        """Progress while it runs, reports when it has ended."""
+        """Send progress while the calibration runs, and reports when it has ended."""
         if time_us < self._next_us or (self._start_us is None and self._finished is None):
             return
         if self._finished is not None:
@@ -97,7 +97,7 @@ class CompassCalibration(Microservice):
         return Result.ACCEPTED
 
     def _known_heading(self, command: Command, source: Source) -> Result:
-        """FIXED_MAG_CAL_YAW: the heading is known, so nothing need be turned."""
+        """FIXED_MAG_CAL_YAW: the heading is known, so the vehicle need not be turned."""
         return Result.FAILED if self._commander.armed else Result.ACCEPTED
 
     def _finish(self, status: int) -> None:
@@ -127,7 +127,7 @@ class CompassCalibration(Microservice):
         )
 
     def _report(self, status: int) -> None:
-        """Offsets as they are; the fitness is how much the measured strength varies, milligauss."""
+        """Report unchanged offsets; the fitness is the variation of the measured strength, milligauss."""
         count = len(self._strengths)
         mean = sum(self._strengths) / count if count else 0.0
         variance = sum((value - mean) ** 2 for value in self._strengths) / count if count else 0.0

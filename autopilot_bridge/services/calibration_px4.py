@@ -1,4 +1,4 @@
-"""PREFLIGHT_CALIBRATION as PX4 takes it: acknowledged at once, then a conversation in "[cal] ..." texts."""
+"""PREFLIGHT_CALIBRATION as PX4 accepts it: acknowledged at once, then a sequence of "[cal] ..." texts."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -26,15 +26,16 @@ _SCRIPTS: Final[tuple[tuple[int, int, CalibrationScript], ...]] = (
     (6, 1, scripts.AIRSPEED),
     (6, 2, scripts.AIRSPEED),
 )
-"""(number of the parameter, its value, what it starts), in PX4's order."""
+"""(number of the parameter, its value, the calibration that it starts), in PX4's order."""
 _BATTERY_IN: Final = "[cal] calibration failed: Disconnect battery and try again"
 
 
 class Px4Calibration(Microservice):
     """Calibrations of a PX4 vehicle, one at a time and on the ground.
 
-    The vehicle is CALIBRATING meanwhile and does not arm. Nothing is changed by a calibration: the sensors'
-    errors are the navigation filter's business. A sensor that fails meanwhile makes it fail.
+    The vehicle is in CALIBRATING during a calibration and does not arm. A calibration changes nothing: the
+    navigation filter estimates the sensors' errors. A sensor that fails during its calibration makes the
+    calibration fail.
     """
 
     unhurried = True
@@ -56,7 +57,7 @@ class Px4Calibration(Microservice):
         }
 
     def tick(self, time_us: int) -> None:
-        """Say what is due."""
+        """Send the texts that are due."""
         script = self._running
         if script is None or (time_us < self._due_us and not self._cancelled):
             return
@@ -80,7 +81,7 @@ class Px4Calibration(Microservice):
         if self._running is not None:
             if any(values):
                 return Result.TEMPORARILY_REJECTED
-            self._cancelled = True  # told after the acknowledgement
+            self._cancelled = True  # reported after the acknowledgement
             return Result.ACCEPTED
         if self._commander.armed:
             return Result.TEMPORARILY_REJECTED
@@ -89,7 +90,7 @@ class Px4Calibration(Microservice):
                 return self._start(script)
         if values[3] == _RADIO_OFF:
             return self._mute(True)
-        if values[6] == 1:  # ESCs are calibrated without their battery
+        if values[6] == 1:  # ESCs are calibrated with the battery disconnected
             self._announce(_CRITICAL, _BATTERY_IN)
             return Result.DENIED
         if values[3] == 0:
@@ -97,7 +98,7 @@ class Px4Calibration(Microservice):
         return Result.UNSUPPORTED
 
     def _known_heading(self, command: Command, source: Source) -> Result:
-        """FIXED_MAG_CAL_YAW: the heading is known, so nothing need be turned."""
+        """FIXED_MAG_CAL_YAW: the heading is known, so the vehicle need not be turned."""
         if self._commander.armed or self._running is not None:
             return Result.TEMPORARILY_REJECTED
         return self._start(scripts.QUICK_MAGNETOMETER)
@@ -113,7 +114,7 @@ class Px4Calibration(Microservice):
         self._commander.situation.calibrating = False
 
     def _mute(self, muted: bool) -> Result:
-        """The radio itself is calibrated by the ground station; its sticks steer nothing meanwhile."""
+        """The ground station calibrates the radio; meanwhile the sticks do not control the vehicle."""
         if muted is not self._commander.pilot.muted:
             self._commander.pilot.muted = muted
             self._announce(_INFO, f"Calibration: {'Disabling' if muted else 'Restoring'} RC input")

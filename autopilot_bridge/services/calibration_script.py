@@ -1,9 +1,9 @@
-"""How PX4 talks a person through a calibration: texts that ground stations parse, and when they come.
+"""How PX4 guides a user through a calibration: the texts that ground stations parse, and their times.
 
 Source: PX4's calibration messages, version 2: QGroundControl and MAVSDK read "[cal] ..." texts.
 
-A simulated vehicle can't be turned by hand, so a hand is simulated: it takes the sides one after the other
-and as long over each as a person does. What is measured meanwhile is whether the sensor works.
+A simulated vehicle can't be turned by hand, so the user is simulated: the sides are shown one after the
+other, each for as long as a person needs. The only thing measured during this is whether the sensor works.
 """
 
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 SIDES: Final = ("down", "up", "left", "right", "front", "back")
-"""In the order in which the hand takes them; "down": standing on its feet."""
+"""The sides in the order of the simulated user; "down": the vehicle stands on its feet."""
 
 _TURN_S: Final = 2.0
 _STILL_S: Final = 1.0
@@ -21,7 +21,7 @@ _STEPS: Final = 10
 
 
 class Line(NamedTuple):
-    """One text, so long after the one before."""
+    """One text, and its delay after the text before it."""
 
     after_s: float
     text: str
@@ -32,9 +32,9 @@ class CalibrationScript:
     """One calibration.
 
     Attributes:
-        name: as the texts call it.
+        name: the name used in the texts.
         sensor: the flag of `VehicleHealth` that must stay set; empty: none.
-        lines: from the first to the last text.
+        lines: all texts from the first to the last.
     """
 
     name: str
@@ -59,7 +59,7 @@ def _framed(name: str, sensor: str, lines: Iterator[Line]) -> CalibrationScript:
 
 
 def _still(seconds: float) -> Iterator[Line]:
-    """The vehicle stands where it is."""
+    """The vehicle stands still."""
     for step in range(_STEPS + 1):
         yield Line(seconds / _STEPS if step else 0.0, _progress(step / _STEPS))
 
@@ -72,7 +72,7 @@ def _side_begins(pending: tuple[str, ...]) -> Iterator[Line]:
 
 
 def _sides_measured() -> Iterator[Line]:
-    """Each side once, held still."""
+    """The vehicle is held still once on each side."""
     yield Line(0.0, _progress(0.0))
     for index, side in enumerate(SIDES):
         yield from _side_begins(SIDES[index:])
@@ -82,7 +82,7 @@ def _sides_measured() -> Iterator[Line]:
 
 
 def _sides_turned() -> Iterator[Line]:
-    """Each side once, turned around the axis that points up."""
+    """The vehicle is put on each side once, and turned around the vertical axis."""
     yield Line(0.0, _progress(0.0))
     for index, side in enumerate(SIDES):
         yield from _side_begins(SIDES[index:])
@@ -94,7 +94,7 @@ def _sides_turned() -> Iterator[Line]:
 
 
 def _blown_into() -> Iterator[Line]:
-    """The pitot tube: covered, then blown into."""
+    """The pitot tube is covered, then the user blows into it."""
     yield Line(0.0, "[cal] Ensure airspeed sensor is not registering wind")
     for step in range(_STEPS + 1):
         yield Line(0.3, _progress(0.8 * step / _STEPS))

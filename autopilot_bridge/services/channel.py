@@ -1,7 +1,8 @@
-"""What the MAVLink microservices stand on: channels, message sources and the shape of a service.
+"""The basis of the MAVLink microservices: channels, message sources and the interface of a service.
 
-A service is sans-IO: the autopilot hands it decoded messages and the time, it answers through channels.
-Message fields are untrusted: whatever they hold, a service neither raises nor stores half of it.
+A service does no I/O: the autopilot passes decoded messages and the time to it, and it answers through
+channels. Message fields are untrusted: whatever their values, a service does not raise, and stores a message
+whole or not.
 """
 
 from collections.abc import Callable, Sequence
@@ -36,7 +37,7 @@ class Broadcast(Protocol):
 
 
 class Source(NamedTuple):
-    """Who sent a message, and by which channel it came: replies go there and nowhere else."""
+    """The sender of a message, and the channel on which it came: replies are sent there and nowhere else."""
 
     channel: Channel
     system_id: int
@@ -53,19 +54,19 @@ class _Nowhere:
 
 
 NOBODY: Final = Source(channel=_Nowhere(), system_id=0, component_id=0)
-"""The source of what the autopilot asks of itself."""
+"""The source of commands that the autopilot gives to itself."""
 
 
 class Service(Protocol):
     """One MAVLink microservice of an autopilot."""
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one message; True when it belonged to this service. Never raises on message contents."""
+        """Handle one message; True when it belonged to this service. Never raises on message contents."""
         ...
 
 
 class TimedService(Service, Protocol):
-    """A microservice with time-outs or queues of its own."""
+    """A microservice with its own timeouts or queues."""
 
     def tick(self, time_us: int) -> None:
         """Advance timers and queues; called at 50 Hz of vehicle time."""
@@ -79,13 +80,13 @@ def send_to_all(broadcast: Broadcast, message: MavlinkMessage) -> None:
 
 
 def is_congested(channel: Channel) -> bool:
-    """True when a channel that knows its backlog asks for a pause."""
+    """True when a channel that measures its backlog requests a pause."""
     return bool(getattr(channel, "congested", False))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AddressRule:
-    """Which target ids of a message an autopilot takes for its own.
+    """The target ids of messages that an autopilot accepts as its own.
 
     Attributes:
         system_id: the vehicle's own system id.
@@ -98,7 +99,7 @@ class AddressRule:
     any_system: bool
 
     def accepts(self, message: MavlinkMessage) -> bool:
-        """True when the message is for this autopilot; a message without target fields is for everybody."""
+        """True when the message is for this autopilot; a message without target fields is for all systems."""
         system = getattr(message, "target_system", None)
         if system is None:
             return True
@@ -109,7 +110,7 @@ class AddressRule:
 
 
 def px4_address_rule(system_id: int) -> AddressRule:
-    """PX4: own system id only; component 1, 190 (once the mission planner's) or 0."""
+    """PX4: own system id only; component 1, 190 (formerly the mission planner's) or 0."""
     return AddressRule(system_id=system_id, component_ids=frozenset((1, 190)), any_system=False)
 
 

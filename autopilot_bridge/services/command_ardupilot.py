@@ -84,12 +84,12 @@ class ArduPilotCommands(CommandHandlers):
         return self.set_flight_mode(mode)
 
     def set_flight_mode(self, mode: FlightMode) -> Result:
-        """A mode that a client has chosen."""
+        """Select a mode that a client has requested."""
         return self.commander.set_mode(mode).result
 
     @staticmethod
     def is_forced(command: Command) -> bool:
-        """COMPONENT_ARM_DISARM: p2 is the number that goes over the checks."""
+        """COMPONENT_ARM_DISARM: p2 holds the number that overrides the checks."""
         return command.p2 == FORCE_NUMBER
 
     def arm_disarm(self, command: Command, source: Source) -> Result:
@@ -150,7 +150,7 @@ class ArduPilotCommands(CommandHandlers):
         return Result.ACCEPTED if self.hooks.set_current_item(item) else Result.FAILED
 
     def set_home(self, command: Command, source: Source) -> Result:
-        """DO_SET_HOME: p1 = 1, or no place at all: here."""
+        """DO_SET_HOME: p1 = 1, or no position given: the current position."""
         nowhere = command.x == 0.0 and command.y == 0.0
         if command.p1 == 1.0 or nowhere:
             return Result.ACCEPTED if self.commander.set_home_here() else Result.FAILED
@@ -166,7 +166,7 @@ class ArduPilotCommands(CommandHandlers):
         return Result.ACCEPTED if placed else Result.FAILED
 
     def terminate(self, command: Command, source: Source) -> Result:
-        """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors for good."""
+        """DO_FLIGHTTERMINATION: p1 > 0.5 stops the motors permanently."""
         if not command.p1 > 0.5:
             return Result.FAILED
         self.commander.terminate()
@@ -180,10 +180,10 @@ class ArduPilotCommands(CommandHandlers):
         return Result.ACCEPTED
 
     def send_banner(self, command: Command, source: Source) -> Result:
-        """DO_SEND_BANNER: the texts of the firmware's version, on the channel that asks."""
+        """DO_SEND_BANNER: send the texts of the firmware's version on the requesting channel."""
         self.hooks.banner(source.channel)
         return Result.ACCEPTED
 
     def fail(self, command: Command, source: Source) -> Result:
-        """FAILED: there is no such device."""
+        """FAILED: the vehicle has no such device."""
         return Result.FAILED

@@ -67,7 +67,7 @@ class ArduPlaneCommands(ArduPilotCommands):
     # arming and modes
 
     def arm_disarm(self, command: Command, source: Source) -> Result:
-        """COMPONENT_ARM_DISARM: a landing sequence that would not be flown is in the way."""
+        """COMPONENT_ARM_DISARM: arming is refused if a landing sequence would not be flown."""
         checked = not self.is_forced(command) and self.commander.parameters.check_arming
         if command.p1 == 1.0 and checked and not self.commander.armed:
             problem = self._mission_problem()
@@ -84,7 +84,7 @@ class ArduPlaneCommands(ArduPilotCommands):
         return None
 
     def set_flight_mode(self, mode: FlightMode) -> Result:
-        """A mode by number; leaving AUTO on the ground after a landing resets the mission."""
+        """Select a mode; leaving AUTO on the ground after a landing resets the mission."""
         commander = self.commander
         landed_by_mission = (
             commander.mode is FlightMode.MISSION
@@ -98,7 +98,7 @@ class ArduPlaneCommands(ArduPilotCommands):
         return result
 
     def start_mission(self, command: Command, source: Source) -> Result:
-        """MISSION_START: without a mission AUTO gives up at once."""
+        """MISSION_START: without a mission AUTO is left at once."""
         result = super().start_mission(command, source)
         if result is Result.ACCEPTED and self.hooks.mission_item_count() <= 1:
             self.hooks.announce(_INFO, "Mission complete, changing mode to RTL")
@@ -106,14 +106,14 @@ class ArduPlaneCommands(ArduPilotCommands):
         return result
 
     def land_start(self, command: Command, source: Source) -> Result:
-        """DO_LAND_START: to the mission's landing sequence, in AUTO."""
+        """DO_LAND_START: jump to the mission's landing sequence, in AUTO."""
         start = landing_start(self.commander.missions.items)
         if start is None or not self.commander.situation.position or not self.hooks.set_current_item(start):
             return Result.FAILED
         return self.commander.set_mode(FlightMode.MISSION).result
 
     def go_around(self, command: Command, source: Source) -> Result:
-        """DO_GO_AROUND: p1 height over home to climb to; none: as the landing says."""
+        """DO_GO_AROUND: p1 height over home to climb to; not positive: the landing item's height."""
         height_m = command.p1 if 0.0 < command.p1 < math.inf else math.nan
         return Result.ACCEPTED if self.commander.guidance.go_around(height_m).accepted else Result.FAILED
 
@@ -129,7 +129,7 @@ class ArduPlaneCommands(ArduPilotCommands):
     # where and how fast to fly
 
     def radius_of(self, command: Command) -> float:
-        """DO_REPOSITION: p3 radius, not positive: WP_LOITER_RAD; p4 not 0: counter-clockwise."""
+        """DO_REPOSITION: p3 radius (not positive: WP_LOITER_RAD); p4 not 0: counter-clockwise."""
         radius_m = command.p3 if command.p3 > 0.0 else abs(self.hooks.parameters.get("WP_LOITER_RAD"))
         counter_clockwise = math.isfinite(command.p4) and command.p4 != 0.0
         return -radius_m if counter_clockwise else radius_m

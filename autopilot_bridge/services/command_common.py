@@ -1,7 +1,7 @@
-"""Commands as both firmwares understand them: one shape for LONG and INT, and shared handlers.
+"""Commands as both firmwares understand them: one form for LONG and INT, and shared handlers.
 
-Source: MAVLink command protocol (mavlink.io/en/services/command.html). A handler answers with a `Result`
-for the COMMAND_ACK, or None where the firmware stays silent.
+Source: MAVLink command protocol (mavlink.io/en/services/command.html). A handler returns a `Result`
+for the COMMAND_ACK, or None where the firmware sends no acknowledgement.
 """
 
 import math
@@ -38,7 +38,7 @@ _PROTOCOL_VERSION: Final = 300
 
 
 class MessageIntervals(Protocol):
-    """Who answers the commands about messages and their rates (511, 510, 512)."""
+    """The service that answers the commands about messages and their rates (511, 510, 512)."""
 
     def set_interval(self, source: Source, message_id: int, interval_us: float) -> Result: ...
 
@@ -48,7 +48,7 @@ class MessageIntervals(Protocol):
 
 
 FailureHook = Callable[[int, int, int], Result]
-"""Takes MAV_CMD_INJECT_FAILURE: (FAILURE_UNIT, FAILURE_TYPE, instance; 0: all)."""
+"""Handles MAV_CMD_INJECT_FAILURE: (FAILURE_UNIT, FAILURE_TYPE, instance; 0: all)."""
 
 
 class Command(NamedTuple):
@@ -74,7 +74,7 @@ class Command(NamedTuple):
 
     @property
     def is_int(self) -> bool:
-        """It came as COMMAND_INT."""
+        """The command came as COMMAND_INT."""
         return self.frame is not None
 
 
@@ -101,29 +101,29 @@ def command_from_message(message: MavlinkMessage) -> Command:
 
 
 def whole(value: float, default: int | None = None) -> int | None:
-    """A parameter that carries a whole number, rounded half away from zero; `default` if not finite."""
+    """A whole number in a parameter, rounded half away from zero; `default` if it is not finite."""
     if not math.isfinite(value):
         return default
     return math.floor(value + 0.5) if value >= 0.0 else math.ceil(value - 0.5)
 
 
 def flags(value: float) -> int:
-    """A parameter that carries bits; NaN and nonsense are no bits."""
+    """A bit mask in a parameter; 0 for NaN and values that are no bit mask."""
     return int(value) if math.isfinite(value) and 0.0 <= value <= 0xFFFFFFFF else 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandHooks:
-    """What commands reach beyond the commander.
+    """The parts of the autopilot that commands need besides the commander.
 
     Attributes:
         intervals: message rates and requests.
         parameters: the parameter store (fence switch, reset to defaults).
         announce: sends a STATUSTEXT.
-        banner: sends the texts that say which firmware this is, on one channel.
-        set_current_item: goes on from another mission item; False refuses.
+        banner: sends the texts that identify the firmware, on one channel.
+        set_current_item: continues the mission from another item; False: refused.
         mission_item_count: stored items.
-        inject_failure: switches sensor failures; None: this vehicle has none.
+        inject_failure: switches sensor failures; None: not supported by this vehicle.
     """
 
     intervals: MessageIntervals
@@ -142,12 +142,12 @@ class CommandHandlers(ABC):
     """Handlers that both flavours share; a flavour adds its own in `table`.
 
     Args:
-        commander: carries commands out.
+        commander: executes the commands.
         hooks: the rest of the autopilot.
     """
 
     double_ack: frozenset[int] = frozenset()
-    """Commands acknowledged as accepted before they are tried, and once more after."""
+    """Commands that are acknowledged as accepted before execution, and once more after it."""
 
     def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
         self.commander = commander
@@ -164,7 +164,7 @@ class CommandHandlers(ABC):
         }
 
     def execute(self, command: Command, source: Source) -> Result | None:
-        """Carry a command out; UNSUPPORTED for one without a handler."""
+        """Execute a command; UNSUPPORTED for one without a handler."""
         handler = self.table.get(command.id)
         return Result.UNSUPPORTED if handler is None else handler(command, source)
 
@@ -173,14 +173,14 @@ class CommandHandlers(ABC):
         """The SET_MODE message."""
 
     def deny(self, command: Command, reason: Reason, result: Result) -> Result:
-        """Refuse with a text, where the flavour has one."""
+        """Refuse with a text, if the flavour has one."""
         self.commander.emit(CommandDenied(time_us=self.commander.time_us, command=command.id, reason=reason))
         return result
 
     # shared handlers
 
     def silence(self, command: Command, source: Source) -> None:
-        """No acknowledgement at all, as the firmware was seen to do."""
+        """Send no acknowledgement at all, as observed on the firmware."""
         return None
 
     def return_to_launch(self, command: Command, source: Source) -> Result:
@@ -188,7 +188,7 @@ class CommandHandlers(ABC):
         return self.commander.guidance.return_home().result
 
     def land(self, command: Command, source: Source) -> Result:
-        """NAV_LAND: here."""
+        """NAV_LAND: land at the current position."""
         return self.commander.guidance.land().result
 
     def set_message_interval(self, command: Command, source: Source) -> Result:
@@ -211,16 +211,16 @@ class CommandHandlers(ABC):
         return self.hooks.intervals.request(source, message_id, command.p2)
 
     def request_capabilities(self, command: Command, source: Source) -> Result:
-        """REQUEST_AUTOPILOT_CAPABILITIES, the old way to ask for AUTOPILOT_VERSION."""
+        """REQUEST_AUTOPILOT_CAPABILITIES, the former request for AUTOPILOT_VERSION."""
         self.hooks.intervals.request(source, _AUTOPILOT_VERSION)
         return Result.ACCEPTED
 
     def request_protocol_version(self, command: Command, source: Source) -> Result:
-        """REQUEST_PROTOCOL_VERSION, the old way."""
+        """REQUEST_PROTOCOL_VERSION, the former request."""
         return self.hooks.intervals.request(source, _PROTOCOL_VERSION)
 
     def get_home_position(self, command: Command, source: Source) -> Result:
-        """GET_HOME_POSITION, the old way to ask for HOME_POSITION."""
+        """GET_HOME_POSITION, the former request for HOME_POSITION."""
         if self.commander.home.position is None:
             return Result.FAILED
         self.hooks.intervals.request(source, _HOME_POSITION)
@@ -236,7 +236,7 @@ class CommandHandlers(ABC):
     # places
 
     def ned_from(self, command: Command, *, relative: bool) -> tuple[float, float, float]:
-        """(north, east, down) m of a command's place; NaN for every part that is not set.
+        """(north, east, down) m of a command's position; NaN for every component that is not set.
 
         Args:
             relative: the altitude is over home, else over mean sea level.
@@ -251,7 +251,7 @@ class CommandHandlers(ABC):
         return north_m, east_m, self.down_from(command.z, relative=relative)
 
     def down_from(self, altitude_m: float, *, relative: bool) -> float:
-        """Down coordinate of an altitude; NaN when it or its reference is not known."""
+        """Down coordinate of an altitude; NaN when the altitude or its reference is not known."""
         context = self.commander.context
         if context.frame is None:
             return math.nan
@@ -260,7 +260,7 @@ class CommandHandlers(ABC):
 
 
 def on_earth(command: Command) -> bool:
-    """Latitude and longitude are a place on Earth, or not set."""
+    """Latitude and longitude are valid, or not set."""
     if not (math.isfinite(command.x) and math.isfinite(command.y)):
         return True
     return abs(command.x) <= 90.0 and abs(command.y) <= 180.0

@@ -51,7 +51,7 @@ class Px4Commands(CommandHandlers):
         }
 
     def set_mode_message(self, base_mode: int, custom_mode: int) -> Result:
-        """SET_MODE: one real acknowledgement."""
+        """SET_MODE: acknowledged once, with the actual result."""
         return self._set_mode(base_mode, custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF)
 
     def set_mode(self, command: Command, source: Source) -> Result:
@@ -76,7 +76,7 @@ class Px4Commands(CommandHandlers):
         return Result.TEMPORARILY_REJECTED
 
     def arm_disarm(self, command: Command, source: Source) -> Result | None:
-        """COMPONENT_ARM_DISARM: p1 rounded to 1 or 0; anything else is answered by a text alone."""
+        """COMPONENT_ARM_DISARM: p1 rounded to 1 or 0; any other value is answered with a text only."""
         action = whole(command.p1)
         forced = whole(command.p2) == FORCE_NUMBER
         if action == 1:
@@ -87,7 +87,7 @@ class Px4Commands(CommandHandlers):
         return None
 
     def takeoff(self, command: Command, source: Source) -> Result:
-        """NAV_TAKEOFF: p4 yaw deg, altitude over mean sea level; none: MIS_TAKEOFF_ALT over home."""
+        """NAV_TAKEOFF: p4 yaw deg, altitude over mean sea level (not set: MIS_TAKEOFF_ALT over home)."""
         down_m = self.down_from(command.z, relative=False)
         return self.commander.guidance.takeoff(down_m=down_m, yaw_rad=math.radians(command.p4)).result
 
@@ -121,12 +121,12 @@ class Px4Commands(CommandHandlers):
         ).result
 
     def change_speed(self, command: Command, source: Source) -> Result:
-        """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed; -1: the parameter's again."""
+        """DO_CHANGE_SPEED: p1 SPEED_TYPE, p2 speed; -1: back to the parameter's speed."""
         self.commander.guidance.change_speed(command.p2, kind=whole(command.p1, 1) or 0)
         return Result.ACCEPTED
 
     def set_home(self, command: Command, source: Source) -> Result:
-        """DO_SET_HOME: p1 = 1 here, else the given place."""
+        """DO_SET_HOME: p1 = 1: the current position, else the given one."""
         if whole(command.p1) == 1:
             here = self.commander.set_home_here()
             return Result.ACCEPTED if here else Result.TEMPORARILY_REJECTED
@@ -134,7 +134,7 @@ class Px4Commands(CommandHandlers):
         return Result.ACCEPTED if placed else Result.TEMPORARILY_REJECTED
 
     def start_mission(self, command: Command, source: Source) -> Result:
-        """MISSION_START: p1 first item. Changes the mode and arms."""
+        """MISSION_START: p1 first item. Changes the mode and arms the vehicle."""
         if self.commander.mission_problem is not None:
             return self.deny(command, Reason.MISSION_MISSING, Result.DENIED)
         first = whole(command.p1)

@@ -12,10 +12,10 @@ from autopilot_bridge.services.command_px4 import Px4Commands
 
 
 class Px4PlaneCommands(Px4Commands):
-    """PX4's commands for an aircraft: those of a multicopter; places are circled.
+    """PX4's commands for a fixed wing: those of a multicopter, with a circle around the commanded position.
 
-    DO_REPOSITION circles with NAV_LOITER_RAD, clockwise: its radius (p3) is not read. DO_ORBIT has a radius
-    and stays in Hold, which circles (`CommanderPolicy.orbit_mode`).
+    DO_REPOSITION circles clockwise with the radius NAV_LOITER_RAD; its own radius (p3) is not read. DO_ORBIT
+    has a radius and stays in Hold, which circles (`CommanderPolicy.orbit_mode`).
     """
 
     def __init__(self, commander: Commander, hooks: CommandHooks) -> None:
@@ -23,7 +23,7 @@ class Px4PlaneCommands(Px4Commands):
         self.table = {**self.table, mavlink.MAV_CMD_DO_GO_AROUND: self.go_around}
 
     def takeoff(self, command: Command, source: Source) -> Result:
-        """NAV_TAKEOFF: altitude over mean sea level (none: MIS_TAKEOFF_ALT over home), place to circle at."""
+        """NAV_TAKEOFF: altitude over mean sea level (not set: MIS_TAKEOFF_ALT over home), centre."""
         north_m, east_m, down_m = self.ned_from(command, relative=False)
         verdict = self.commander.guidance.takeoff(
             down_m=down_m, yaw_rad=math.nan, north_m=north_m, east_m=east_m
@@ -31,6 +31,6 @@ class Px4PlaneCommands(Px4Commands):
         return verdict.result
 
     def go_around(self, command: Command, source: Source) -> Result:
-        """DO_GO_AROUND: breaks off a landing."""
+        """DO_GO_AROUND: abort a landing."""
         gone = self.commander.guidance.go_around()
         return Result.ACCEPTED if gone.accepted else Result.TEMPORARILY_REJECTED

@@ -23,7 +23,7 @@ from autopilot_bridge.services.vehicle_class import is_aircraft
 
 _COMMANDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT})
 _SET_MODE: Final = mavlink.MAVLINK_MSG_ID_SET_MODE
-_CANCEL: Final = 80  # COMMAND_CANCEL, which not every release of the dialect knows
+_CANCEL: Final = 80  # COMMAND_CANCEL; not every release of the dialect has it
 _MULTICOPTERS: Final[Mapping[str, type[CommandHandlers]]] = {
     "px4": Px4Commands,
     "ardupilot": ArduCopterCommands,
@@ -35,12 +35,12 @@ _AIRCRAFT: Final[Mapping[str, type[CommandHandlers]]] = {
 
 
 class CommandService:
-    """Takes commands and acknowledges them, on the asking channel only.
+    """Executes commands and acknowledges them, on the requesting channel only.
 
     Args:
         handlers: the flavour's commands.
-        address: which targets are this autopilot.
-        more: commands of other services, by MAV_CMD; they go before the flavour's own.
+        address: the target ids of this autopilot.
+        more: commands of other services, by MAV_CMD; they take precedence over the flavour's own commands.
     """
 
     def __init__(
@@ -64,7 +64,7 @@ class CommandService:
         return cls(handlers[name](commander, hooks), address, more)
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL or SET_MODE; never raises on contents."""
+        """Handle COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL or SET_MODE; never raises on contents."""
         message_id = message.get_msgId()
         if message_id in _COMMANDS:
             if self._address.accepts(message):
@@ -76,14 +76,14 @@ class CommandService:
                 if result is not None:
                     _acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
             return True
-        return bool(message_id == _CANCEL)  # nothing here takes long enough to be cancelled
+        return bool(message_id == _CANCEL)  # no command here takes long enough to be cancelled
 
     def knows(self, command: int) -> bool:
-        """Somebody carries this MAV_CMD out."""
+        """A handler for this MAV_CMD exists."""
         return command in self._more or command in self._handlers.table
 
     def carry_out(self, command: Command, source: Source | None = None) -> Result | None:
-        """Do what a command says, unacknowledged; without a source, answers go nowhere."""
+        """Execute a command without an acknowledgement; without a source, replies are dropped."""
         asker = NOBODY if source is None else source
         handler = self._more.get(command.id)
         return self._handlers.execute(command, asker) if handler is None else handler(command, asker)

@@ -31,7 +31,7 @@ _TYPE_PARAMETER: Final = 1  # COMP_METADATA_TYPE
 _TYPE_EVENTS: Final = 4
 _TYPE_ACTUATORS: Final = 5
 _LZMA2: Final = {"id": lzma.FILTER_LZMA2, "preset": 3, "dict_size": 1 << 17}
-"""The files are made in flight: a dictionary of their size takes a tenth of the time of the usual 8 MiB."""
+"""Dictionary size as the files. They are made in flight; this takes a tenth of the time of 8 MiB."""
 _TYPES: Final = {
     ParameterType.INT8: "Int8",
     ParameterType.INT16: "Int16",
@@ -42,11 +42,11 @@ _TYPES: Final = {
 
 
 class ComponentMetadataService(Microservice):
-    """Answers requests for COMPONENT_METADATA, and makes the files when they are first asked for.
+    """Answers requests for COMPONENT_METADATA, and makes the files at the first request.
 
     Args:
         parameters: the vehicle's table.
-        time_us: the time now, microseconds since boot.
+        time_us: returns the current time, microseconds since boot.
     """
 
     def __init__(self, parameters: tuple[ParameterDefinition, ...], time_us: Callable[[], int]) -> None:
@@ -76,7 +76,7 @@ class ComponentMetadataService(Microservice):
         return {GENERAL: packed(general), **parts}
 
     def store(self) -> GeneratedStore:
-        """The files as a store, which makes them when it is looked at."""
+        """The files as a store, which makes them at the first access."""
         names = (GENERAL, PARAMETERS, EVENTS, ACTUATORS)
         return GeneratedStore({name: self._content(name) for name in names})
 

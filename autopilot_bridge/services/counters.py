@@ -1,4 +1,4 @@
-"""Parameters in which ArduPilot counts: stored mission items (MIS_TOTAL), boots (STAT_BOOTCNT)."""
+"""The counter parameters of ArduPilot: stored mission items (MIS_TOTAL), boots (STAT_BOOTCNT)."""
 
 from typing import Final
 
@@ -10,7 +10,7 @@ BOOTS: Final = "STAT_BOOTCNT"
 
 
 class Counters(Microservice):
-    """Keeps the counters; a change is announced and stored like any other parameter's.
+    """Updates the counters; a change is announced and stored like that of any other parameter.
 
     Args:
         parts: the autopilot's parameters and plans.
@@ -24,7 +24,7 @@ class Counters(Microservice):
         self._booted = False
 
     def tick(self, time_us: int) -> None:
-        """Count the boot once; follow the stored mission."""
+        """Count the boot once; update the count of the stored mission items."""
         parameters = self._parameters
         if not self._booted:
             self._booted = True

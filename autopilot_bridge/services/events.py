@@ -1,8 +1,8 @@
-"""MAVLink's events interface, sender's side: EVENT, CURRENT_EVENT_SEQUENCE, REQUEST_EVENT and its answers.
+"""MAVLink's events interface, sending side: EVENT, CURRENT_EVENT_SEQUENCE, REQUEST_EVENT and its answers.
 
-Events are numbered, and the newest are kept, so that who has missed one can ask for it. The report of health
-and arming checks goes out when it has changed, when somebody was refused, when a ground station is heard
-(again) before a flight, and when somebody asks for the checks.
+Events are numbered and the newest are kept, so that a client can request an event that it has missed. The
+report of health and arming checks is sent when it has changed, when a command was refused, when a ground
+station connects (again) before a flight, and when a client requests the checks.
 
 Sources: mavlink.io/en/services/events.html; PX4 1.16, Commander (RUN_PREARM_CHECKS, and a ground station that
 connects, bring the report also when nothing has changed).
@@ -32,8 +32,8 @@ from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.streams import Builder
 
 KEPT: Final = 64
-"""Events that can be asked for again."""
-_FIRST_SEQUENCE: Final = 65535 - 10  # near the wrap, as PX4 begins, so that clients meet it early
+"""Number of events that clients can request again."""
+_FIRST_SEQUENCE: Final = 65535 - 10  # near the wrap, as in PX4, so that clients meet the wrap early
 _REPORT_US: Final = 2_000_000
 _MODULO: Final = 0x10000
 _UNAVAILABLE: Final = 0  # MAV_EVENT_ERROR_REASON
@@ -43,7 +43,7 @@ class EventService(Microservice):
     """Sends the events of a PX4.
 
     Args:
-        commander: what the checks look at.
+        commander: the arming checks read its state.
         broadcast: all channels.
         notices: the texts of an event.
     """
@@ -70,7 +70,7 @@ class EventService(Microservice):
         return {CURRENT_EVENT_SEQUENCE: lambda: (self._sequence, 0)}
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Answer REQUEST_EVENT; ranges may wrap, and what is too old is said so once for each event."""
+        """Answer REQUEST_EVENT; ranges may wrap. An event that is no longer kept gets one error reply."""
         if message.get_msgId() != REQUEST_EVENT:
             return False
         count = (message.last_sequence - message.first_sequence) % _MODULO + 1
@@ -87,7 +87,7 @@ class EventService(Microservice):
         return True
 
     def tick(self, time_us: int) -> None:
-        """Report the checks when they have changed, and to a ground station that comes."""
+        """Report the checks when they have changed, and when a ground station connects."""
         self._time_us = time_us
         if time_us >= self._next_report_us:
             self._next_report_us = time_us + _REPORT_US
@@ -96,19 +96,19 @@ class EventService(Microservice):
                 self._send_report(report)
 
     def _station_comes(self) -> bool:
-        """Before a flight, a ground station is heard that was not before."""
+        """Before a flight, a ground station is connected that was not connected at the last tick."""
         situation, before = self._commander.situation, self._station_heard
         self._station_heard = situation.gcs_age_s < self._commander.parameters.gcs_loss_s
         return self._station_heard and not before and not self._commander.armed
 
     def _run_checks(self, command: Command, source: Source) -> Result:
-        """RUN_PREARM_CHECKS; what is in the way comes as texts too, and brings the report by itself."""
+        """RUN_PREARM_CHECKS; failed checks are sent as texts too, which brings the report."""
         if not self._commander.check_arming():
             self._send_report(self._report())
         return Result.ACCEPTED
 
     def follow(self, event: Event) -> None:
-        """Send the events of what happened."""
+        """Send the events that belong to a vehicle event."""
         for occurrence in px4_events.occurrences(event, self._notices(event)):
             self._send(occurrence)
         if isinstance(event, ArmingDenied):
@@ -124,7 +124,7 @@ class EventService(Microservice):
         level = kind.level if level is None else level
         self._sequence = (self._sequence + 1) % _MODULO
         message = EventMessage(
-            0,  # to everybody
+            0,  # to all systems
             0,
             kind.event_id,
             self._time_us // 1000 & 0xFFFFFFFF,
@@ -136,7 +136,7 @@ class EventService(Microservice):
         send_to_all(self._broadcast, message)
 
     def _report(self) -> tuple[Occurrence, ...]:
-        """Which modes can be armed and flown, and what is against it."""
+        """The modes that can be armed and flown, and the failed checks."""
         commander = self._commander
         situation, policy, parameters = commander.situation, commander.policy, commander.parameters
         can_arm = can_run = 0

@@ -2,10 +2,10 @@
 
 Sources: MAVLink common.xml (ODOMETRY, VISION_POSITION_ESTIMATE and its kin, SET_GPS_GLOBAL_ORIGIN); PX4 1.16
 `mavlink_receiver` takes ODOMETRY, VISION_POSITION_ESTIMATE and ATT_POS_MOCAP; ArduPilot 4.6 takes
-the others too, once VISO_TYPE says that there is a sender.
+the others too, once VISO_TYPE configures a sender.
 
-A time stamp in vehicle time (TIMESYNC gives it) says when a sample was taken; of any other clock the arrival
-counts, and the delay parameter.
+A time stamp in vehicle time (synchronised by TIMESYNC) is the sample's time of measurement. For a time stamp
+of any other clock, the time of arrival and the delay parameter are used.
 """
 
 import math
@@ -53,7 +53,7 @@ _POSE_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion, Quaternion]]] 
     mavlink.MAV_FRAME_LOCAL_FRD: (ExternalFrame.LOCAL_FRD, _SAME, _SAME),
     mavlink.MAV_FRAME_LOCAL_FLU: (ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU, _FRD_FROM_FLU),
 }
-"""Of ODOMETRY.frame_id: our frame, its axes from the message's, and our body axes from the message's."""
+"""By ODOMETRY.frame_id: our frame, our axes from the message's axes, and our body axes from the message's."""
 
 _VELOCITY_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion]]] = {
     mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME),
@@ -64,19 +64,19 @@ _VELOCITY_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion]]] = {
     mavlink.MAV_FRAME_BODY_FRD: (ExternalFrame.BODY_FRD, _SAME),
     mavlink.MAV_FRAME_BODY_OFFSET_NED: (ExternalFrame.BODY_FRD, _SAME),
 }
-"""Of ODOMETRY.child_frame_id, the same."""
+"""The same by ODOMETRY.child_frame_id."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExternalPolicy:
-    """What one firmware takes.
+    """What one firmware accepts.
 
     Attributes:
-        messages: ids it listens to.
-        pose_frames, velocity_frames: of ODOMETRY that it takes.
-        enabled: it listens at all, by its parameters.
-        local_frame: of messages that name none, and of every pose where `one_frame`.
-        one_frame: the frame of an ODOMETRY's pose is not looked at any further.
+        messages: ids of the messages that it uses.
+        pose_frames, velocity_frames: the frames of ODOMETRY that it accepts.
+        enabled: returns whether it uses external odometry at all, from its parameters.
+        local_frame: the frame of messages without a frame field, and of every pose where `one_frame`.
+        one_frame: the frame of an ODOMETRY's pose is not distinguished any further.
     """
 
     messages: frozenset[int]
@@ -88,13 +88,13 @@ class ExternalPolicy:
 
 
 def _ardupilot_frame(store: ParameterStore) -> ExternalFrame:
-    """ArduPilot takes all as NED; with the sender's heading that is a frame of its own."""
+    """ArduPilot takes every frame as NED; if it uses the sender's heading, that is a separate frame."""
     yaw_source = integer(store, "EK3_SRC1_YAW", 1)
     return ExternalFrame.LOCAL_FRD if yaw_source == EXTERNAL_NAV_SOURCE else ExternalFrame.NED
 
 
 EXTERNAL_NAV_SOURCE: Final = 6
-"""ExternalNav, of EK3_SRC1_*."""
+"""Value ExternalNav of EK3_SRC1_*."""
 
 POLICIES: Final[Mapping[str, ExternalPolicy]] = {
     "px4": ExternalPolicy(
@@ -132,10 +132,10 @@ POLICIES: Final[Mapping[str, ExternalPolicy]] = {
 
 
 class ExternalOdometryService(Microservice):
-    """Turns messages into samples of the navigation filter, and sets its origin.
+    """Converts messages into samples of the navigation filter, and sets its origin.
 
     Attributes:
-        wrong_frames: messages in frames that are not taken.
+        wrong_frames: number of messages in frames that are not accepted.
     """
 
     def __init__(self, parts: AutopilotParts) -> None:
@@ -148,7 +148,7 @@ class ExternalOdometryService(Microservice):
         self.wrong_frames = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one message. A vehicle's own ODOMETRY, heard by another, is none of that one's."""
+        """Handle one message. Another vehicle's own ODOMETRY that arrives here is ignored."""
         message_id = message.get_msgId()
         if message_id == mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN:
             self._set_origin(message, time_us)
@@ -167,7 +167,7 @@ class ExternalOdometryService(Microservice):
         return True
 
     def _set_origin(self, message: MavlinkMessage, time_us: int) -> None:
-        """SET_GPS_GLOBAL_ORIGIN: once; positions refer to it from then on."""
+        """SET_GPS_GLOBAL_ORIGIN: accepted once; positions refer to it from then on."""
         if self._navigation.frame is not None or message.target_system != self._system_id:
             return
         lat_deg, lon_deg, alt_m = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
@@ -284,7 +284,7 @@ _READERS: Final[Mapping[int, _Reader]] = {
 
 
 def _entry(covariance: list[float], index: int) -> float:
-    """One of the covariance; NaN in the first one says that there is none."""
+    """One element of the covariance; NaN in the first element means that no covariance is given."""
     return float(covariance[index]) if math.isfinite(covariance[0]) else math.nan
 
 
@@ -294,7 +294,7 @@ def _diagonal(covariance: list[float], indices: tuple[int, int, int]) -> tuple[f
 
 
 def _rotated(q: Quaternion, vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """A vector in other axes; only the changes of axes above."""
+    """A vector in other axes; used only for the changes of axes above."""
     x, y, z = vector
     if q is _NED_FROM_ENU:
         return y, x, -z

@@ -1,11 +1,11 @@
 """MAVLink FTP: the vehicle's files for ground stations.
 
-Every client (system and component on a channel) has sessions of its own. A request that comes again, because
-its reply was lost, gets the same reply and is not carried out twice. Bursts and checksums of long files go on
-at 50 Hz, a piece at a time, so that they neither hold the vehicle up nor flood a line.
+Every client (system and component on a channel) has its own sessions. A client repeats a request when the
+reply was lost; it then gets the same reply, and the request is not executed twice. Bursts and checksums of
+long files are processed in pieces at 50 Hz, so that they neither block the vehicle nor overload a link.
 
-A session gets the number that the client proposes, if it is free, else the lowest free one: PX4's clients
-take the number in the reply, ArduPilot's expect the one they have sent.
+A session gets the number that the client proposes if it is free, else the lowest free one: PX4's clients use
+the number in the reply, ArduPilot's expect the one that they have sent.
 
 Source: MAVLink file transfer protocol, https://mavlink.io/en/services/ftp.html.
 """
@@ -34,7 +34,7 @@ from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.storage import FileStore, Mode, OpenFile, parse_path
 
 BURST_REPLIES: Final = 100
-"""Replies in one burst; then the client asks on, which keeps it from being flooded at any speed."""
+"""Replies in one burst. The client then requests the next one, so no simulation speed floods it."""
 REPLIES_PER_TICK: Final = 20
 """On one channel: 240 kB/s of vehicle time, as over USB."""
 _CHECKSUM_BYTES_PER_TICK: Final = 512 * 1024
@@ -52,14 +52,14 @@ _NOT_REPEATED: Final = frozenset(
         Opcode.RENAME,
     }
 )
-"""Requests that do something else when they are carried out twice."""
+"""Requests whose second execution would have a different effect."""
 
 _Reply = tuple[bytes, int | None]
-"""Data of an acknowledgement, and the session it is about (None: as in the request)."""
+"""Data of an acknowledgement, and its session number (None: as in the request)."""
 
 
 class _Checksum:
-    """A checksum being made of a long file."""
+    """A running checksum computation of a long file."""
 
     __slots__ = ("client", "crc", "file", "offset", "request")
 
@@ -75,7 +75,7 @@ class FileTransferService(Microservice):
     """Answers FILE_TRANSFER_PROTOCOL from a tree of files.
 
     Args:
-        files: what there is.
+        files: the tree of files.
     """
 
     def __init__(self, files: FileStore) -> None:
@@ -110,7 +110,7 @@ class FileTransferService(Microservice):
         }
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take FILE_TRANSFER_PROTOCOL; replies of others (ACK, NAK) are let pass."""
+        """Handle FILE_TRANSFER_PROTOCOL; replies (ACK, NAK) of other systems are ignored."""
         if message.get_msgId() != mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
             return False
         payload = bytes(message.payload)
@@ -129,10 +129,10 @@ class FileTransferService(Microservice):
         return True
 
     def tick(self, time_us: int) -> None:
-        """Go on with bursts and checksums; close what is left open."""
+        """Continue bursts and checksums; close idle sessions."""
         if self._bursting:
             self._bursting = False
-            for client in tuple(self._clients):  # what is sent may be answered at once
+            for client in tuple(self._clients):  # a copy: an answer may change the list
                 self._continue_bursts(client)
         if self._checksums:
             self._continue_checksum()
@@ -149,7 +149,7 @@ class FileTransferService(Microservice):
         self._checksums.clear()
 
     def _answer(self, client: Client, request: Request, time_us: int) -> bytes | None:
-        """The reply to a request; None when it comes later."""
+        """The reply to a request; None when the reply is sent later."""
         try:
             handler = self._handlers.get(request.opcode)
             if handler is None:
@@ -238,7 +238,7 @@ class FileTransferService(Microservice):
         return b"", None
 
     def _checksum(self, client: Client, request: Request, time_us: int) -> None:
-        """The reply follows when the file was read; asked again meanwhile, it is still one."""
+        """Reply when the file was read; a request repeated before that starts no second computation."""
         if not any(work.client is client and work.request == request for work in self._checksums):
             path = parse_path(request.data)
             self._clients.make_room(client, time_us)
@@ -248,7 +248,7 @@ class FileTransferService(Microservice):
                 self._checksums.remove(work)
             self._checksums.append(_Checksum(client, request, file))
 
-    # what goes on by itself
+    # continued by the tick
 
     def _continue_bursts(self, client: Client) -> None:
         bursting = [session for session in client.sessions.values() if session.burst is not None]
@@ -306,7 +306,7 @@ def _readable(session: Session) -> Session:
 
 
 def _chunk(request: Request) -> int:
-    """Bytes in a reply: as asked for, as far as they fit; 0 is as many as fit."""
+    """Bytes in a reply: the requested number, as far as they fit; 0 requests as many as fit."""
     return min(request.size or MAX_DATA, MAX_DATA)
 
 

@@ -1,7 +1,7 @@
-"""Whom to follow: FOLLOW_TARGET, and on ArduPilot the GLOBAL_POSITION_INT of another system.
+"""The target to follow: FOLLOW_TARGET, and on ArduPilot the GLOBAL_POSITION_INT of another system.
 
-Sources: MAVLink common.xml; PX4 1.16 takes FOLLOW_TARGET, ArduPilot 4.6 (AP_Follow) both, once FOLL_ENABLE is
-set, of the system FOLL_SYSID or of the first one heard.
+Sources: MAVLink common.xml; PX4 1.16 uses FOLLOW_TARGET. ArduPilot 4.6 (AP_Follow) uses both, once
+FOLL_ENABLE is set, of the system FOLL_SYSID or of the first system received.
 """
 
 import math
@@ -20,14 +20,14 @@ _HAS_POSITION: Final = 1  # of est_capabilities
 _HAS_VELOCITY: Final = 2
 _MAX_SPEED_M_S: Final = 200.0
 _SIGMA_M: Final = 1.0
-_FORGET_S: Final = 10.0  # then another system may be followed
+_FORGET_S: Final = 10.0  # after this time another system may be followed
 
 
 class FollowService(Microservice):
     """Keeps `surroundings.leader` up to date.
 
     Attributes:
-        leader_id: system that is followed; 0: nobody was heard.
+        leader_id: id of the followed system; 0: none received.
     """
 
     def __init__(self, parts: AutopilotParts) -> None:
@@ -37,7 +37,7 @@ class FollowService(Microservice):
         self.leader_id = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one message; positions are left to others too."""
+        """Handle one message; positions are passed on to other services too."""
         message_id = message.get_msgId()
         if message_id == _FOLLOW:
             self._take(message, source, time_us, *_of_follow(message))

@@ -64,7 +64,7 @@ _OF_ERRNO: Final = {
 
 
 class FtpRefusal(Exception):
-    """A request that can't be carried out; `data` is what the NAK says."""
+    """A request that can't be executed; `data` is the content of the NAK."""
 
     def __init__(self, data: bytes) -> None:
         super().__init__(data)
@@ -72,12 +72,12 @@ class FtpRefusal(Exception):
 
     @classmethod
     def of(cls, code: FtpError) -> "FtpRefusal":
-        """With an error code of the protocol."""
+        """The refusal with an error code of the protocol."""
         return cls(bytes((code,)))
 
     @classmethod
     def of_os_error(cls, failure: OSError) -> "FtpRefusal":
-        """With the protocol's code for a file system's error, else FailErrno and the errno."""
+        """The refusal with the protocol's code for a file system error, else FailErrno and the errno."""
         code = _OF_ERRNO.get(failure.errno or 0)
         if code is not None:
             return cls.of(code)
@@ -98,7 +98,7 @@ class Request(NamedTuple):
 def parse_request(payload: bytes) -> Request:
     """The request in a payload of FILE_TRANSFER_PROTOCOL (251 bytes, so it always has a header).
 
-    `size` is as sent; `data` holds no more than there is.
+    `size` is as sent; `data` holds at most the bytes that are present.
     """
     sequence, session, opcode, size, _, _, offset = HEADER.unpack_from(payload)
     return Request(sequence, session, opcode, offset, payload[HEADER.size : HEADER.size + size], size)
@@ -114,7 +114,7 @@ def reply_payload(
     offset: int | None = None,
     burst_complete: bool = False,
 ) -> bytes:
-    """The payload of a reply; what is not given is as in the request, the sequence number one further."""
+    """The payload of a reply; fields not given are as in the request, with the next sequence number."""
     return (
         HEADER.pack(
             (request.sequence if sequence is None else sequence) + 1 & 0xFFFF,
@@ -130,7 +130,7 @@ def reply_payload(
 
 
 def uint32(value: int) -> bytes:
-    """A size or checksum in a reply; what doesn't fit is cut off."""
+    """A size or checksum in a reply; higher bits that do not fit are cut off."""
     return _UINT32.pack(value & 0xFFFFFFFF)
 
 

@@ -1,4 +1,4 @@
-"""Who is using the file transfer, what they have open, and what they were told last."""
+"""The clients of the file transfer, their open files, and the last replies sent to them."""
 
 import contextlib
 from collections import OrderedDict
@@ -14,23 +14,23 @@ MAX_SESSIONS: Final = 16
 MAX_SESSIONS_PER_CLIENT: Final = 4
 MAX_CLIENTS: Final = 32
 IDLE_US: Final = 60_000_000
-"""A session that nobody uses so long is closed."""
+"""A session that is not used for this time is closed."""
 GIVEN_UP_US: Final = 10_000_000
-"""One that nobody uses so long is closed when its place is wanted."""
+"""A session that is not used for this time is closed when another client needs the place."""
 REPEAT_US: Final = 10_000_000
-"""So long a request that comes again, byte for byte, gets the same reply and is not carried out again."""
+"""For this time, a repeated request (equal in every byte) gets the same reply and is not executed again."""
 _MAX_REPLIES: Final = 16
 
 
 @dataclass(slots=True)
 class Burst:
-    """A burst read on its way.
+    """A read burst in progress.
 
     Attributes:
-        request: what was asked.
-        offset: of the next bytes.
+        request: the client's request.
+        offset: offset of the next bytes.
         size: bytes in one reply.
-        sequence: of the reply before the next.
+        sequence: sequence number of the reply before the next.
         left: replies left in this burst.
     """
 
@@ -52,10 +52,10 @@ class Session:
     burst: Burst | None = None
 
     def close(self) -> None:
-        """Give the file back.
+        """Close the file.
 
         Raises:
-            OSError: what was written is not accepted.
+            OSError: the written data are not accepted.
         """
         self.burst = None
         self.file.close()
@@ -63,13 +63,13 @@ class Session:
 
 @dataclass(slots=True)
 class Client:
-    """One asker: a component on a channel.
+    """One client: a component on a channel.
 
     Attributes:
-        channel, system_id, component_id: who it is.
-        sessions: what it has open, by number.
-        replies: what it was told last: request bytes -> when, and the reply.
-        seen_us: when it asked last.
+        channel, system_id, component_id: identity of the client.
+        sessions: its open sessions, by number.
+        replies: the last replies sent to it: request bytes -> time, and the reply.
+        seen_us: time of its last request.
     """
 
     channel: Channel
@@ -80,19 +80,19 @@ class Client:
     replies: "OrderedDict[bytes, tuple[int, bytes]]" = field(default_factory=OrderedDict)
 
     def repeated(self, request: bytes, time_us: int) -> bytes | None:
-        """The reply to a request that was answered a moment ago."""
+        """The reply to a request that was answered a short time ago; None for a new request."""
         told = self.replies.get(request)
         return told[1] if told is not None and time_us - told[0] <= REPEAT_US else None
 
     def remember(self, request: bytes, reply: bytes, time_us: int) -> None:
-        """Keep a reply for a repetition."""
+        """Keep a reply for a repeated request."""
         self.replies[request] = (time_us, reply)
         self.replies.move_to_end(request)
         if len(self.replies) > _MAX_REPLIES:
             self.replies.popitem(last=False)
 
     def session(self, number: int, time_us: int) -> Session:
-        """An open session, which is in use now; `FtpRefusal` when there is none of that number."""
+        """An open session, marked as used now; `FtpRefusal` when no session has that number."""
         session = self.sessions.get(number)
         if session is None:
             raise FtpRefusal.of(FtpError.INVALID_SESSION)
@@ -100,7 +100,7 @@ class Client:
         return session
 
     def close_all(self) -> None:
-        """Close every session; what can't be closed is closed too."""
+        """Close every session; errors in closing are ignored."""
         for session in self.sessions.values():
             with contextlib.suppress(OSError):
                 session.close()
@@ -108,7 +108,7 @@ class Client:
 
 
 class Clients:
-    """All askers and their sessions."""
+    """All clients and their sessions."""
 
     def __init__(self) -> None:
         self._clients: dict[tuple[str, int, int], Client] = {}
@@ -117,7 +117,7 @@ class Clients:
         return iter(self._clients.values())
 
     def client(self, source: Source, time_us: int) -> Client:
-        """The asker of a message; a new one takes the place of the one that was quiet longest."""
+        """The client that sent a message; a new client replaces the one that was idle longest."""
         key = (source.channel.name, source.system_id, source.component_id)
         client = self._clients.get(key)
         if client is None or client.channel is not source.channel:
@@ -136,7 +136,7 @@ class Clients:
         return bool(client.sessions), client.seen_us
 
     def make_room(self, client: Client, time_us: int) -> None:
-        """See to it that a client may open one more file; `FtpRefusal` when there are too many."""
+        """Ensure that a client may open one more file; `FtpRefusal` when there are too many."""
         if len(client.sessions) >= MAX_SESSIONS_PER_CLIENT:
             self._close_idle(time_us - GIVEN_UP_US, client)
         if sum(len(each.sessions) for each in self) >= MAX_SESSIONS:
@@ -148,7 +148,7 @@ class Clients:
             raise FtpRefusal.of(FtpError.NO_SESSIONS_AVAILABLE)
 
     def close_idle(self, time_us: int) -> None:
-        """Close what nobody has used for a minute, and forget who has nothing open."""
+        """Close sessions that were not used for a minute, and forget clients without sessions."""
         self._close_idle(time_us - IDLE_US)
         for key, client in list(self._clients.items()):
             if not client.sessions and client.seen_us < time_us - IDLE_US:

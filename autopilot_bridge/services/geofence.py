@@ -1,6 +1,6 @@
-"""The geofence to clients: FENCE_STATUS, DO_FENCE_ENABLE, and whether a mission keeps inside.
+"""The geofence towards clients: FENCE_STATUS, DO_FENCE_ENABLE, and the check that a mission stays inside.
 
-Source: ArduPilot 4.6 GCS_Fence; PX4 1.16 MissionFeasibility (checkMissionAgainstGeofence). PX4 knows neither
+Source: ArduPilot 4.6 GCS_Fence; PX4 1.16 MissionFeasibility (checkMissionAgainstGeofence). PX4 has neither
 the message nor the command.
 """
 
@@ -28,10 +28,10 @@ _OFF, _ON, _FLOOR_OFF = 0, 1, 2  # of DO_FENCE_ENABLE
 
 
 class ArdupilotGeofence(Microservice):
-    """What an ArduPilot tells of its fence, and takes about it.
+    """The messages and commands of an ArduPilot geofence.
 
     Args:
-        commander: has the fence.
+        commander: owns the fence.
         parameters: FENCE_ENABLE.
         broadcast: all channels.
     """
@@ -48,7 +48,7 @@ class ArdupilotGeofence(Microservice):
 
     @classmethod
     def of(cls, parts: AutopilotParts) -> "ArdupilotGeofence":
-        """The one of an autopilot."""
+        """Build the service of an autopilot."""
         return cls(parts.commander, parts.parameters, parts.broadcast)
 
     @property
@@ -62,7 +62,7 @@ class ArdupilotGeofence(Microservice):
         return {_STATUS: self._status}
 
     def follow(self, event: Event) -> None:
-        """A breach is told at once."""
+        """Send the status at once when the fence is breached."""
         if isinstance(event, FenceBreached):
             values = self._status()
             if values is not None:
@@ -103,10 +103,10 @@ class ArdupilotGeofence(Microservice):
 
 
 class MissionFence:
-    """Whether the items of a mission keep inside the geofence (PX4).
+    """Checks whether the items of a mission stay inside the geofence (PX4).
 
     Args:
-        commander: has the fence.
+        commander: owns the fence.
     """
 
     def __init__(self, commander: Commander) -> None:
@@ -114,13 +114,13 @@ class MissionFence:
 
     @property
     def state(self) -> object:
-        """Equal while the answers are."""
+        """A value that stays equal as long as the answers stay the same."""
         commander = self._commander
         home = commander.home.position
         return (commander.fence.geofence.version, commander.parameters.fence, home)
 
     def excludes(self, item: MissionItem) -> bool:
-        """A place of the mission lies outside."""
+        """True when a position of the item lies outside."""
         commander = self._commander
         context = commander.context
         if item.command not in PLACED_COMMANDS or not math.isfinite(item.x + item.y):

@@ -1,8 +1,8 @@
-"""Fixes of a receiver on another computer: GPS_INPUT and HIL_GPS, as ArduPilot takes them with GPS1_TYPE 14.
+"""Fixes of an external GPS receiver: GPS_INPUT and HIL_GPS, as ArduPilot accepts them with GPS1_TYPE 14.
 
-They stand in the place of the receiver on board from boot on, and are judged as its fixes are. What a message
-leaves out is not known: without accuracies those count that its dilutions of precision stand for, without a
-velocity the filter has positions only, and without dilutions of precision the fix is not good enough.
+They replace the onboard receiver from boot on, and pass the same checks as its fixes. A value that is missing
+in a message is unknown: missing accuracies are derived from the dilutions of precision; without a velocity
+the filter uses positions only; without dilutions of precision the fix is not good enough.
 
 Source: MAVLink common.xml (GPS_INPUT 232, HIL_GPS 113); ArduPilot 4.6 AP_GPS_MAV.
 """
@@ -23,13 +23,13 @@ _LAST_FIX_TYPE: Final = mavlink.GPS_FIX_TYPE_PPP
 _WEEK_MS: Final = 604_800_000
 _LATEST_US: Final = 500_000
 _DRIFT_US: Final = 20
-"""A message's shortest way is taken to be so much longer than the shortest yet: clocks drift."""
+"""Increase of the assumed shortest delay with each message, because clocks drift."""
 _DRIVER_DELAY_MS: Final = 200.0
 _MAX_DELAY_MS: Final = 250.0
 _UNKNOWN_DOP: Final = 99.99
 _UNKNOWN_ACCURACY_M: Final = 99.0
 _RANGE_ERROR_M: Final = 1.0
-"""Times a dilution of precision: an accuracy that was not told."""
+"""Multiplied by a dilution of precision, this is the accuracy of a fix that was sent without one."""
 _SPEED_ACCURACY_M_S: Final = 0.3
 _MAX_ALT_M: Final = 1e5
 _MAX_SPEED_M_S: Final = 400.0
@@ -37,22 +37,22 @@ _UNKNOWN_SATELLITES: Final = 255
 
 
 class GpsInputService(Microservice):
-    """Writes fixes that come by messages where the receiver's samples are.
+    """Writes fixes received by messages in the place of the onboard receiver's samples.
 
     Attributes:
-        taken: fixes.
-        refused: messages with numbers that are none.
+        taken: number of accepted fixes.
+        refused: number of messages with invalid values.
     """
 
     def __init__(self, parts: AutopilotParts) -> None:
         self._reading = parts.readings.gps
         self._parameters = parts.parameters
         self._listens = parts.flavour.gps_source(parts.parameters) is GpsSource.MESSAGES
-        self._offset_us: int | None = None  # of the vehicle's time from the sender's, for the shortest way
+        self._offset_us: int | None = None  # vehicle time minus sender's time, at the shortest delay
         self.taken = self.refused = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one fix. Other receivers than the first (`gps_id`) are not there."""
+        """Handle one fix. Only the first receiver (`gps_id`) exists."""
         reader = _READERS.get(message.get_msgId())
         if reader is None:
             return False
@@ -72,21 +72,21 @@ class GpsInputService(Microservice):
         return True
 
     def _sent_us(self, message: MavlinkMessage, values: list[float], time_us: int) -> int:
-        """When a fix set out: by its GPS time, which takes out what one's way differs from another's."""
+        """The send time of a fix from its GPS time, which removes the variation of the transport delay."""
         week = int(getattr(message, "time_week", 0))
         if week == 0 or values[i.GPS_FIX_TYPE] < _FIX_3D:
             return time_us
         stamp_us = 1000 * (week * _WEEK_MS + int(message.time_week_ms))
         offset_us = time_us - stamp_us
         if self._offset_us is None or not -_LATEST_US < offset_us - self._offset_us < _LATEST_US:
-            self._offset_us = offset_us  # the first one, or another clock
+            self._offset_us = offset_us  # the first message, or another clock
         else:
             self._offset_us = min(self._offset_us + _DRIFT_US, offset_us)
         return stamp_us + self._offset_us
 
 
 def _gps_input(message: MavlinkMessage) -> list[float] | None:
-    """GPS_INPUT; None: not a fix."""
+    """The values of a GPS_INPUT; None: not a fix."""
     ignored = int(message.ignore_flags)
 
     def said(flag: int, value: float) -> float:
@@ -110,7 +110,7 @@ def _gps_input(message: MavlinkMessage) -> list[float] | None:
 
 
 def _hil_gps(message: MavlinkMessage) -> list[float] | None:
-    """HIL_GPS, in integers."""
+    """The values of a HIL_GPS, which has integers."""
     return _fix(
         message,
         alt_m=message.alt * 1e-3,
@@ -131,7 +131,7 @@ def _fix(
     epv_m: float = math.nan,
     speed_accuracy_m_s: float = math.nan,
 ) -> list[float] | None:
-    """A sample as in `flightsim.interface`; NaN: not told. None: it can't be one."""
+    """A sample as in `flightsim.interface`; NaN: value not sent. None: invalid values."""
     fix_type, satellites = int(message.fix_type), int(message.satellites_visible)
     if fix_type > _LAST_FIX_TYPE or not abs(alt_m) < _MAX_ALT_M:
         return None
@@ -153,7 +153,7 @@ def _fix(
 
 
 def _least(said: float, otherwise: float) -> float:
-    """What was told, if it makes sense."""
+    """The received value if it is valid, else the other one."""
     return said if said > 0.0 else otherwise
 
 

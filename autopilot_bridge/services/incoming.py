@@ -1,4 +1,4 @@
-"""What a vehicle takes in by messages besides commands: odometry, fixes, targets, obstacles."""
+"""The services for received messages other than commands: odometry, fixes, targets, obstacles."""
 
 from autopilot_bridge.services.external_odometry import ExternalOdometryService
 from autopilot_bridge.services.follow import FollowService
@@ -9,7 +9,7 @@ from autopilot_bridge.services.obstacles import ObstacleService
 
 
 def incoming_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
-    """Those of one autopilot; a simulated world gets to know it."""
+    """The services of one autopilot; a simulated world is connected to the autopilot first."""
     if parts.simulation is not None:
         parts.simulation.attend(parts)
     return (

@@ -1,9 +1,10 @@
-"""LANDING_TARGET: where to land, as a detector on the vehicle sees it.
+"""LANDING_TARGET: the landing place as an onboard detector measures it.
 
-Sources: MAVLink landing target protocol; PX4 1.16 takes places in LOCAL_NED and angles, ArduPilot 4.6 those
-in BODY_FRD or LOCAL_FRD and angles (PLND_TYPE 1). Angles are off the optical axis, right and downwards in
-the image; the camera looks straight down with the top of its image forward, unless the vehicle's own gimbal
-tells where it points (GIMBAL_DEVICE_ATTITUDE_STATUS of component 154, for the camera, component 100).
+Sources: MAVLink landing target protocol; PX4 1.16 accepts positions in LOCAL_NED and angles, ArduPilot 4.6
+positions in BODY_FRD or LOCAL_FRD and angles (PLND_TYPE 1). Angles are off the optical axis, right and
+downwards in the image; the camera looks straight down with the top of its image forward, unless the vehicle's
+own gimbal reports where it points (GIMBAL_DEVICE_ATTITUDE_STATUS of component 154, for the camera, component
+100).
 """
 
 import math
@@ -30,7 +31,7 @@ _GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
 _YAW_IN_EARTH: Final = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
 _GIMBAL_US: Final = 500_000
 _MAX_ANGLE_RAD: Final = 1.3
-_STEEPEST: Final = 0.2  # least part of a line of sight that points down
+_STEEPEST: Final = 0.2  # smallest downward component of a usable line of sight
 _ANGLE_SIGMA_RAD: Final = math.radians(1.0)
 _LEAST_SIGMA_M: Final = 0.05
 _MAX_DISTANCE_M: Final = 200.0
@@ -40,7 +41,7 @@ class LandingTargetService(Microservice):
     """Keeps `surroundings.landing_target` up to date.
 
     Attributes:
-        refused: messages that say nothing usable.
+        refused: number of messages without usable content.
     """
 
     def __init__(self, parts: AutopilotParts) -> None:
@@ -52,7 +53,7 @@ class LandingTargetService(Microservice):
         self.refused = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one message of the vehicle's own payload, or of anybody who helps it to land."""
+        """Handle one message, from the vehicle's own payload or from any other system."""
         message_id = message.get_msgId()
         if not self._lands_there:
             return False
@@ -77,7 +78,7 @@ class LandingTargetService(Microservice):
     def _place(
         self, message: MavlinkMessage, source: Source, time_us: int
     ) -> tuple[int, Array, float] | None:
-        """(time, local NED, 1-sigma) of what the message says; None for nothing usable."""
+        """(time, local NED, 1-sigma) from the message; None if the message is not usable."""
         measured_us = in_vehicle_time(int(message.time_usec), time_us)
         pose = self._navigation.past_pose(measured_us, time_us)
         if pose is None or not self._context.position_valid:
@@ -136,5 +137,5 @@ def rotated(q: Array, vector: Array) -> Array:
 
 
 def _heading(q: Array) -> Array:
-    """The part of an attitude that turns about the vertical."""
+    """The rotation about the vertical in an attitude."""
     return np.array(from_euler(0.0, 0.0, yaw_of(q.tolist())))

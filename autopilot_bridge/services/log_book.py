@@ -1,7 +1,7 @@
-"""The logs on a memory card: which there are, under which numbers, and how a new one is called.
+"""The logs on a memory card: a list of them, their numbers, and the names of new logs.
 
-They are telemetry logs (`.tlog`) of what the vehicle says; no kept library writes the firmwares' own formats.
-What somebody else has put among them (.ulg, .bin) is offered for download as well.
+They are telemetry logs (`.tlog`) of the vehicle's own messages; no maintained library writes the firmwares'
+own formats. Log files from other sources in the same folders (.ulg, .bin) are offered for download as well.
 """
 
 from datetime import UTC, datetime
@@ -21,7 +21,7 @@ class LogFile(NamedTuple):
     """A log on the card.
 
     Attributes:
-        number: as LOG_ENTRY counts.
+        number: number in LOG_ENTRY.
         path: on the card.
         size: bytes.
         time_utc_s: Unix time of its first record; 0: not known.
@@ -38,7 +38,7 @@ class LogBook:
 
     Args:
         files: the memory card.
-        layout: where on it, and how they are called.
+        layout: folder and names of the logs.
     """
 
     def __init__(self, files: FileStore, layout: CardLayout) -> None:
@@ -55,14 +55,14 @@ class LogBook:
         ]
 
     def open(self, log: LogFile) -> OpenFile:
-        """Open a log for reading; OSError when it is gone."""
+        """Open a log for reading; OSError when it no longer exists."""
         return self._files.open(log.path, Mode.READ)
 
     def create(self, unix_us: int) -> tuple[VehiclePath, OpenFile]:
-        """A new log that begins now; no other is touched.
+        """Create a new log that begins now; no other log is changed.
 
         Raises:
-            OSError: there is no room.
+            OSError: the card is full.
         """
         folder, names = self._layout.logs, iter(range(1, _NAMES_TRIED))
         if self._layout.log_folder_by_day:
@@ -70,7 +70,7 @@ class LogBook:
             folder = (*folder, began.strftime("%Y-%m-%d"))
             name = began.strftime("%H_%M_%S")
             path = (*folder, name + SUFFIX)
-            while exists(self._files, path):  # the same second of another run
+            while exists(self._files, path):  # another log of the same second
                 path = (*folder, f"{name}_{next(names) + 1}{SUFFIX}")
         else:
             last = max((_number(path[-1]) for path, _ in self._found()), default=0)
@@ -79,7 +79,7 @@ class LogBook:
         return path, self._files.open(path, Mode.NEW)
 
     def erase(self, *, but: VehiclePath | None) -> None:
-        """Remove all logs but one, and the folders that are empty then; OSError when one can't be removed."""
+        """Remove all logs but one, and folders that are then empty; OSError when one can't be removed."""
         for path, _ in list(self._found()):
             if path != but:
                 self._files.remove(path)

@@ -1,8 +1,8 @@
 """Log list and download: LOG_REQUEST_LIST, LOG_REQUEST_DATA, LOG_ERASE, LOG_REQUEST_END.
 
-Every client (system and component on a channel) has its own list and download. Answers go out at 50 Hz, a few
-at a time and none while the line is congested. Several ranges may be asked for one behind the other, as
-clients do to fill what was lost.
+Every client (system and component on a channel) has its own list and download. Answers are sent at 50 Hz, a
+few at a time, and none while the link is congested. A client may request several ranges one after the other,
+as clients do to fill gaps.
 
 Source: MAVLink log download (mavlink.io/en/messages/common.html, LOG_ENTRY, LOG_DATA).
 """
@@ -37,14 +37,14 @@ _REQUESTS: Final = frozenset(
 
 @dataclass(slots=True)
 class _Download:
-    """What a client is being sent.
+    """The data that are being sent to a client.
 
     Attributes:
-        source: who.
-        entries: of the list, still to be sent.
-        ranges: (offset, end) of the log's bytes, still to be sent.
-        number, file: the log that is open; -1: none is.
-        used_us: when it asked last.
+        source: the client.
+        entries: list entries still to be sent.
+        ranges: (offset, end) of the log's bytes still to be sent.
+        number, file: the open log; -1: none.
+        used_us: time of the last request.
     """
 
     source: Source
@@ -55,7 +55,7 @@ class _Download:
     file: OpenFile | None = None
 
     def close(self) -> None:
-        """Nothing more is to be sent."""
+        """Discard what is still to be sent."""
         self.entries.clear()
         self.ranges.clear()
         self.number = -1
@@ -69,9 +69,10 @@ class LogTransferService(Microservice):
 
     Args:
         book: the logs.
-        recording: path of the log that is being written, which is not erased; None: none is.
+        recording: path of the log that is being written, which is not erased; None: none.
         armed: whether the vehicle is armed.
-        armed_refusal: what who asks meanwhile is told, once; empty: logs are sent in flight too.
+        armed_refusal: text sent once to a client that requests logs while armed; empty: logs are sent in
+            flight too.
     """
 
     def __init__(
@@ -86,11 +87,11 @@ class LogTransferService(Microservice):
         self._armed = armed
         self._armed_refusal = armed_refusal
         self._refused = False
-        self._logs: list[LogFile] = []  # as they were listed: numbers keep their meaning
+        self._logs: list[LogFile] = []  # as listed, so that the numbers stay valid
         self._downloads: dict[tuple[str, int, int], _Download] = {}
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take the requests of the log protocol."""
+        """Handle the requests of the log protocol."""
         if message.get_msgId() in _REQUESTS and self._waits:
             self._refuse(source)
             return True
@@ -108,7 +109,7 @@ class LogTransferService(Microservice):
         return True
 
     def tick(self, time_us: int) -> None:
-        """Send what was asked for; forget who went away."""
+        """Send the requested data; forget idle clients."""
         if not self._downloads or self._waits:
             return
         for key, download in tuple(self._downloads.items()):
@@ -118,13 +119,13 @@ class LogTransferService(Microservice):
                 del self._downloads[key]
 
     def close(self) -> None:
-        """Close what is open."""
+        """Close the open files."""
         for download in self._downloads.values():
             download.close()
 
     @property
     def _waits(self) -> bool:
-        """Nothing is sent while the vehicle is armed; what was under way goes on afterwards."""
+        """Nothing is sent while the vehicle is armed; running transfers continue afterwards."""
         return bool(self._armed_refusal) and self._armed()
 
     def _refuse(self, source: Source) -> None:
@@ -169,14 +170,14 @@ class LogTransferService(Microservice):
                 return
             try:
                 download.file = self._book.open(log)
-            except OSError:  # erased since it was listed
+            except OSError:  # erased after it was listed
                 return
             download.number = message.id
         if download.file is None:
             return
         end = min(message.ofs + message.count, download.file.size)
         if message.count > DATA_BYTES * 1000:
-            download.ranges.clear()  # all of it, from here on: what was asked before is in it
+            download.ranges.clear()  # the rest of the log from here on, which contains the earlier requests
         if (message.ofs, end) not in download.ranges and len(download.ranges) < _MAX_RANGES:
             download.ranges.append((message.ofs, end))
 
@@ -186,7 +187,7 @@ class LogTransferService(Microservice):
         self._logs = []
         try:
             self._book.erase(but=self._recording())
-        except OSError:  # the list shows what is left
+        except OSError:  # the next list shows the remaining logs
             return
 
     def _continue(self, download: _Download) -> None:

@@ -1,4 +1,4 @@
-"""People at the controls: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, heartbeats of ground stations."""
+"""Manual control: MANUAL_CONTROL, RC_CHANNELS_OVERRIDE, heartbeats of ground stations."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -27,27 +27,27 @@ _MANUAL: Final = mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL
 _OVERRIDE: Final = mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE
 _HEARTBEAT: Final = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
-_UNUSED: Final = 65535  # RC_CHANNELS_OVERRIDE: leave this channel alone
-_RELEASE: Final = 0  # back to the radio, of channels 1 to 8
-_RELEASE_MORE: Final = 65534  # and of channels 9 to 18, where 0 leaves them alone
+_UNUSED: Final = 65535  # RC_CHANNELS_OVERRIDE: this channel is not changed
+_RELEASE: Final = 0  # back to the radio, for channels 1 to 8
+_RELEASE_MORE: Final = 65534  # the same for channels 9 to 18, where 0 does not change the channel
 _FIRST_CHANNELS: Final = 8
 _INVALID_AXIS: Final = 32767  # MANUAL_CONTROL: axis not sent
 _RSSI_UNKNOWN: Final = 255
-_NO_RADIO_S: Final = 1.0  # PX4: a radio that is silent so long is gone
+_NO_RADIO_S: Final = 1.0  # PX4: the radio counts as lost after this time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ManualRules:
-    """How a firmware takes sticks.
+    """How a firmware uses the sticks.
 
     Attributes:
         at_rest: pulses of the built-in transmitter, microseconds; empty: there is none.
-        axes: parameters with the channels of roll, pitch, throttle and yaw; 0 there: 1, 2, 3, 4.
-        gcs_only: parameter with the one system id that may use the sticks; empty: everybody may.
-        source: parameter that says whether sticks come by radio or by MANUAL_CONTROL; empty: by both.
-        timeout_s: age at which an override is forgotten; negative: never, 0: overrides are not taken.
-        sticks_are_radio: MANUAL_CONTROL is an override of the radio's channels (ArduPilot).
-        mode_switch, gesture: the switch that chooses modes and the sticks that arm.
+        axes: parameters with the channels of roll, pitch, throttle and yaw; value 0: channels 1, 2, 3, 4.
+        gcs_only: parameter with the only system id that may use the sticks; empty: any system may.
+        source: parameter that selects the radio or MANUAL_CONTROL as source of the sticks; empty: both.
+        timeout_s: age at which an override expires; negative: never, 0: overrides are not accepted.
+        sticks_are_radio: MANUAL_CONTROL overrides the radio's channels (ArduPilot).
+        mode_switch, gesture: the switch that selects modes and the stick gesture that arms.
     """
 
     at_rest: tuple[int, ...]
@@ -60,11 +60,11 @@ class ManualRules:
     gesture: GestureRules
 
     def takes_radio(self, parameters: ParameterStore) -> bool:
-        """The radio's sticks steer (COM_RC_IN_MODE: 0 radio, 2 and 3 both)."""
+        """The radio's sticks control the vehicle (COM_RC_IN_MODE: 0 radio, 2 and 3 both)."""
         return not self.source or round(parameters.get(self.source)) in (0, 2, 3)
 
     def takes_messages(self, parameters: ParameterStore) -> bool:
-        """MANUAL_CONTROL steers (COM_RC_IN_MODE: 1 messages, 2 and 3 both)."""
+        """MANUAL_CONTROL controls the vehicle (COM_RC_IN_MODE: 1 messages, 2 and 3 both)."""
         return not self.source or round(parameters.get(self.source)) in (1, 2, 3)
 
 
@@ -131,7 +131,7 @@ _ARDUPLANE: Final = replace(_ARDUCOPTER, gesture=replace(_ARDUCOPTER.gesture, ho
 
 
 def manual_rules(flavour: Flavour) -> ManualRules:
-    """The rules of a flavour; ArduPilot's modes are its own numbers."""
+    """The rules of a flavour; ArduPilot's modes have its own numbers."""
     if flavour.name == "px4":
         return _PX4
     rules = _ARDUPLANE if flavour.kind is AirframeKind.FIXED_WING else _ARDUCOPTER
@@ -140,11 +140,11 @@ def manual_rules(flavour: Flavour) -> ManualRules:
 
 
 class ManualService(Microservice):
-    """Turns stick messages into the commander's pilot input, and tells what the radio is heard to say.
+    """Converts stick messages into the commander's pilot input, and reports the radio's channels.
 
     Args:
-        commander: whose pilot this is.
-        system_id: messages for other vehicles are left alone.
+        commander: receives the pilot input.
+        system_id: the vehicle's id; messages for other vehicles are ignored.
         parameters: of the vehicle.
         rules: the firmware's.
     """
@@ -179,7 +179,7 @@ class ManualService(Microservice):
         return {mavlink.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels}
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one message; a HEARTBEAT is looked at and left to others (False)."""
+        """Handle one message; a HEARTBEAT is read and passed on to other services (False)."""
         message_id = message.get_msgId()
         if message_id == _HEARTBEAT:
             if self._is_gcs(message, source):
@@ -196,7 +196,7 @@ class ManualService(Microservice):
         return False
 
     def tick(self, time_us: int) -> None:
-        """Overrides grow old; mode switch and arming sticks are watched once somebody has used them."""
+        """Expire overrides; check mode switch and arming gesture once the sticks have been used."""
         if not self._used:
             return
         self._time_us = time_us
@@ -266,7 +266,7 @@ class ManualService(Microservice):
         return roll, pitch, throttle, yaw
 
     def _steer(self, time_us: int) -> None:
-        """The sticks are where the radio's channels are."""
+        """Set the sticks from the radio's channels."""
         axes = self._axes()
         if not self._radio.is_overridden(axes):
             self._release_sticks()
@@ -282,7 +282,7 @@ class ManualService(Microservice):
             self._commander.pilot.release()
 
     def _rc_channels(self) -> Values | None:
-        """RC_CHANNELS (65): nothing where there is no radio."""
+        """RC_CHANNELS (65); None without a radio."""
         pulses_us = self._radio.pulses_us
         heard = [channel for channel, pulse_us in enumerate(pulses_us) if pulse_us]
         if not heard:

@@ -23,17 +23,17 @@ _FASTEST_REQUESTABLE_US: Final = 100_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class IntervalPolicy:
-    """What one firmware does its own way.
+    """The differences of one firmware.
 
     Attributes:
         unknown_set, unknown_get, unknown_request: results for a message the firmware does not send.
         fixed: messages whose interval can't be set (PX4: HEARTBEAT).
-        not_requestable: messages that are sent, if at all, by the firmware's own choice: a client can neither
+        not_requestable: messages that only the firmware decides to send: a client can neither
             request them nor set their interval.
-        refuse_running: a message that a fast stream is sending anyway is refused on request (PX4).
+        refuse_running: a request for a message that a fast stream already sends is refused (PX4).
         max_rate_hz: fastest stream that is accepted; faster ones are denied with a text.
         groups: REQUEST_DATA_STREAM group -> message ids; empty: the message is ignored.
-        unknown_text, too_fast_text: texts to the pilot, with the message id; empty: silence.
+        unknown_text, too_fast_text: texts to the pilot, with the message id; empty: no text.
     """
 
     unknown_set: Result
@@ -49,10 +49,10 @@ class IntervalPolicy:
 
 
 class MessageIntervalService:
-    """Changes and answers for the streams of every channel.
+    """Changes the streams of every channel, and answers requests about them.
 
     Args:
-        policy: the firmware's ways.
+        policy: the firmware's behaviour.
         tables: the stream table of each channel, by channel name; the mapping may grow.
         cache: builds the messages.
         announce: sends a STATUSTEXT (MAV_SEVERITY, text).
@@ -72,11 +72,11 @@ class MessageIntervalService:
         self._cache = cache
         self._announce = announce
         self._on_demand = on_demand
-        self._pending: dict[tuple[Channel, int, float], None] = {}  # the same asked for twice is one answer
+        self._pending: dict[tuple[Channel, int, float], None] = {}  # two equal requests get one answer
         self._time_us = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """REQUEST_DATA_STREAM; the commands come through the methods below."""
+        """Handle REQUEST_DATA_STREAM; the commands come through the methods below."""
         self._time_us = time_us
         if message.get_msgId() != mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
             return False
@@ -158,5 +158,5 @@ class MessageIntervalService:
         return Result.ACCEPTED
 
     def _known(self, message_id: int) -> bool:
-        """A client may ask for the message."""
+        """A client may request the message."""
         return message_id in self._cache and message_id not in self._policy.not_requestable

@@ -1,6 +1,6 @@
-"""What a MAVLink microservice may bring along besides answering messages, and what it may reach.
+"""What a MAVLink microservice may provide besides answers to messages, and which parts it may use.
 
-`autopilot.microservices` makes those of an autopilot; a new one is a class here and a line there.
+`autopilot.microservices` builds those of an autopilot; a new one needs a class here and a line there.
 """
 
 from collections.abc import Callable, Mapping
@@ -26,24 +26,24 @@ from flightsim.interface import SensorReadings
 
 
 class Simulation(Protocol):
-    """The simulated world's side of an autopilot, where there is one: failures of what comes in."""
+    """The simulated world of an autopilot, if there is one: it makes received data fail."""
 
     def attend(self, parts: "AutopilotParts") -> None:
         """An autopilot has booted."""
         ...
 
     def spoil(self, unit: int, values: NDArray[np.float64]) -> bool:
-        """Spoil the values of a FAILURE_UNIT's sample in place; False: the sample doesn't arrive."""
+        """Apply a failure to the values of a FAILURE_UNIT's sample in place; False: the sample is lost."""
         ...
 
     def deaf_to(self, command: int | None) -> bool:
-        """No message arrives; `command` is the MAV_CMD of one, None: it is another message."""
+        """True: received messages are lost; `command` is the MAV_CMD of a command, None: another message."""
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AutopilotParts:
-    """What microservices may reach.
+    """The parts of an autopilot that microservices may use.
 
     Attributes:
         flavour: which firmware is emulated.
@@ -58,7 +58,7 @@ class AutopilotParts:
         announce: sends a STATUSTEXT.
         memory: card, clock and power of the computer it runs on.
         simulation: the simulated world; None: there is none.
-        execute: carries a command out as if a client had sent it; None: nobody does.
+        execute: executes a command as if a client had sent it; None: not available.
     """
 
     flavour: Flavour
@@ -79,17 +79,18 @@ class AutopilotParts:
 class Microservice:
     """One microservice; by default it does nothing.
 
-    Everything is called between two steps of the autopilot, and never raises for what a message holds.
+    All methods are called between two steps of the autopilot, and never raise because of a message's
+    contents.
 
     Attributes:
-        unhurried: its timers may be late by a tenth of a second: `tick` is called at 10 Hz only.
+        unhurried: its timers may be late by a tenth of a second: `tick` is called only at 10 Hz.
     """
 
     unhurried: ClassVar[bool] = False
 
     @property
     def commands(self) -> Mapping[int, Handler]:
-        """MAV_CMDs it carries out, before the flavour's own table is asked. Read once."""
+        """The MAV_CMDs that it executes; they take precedence over the flavour's own table. Read once."""
         return {}
 
     @property

@@ -1,7 +1,7 @@
-"""The MAVLink mission protocol, autopilot side, as PX4 and ArduPilot speak it.
+"""The MAVLink mission protocol, autopilot side, of PX4 and ArduPilot.
 
-Source: MAVLink mission protocol (mavlink.io/en/services/mission.html); `MissionPolicy` holds what each
-firmware does its own way. Missions, fences and rally points share the protocol, each with its own store.
+Source: MAVLink mission protocol (mavlink.io/en/services/mission.html); `MissionPolicy` holds the differences
+between the firmwares. Missions, fences and rally points share the protocol, each with its own store.
 """
 
 import math
@@ -31,7 +31,7 @@ from autopilot_bridge.services.mission_upload import MissionUploads
 
 
 class _Judged(NamedTuple):
-    """What a judgement of the stored mission rests on."""
+    """The inputs of a feasibility check of the stored mission."""
 
     version: int
     landed: bool
@@ -41,21 +41,21 @@ class _Judged(NamedTuple):
 
 
 class FenceJudge(Protocol):
-    """Says whether the items of a mission keep inside the geofence."""
+    """Checks whether the items of a mission stay inside the geofence."""
 
     @property
     def state(self) -> object:
-        """Equal while the answers are."""
+        """A value that stays equal as long as the answers stay the same."""
         ...
 
     def excludes(self, item: MissionItem) -> bool:
-        """A place of the mission lies outside."""
+        """True when a position of the item lies outside."""
         ...
 
 
 HomeOf = Callable[[], GeodeticPosition | None]
 _GUIDED_ITEM = 2  # MISSION_ITEM.current of a guided-mode target
-_PROBLEMS_TOLD = 3  # a mission of the wrong place has one for each item
+_PROBLEMS_TOLD = 3  # a mission at a wrong place has one problem for each item
 
 
 def new_stores() -> dict[MissionType, MissionStore]:
@@ -67,18 +67,18 @@ class MissionService:
     """Uploads, downloads, clearing and progress of an autopilot's plans.
 
     Args:
-        policy: the firmware's ways.
-        stores: one store per mission type; a plan is replaced whole or not at all.
+        policy: the firmware's behaviour.
+        stores: one store per mission type; a plan is replaced completely or not at all.
         broadcast: all channels of the autopilot.
         announce: sends STATUSTEXTs.
-        home: the home position, None while there is none.
+        home: the home position; None while it is not set.
         progress: the task that flies missions.
-        set_current: asks that task to fly from another item on; False refuses. The service sets
+        set_current: makes that task continue from another item; False: refused. The service sets
             `MissionStore.current` itself when this is None.
         on_plan_changed: called after a plan was replaced or cleared.
-        on_guided_item: takes an item as a target for guided mode; False refuses (ArduPilot only).
-        parameters: what an aircraft's missions are judged by; None: the firmware's defaults.
-        fence: what missions must keep inside (PX4); None: nothing.
+        on_guided_item: uses an item as a target for guided mode; False: refused (ArduPilot only).
+        parameters: limits for missions of an aircraft; None: the firmware's defaults.
+        fence: the fence that missions must stay inside (PX4); None: none.
         landed: whether the vehicle stands on the ground.
     """
 
@@ -123,18 +123,18 @@ class MissionService:
         return self._stores
 
     def current_message(self) -> MavlinkMessage:
-        """MISSION_CURRENT as it stands now, for the streams."""
+        """MISSION_CURRENT with the present state, for the streams."""
         return self._report.current_message()
 
     def item_reached(self, seq: int) -> None:
-        """The flying task is done with an item: the next `tick` sends MISSION_ITEM_REACHED."""
+        """The flying task has finished an item: the next `tick` sends MISSION_ITEM_REACHED."""
         if 0 <= seq <= 65535:
             self._report.item_reached(seq)
 
     def problems(self, *, landed: bool = True) -> tuple[str, ...]:
-        """Why the stored mission may not be flown, in the firmware's words; empty when nothing is wrong."""
+        """Why the stored mission may not be flown, in the firmware's words; empty when it may."""
         store = self._stores[MissionType.MISSION]
-        if self._policy.home_is_item_0:  # ArduPilot finds out in flight
+        if self._policy.home_is_item_0:  # ArduPilot checks in flight
             return ()
         home = self._home()
         home_alt_m = None if home is None else home.alt_m
@@ -155,18 +155,18 @@ class MissionService:
         return self._judged[1]
 
     def _forget_rules(self, name: str, value: float) -> None:
-        self._rules = None  # made of parameters
+        self._rules = None  # depends on parameters
 
     def has_mission(self) -> bool:
-        """There is something to fly (ArduPilot's home item does not count)."""
+        """A mission is stored (ArduPilot's home item does not count)."""
         return len(self._stores[MissionType.MISSION].items) > int(self._policy.home_is_item_0)
 
     def mission_valid(self, *, landed: bool = True) -> bool:
-        """There is a mission, and it may be flown."""
+        """A mission is stored, and it may be flown."""
         return self.has_mission() and not self.problems(landed=landed)
 
     def set_current(self, seq: int) -> bool:
-        """Go on from item `seq`; False when there is no such item or the flying task refuses."""
+        """Continue from item `seq`; False when there is no such item or the flying task refuses."""
         store = self._stores[MissionType.MISSION]
         if not 0 <= seq < len(store.items):
             return False
@@ -288,7 +288,7 @@ class MissionService:
         store = self._stores[mission_type]
         unchanged = bool(items) and checksum == store.plan_id and len(items) == len(store.items)
         if unchanged and flying:
-            return  # PX4 flies on when the mission it flies is sent again
+            return  # PX4 continues when the mission being flown is uploaded again
         self._replace(mission_type, items, checksum)
         if items:
             store.current = current
@@ -325,7 +325,7 @@ class MissionService:
 
 
 def _finite_home(item: MissionItem) -> MissionItem:
-    """Item 0 as it was uploaded, kept until home is known; what it holds was not checked."""
+    """Item 0 as uploaded, used until home is known; its values were not checked."""
     good = all(math.isfinite(value) for value in (item.x, item.y, item.z))
     x, y, z = (item.x, item.y, item.z) if good else (0.0, 0.0, 0.0)
     return MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, frame=mavlink.MAV_FRAME_GLOBAL, x=x, y=y, z=z)

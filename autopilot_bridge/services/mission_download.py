@@ -1,6 +1,6 @@
 """Sending a plan: MISSION_REQUEST_LIST, MISSION_REQUEST(_INT) and the closing MISSION_ACK.
 
-PX4 opens a list and sends its items in order; ArduPilot answers each request for itself.
+PX4 opens a list and sends its items in order; ArduPilot answers each request independently.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from autopilot_bridge.services.mission_policy import MissionPolicy, Text
 from autopilot_bridge.services.mission_sessions import Download, Sessions, mission_type_of, same_partner
 
 ReadPlan = Callable[[MissionType], tuple[MissionItem, ...]]
-"""The plan of a type as it is sent, home included where the firmware has it."""
+"""Returns the plan of a type as it is sent, home included if the firmware sends it."""
 
 
 class MissionDownloads:
@@ -59,7 +59,7 @@ class MissionDownloads:
             self._single(message, source, uploader, as_int=as_int)
 
     def on_ack(self, message: MavlinkMessage, source: Source) -> None:
-        """The partner has everything, or gave up."""
+        """The client has received everything, or has cancelled."""
         session = self._sessions.of(source.channel)
         download = session.download
         if (

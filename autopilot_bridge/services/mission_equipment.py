@@ -1,7 +1,7 @@
-"""Items of the mission that the autopilot doesn't fly: for camera and gimbal, or commands to itself.
+"""Mission items that are not flown: commands for camera and gimbal, or for the autopilot itself.
 
-What a camera (component 100) or a gimbal (154) does goes there as a command, as PX4 passes its vehicle
-commands on; everything else is carried out as if it had come as a COMMAND_LONG. Sources: PX4 1.16
+Items for a camera (component 100) or a gimbal (154) are sent to the device as a command, as PX4 passes its
+vehicle commands on; all other items are executed like a COMMAND_LONG. Sources: PX4 1.16
 navigator/mission_block (issue_command), ArduPilot 4.6 AP_Mission_Commands, gimbal protocol v2.
 """
 
@@ -60,7 +60,7 @@ _LEVEL: Final = mavlink.GIMBAL_MANAGER_FLAGS_ROLL_LOCK | mavlink.GIMBAL_MANAGER_
 
 
 class MissionEquipment(Microservice):
-    """Sends items of the mission on to whom they are for.
+    """Sends mission items to the devices that execute them.
 
     Args:
         parts: of the autopilot.
@@ -72,7 +72,7 @@ class MissionEquipment(Microservice):
         self._in_control = False
 
     def follow(self, event: Event) -> None:
-        """An item is due, or the mission is left."""
+        """An item is due, or the mission mode was left."""
         match event:
             case ItemCommanded(index=index) if 0 <= index < len(self._missions.items):
                 self._carry_out(index, self._missions.items[index])
@@ -98,13 +98,13 @@ class MissionEquipment(Microservice):
     # gimbal
 
     def _take_control(self) -> None:
-        """The mission points the gimbal now, whoever did before (PX4's acquire_gimbal_control)."""
+        """The mission takes control of the gimbal from any client (PX4's acquire_gimbal_control)."""
         if not self._in_control:
             self._in_control = True
             self._tell_gimbal(_CONFIGURE, float(self._parts.system_id), float(_AUTOPILOT), _KEEP, _KEEP)
 
     def _point_mount(self, item: MissionItem) -> None:
-        """DO_MOUNT_CONTROL, DO_MOUNT_CONFIGURE: the gimbal protocol's first version, in its second."""
+        """Convert DO_MOUNT_CONTROL, DO_MOUNT_CONFIGURE of gimbal protocol v1 to v2."""
         configures = item.command == mavlink.MAV_CMD_DO_MOUNT_CONFIGURE
         value = item.param1 if configures else item.z
         mode = round(value) if math.isfinite(value) else -1
@@ -116,13 +116,13 @@ class MissionEquipment(Microservice):
             self._tell_gimbal(_POINT, pitch, yaw, math.nan, math.nan, float(_LEVEL), 0.0, 0.0)
 
     def _look(self, index: int, item: MissionItem) -> None:
-        """A region of interest: a place on Earth, or none any more."""
+        """Set a region of interest (a position on Earth), or end it."""
         place = self._place_of(index, item)
         if place is None:
             self._tell_gimbal(mavlink.MAV_CMD_DO_SET_ROI_NONE)
             return
         frame = place.frame
-        if frame in TERRAIN_FRAMES:  # the ground is taken as level with home
+        if frame in TERRAIN_FRAMES:  # the ground is assumed level with home
             frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         message = mavlink.MAVLink_command_int_message(
             self._parts.system_id,
@@ -142,7 +142,7 @@ class MissionEquipment(Microservice):
         send_to_all(self._parts.broadcast, message)
 
     def _place_of(self, index: int, item: MissionItem) -> MissionItem | None:
-        """The item whose place is looked at; None: nothing."""
+        """The item with the position of the region of interest; None: no region of interest."""
         items = self._missions.items
         by_kind = item.command in (mavlink.MAV_CMD_DO_SET_ROI, mavlink.MAV_CMD_NAV_ROI)
         kind = round(item.param1) if by_kind and math.isfinite(item.param1) else 0

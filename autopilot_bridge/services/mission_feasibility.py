@@ -1,7 +1,7 @@
-"""PX4's feasibility check: may this stored mission be flown?
+"""PX4's feasibility check: whether a stored mission may be flown.
 
 An infeasible mission is stored and acknowledged, but mission mode and arming in it are refused. Source: PX4
-1.16 navigator, MissionFeasibility/FeasibilityChecker. What concerns aircraft alone is in
+1.16 navigator, MissionFeasibility/FeasibilityChecker. The checks for fixed wings are in
 `mission_feasibility_aircraft`.
 """
 
@@ -46,14 +46,14 @@ def mission_problems(
     aircraft: AircraftRules | None = None,
     outside: Callable[[MissionItem], bool] | None = None,
 ) -> tuple[str, ...]:
-    """Why a mission may not be flown, as PX4 words it; empty when it may. An empty mission has no problems.
+    """Why a mission may not be flown, in PX4's words; empty when it may. An empty mission has no problems.
 
     Args:
         items: the stored mission.
         home_alt_m: home altitude above mean sea level, for takeoffs given in AMSL; None: not known.
         landed: the vehicle stands on the ground.
-        aircraft: what a fixed wing asks of a mission; None: the vehicle is none.
-        outside: says whether an item lies outside the geofence; None: there is none.
+        aircraft: the rules for a fixed wing; None: the vehicle is no fixed wing.
+        outside: returns whether an item lies outside the geofence; None: there is none.
     """
     problems: list[str] = []
     placed = False

@@ -1,4 +1,4 @@
-"""What PX4 asks of a fixed wing's mission: take-off and landing items, and an approach that can be flown.
+"""PX4's rules for a fixed wing's mission: take-off and landing items, and a flyable approach.
 
 Source: PX4 1.16 navigator, FeasibilityChecker (checkTakeoffLandAvailable, the fixed-wing landing checks); the
 slope as it was seen (reference: PX4 v1.16.1, section 10).
@@ -45,7 +45,7 @@ class AircraftRules:
 
     @classmethod
     def of(cls, store: ParameterStore) -> "AircraftRules":
-        """The rules that a vehicle's parameters make."""
+        """The rules from a vehicle's parameters."""
         return cls(
             landing_angle_rad=math.radians(clamp(number(store, "FW_LND_ANG", 5.0), 1.0, 15.0)),
             loiter_radius_m=clamp(number(store, "NAV_LOITER_RAD", 80.0), 1.0, 1e4),
@@ -56,7 +56,7 @@ class AircraftRules:
 def aircraft_problems(
     items: tuple[MissionItem, ...], rules: AircraftRules, *, home_alt_m: float | None
 ) -> list[str]:
-    """Why an aircraft may not fly a mission, as PX4 words it; empty when it may."""
+    """Why an aircraft may not fly a mission, in PX4's words; empty when it may."""
     takeoff = any(item.command == mavlink.MAV_CMD_NAV_TAKEOFF for item in items)
     landings = [seq for seq, item in enumerate(items) if item.command == mavlink.MAV_CMD_NAV_LAND]
     problems = _missing(takeoff, bool(landings), rules.required)
@@ -86,11 +86,11 @@ def _missing(takeoff: bool, landing: bool, required: int) -> list[str]:
 def _approach_problem(
     items: tuple[MissionItem, ...], seq: int, rules: AircraftRules, home_alt_m: float | None
 ) -> str | None:
-    """What is wrong with the way from the item before a landing down to it."""
+    """The problem of the approach from the item before a landing to the landing; None: no problem."""
     land = items[seq]
     places = [item for item in items[:seq] if item.command in _PLACES and math.isfinite(item.x + item.y)]
     if seq == 0 or not math.isfinite(land.x + land.y):
-        return None  # it lands where it is
+        return None  # it lands at its position
     if not places:
         return "need landing approach"
     entry = places[-1]
@@ -105,7 +105,7 @@ def _approach_problem(
         )
         if distance_m <= radius_m:
             return "landing point is within the loiter radius"
-        distance_m = math.sqrt(distance_m**2 - radius_m**2)  # the circle is left along its tangent
+        distance_m = math.sqrt(distance_m**2 - radius_m**2)  # it leaves the circle along a tangent
     descent_m = _altitude_m(entry, home_alt_m) - _altitude_m(land, home_alt_m)
     if descent_m < _LEAST_HEIGHT_M:
         return "the approach waypoint must be above the landing point"

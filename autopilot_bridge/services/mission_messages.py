@@ -2,8 +2,8 @@
 
 pymavlink's dialect leaves out the plan identifiers that the MAVLink definition gives as extension fields:
 MISSION_COUNT.opaque_id, MISSION_ACK.opaque_id and MISSION_CURRENT.mission_id, fence_id, rally_points_id (all
-uint32, 0 = unknown). They are added here; a pymavlink that has them is used as it is. Extension fields take
-no part in CRC_EXTRA, so every MAVLink 2 receiver understands both.
+uint32, 0 = unknown). They are added here; a pymavlink that has them is used unchanged. Extension fields are
+not part of CRC_EXTRA, so every MAVLink 2 receiver understands both.
 """
 
 import struct
@@ -64,8 +64,8 @@ _Current: Final = _with_extensions(
 def send_extended(channel: Channel, message: MavlinkMessage) -> None:
     """Send a message with its extension fields.
 
-    An encoder that works from pymavlink's definitions would leave them out, so the packed payload goes to a
-    channel that takes one (`send_payload(message_id, payload)`).
+    An encoder based on pymavlink's definitions would leave them out, so the packed payload is passed to a
+    channel that supports it (`send_payload(message_id, payload)`).
     """
     wire_payload = getattr(message, "wire_payload", None)
     send_payload = getattr(channel, "send_payload", None)

@@ -1,4 +1,4 @@
-"""How PX4 and ArduPilot differ in the mission protocol, as data."""
+"""The differences between PX4 and ArduPilot in the mission protocol, as data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -21,7 +21,7 @@ Text = tuple[int, str] | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionTexts:
-    """The STATUSTEXTs of the mission protocol; None where the firmware says nothing."""
+    """The STATUSTEXTs of the mission protocol; None where the firmware sends no text."""
 
     upload_busy: Text = None
     download_open: Text = None
@@ -45,22 +45,22 @@ class MissionTexts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionPolicy:
-    """What one firmware does its own way.
+    """The differences of one firmware.
 
     Attributes:
-        rules: which items it takes and how it keeps them.
-        texts: what it says.
+        rules: the item types that it accepts and how it stores them.
+        texts: its STATUSTEXTs.
         capacity: items per mission type.
         retry_us: a request not answered is repeated after this time.
         timeout_us: an upload (PX4: also a download) not continued ends after this time.
         timeout_result: MISSION_ACK result sent then; None: no MISSION_ACK.
-        requests_as_int: asks with MISSION_REQUEST_INT once the partner speaks integers; else MISSION_REQUEST.
+        requests_as_int: requests with MISSION_REQUEST_INT once the client has used it; else MISSION_REQUEST.
         wrong_sequence_result: MISSION_ACK result for an item out of sequence; None: ignored in silence.
-        restart_on_count: a new MISSION_COUNT of the partner starts over; else "busy" once items came.
-        foreign_count_result: MISSION_ACK result for a MISSION_COUNT while another partner uploads.
+        restart_on_count: a new MISSION_COUNT of the client restarts the upload; else "busy" once items came.
+        foreign_count_result: MISSION_ACK result for a MISSION_COUNT while another client uploads.
         ordered_download: items are only sent in an open list and in order.
         home_is_item_0: item 0 is the home position, whatever was uploaded.
-        partial_writes: MISSION_WRITE_PARTIAL_LIST is understood.
+        partial_writes: MISSION_WRITE_PARTIAL_LIST is supported.
         clears_all_types: MISSION_CLEAR_ALL with type 255, and of unknown types, is accepted.
         refuses_clear_in_flight: MISSION_CLEAR_ALL is refused while the mission is flown.
         plan_ids: plan identifiers are sent.
@@ -70,7 +70,7 @@ class MissionPolicy:
         sends_current_on_change: MISSION_CURRENT goes out at once when the current item changes.
         acks_set_current: MISSION_SET_CURRENT is answered with MISSION_CURRENT.
         guided_items: MISSION_ITEM with current = 2 is a guided-mode target (old DroneKit clients).
-        aircraft: the vehicle is a fixed wing, whose missions must be fit for one (PX4).
+        aircraft: the vehicle is a fixed wing, whose missions must meet additional rules (PX4).
     """
 
     rules: ItemRules

@@ -1,4 +1,4 @@
-"""What an autopilot tells of the mission being flown: MISSION_CURRENT and MISSION_ITEM_REACHED."""
+"""The progress of the mission being flown: MISSION_CURRENT and MISSION_ITEM_REACHED."""
 
 from collections.abc import Mapping
 from typing import Final, Protocol
@@ -12,7 +12,7 @@ from autopilot_bridge.services.mission_policy import MissionPolicy
 
 REPEAT_INTERVAL_US: Final = 1_000_000
 _MODE_FLYING: Final = 1
-_MODE_UNKNOWN: Final = 0  # what ArduPilot was seen to send outside AUTO
+_MODE_UNKNOWN: Final = 0  # observed from ArduPilot outside AUTO
 
 
 class MissionProgress(Protocol):
@@ -25,12 +25,12 @@ class MissionProgress(Protocol):
 
     @property
     def complete(self) -> bool:
-        """The last item was done, and the mission mode was not left since."""
+        """The last item was finished, and the mission mode was not left since."""
         ...
 
 
 class NoProgress:
-    """No task flies the mission."""
+    """The progress without a task that flies missions."""
 
     active = False
     complete = False
@@ -58,7 +58,7 @@ class MissionReport:
         self._repeat_at_us = 0
 
     def current_message(self) -> MavlinkMessage:
-        """MISSION_CURRENT as it stands now."""
+        """MISSION_CURRENT with the present state."""
         mission = self._mission
         count = len(mission.items)
         total = count - 1 if self._policy.home_is_item_0 else count
@@ -81,16 +81,16 @@ class MissionReport:
         )
 
     def item_reached(self, seq: int) -> None:
-        """An item is done; the next `tick` sends it.
+        """An item is finished; the next `tick` reports it.
 
-        Of items that are done at the same time only the last is sent: a waypoint directly before a DO_ item
-        is not reported, as both firmwares have it.
+        Of items that are finished at the same time only the last is reported: a waypoint directly before a
+        DO_ item is not reported, as in both firmwares.
         """
         self._reached = seq
         self._unsent = True
 
     def forget_reached(self) -> None:
-        """A new plan is on its way: do not report what was reached in the old one."""
+        """Do not report items of the old plan: a new plan is being uploaded."""
         self._unsent = False
         self._repeats_left = 0
 

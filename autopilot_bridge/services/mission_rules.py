@@ -1,7 +1,7 @@
-"""What makes a mission item acceptable, and how an autopilot stores it: rules both flavours share.
+"""Which mission items are acceptable, and how an autopilot stores them: rules of both flavours.
 
-Results are MAV_MISSION_RESULT values. Both firmwares acknowledge some impossible items; here every impossible
-value is refused with the result the MAVLink specification has for it.
+Results are MAV_MISSION_RESULT values. Both firmwares accept some impossible items; here every impossible
+value is refused with the result that the MAVLink specification defines for it.
 """
 
 import math
@@ -42,7 +42,7 @@ HERE_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
     )
 )
-"""Commands whose unset latitude and longitude mean the place where the vehicle is."""
+"""For these commands, unset latitude and longitude mean the vehicle's current position."""
 
 
 PLACED_COMMANDS: Final = HERE_COMMANDS | {
@@ -51,18 +51,18 @@ PLACED_COMMANDS: Final = HERE_COMMANDS | {
     mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
     mavlink.MAV_CMD_NAV_VTOL_LAND,
 }
-"""Commands that take the vehicle to a place."""
+"""Commands that move the vehicle to a position."""
 
 
 class ItemRules(Protocol):
-    """How one firmware judges, stores and reads back mission items."""
+    """How one firmware checks, stores and reads back mission items."""
 
     def check(self, item: MissionItem, mission_type: MissionType, seq: int, count: int) -> int:
-        """MAV_MISSION_RESULT for one uploaded item of a plan of `count` items; ACCEPTED (0) if it is good."""
+        """MAV_MISSION_RESULT for one uploaded item of a plan of `count` items; ACCEPTED (0) if valid."""
         ...
 
     def stored(self, item: MissionItem) -> MissionItem:
-        """An accepted item as the firmware keeps it."""
+        """An accepted item as the firmware stores it."""
         ...
 
     def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
@@ -71,7 +71,7 @@ class ItemRules(Protocol):
 
 
 def check_position(item: MissionItem) -> int:
-    """Latitude, longitude and altitude of an item in a geodetic frame."""
+    """Check latitude, longitude and altitude of an item in a geodetic frame."""
     unset = math.isnan(item.x) and math.isnan(item.y) and item.command in HERE_COMMANDS
     if not unset:
         if not abs(item.x) <= 90.0:
@@ -88,7 +88,7 @@ def check_altitude(item: MissionItem) -> int:
 
 
 def check_params(item: MissionItem, *, nan_allowed: tuple[bool, bool, bool, bool]) -> int:
-    """Finite param1..param4; NaN ("not set") where allowed."""
+    """Check that param1..param4 are finite; NaN ("not set") where allowed."""
     params = (item.param1, item.param2, item.param3, item.param4)
     for value, may_be_nan, result in zip(params, nan_allowed, INVALID_PARAM, strict=True):
         if math.isinf(value) or (math.isnan(value) and not may_be_nan):
@@ -97,7 +97,7 @@ def check_params(item: MissionItem, *, nan_allowed: tuple[bool, bool, bool, bool
 
 
 def check_special(item: MissionItem, seq: int, count: int) -> int:
-    """The commands with parameters that can be impossible: jumps, speeds, delays."""
+    """Check the commands whose parameters can be impossible: jumps, speeds, delays."""
     match item.command:
         case mavlink.MAV_CMD_DO_JUMP:
             target = item.param1
@@ -116,7 +116,7 @@ def check_special(item: MissionItem, seq: int, count: int) -> int:
             mavlink.MAV_CMD_NAV_WAYPOINT
             | mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT
             | mavlink.MAV_CMD_NAV_LOITER_TIME
-            | mavlink.MAV_CMD_NAV_DELAY  # a time of day isn't waited for
+            | mavlink.MAV_CMD_NAV_DELAY  # not delayed until a time of day
             | mavlink.MAV_CMD_CONDITION_DELAY
             | mavlink.MAV_CMD_CONDITION_DISTANCE
         ):
@@ -126,10 +126,10 @@ def check_special(item: MissionItem, seq: int, count: int) -> int:
 
 
 def check_fence(item: MissionItem, *, empty_circles: bool = False) -> int:
-    """One item of a fence plan.
+    """Check one item of a fence plan.
 
     Args:
-        empty_circles: circles of radius 0 are taken (PX4); nothing is inside of them.
+        empty_circles: circles of radius 0 are accepted (PX4); nothing is inside of them.
     """
     if item.command not in FENCE_COMMANDS:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
@@ -146,7 +146,7 @@ def check_fence(item: MissionItem, *, empty_circles: bool = False) -> int:
 
 
 def check_rally(item: MissionItem) -> int:
-    """One item of a rally plan."""
+    """Check one item of a rally plan."""
     if item.command not in RALLY_COMMANDS:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     if item.frame not in GEODETIC_FRAMES:
@@ -155,7 +155,7 @@ def check_rally(item: MissionItem) -> int:
 
 
 def check_finite(item: MissionItem) -> int:
-    """No infinity anywhere: for items whose values are plain numbers."""
+    """Check that no value is infinite: for items whose values are plain numbers."""
     for value, result in (
         (item.x, mavlink.MAV_MISSION_INVALID_PARAM5_X),
         (item.y, mavlink.MAV_MISSION_INVALID_PARAM6_Y),
@@ -175,7 +175,7 @@ def check_horizontal(item: MissionItem) -> int:
 
 
 def check_fence_polygons(items: tuple[MissionItem, ...]) -> int:
-    """A whole fence plan: each polygon has as many vertices in a row as each of them says."""
+    """Check a whole fence plan: each polygon has as many vertices as each vertex states."""
     left = 0
     size = 0
     command = 0

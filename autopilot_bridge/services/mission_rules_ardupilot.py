@@ -81,9 +81,9 @@ PLAIN_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_DO_WINCH,
     )
 )
-"""Mission commands without a position; their frame is not looked at.
+"""Mission commands without a position; their frame is not checked.
 
-The firmware knows some more that are not flown here, so they are refused: NAV_GUIDED_ENABLE with
+The firmware supports some more that are not flown here, so they are refused: NAV_GUIDED_ENABLE with
 DO_GUIDED_LIMITS, NAV_SCRIPT_TIME, NAV_ATTITUDE_TIME, NAV_PAYLOAD_PLACE, DO_INVERTED_FLIGHT.
 """
 
@@ -97,13 +97,13 @@ PASSED_OVER: Final = frozenset(
         mavlink.MAV_CMD_DO_ENGINE_CONTROL,
         mavlink.MAV_CMD_DO_VTOL_TRANSITION,
         mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
-        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,  # a plane's
+        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,  # for planes
     )
 )
-"""Taken and passed over, by the firmware too, on vehicles without what they are for."""
+"""Accepted and skipped on vehicles without the device, as in the firmware."""
 
 AIRCRAFT_REFUSED: Final = frozenset((mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,))
-"""What aircraft don't fly."""
+"""Items that aircraft refuse."""
 
 _MARKERS: Final = frozenset(
     (
@@ -112,7 +112,7 @@ _MARKERS: Final = frozenset(
         mavlink.MAV_CMD_DO_GO_AROUND,
     )
 )
-"""Commands that may do without their position: ground stations send them in MAV_FRAME_MISSION."""
+"""Commands whose position is optional: ground stations send them in MAV_FRAME_MISSION."""
 
 _PLACE_OPTIONAL: Final = frozenset(
     (
@@ -121,7 +121,7 @@ _PLACE_OPTIONAL: Final = frozenset(
         mavlink.MAV_CMD_DO_GO_AROUND,
     )
 )
-"""Ground stations send these without a place, in MAV_FRAME_MISSION (QGroundControl's landing pattern)."""
+"""Ground stations send these without a position, in MAV_FRAME_MISSION (QGroundControl's landing pattern)."""
 
 _YAW_IN_PARAM4: Final = frozenset(
     (
@@ -148,7 +148,7 @@ class ArdupilotItemRules:
             return check_fence(item)
         if mission_type is MissionType.RALLY:
             return check_rally(item)
-        if seq == 0:  # home: whatever it holds is replaced
+        if seq == 0:  # home: its uploaded values are replaced
             return int(mavlink.MAV_MISSION_ACCEPTED)
         if item.command in self._refused:
             return int(mavlink.MAV_MISSION_UNSUPPORTED)

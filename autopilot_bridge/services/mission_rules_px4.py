@@ -1,4 +1,4 @@
-"""PX4's rules for mission items: commands, frames, what is kept of an item and how it is read back."""
+"""PX4's rules for mission items: commands, frames, how an item is stored and read back."""
 
 import math
 from dataclasses import replace
@@ -35,7 +35,7 @@ POSITION_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_NAV_VTOL_LAND,
     )
 )
-"""Mission commands taken in a global frame."""
+"""Mission commands accepted in a global frame."""
 
 PLAIN_COMMANDS: Final = frozenset(
     (
@@ -74,9 +74,9 @@ PLAIN_COMMANDS: Final = frozenset(
         mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
     )
 )
-"""Mission commands taken in MAV_FRAME_MISSION.
+"""Mission commands accepted in MAV_FRAME_MISSION.
 
-The firmware knows CONDITION_GATE and OBLIQUE_SURVEY too, which are not flown here, so they are refused.
+The firmware supports CONDITION_GATE and OBLIQUE_SURVEY too, which are not flown here, so they are refused.
 """
 
 PASSED_OVER: Final = frozenset(
@@ -87,7 +87,7 @@ PASSED_OVER: Final = frozenset(
         mavlink.MAV_CMD_DO_WINCH,
     )
 )
-"""Taken and passed over by the firmware too."""
+"""Accepted and skipped, as in the firmware."""
 
 _POSITION_FRAMES: Final = GLOBAL_FRAMES | RELATIVE_FRAMES
 _UNSET_EVERYWHERE: Final = (True, True, True, True)
@@ -114,7 +114,7 @@ class Px4ItemRules:
         return result or check_special(item, seq, count) or self._check_roi(item)
 
     def stored(self, item: MissionItem) -> MissionItem:
-        """Only the parameters PX4 keeps of a positioned item; the others read back as 0."""
+        """Only the parameters that PX4 stores of an item with a position; the others read back as 0."""
         if item.frame == mavlink.MAV_FRAME_MISSION:
             return item
         p1 = p2 = p3 = p4 = 0.0

@@ -1,4 +1,4 @@
-"""What belongs to missions and fences beside their protocol: those of a firmware."""
+"""The services for missions and fences of a firmware, besides the mission protocol."""
 
 from autopilot_bridge.services.geofence import ArdupilotGeofence
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
@@ -7,7 +7,7 @@ from autopilot_bridge.services.old_points import OldPoints
 
 
 def mission_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
-    """Those of one autopilot."""
+    """The services of one autopilot."""
     equipment = MissionEquipment(parts)
     if parts.flavour.name == "px4":
         return (equipment,)

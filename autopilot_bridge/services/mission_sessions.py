@@ -1,4 +1,4 @@
-"""What the mission protocol remembers of each channel between messages."""
+"""The state of the mission protocol for each channel between messages."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from autopilot_bridge.services.channel import Channel, Source
 
 @dataclass(slots=True)
 class Finished:
-    """The last upload that was accepted: its last item may come again when the MISSION_ACK was lost."""
+    """The last accepted upload: its last item may be repeated when the MISSION_ACK was lost."""
 
     partner: Source
     mission_type: MissionType
@@ -18,7 +18,7 @@ class Finished:
 
 @dataclass(slots=True)
 class Download:
-    """A list the partner opened, with the plan as it was then."""
+    """A list that the client opened, with the plan at that time."""
 
     partner: Source
     mission_type: MissionType
@@ -33,10 +33,10 @@ class ChannelSession:
 
     Attributes:
         channel: the channel.
-        as_int: the partner speaks MISSION_ITEM_INT.
+        as_int: the client uses MISSION_ITEM_INT.
         download: the open list, if any.
         finished: the last accepted upload, if any.
-        warned_item, warned_request: the partner was told to use the integer messages.
+        warned_item, warned_request: the client was sent the text to use the integer messages.
     """
 
     channel: Channel
@@ -48,7 +48,7 @@ class ChannelSession:
 
 
 class Sessions:
-    """The sessions of all channels heard so far."""
+    """The sessions of all channels on which messages were received."""
 
     __slots__ = ("_sessions",)
 
@@ -56,7 +56,7 @@ class Sessions:
         self._sessions: dict[int, ChannelSession] = {}
 
     def of(self, channel: Channel) -> ChannelSession:
-        # By identity: two links may carry the same name, and a session keeps its channel alive.
+        # By identity: two links may have the same name, and a session keeps its channel alive.
         session = self._sessions.get(id(channel))
         if session is None:
             session = self._sessions[id(channel)] = ChannelSession(channel)

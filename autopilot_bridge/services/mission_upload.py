@@ -1,7 +1,8 @@
 """Receiving a plan: MISSION_COUNT, MISSION_ITEM(_INT), MISSION_WRITE_PARTIAL_LIST.
 
-The items are gathered beside the store and handed over whole, so that an upload which fails, times out or is
-cancelled leaves the plan as it was. One upload at a time, over all channels and mission types.
+The items are collected outside the store and stored together at the end, so an upload that fails, times out
+or is cancelled leaves the plan unchanged. Only one upload runs at a time, over all channels and mission
+types.
 """
 
 from collections.abc import Callable
@@ -28,7 +29,7 @@ StorePlan = Callable[[MissionType, tuple[MissionItem, ...], int, int], None]
 
 @dataclass(slots=True)
 class Upload:
-    """An upload under way: items `first` to `end` (exclusive), the next one being `next_seq`."""
+    """An upload in progress: items `first` to `end` (exclusive); the next one is `next_seq`."""
 
     partner: Source
     mission_type: MissionType
@@ -70,7 +71,7 @@ class MissionUploads:
 
     @property
     def partner(self) -> Source | None:
-        """Who uploads just now."""
+        """The client that is uploading now; None: no upload."""
         return None if self._upload is None else self._upload.partner
 
     def on_count(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
@@ -106,7 +107,7 @@ class MissionUploads:
             self._request(self._upload, time_us)
 
     def on_partial(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
-        """MISSION_WRITE_PARTIAL_LIST: items start_index..end_index (inclusive) of the plan come anew."""
+        """MISSION_WRITE_PARTIAL_LIST: items start_index..end_index (inclusive) are uploaded again."""
         if not self._policy.partial_writes:
             return
         if self._upload is not None and not same_partner(self._upload.partner, source):
@@ -153,7 +154,7 @@ class MissionUploads:
         self._take(upload, message, time_us)
 
     def on_ack(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
-        """MISSION_ACK of the partner: "I don't speak that form of item", or "stop"."""
+        """MISSION_ACK of the client: it does not support that form of item, or it cancels."""
         upload = self._upload
         if upload is None or not same_partner(upload.partner, source):
             return

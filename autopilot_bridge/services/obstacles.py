@@ -1,7 +1,7 @@
-"""OBSTACLE_DISTANCE and DISTANCE_SENSOR: what is around the vehicle, for avoidance.
+"""OBSTACLE_DISTANCE and DISTANCE_SENSOR: obstacles around the vehicle, for avoidance.
 
-Sources: MAVLink common.xml; PX4 1.16 takes OBSTACLE_DISTANCE in BODY_FRD (or against north)
-and horizontal DISTANCE_SENSORs; ArduPilot 4.6 both, with PRX1_TYPE 2.
+Sources: MAVLink common.xml; PX4 1.16 accepts OBSTACLE_DISTANCE in BODY_FRD (or relative to north)
+and horizontal DISTANCE_SENSORs; ArduPilot 4.6 accepts both, with PRX1_TYPE 2.
 """
 
 import math
@@ -37,7 +37,7 @@ class ObstacleService(Microservice):
     """Keeps `surroundings.obstacles` up to date.
 
     Attributes:
-        refused: messages that say nothing usable.
+        refused: number of messages without usable content.
     """
 
     def __init__(self, parts: AutopilotParts) -> None:
@@ -49,7 +49,7 @@ class ObstacleService(Microservice):
         self.refused = 0
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one message; another vehicle's own DISTANCE_SENSOR isn't this one's."""
+        """Handle one message; a DISTANCE_SENSOR of another vehicle is ignored."""
         message_id = message.get_msgId()
         if message_id not in (_OBSTACLES, _SENSOR):
             return False
@@ -90,7 +90,7 @@ class ObstacleService(Microservice):
         return True
 
     def _beam(self, message: MavlinkMessage, time_us: int) -> bool:
-        """DISTANCE_SENSOR (132) that looks to one of the eight sides."""
+        """DISTANCE_SENSOR (132) in one of the eight horizontal directions."""
         if message.orientation not in _HORIZONTAL:
             return False
         reach_m, distance_m = message.max_distance * 0.01, message.current_distance * 0.01

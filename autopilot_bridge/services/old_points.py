@@ -1,9 +1,9 @@
-"""Fence and rally points by the messages of old ground stations: FENCE_POINT and RALLY_POINT (ArduPilot).
+"""Fence and rally points in the messages of old ground stations: FENCE_POINT and RALLY_POINT (ArduPilot).
 
-The number of points is set by parameter (FENCE_TOTAL, RALLY_TOTAL; fewer than there are takes points away),
-then every point is sent, then read back. A fence is its return point and one inclusion polygon, whose first
-vertex comes once more at the end. The points are gathered beside the plan, which is replaced when all have
-come. Source: ArduPilot 4.6 (AC_PolyFence_loader, GCS_Rally), the last release that takes them.
+A parameter sets the number of points (FENCE_TOTAL, RALLY_TOTAL; a smaller number removes points), then every
+point is sent, then read back. A fence is its return point and one inclusion polygon, whose first vertex is
+repeated at the end. The points are collected outside the plan, which is replaced when all have been received.
+Source: ArduPilot 4.6 (AC_PolyFence_loader, GCS_Rally), the last release that accepts them.
 """
 
 import math
@@ -20,7 +20,7 @@ from autopilot_bridge.services.mission_messages import plan_checksum
 
 FENCE_TOTAL: Final = "FENCE_TOTAL"
 RALLY_TOTAL: Final = "RALLY_TOTAL"
-_LEAST_FENCE: Final = 5  # return point, three vertices, and the first of them once more
+_LEAST_FENCE: Final = 5  # return point, three vertices, and the first vertex again
 _WARNING: Final = mavlink.MAV_SEVERITY_WARNING
 _INFO: Final = mavlink.MAV_SEVERITY_INFO
 _NAMES: Final = {
@@ -36,7 +36,7 @@ Point = tuple[float, float]
 
 
 def old_fence(items: tuple[MissionItem, ...]) -> list[Point] | None:
-    """A fence as points of the old messages; None for one that they can't carry."""
+    """A fence as points of the old messages; None for a fence that these messages can't represent."""
     head = [item for item in items if item.command == _RETURN_POINT]
     ring = [item for item in items if item.command == _VERTEX]
     if not ring or len(head) > 1 or len(head) + len(ring) != len(items) or len(ring) != ring[0].param1:
@@ -50,7 +50,7 @@ class OldPoints(Microservice):
     """FENCE_POINT, FENCE_FETCH_POINT, RALLY_POINT and RALLY_FETCH_POINT.
 
     Args:
-        parameters: with the totals.
+        parameters: contain the totals.
         stores: the plans.
         announce: sends a STATUSTEXT.
     """
@@ -72,11 +72,11 @@ class OldPoints(Microservice):
 
     @classmethod
     def of(cls, parts: AutopilotParts) -> "OldPoints":
-        """The one of an autopilot."""
+        """Build the service of an autopilot."""
         return cls(parts.parameters, parts.stores, parts.announce)
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one of the four messages."""
+        """Handle one of the four messages."""
         number = message.get_msgId()
         if number not in _NAMES:
             return False
@@ -95,7 +95,7 @@ class OldPoints(Microservice):
         return True
 
     def tick(self, time_us: int) -> None:
-        """The totals follow what was uploaded by missions."""
+        """Update the totals after an upload by the mission protocol."""
         versions = [self._fence.version, self._rally.version]
         if versions == self._versions:
             return
@@ -110,7 +110,7 @@ class OldPoints(Microservice):
         return int(self._parameters.get(name)) if name in self._parameters else 0
 
     def _on_parameter(self, name: str, value: float) -> None:
-        """Fewer points than there are: a ground station takes some away before it sends others."""
+        """A smaller total: a ground station removes points before it sends others."""
         if name == FENCE_TOTAL:
             self._fence_points.clear()
             if value == 0.0 and self._fence.items:

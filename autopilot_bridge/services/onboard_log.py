@@ -1,7 +1,7 @@
-"""The log that the vehicle writes of itself while it flies: what it says, on a channel of its own.
+"""The vehicle's onboard log of a flight: the messages that it sends, on a separate channel.
 
-Begins and ends as the firmware's parameters say. Records are handed to the card at 50 Hz, whole ones only, so
-the log can be read to its end whatever stops the process.
+The firmware's parameters define when the log begins and ends. Only whole records are written to the card, at
+50 Hz, so the log can be read to its end even when the process was killed.
 """
 
 import contextlib
@@ -23,20 +23,20 @@ from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.packet_records import packet_records
 
 _STOP_AFTER_US: Final = 2_000_000
-"""A log goes on so long after disarming, so that the end of the flight is in it."""
+"""A log continues for this time after disarming, so that it contains the end of the flight."""
 
 
 class LogChannel:
-    """An autopilot's channel that ends in a log.
+    """A channel of the autopilot that writes to a log.
 
     Args:
         system_id: the vehicle's.
-        unix_us: the time now, microseconds of the Unix epoch.
+        unix_us: returns the current time, microseconds of the Unix epoch.
 
     Attributes:
         motion: set by the autopilot that the channel is added to.
-        hears_all: texts are for it, whether somebody has greeted or not.
-        line: what it can carry: whatever there is.
+        hears_all: it gets all texts, even before a client has sent a heartbeat.
+        line: its capacity: unlimited.
     """
 
     name = "onboard log"
@@ -59,7 +59,7 @@ class LogChannel:
         self._keep(self._encoder.encode_payload(message_id, payload))
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Log what is due together."""
+        """Log the payloads that are due together."""
         packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
         packet += b"".join(self._encoder.encode_payloads(payloads))
         if packet:
@@ -85,14 +85,14 @@ class OnboardLog(Microservice):
     Args:
         book: the logs on the card.
         layout: when to log.
-        parameters: they say so.
+        parameters: contain the logging mode.
         announce: sends a STATUSTEXT.
         system_id: the vehicle's.
-        unix_us: the time now, microseconds of the Unix epoch.
+        unix_us: returns the current time, microseconds of the Unix epoch.
         add_channel, remove_channel: of the autopilot.
 
     Attributes:
-        path: of the log that is written now; None: none is.
+        path: path of the log that is being written; None: none.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class OnboardLog(Microservice):
         return self._layout.log_times(self._parameters)
 
     def tick(self, time_us: int) -> None:
-        """Hand what was logged to the card."""
+        """Write the collected records to the card."""
         if not self._booted:
             self._booted = True
             times = self._times
@@ -140,7 +140,7 @@ class OnboardLog(Microservice):
                 self._start()
 
     def follow(self, event: Event) -> None:
-        """Begin at arming, end after disarming, where the parameters say so."""
+        """Begin at arming and end after disarming, if the parameters require it."""
         times = self._times
         if isinstance(event, Armed):
             self._stop_us = None
@@ -152,7 +152,7 @@ class OnboardLog(Microservice):
             self._stop_us = event.time_us + _STOP_AFTER_US
 
     def close(self) -> None:
-        """End the log; does nothing when there is none."""
+        """End the log; does nothing when no log is open."""
         self._stop_us = None
         file, self._file = self._file, None
         if file is None:

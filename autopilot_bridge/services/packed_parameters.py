@@ -34,7 +34,7 @@ _MAX_SHARED: Final = 15
 
 
 def pack(store: ParameterStore, query: Mapping[str, str]) -> bytes:
-    """The file, as asked for: `start` and `count` choose a part, `withdefaults=1` adds the defaults."""
+    """The file for a query: `start` and `count` choose a part, `withdefaults=1` adds the defaults."""
     total = store.count
     start = min(_number(query.get("start", "0")), total)
     count = _number(query.get("count", "0")) or total
@@ -53,7 +53,7 @@ def unpack(data: bytes) -> dict[str, float]:
     """Names and values in a file that a client has written.
 
     Raises:
-        ValueError: it is not such a file.
+        ValueError: the data are no such file.
     """
     if len(data) < _HEADER.size or _HEADER.unpack_from(data)[0] not in (_MAGIC, _MAGIC_WITH_DEFAULTS):
         raise ValueError("not packed parameters: no magic number")
@@ -80,7 +80,7 @@ def apply(store: ParameterStore, data: bytes) -> None:
     """Set the parameters in a file that a client has written, all of them or none.
 
     Raises:
-        ValueError: it is not such a file, or names a parameter or a value that the vehicle can't have.
+        ValueError: the data are no such file, or contain a name or a value that the vehicle does not accept.
     """
     values = unpack(data)
     converted: dict[str, float] = {}

@@ -1,7 +1,7 @@
-"""Parameters that outlive a boot: stored on the memory card, loaded, reset (MAV_CMD_PREFLIGHT_STORAGE).
+"""Parameters that persist over a boot: stored on the memory card, loaded, reset (MAV_CMD_PREFLIGHT_STORAGE).
 
-What is stored are the values that clients or the autopilot have changed; the ones that an airframe or the
-command line sets at the start are not. PX4 stores a moment after a change, ArduPilot at once.
+The values that clients or the autopilot have changed are stored; values that an airframe or the command line
+sets at the start are not stored. PX4 stores a short time after a change, ArduPilot at once.
 """
 
 from collections.abc import Mapping
@@ -33,10 +33,10 @@ class StoragePolicy:
     """How a firmware answers PREFLIGHT_STORAGE.
 
     Attributes:
-        actions: of param1, those it knows.
-        unknown: the answer to others; None: silence.
+        actions: the supported values of param1.
+        unknown: the answer to other values; None: no answer.
         armed: the answer while armed.
-        reset_at_boot: a reset takes effect at the next boot, with a text that says so (ArduPilot).
+        reset_at_boot: a reset takes effect at the next boot, and a text reports this (ArduPilot).
     """
 
     actions: frozenset[int]
@@ -66,7 +66,7 @@ class ParameterStorageService(Microservice):
     Args:
         stored: the file.
         store: the parameters.
-        commander: armed or not.
+        commander: knows whether the vehicle is armed.
         policy: the firmware's answers.
         layout: when to store.
         announce: sends a STATUSTEXT.
@@ -99,7 +99,7 @@ class ParameterStorageService(Microservice):
         return {mavlink.MAV_CMD_PREFLIGHT_STORAGE: self._command}
 
     def tick(self, time_us: int) -> None:
-        """Store what has changed, when it is time."""
+        """Store changed values when it is time."""
         self._time_us = time_us
         if self._stored.damaged is not None:
             self._announce(mavlink.MAV_SEVERITY_ERROR, "Stored parameters damaged, using defaults")
@@ -108,7 +108,7 @@ class ParameterStorageService(Microservice):
             self._save()
 
     def close(self) -> None:
-        """Store at once what is waiting for it."""
+        """Store pending changes at once."""
         if self._due_us is not None:
             self._save()
 

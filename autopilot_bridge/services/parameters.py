@@ -1,7 +1,7 @@
-"""The MAVLink parameter protocol, autopilot side, as PX4 and ArduPilot speak it.
+"""The MAVLink parameter protocol, autopilot side, of PX4 and ArduPilot.
 
-Source: MAVLink parameter protocol (mavlink.io/en/services/parameter.html). Where the firmwares differ, and
-where both leave the document (silence instead of an error, no range check), they are followed;
+Source: MAVLink parameter protocol (mavlink.io/en/services/parameter.html). Where the firmwares differ, or
+deviate from the document (no answer instead of an error, no range check), their behaviour is emulated;
 `ParameterPolicy` holds every difference.
 """
 
@@ -41,18 +41,19 @@ _ROUNDING: Final = 0.01  # ArduPilot adds this away from zero before it truncate
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParameterPolicy:
-    """What one firmware does its own way.
+    """The differences of one firmware.
 
     Attributes:
         bytewise: integers travel as their bit pattern in the float field (PX4), else as a float (ArduPilot).
         strict_type: a PARAM_SET of another type than the parameter's is ignored (PX4).
-        ignore_case: names match in any case, and a reply repeats the name as asked (ArduPilot).
+        ignore_case: names match in any case, and a reply repeats the name as requested (ArduPilot).
         index_by_name: replies to requests by name carry the index (PX4), else 65535 (ArduPilot).
-        set_echo_to_all: every PARAM_SET is answered on all channels (ArduPilot); else on the asking channel,
-            and on all channels once more if the value changed (PX4).
+        set_echo_to_all: every PARAM_SET is answered on all channels (ArduPilot); else on the requesting
+            channel, and on all channels once more if the value changed (PX4).
         hash_parameter: the list starts with `_HASH_CHECK`, and setting it ends the list (PX4).
-        identity: parameters that are the system id, and the component id 1. They are what they are as long as
-            the vehicle is there, and a change is refused: real ones take it over at the next boot.
+        identity: the parameters with the system id, and with the component id 1. They keep their values as
+            long
+            as the vehicle runs, and a change is refused: real vehicles apply a change at the next boot.
         list_per_tick: parameters sent per 50 Hz tick and channel while listing.
     """
 
@@ -78,7 +79,7 @@ PX4_PARAMETER_POLICY: Final = ParameterPolicy(
     set_echo_to_all=False,
     hash_parameter=True,
     identity=("MAV_SYS_ID", "MAV_COMP_ID"),
-    list_per_tick=20,  # 904 were seen to take 0.9 s
+    list_per_tick=20,  # measured: 904 in 0.9 s
 )
 ARDUPILOT_PARAMETER_POLICY: Final = ParameterPolicy(
     bytewise=False,
@@ -88,12 +89,12 @@ ARDUPILOT_PARAMETER_POLICY: Final = ParameterPolicy(
     set_echo_to_all=True,
     hash_parameter=False,
     identity=("SYSID_THISMAV",),
-    list_per_tick=43,  # 1397 were seen to take 0.65 s
+    list_per_tick=43,  # measured: 1397 in 0.65 s
 )
 
 
 def fix_identity(store: ParameterStore, policy: ParameterPolicy, system_id: int) -> None:
-    """Have the parameters tell the ids that the vehicle has, whatever a file says."""
+    """Set the identity parameters to the vehicle's ids, whatever a file contains."""
     for name, value in zip(policy.identity, (system_id, _COMPONENT_ID), strict=False):
         if name in store:
             store.fix(name, value)
@@ -112,14 +113,15 @@ class _Listing:
 class ParameterService:
     """Answers PARAM_REQUEST_READ, PARAM_REQUEST_LIST and PARAM_SET from a `ParameterStore`.
 
-    A parameter that anybody changes (a ground station, the autopilot itself) is announced on every channel.
+    A changed parameter is announced on every channel, whether a client or the autopilot has changed it.
 
     Args:
         store: the values.
-        policy: the firmware's ways.
+        policy: the firmware's behaviour.
         broadcast: all channels of the autopilot.
-        on_list: called with the asking channel for each PARAM_REQUEST_LIST (ArduPilot sends its banner then).
-        on_fixed: called with the name of a parameter that somebody tried to change and nobody can.
+        on_list: called with the requesting channel for each PARAM_REQUEST_LIST (ArduPilot sends its banner
+            then).
+        on_fixed: called with the name of a parameter that a client tried to change and that can't be changed.
     """
 
     def __init__(
@@ -137,7 +139,7 @@ class ParameterService:
         self._on_list = on_list
         self._on_fixed = on_fixed
         self._listings: list[_Listing] = []
-        self._setting: str | None = None  # being set by PARAM_SET, whose echo stands for the announcement
+        self._setting: str | None = None  # being set by PARAM_SET; the echo replaces the announcement
         store.subscribe(self._announce_change)
 
     @property
@@ -188,7 +190,7 @@ class ParameterService:
         """Send all parameters on a channel, from the next tick on."""
         running = next((listing for listing in self._listings if listing.channel is channel), None)
         if running is not None:
-            running.next_index = 0  # PX4 skips the hash when a list is asked for again before its end
+            running.next_index = 0  # PX4 leaves the hash out when a list is requested again before its end
         else:
             self._listings.append(_Listing(channel, -1 if self._policy.hash_parameter else 0))
         if self._on_list is not None:
@@ -221,11 +223,11 @@ class ParameterService:
         try:
             changed = self._store.set(definition.name, value, check_range=False)
         except ParameterError:
-            if self._store.is_fixed(definition.name):  # the present value tells that it was not taken
+            if self._store.is_fixed(definition.name):  # the reply with the unchanged value shows the refusal
                 channel.send(self._value_message(definition, index=self._index_in_reply(definition)))
                 if self._on_fixed is not None:
                     self._on_fixed(definition.name)
-            return  # beyond the storage type: refused in silence, as the firmwares refuse
+            return  # outside the storage type: refused without an answer, as in the firmwares
         finally:
             self._setting = None
         reply = self._value_message(definition, index=self._index_in_reply(definition))
@@ -239,7 +241,7 @@ class ParameterService:
             )
 
     def _decode(self, definition: ParameterDefinition, message: MavlinkMessage) -> float | None:
-        """The value a PARAM_SET asks for; None when the firmware would ignore it."""
+        """The value in a PARAM_SET; None when the firmware would ignore it."""
         value = message.param_value
         if self._policy.strict_type and message.param_type != definition.type:
             return None

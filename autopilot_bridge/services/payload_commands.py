@@ -1,9 +1,10 @@
-"""Commands for camera and gimbal that clients send to the autopilot, which passes them on.
+"""Commands for camera and gimbal that clients send to the autopilot, which forwards them.
 
-ArduPilot passes on what its camera and mount libraries know, and acknowledges at once (4.6 AP_Camera,
-AP_Mount). PX4's gimbal manager and camera trigger do the same for theirs, while cameras with a component id
-of their own are spoken to directly (PX4 1.16 gimbal, camera_trigger; Commander.cpp leaves these commands to
-them, and nobody answers when they do not run). A device is there when its heartbeat has been heard.
+ArduPilot forwards the commands that its camera and mount libraries support, and acknowledges at once (4.6
+AP_Camera, AP_Mount). PX4's gimbal manager and camera trigger do the same for their commands. Clients address
+a camera with its own component id directly (PX4 1.16 gimbal, camera_trigger; Commander.cpp leaves these
+commands to them, and nothing answers when they do not run). A device counts as present once its heartbeat has
+been received.
 """
 
 import math
@@ -65,16 +66,16 @@ _ROI: Final = frozenset(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PayloadPolicy:
-    """What a firmware does with commands for its payload.
+    """How a firmware handles commands for its payload.
 
     Attributes:
-        camera: commands it passes on to a camera.
-        absent: what it answers while the device is not there; None: nothing.
+        camera: commands that it forwards to a camera.
+        absent: its answer while the device is not present; None: no answer.
         nose_modes: modes in which a commanded region of interest turns a multicopter's nose, and whether the
-            nose follows whatever is flown there (else as the mission does).
-        kinds_of_roi: DO_SET_ROI says by param1 what it means, and the next waypoint can be looked at; else it
-            is always a place.
-        bad_place: the answer to a region of interest that is nowhere on Earth.
+            nose follows during every manoeuvre of the mode (else as the mission defines).
+        kinds_of_roi: param1 of DO_SET_ROI is the kind of target, and the next waypoint is a possible target;
+            else the target is always a position.
+        bad_place: the answer to a region of interest at an invalid position.
     """
 
     camera: frozenset[int]
@@ -101,7 +102,7 @@ ARDUPILOT_PAYLOAD: Final = PayloadPolicy(
 
 
 class PayloadCommands(Microservice):
-    """Passes commands on to camera and gimbal.
+    """Forwards commands to camera and gimbal.
 
     Args:
         parts: of the autopilot.
@@ -115,7 +116,7 @@ class PayloadCommands(Microservice):
 
     @property
     def commands(self) -> Mapping[int, Handler]:
-        """Those that are passed on. Regions of interest are accepted without a gimbal too."""
+        """The forwarded commands. Regions of interest are accepted without a gimbal too."""
         return {
             **dict.fromkeys(self._policy.camera, self._to_camera),
             **dict.fromkeys(GIMBAL_COMMANDS, self._to_gimbal),
@@ -124,7 +125,7 @@ class PayloadCommands(Microservice):
         }
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Notice devices of this vehicle, and who controls the gimbal."""
+        """Record the devices of this vehicle, and the client in control of the gimbal."""
         if source.system_id == self._parts.system_id and source.component_id in (_CAMERA, _GIMBAL):
             kind = message.get_msgId()
             if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
@@ -179,7 +180,7 @@ class PayloadCommands(Microservice):
             context.look_at(roi_of(item, context), nose=self._policy.nose_modes[mode])
 
     def _configured(self, command: Command, source: Source) -> Command:
-        """The client itself is meant by -2 and -3, not the autopilot that passes its words on."""
+        """Values -2 and -3 refer to the client itself, not to the autopilot that forwards its command."""
         asker = (source.system_id, source.component_id)
         pairs = [(command.p1, command.p2), (command.p3, command.p4)]
         for index, pair in enumerate(pairs):
@@ -195,9 +196,9 @@ class PayloadCommands(Microservice):
 
 
 def _roi_item(command: Command, *, kinds: bool) -> MissionItem | None:
-    """A region of interest as a mission has it; None: one that is no place (another vehicle).
+    """A region of interest as a mission item; None: it is not a position (another vehicle).
 
-    0/0 ends it, as ArduPilot has it.
+    0/0 ends it, as in ArduPilot.
     """
     if command.id == mavlink.MAV_CMD_DO_SET_ROI_SYSID:
         return None
@@ -219,7 +220,7 @@ def _roi_item(command: Command, *, kinds: bool) -> MissionItem | None:
 
 
 def forwarded(command: Command, system_id: int, component: int) -> MavlinkMessage:
-    """The message that carries a command on, in the form in which it came."""
+    """The message that forwards a command, in the form (LONG or INT) in which it came."""
     first = (command.p1, command.p2, command.p3, command.p4)
     if command.frame is None:
         return mavlink.MAVLink_command_long_message(

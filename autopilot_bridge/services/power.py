@@ -1,7 +1,8 @@
 """Reboot and shutdown: MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN.
 
-What can restart the vehicle is outside the autopilot; this service asks for it when the firmware would do it.
-PX4's SITL build refuses to reboot, its hardware does not: here it reboots, as hardware does.
+The program that restarts the vehicle is outside the autopilot; this service calls it when the firmware would
+reboot. PX4's SITL build refuses to reboot, PX4 on hardware does not: here the vehicle reboots, as hardware
+does.
 """
 
 from collections.abc import Mapping
@@ -25,12 +26,12 @@ class PowerPolicy:
     """How a firmware answers.
 
     Attributes:
-        actions: by param1; 0 where nothing is asked for is not among them.
-        nothing: the answer when nothing is asked of the autopilot (param1 0).
+        actions: by param1; without 0, which requests no action.
+        nothing: the answer when no action is requested of the autopilot (param1 0).
         unknown: the answer to others.
         armed: the answer while armed.
-        force: param6 that reboots an armed vehicle too; None: nothing does.
-        delay_s: from the acknowledgement until it goes down.
+        force: param6 that reboots an armed vehicle too; None: no value does.
+        delay_s: time from the acknowledgement to the shutdown.
     """
 
     actions: Mapping[int, PowerAction]
@@ -68,8 +69,8 @@ class PowerService(Microservice):
 
     Args:
         policy: the firmware's answers.
-        commander: armed or not.
-        act: carries out; None: this autopilot can't be restarted.
+        commander: knows whether the vehicle is armed.
+        act: executes the action; None: this autopilot can't be restarted.
     """
 
     unhurried = True
@@ -86,13 +87,13 @@ class PowerService(Microservice):
         return {mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._command}
 
     def tick(self, time_us: int) -> None:
-        """Go down, when it is time."""
+        """Execute the action when its delay is over."""
         self._time_us = time_us
         if self._wanted is None or time_us < self._wanted[0]:
             return
         action, forced = self._wanted[1:]
         self._wanted = None
-        if self._act is not None and (forced or not self._commander.armed):  # armed since then: it stays up
+        if self._act is not None and (forced or not self._commander.armed):  # not if armed since
             self._act(action)
 
     def _command(self, command: Command, source: Source) -> Result:

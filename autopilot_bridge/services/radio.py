@@ -1,4 +1,4 @@
-"""RADIO_STATUS: a telemetry radio tells how full its transmit buffer is."""
+"""RADIO_STATUS: a telemetry radio reports how full its transmit buffer is."""
 
 from collections.abc import Callable
 
@@ -9,10 +9,10 @@ from autopilot_bridge.telemetry.throttle import StreamThrottle
 
 
 class RadioService:
-    """Slows the streams of a channel down while the radio at its end is behind.
+    """Reduces the rates of a channel's streams while the transmit buffer of its radio fills up.
 
     Args:
-        throttle: what thins the streams of a channel; None: it has none.
+        throttle: returns the throttle of a channel's streams; None: the channel has none.
     """
 
     def __init__(self, throttle: Callable[[Channel], StreamThrottle | None]) -> None:

@@ -1,7 +1,7 @@
 """Streamed setpoints as ArduPlane takes them (reference: ArduPilot 4.6.3, section 7).
 
-Only GUIDED listens. Roll, pitch and throttle of SET_ATTITUDE_TARGET are taken or left to the autopilot one by
-one; of the position setpoints only a height is used.
+Setpoints are used in GUIDED only. Roll, pitch and throttle of SET_ATTITUDE_TARGET are each either used or
+left to the autopilot; of the position setpoints only a height is used.
 """
 
 import math
@@ -38,7 +38,7 @@ class ArduPlaneSetpoints:
     def on_local(self, message: MavlinkMessage, time_us: int) -> None:
         """SET_POSITION_TARGET_LOCAL_NED: in MAV_FRAME_LOCAL_OFFSET_NED (7) a step in height, nothing else.
 
-        The mask isn't looked at, as in the firmware.
+        The mask is not checked, as in the firmware.
         """
         if message.coordinate_frame != mavlink.MAV_FRAME_LOCAL_OFFSET_NED:
             return
@@ -95,7 +95,7 @@ class ArduPlaneSetpoints:
             guided.set_attitude(self.commander.context, roll, pitch, throttle)
 
     def _fly_at(self, guided: Any, down_m: float) -> None:
-        """Another height for the circle being flown, or for what is flown in its place."""
+        """Set another height for the current circle, or for the manoeuvre that is flown instead of it."""
         if not math.isfinite(down_m):
             return
         if guided.circle is not None:
@@ -113,7 +113,7 @@ class ArduPlaneSetpoints:
 
 
 def _angles_wanted(mask: int) -> tuple[bool, bool]:
-    """(roll, pitch) are asked for."""
+    """(roll, pitch): True where the message controls the angle."""
     if not mask & _ATTITUDE_BIT:
         return True, True
     return not mask & _ROLL_RATE_BIT, not mask & _PITCH_RATE_BIT

@@ -1,4 +1,4 @@
-"""The frames of streamed setpoints: what a SET_POSITION_TARGET means in local NED. Numbers are untrusted."""
+"""The frames of streamed setpoints: a SET_POSITION_TARGET in local NED. Message fields are untrusted."""
 
 import math
 from typing import Final, NamedTuple
@@ -55,7 +55,7 @@ def any_finite(triple: Triple) -> bool:
 
 
 def masked(values: Triple, bits: tuple[int, int, int], type_mask: int, limit: float) -> Triple:
-    """Components that the mask does not ignore; what is not finite or beyond any sense counts as ignored."""
+    """Components that the mask does not ignore; one that is not finite or too large counts as ignored."""
     x, y, z = (
         float(value) if not type_mask & bit and abs(value) <= limit else math.nan
         for value, bit in zip(values, bits, strict=True)
@@ -88,7 +88,7 @@ def yaw_of(yaw_rad: float, yaw_rate_rad_s: float, type_mask: int) -> tuple[float
 
 
 def rotated_by_heading(values: Triple, heading_rad: float) -> Triple:
-    """A vector given forward, right, down, in NED. A lone horizontal component has the other one zero."""
+    """A vector given as forward, right, down, in NED. A single unset horizontal component is zero."""
     forward, right, down = values
     if not (math.isfinite(forward) or math.isfinite(right)):
         return math.nan, math.nan, down
@@ -112,7 +112,7 @@ def place_of(context: FlightContext) -> Triple:
 def local_from_global(
     context: FlightContext, lat_e7: int, lon_e7: int, altitude_m: float, *, relative: bool
 ) -> Triple | None:
-    """Local NED of a geodetic place; None when it is none, or the vehicle does not know where it is.
+    """Local NED of a geodetic position; None when it is invalid, or the vehicle's own position is not known.
 
     Args:
         relative: the altitude is over home, else over mean sea level.

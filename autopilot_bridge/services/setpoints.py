@@ -60,7 +60,7 @@ _ARDUPILOT_BODY_FRAMES: Final = frozenset({mavlink.MAV_FRAME_BODY_NED, mavlink.M
 
 
 class SetpointRules(Protocol):
-    """How one firmware takes each kind of setpoint; bad ones are ignored."""
+    """How one firmware uses each kind of setpoint; invalid setpoints are ignored."""
 
     def on_local(self, message: MavlinkMessage, time_us: int) -> None: ...
 
@@ -70,7 +70,7 @@ class SetpointRules(Protocol):
 
 
 class SetpointService:
-    """Hands setpoints to the commander's stream.
+    """Passes setpoints to the commander's setpoint stream.
 
     Args:
         flavour: name of the flavour whose rules apply.
@@ -82,7 +82,7 @@ class SetpointService:
         self._rules: SetpointRules = rules[flavour](commander)
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one setpoint; bad ones are ignored, as the flavour does."""
+        """Handle one setpoint; invalid ones are ignored, as in the flavour."""
         message_id = message.get_msgId()
         if message_id == _LOCAL:
             self._rules.on_local(message, time_us)
@@ -96,7 +96,7 @@ class SetpointService:
 
 
 class Px4Setpoints:
-    """PX4: components are ignored one by one; a setpoint that controls nothing does not count."""
+    """PX4: each component can be ignored; a setpoint that controls nothing does not count."""
 
     def __init__(self, commander: Commander) -> None:
         self.commander = commander
@@ -171,7 +171,7 @@ class Px4Setpoints:
 
 
 class ArduCopterSetpoints:
-    """ArduCopter: position, velocity and acceleration are taken or ignored whole; only GUIDED listens."""
+    """ArduCopter: position, velocity and acceleration are each used or ignored whole; used in GUIDED only."""
 
     def __init__(self, commander: Commander) -> None:
         self.commander = commander
@@ -295,7 +295,7 @@ _AIRCRAFT: Final[Mapping[str, Callable[[Commander], SetpointRules]]] = {
 
 
 def _whole(bits: Triple | tuple[int, int, int], type_mask: int, values: Triple) -> Triple | None:
-    """A vector that counts whole: ignored when any bit says so; None when a number in it is unusable."""
+    """A vector that is used whole: ignored when any of its bits is set; None when a component is invalid."""
     if any(type_mask & int(bit) for bit in bits):
         return UNSET
     return values if all(math.isfinite(value) for value in values) else None

@@ -1,4 +1,4 @@
-"""Calibration, actuators, traffic, modes, sticks: those of a firmware for a class of vehicle."""
+"""Calibration, actuators, traffic, modes and sticks: the services of a firmware for a class of vehicle."""
 
 from autopilot_bridge.services.actuators import ArducopterActuators, ArduplaneActuators, Px4Actuators, Tunes
 from autopilot_bridge.services.available_modes import AvailableModes
@@ -12,7 +12,7 @@ from flightsim.airframe import AirframeKind
 
 
 def small_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
-    """Those of one autopilot."""
+    """The services of one autopilot."""
     manual, tunes = ManualService.of(parts), Tunes()
     if parts.flavour.name == "px4":
         return (

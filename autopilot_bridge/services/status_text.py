@@ -1,4 +1,4 @@
-"""STATUSTEXT: the texts a ground station shows, in chunks where they are long."""
+"""STATUSTEXT: the texts that a ground station shows; long texts are sent in chunks."""
 
 from typing import Final
 
@@ -14,10 +14,10 @@ _MAX_ID: Final = 0xFFFF
 
 
 class StatusTextService:
-    """Sends texts on all channels; keeps quiet on a channel that nobody greeted, where the flavour does.
+    """Sends texts on all channels. In some flavours a channel gets no texts before a heartbeat.
 
     Args:
-        flavour: words of events, and whether a heartbeat is awaited.
+        flavour: texts of events, and whether a heartbeat is awaited.
         broadcast: all channels.
     """
 
@@ -28,30 +28,30 @@ class StatusTextService:
         self._next_id = 1
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Note who is there; the heartbeat is left to others."""
+        """Record the channels that have received a heartbeat; the message is passed on to other services."""
         if message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             self._greeted.add(source.channel.name)
         return False
 
     def forget(self, channel: Channel) -> None:
-        """A channel was closed."""
+        """Forget a channel that was closed."""
         self._greeted.discard(channel.name)
 
     def tell(self, event: Event) -> None:
-        """Announce an event in the flavour's words."""
-        end = "\t" if self._flavour.sends_events else ""  # marks what an EVENT says too
+        """Announce an event with the flavour's text."""
+        end = "\t" if self._flavour.sends_events else ""  # marks a text that an EVENT repeats
         for notice in self._flavour.notices(event):
             self.announce(notice.severity, notice.text + end)
 
     def banner(self, channel: Channel) -> None:
-        """Who this is, as after a parameter list request on a channel."""
+        """Send the firmware's identification, as after a parameter list request on a channel."""
         if self._listens(channel):
             for notice in self._flavour.banner:
                 for message in self._messages(int(notice.severity), notice.text):
                     channel.send(message)
 
     def announce(self, severity: int, text: str) -> None:
-        """Send a text (MAV_SEVERITY) on every channel that takes texts."""
+        """Send a text (MAV_SEVERITY) on every channel that gets texts."""
         channels = [channel for channel in self._broadcast.channels if self._listens(channel)]
         if not channels:
             return

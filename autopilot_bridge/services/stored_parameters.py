@@ -18,16 +18,16 @@ from autopilot_bridge.storage.files import exists, make_directories, read_whole,
 
 
 class StoredParameters:
-    """The file of stored parameters, and what the values are without it.
+    """The file of stored parameters, and the values that the parameters have without it.
 
     Args:
-        store: the vehicle's parameters as they are before anything was loaded.
+        store: the vehicle's parameters before anything was loaded.
         files: the memory card.
-        layout: where on it.
-        system_id: for the file.
+        layout: the file's place on the card.
+        system_id: written to the file.
 
     Attributes:
-        damaged: why the file could not be read; None: it could, or there is none.
+        damaged: why the file could not be read; None: it could be read, or there is none.
     """
 
     def __init__(
@@ -38,11 +38,11 @@ class StoredParameters:
         self._path = layout.parameters
         self._system_id = system_id
         self._initial: Mapping[str, float] = MappingProxyType(store.as_dict())
-        self._reference = self._initial  # what is not stored, because it is so without
+        self._reference = self._initial  # values that equal these are not stored
         self.damaged: str | None = None
 
     def load(self, *, without: Collection[str] = ()) -> None:
-        """Take the stored values over, but for those `without`; values that can't be are left out."""
+        """Load the stored values, except those in `without`; invalid values are skipped."""
         if not exists(self._files, self._path):
             return
         try:
@@ -50,7 +50,7 @@ class StoredParameters:
             values = parse_untyped_parameters(text, source=self._path[-1])
         except (OSError, UnicodeDecodeError, ParameterError) as failure:
             self.damaged = str(failure)
-            with contextlib.suppress(OSError):  # kept for whoever wants to mend it
+            with contextlib.suppress(OSError):  # kept, so that a user can repair it
                 self._files.rename(self._path, (*self._path[:-1], f"{self._path[-1]}.damaged"))
             return
         for name, value in values.items():
@@ -59,10 +59,10 @@ class StoredParameters:
                     self._store.set(name, value, check_range=False)
 
     def save(self) -> None:
-        """Store what differs from the start.
+        """Store the values that differ from those at the start.
 
         Raises:
-            OSError: there is no room; the old file stays.
+            OSError: the card is full; the old file is kept.
         """
         reference = self._reference
         values = {name: value for name, value in self._store.as_dict().items() if value != reference[name]}
@@ -74,7 +74,7 @@ class StoredParameters:
         replace_whole(self._files, self._path, text.encode())
 
     def erase(self) -> None:
-        """Forget what is stored; the values in use stay, and are not stored again.
+        """Delete the stored values; the values in use do not change, and are not stored again.
 
         Raises:
             OSError: the card can't be written.
@@ -84,7 +84,7 @@ class StoredParameters:
         self._reference = MappingProxyType(self._store.as_dict())
 
     def reset(self, prefixes: tuple[str, ...] = ("",)) -> None:
-        """Set parameters to what they are without a card: airframe and command line."""
+        """Set parameters to the values without a card: those of the airframe and the command line."""
         for name, value in self._initial.items():
             if name.startswith(prefixes):
                 self._store.set(name, value, check_range=False)
@@ -98,10 +98,10 @@ def boot_parameters(
     system_id: int,
     given: Collection[str],
 ) -> StoredParameters:
-    """Take what a card holds over into the parameters of an autopilot that boots.
+    """Load the values on a card into the parameters of an autopilot that boots.
 
-    At the first boot of a run, what was `given` (on the command line) goes before what is stored; at a reboot
-    what is stored goes before all, as clients may have changed it since.
+    At the first boot of a run, the `given` values (from the command line) take precedence over the stored
+    ones; at a reboot the stored values take precedence over all, because clients may have changed them since.
     """
     stored = StoredParameters(store, card.files, CARD_LAYOUTS[flavour_name], system_id=system_id)
     stored.load(without=() if card.boots else given)

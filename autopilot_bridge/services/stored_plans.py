@@ -1,9 +1,10 @@
-"""Plans that outlive a boot and a run: missions, fences and rally points, each in a file on the memory card.
+"""Plans that persist over boots and runs: missions, fences and rally points, each in a file on the card.
 
 Real vehicles keep them on the card (PX4, `dataman`) or in their parameter memory (ArduPilot). A file is a
 header (name of the format, MAV_MISSION_TYPE, number of items, identifier), the items as they are stored, and
-the CRC-32 of all that, so that a client reads the same plan back, with the same identifier. A file that is
-damaged, or that holds what would be refused from a client, is kept aside and told, and no plan is loaded.
+the CRC-32 of all these bytes, so that a client reads back the same plan with the same identifier. If a file
+is damaged, or its plan would be refused from a client, the file is moved aside and reported, and no plan is
+loaded.
 """
 
 import contextlib
@@ -49,10 +50,10 @@ def pack_plan(items: tuple[MissionItem, ...], kind: MissionType, plan_id: int) -
 
 
 def unpack_plan(data: bytes, kind: MissionType) -> tuple[tuple[MissionItem, ...], int]:
-    """Items and identifier of a plan's file; what they say is not judged.
+    """Items and identifier in a plan's file; the items are not checked.
 
     Raises:
-        ValueError: it is no such file, one of another type of plan, or damaged.
+        ValueError: the data are no such file, are damaged, or are of another type of plan.
     """
     if len(data) < _HEADER.size + _CRC.size:
         raise ValueError(f"{len(data)} bytes are too few for a stored plan")
@@ -85,10 +86,10 @@ class StoredPlans(Microservice):
     """Stores plans when they change, and loads them when the vehicle boots.
 
     Args:
-        stores: the plans; those that are stored are put into them at once.
+        stores: the plans; the stored plans are loaded into them at once.
         files: the memory card.
-        folder: where on it.
-        policy: what the firmware takes from a client, and so from a card.
+        folder: folder on the card.
+        policy: the firmware's rules for plans from a client, which are applied to the card too.
         announce: sends a STATUSTEXT.
     """
 
@@ -122,7 +123,7 @@ class StoredPlans(Microservice):
                 self._store(kind, store)
 
     def close(self) -> None:
-        """Store at once what was changed since the last look."""
+        """Store changes since the last tick at once."""
         self.tick(0)
 
     def _path(self, kind: MissionType) -> VehiclePath:
@@ -138,7 +139,7 @@ class StoredPlans(Microservice):
             )
 
     def _load(self, kind: MissionType) -> bool:
-        """False: there is a file, and it can't be used."""
+        """Load a plan; False: its file exists and can't be used."""
         path = self._path(kind)
         if not exists(self._files, path):
             return True
@@ -146,17 +147,17 @@ class StoredPlans(Microservice):
             items, plan_id = unpack_plan(read_whole(self._files, path), kind)
             self._judge(items, kind)
         except (OSError, ValueError):
-            with contextlib.suppress(OSError):  # kept for whoever wants to know
+            with contextlib.suppress(OSError):  # kept, so that a user can examine it
                 self._files.rename(path, (*path[:-1], f"{path[-1]}.damaged"))
             return False
         self._stores[kind].replace(items, plan_id)
         return True
 
     def _judge(self, items: tuple[MissionItem, ...], kind: MissionType) -> None:
-        """A card may come from anywhere, and clients can write to it.
+        """Check a plan: a card may come from any source, and clients can write to it.
 
         Raises:
-            ValueError: an item or the plan would not be taken from a client.
+            ValueError: an item or the plan would be refused from a client.
         """
         count = len(items)
         if count > self._policy.capacity[kind]:

@@ -1,7 +1,8 @@
 """TIMESYNC and PING: the autopilot's side of time synchronisation and of round-trip measurements.
 
-Sources: MAVLink time synchronisation protocol (tc1 = 0 asks; the answer carries the own clock in tc1 and the
-asker's ts1, both in nanoseconds) and ping protocol (target 0/0 asks; the answer is addressed to the asker).
+Sources: MAVLink time synchronisation protocol (tc1 = 0 is a request; the answer carries the own clock in tc1
+and the requester's ts1, both in nanoseconds) and ping protocol (target 0/0 is a request; the answer is
+addressed to its sender).
 """
 
 from typing import Final
@@ -18,7 +19,7 @@ class TimeSyncService:
     """Answers TIMESYNC and PING requests. The autopilot's own TIMESYNC requests are a stream.
 
     Args:
-        answers_ping: PX4 does, ArduPilot does not.
+        answers_ping: PX4 answers PING, ArduPilot does not.
     """
 
     def __init__(self, *, answers_ping: bool) -> None:

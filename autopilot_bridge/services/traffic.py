@@ -1,4 +1,4 @@
-"""Other aircraft: ADSB_VEHICLE reports are kept, passed on to everybody, and warned of (PX4's NAV_TRAFF_*).
+"""Other aircraft: ADSB_VEHICLE reports are stored, forwarded and cause warnings (PX4's NAV_TRAFF_*).
 
 Sources: PX4 v1.16 (transponder_report, AdsbConflict), ArduPilot 4.6 (AP_ADSB, which is off by default).
 """
@@ -18,11 +18,11 @@ from autopilot_bridge.telemetry.streams import Builder
 
 _ADSB_VEHICLE: Final = mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE
 _AUTOPILOT: Final = 1
-_MOST: Final = 50  # aircraft kept
+_MOST: Final = 50  # maximum number of aircraft stored
 _LIFETIME_US: Final = 30_000_000
-_LEAST_INTERVAL_US: Final = 90_000  # of one aircraft's reports
+_LEAST_INTERVAL_US: Final = 90_000  # between two reports of one aircraft
 _REMIND_US: Final = 60_000_000
-_PASSED_M: Final = 1000.0  # the other's way is looked at so far beyond us
+_PASSED_M: Final = 1000.0  # distance beyond us up to which the other's path is checked
 _NEEDED: Final = mavlink.ADSB_FLAGS_VALID_COORDS | mavlink.ADSB_FLAGS_VALID_ALTITUDE
 _NOTICE: Final = mavlink.MAV_SEVERITY_NOTICE
 
@@ -35,11 +35,11 @@ class _Aircraft:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrafficRules:
-    """What a firmware does with traffic.
+    """How a firmware handles traffic.
 
     Attributes:
-        switch: parameter that switches reception on; empty: it is always on.
-        conflicts: conflicts are looked for, with the NAV_TRAFF_ parameters.
+        switch: parameter that enables reception; empty: it is always enabled.
+        conflicts: conflicts are checked, with the NAV_TRAFF_ parameters.
     """
 
     switch: str = ""
@@ -54,11 +54,11 @@ _ACTIONS: Final[Mapping[int, tuple[FlightMode, str]]] = {
     3: (FlightMode.LAND, ", landing"),
     4: (FlightMode.HOLD, ", holding position"),
 }
-"""NAV_TRAFF_AVOID beyond 1 (warn only)."""
+"""Values of NAV_TRAFF_AVOID above 1 (warn only)."""
 
 
 class TrafficService(Microservice):
-    """Aircraft heard by transponder."""
+    """The aircraft received by transponder."""
 
     def __init__(self, parts: AutopilotParts, rules: TrafficRules) -> None:
         self._parts = parts
@@ -68,16 +68,16 @@ class TrafficService(Microservice):
 
     @property
     def aircraft(self) -> tuple[int, ...]:
-        """ICAO addresses of those heard lately."""
+        """ICAO addresses of the aircraft received recently."""
         return tuple(self._heard)
 
     @property
     def builders(self) -> Mapping[int, Builder]:
-        """ADSB_VEHICLE can be asked for; it goes out when it comes in, whatever the interval."""
+        """ADSB_VEHICLE can be requested; it is sent when it is received, whatever the interval."""
         return {_ADSB_VEHICLE: lambda: None}
 
     def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take ADSB_VEHICLE; what another autopilot passes on is not passed on again."""
+        """Handle ADSB_VEHICLE; a report forwarded by another autopilot is not forwarded again."""
         if message.get_msgId() != _ADSB_VEHICLE:
             return False
         switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0
@@ -120,10 +120,11 @@ class TrafficService(Microservice):
             self._commander.set_mode(mode)
 
     def _conflict(self, message: MavlinkMessage) -> float | None:
-        """How far from us the other's straight way passes, metres, when that is a conflict; else None.
+        """The distance at which the other's straight path passes us, metres; None without a conflict.
 
-        As PX4: its way passes nearer than NAV_TRAFF_A_HOR ahead of it, it is nearer in height than
-        NAV_TRAFF_A_VER, and both flying straight at each other would meet within NAV_TRAFF_COLL_T.
+        As in PX4, a conflict means: its path passes nearer than NAV_TRAFF_A_HOR ahead of it, its height
+        difference is less than NAV_TRAFF_A_VER, and both flying straight at each other would meet within
+        NAV_TRAFF_COLL_T.
         """
         frame = self._commander.context.frame
         if frame is None or message.flags & _NEEDED != _NEEDED:
@@ -144,7 +145,7 @@ class TrafficService(Microservice):
         heading_rad = math.radians(message.heading / 100.0)
         along_m = -(
             north_m * math.cos(heading_rad) + east_m * math.sin(heading_rad)
-        )  # to be flown until abeam
+        )  # its distance to the point abeam of us
         across_m = abs(east_m * math.cos(heading_rad) - north_m * math.sin(heading_rad))
         horizontal_m = math.hypot(north_m, east_m)
         if not 0.0 <= along_m <= horizontal_m + _PASSED_M or across_m >= parameters.get("NAV_TRAFF_A_HOR"):

@@ -1,4 +1,4 @@
-"""The radio as an autopilot hears it: pulses of a transmitter, and what ground stations put over them."""
+"""The radio as an autopilot receives it: pulses of a transmitter, and the overrides of ground stations."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -15,10 +15,10 @@ _HALF_RANGE_US: Final = 500.0
 
 
 class Radio:
-    """Pulses of 18 channels, microseconds; 0: nothing is heard on that channel.
+    """Pulses of 18 channels, microseconds; 0: nothing is received on that channel.
 
     Args:
-        at_rest: what a built-in transmitter sends that nobody touches; empty: there is none.
+        at_rest: pulses of a built-in transmitter with untouched sticks; empty: there is none.
     """
 
     __slots__ = ("_at_rest", "_overrides", "_times_us")
@@ -29,16 +29,16 @@ class Radio:
         self._times_us = [0] * CHANNELS
 
     def override(self, channel: int, pulse_us: int, time_us: int) -> None:
-        """Channel (from 0) is this from now on."""
+        """Override a channel (from 0) with this pulse."""
         self._overrides[channel] = pulse_us
         self._times_us[channel] = time_us
 
     def release(self, channel: int) -> None:
-        """Channel (from 0) is the transmitter's again."""
+        """End the override of a channel (from 0): it is the transmitter's again."""
         self._overrides[channel] = 0
 
     def expire(self, time_us: int, timeout_s: float) -> None:
-        """Release what was not repeated for so long; never with a negative time."""
+        """Release the channels whose override was not repeated within `timeout_s`; negative: never."""
         if timeout_s < 0.0:
             return
         for channel, pulse_us in enumerate(self._overrides):
@@ -47,33 +47,33 @@ class Radio:
 
     @property
     def overridden(self) -> bool:
-        """Some channel is a ground station's."""
+        """A ground station overrides some channel."""
         return any(self._overrides)
 
     def is_overridden(self, channels: Iterable[int]) -> bool:
-        """One of these channels (from 0) is a ground station's."""
+        """A ground station overrides one of these channels (from 0)."""
         return any(self._overrides[channel] for channel in channels)
 
     @property
     def pulses_us(self) -> list[int]:
-        """All channels."""
+        """The pulses of all channels."""
         return [own or rest for own, rest in zip(self._overrides, self._at_rest, strict=True)]
 
     def stick(self, channel: int) -> float:
-        """A channel (from 0) as a stick, -1..1; unheard: in the middle."""
+        """A channel (from 0) as a stick, -1..1; in the middle if nothing is received."""
         pulse_us = self._overrides[channel] or self._at_rest[channel] or _MIDDLE_US
         return (pulse_us - _MIDDLE_US) / _HALF_RANGE_US
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeSwitchRules:
-    """The switch that chooses the mode.
+    """The switch that selects the mode.
 
     Attributes:
         channel: parameter with its channel, from 1; 0: there is none.
         slot: parameters of the modes, with {} for 1 to 6.
-        limits_us: pulses that part the six positions.
-        modes: what the numbers in them mean.
+        limits_us: pulses that separate the six positions.
+        modes: the modes by the values of these parameters.
     """
 
     channel: str
@@ -99,7 +99,7 @@ class ModeSwitch:
         self._seen_us = 0
 
     def tick(self, time_us: int) -> None:
-        """Look at the switch."""
+        """Read the switch."""
         position = self._read()
         if position != self._seen:
             self._seen, self._seen_us = position, time_us
@@ -121,15 +121,15 @@ class ModeSwitch:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GestureRules:
-    """Arming by the sticks: throttle down and yaw held to the right; to the left it disarms.
+    """Arming by the sticks: throttle down and yaw held to the right arms; yaw to the left disarms.
 
     Attributes:
-        switch: parameter that allows it.
-        arm_from, disarm_from: from which value of it.
-        hold_s: how long it is held, of the parameters.
+        switch: parameter that enables the gesture.
+        arm_from, disarm_from: smallest values of that parameter that allow arming and disarming.
+        hold_s: time that the sticks are held, from the parameters.
         throttle_below, yaw_beyond: stick positions, -1..1.
-        centred: roll and pitch must be left alone.
-        by_hand_only: arms in modes flown by the sticks only.
+        centred: roll and pitch must be centred.
+        by_hand_only: arms only in modes flown by the sticks.
     """
 
     switch: str
@@ -143,7 +143,7 @@ class GestureRules:
 
 
 class ArmingGesture:
-    """Watches the sticks for the arming gesture."""
+    """Detects the arming gesture."""
 
     _CENTRE: Final = 0.1
 
@@ -155,7 +155,7 @@ class ArmingGesture:
         self._since_us = 0
 
     def tick(self, time_us: int) -> None:
-        """Look at the sticks."""
+        """Read the sticks."""
         side = self._read(self._commander.context.sticks)
         if side != self._side:
             self._side, self._since_us = side, time_us
@@ -165,7 +165,7 @@ class ArmingGesture:
         rules, commander = self._rules, self._commander
         if time_us - self._since_us < rules.hold_s(self._parameters) * 1e6:
             return
-        self._since_us = -1  # done: not again before the sticks were let go
+        self._since_us = -1  # done: not repeated before the sticks are released
         allowed = self._parameters.get(rules.switch)
         if side > 0 and allowed >= rules.arm_from and not commander.armed:
             if commander.mode in STICK_MODES or not rules.by_hand_only:

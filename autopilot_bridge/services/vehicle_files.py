@@ -1,4 +1,4 @@
-"""The microservices of a vehicle that have to do with files, put together for one autopilot."""
+"""The microservices of a vehicle that use files, built for one autopilot."""
 
 from autopilot_bridge.flavours.card_layout import CARD_LAYOUTS
 from autopilot_bridge.parameters import ParameterStore

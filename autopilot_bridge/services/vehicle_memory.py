@@ -1,4 +1,4 @@
-"""What microservices reach of the computer that the autopilot runs on: its card, its clock, its power."""
+"""What microservices use of the computer that the autopilot runs on: its card, its clock, its power."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,32 +9,32 @@ from autopilot_bridge.services.stored_parameters import StoredParameters
 from autopilot_bridge.storage.card import MemoryCard
 
 LOG_ROLE: Final = "log"
-"""Of the channel that ends in the vehicle's own log."""
+"""The role of the channel that writes the vehicle's own log."""
 
 
 class PowerAction(Enum):
-    """What happens to the autopilot."""
+    """What is done with the autopilot."""
 
     REBOOT = auto()
     SHUTDOWN = auto()
 
 
 PowerHook = Callable[[PowerAction], None]
-"""Carries it out, after the present step."""
+"""Executes the action, after the present step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VehicleMemory:
-    """See above.
+    """The card, the clock and the power of the autopilot's computer.
 
     Attributes:
         card: the memory card.
         stored: the parameters on it.
-        time_us: the time now, microseconds since boot.
+        time_us: returns the current time, microseconds since boot.
         unix_epoch_us: Unix time of boot.
         add_channel: starts the streams of a role on a channel: (channel, role).
         remove_channel: ends them.
-        power: restarts the vehicle, or shuts it down; None: nobody can.
+        power: restarts the vehicle, or shuts it down; None: not possible.
     """
 
     card: MemoryCard
@@ -46,5 +46,5 @@ class VehicleMemory:
     power: PowerHook | None
 
     def unix_us(self) -> int:
-        """The time now, microseconds of the Unix epoch."""
+        """The current time, microseconds of the Unix epoch."""
         return self.unix_epoch_us + self.time_us()
