@@ -1,4 +1,4 @@
-"""Modes, arming, failsafes and home: who decides what the vehicle flies. Flavour-neutral, set by a policy."""
+"""Modes, arming, failsafes and home: decides what the vehicle flies. Flavour-neutral, set by a policy."""
 
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor, VehicleHealth

@@ -1,4 +1,4 @@
-"""Watching what the flight leans on: airspeed, links to people, GPS in the filter. News, no actions."""
+"""Monitoring of airspeed, ground station and stick links, and GPS in the filter. Events, no actions."""
 
 from typing import Final
 
@@ -9,22 +9,22 @@ from autopilot_bridge.commander.situation import Situation
 from autopilot_bridge.navigation.health import NavigationHealth
 
 _GPS_STOPPED_US: Final = 7_000_000
-"""Not fused for so long: it has stopped (PX4's EKF2 gives it up then)."""
+"""GPS that was not fused for this time counts as lost (PX4's EKF2 then stops using it)."""
 
 
 class AidsWatch:
-    """Tells when a link or GPS is lost, and when it is back; what never was there is not missed."""
+    """Reports when a link or GPS that was present is lost, and when it is back."""
 
     __slots__ = ("_airspeed", "_lost_us")
 
     def __init__(self) -> None:
         self._airspeed = AirspeedWatch()
-        self._lost_us: dict[Aid, int | None] = {}  # None: it is there
+        self._lost_us: dict[Aid, int | None] = {}  # None: not lost
 
     def update(
         self, situation: Situation, parameters: CommanderParameters, navigation: NavigationHealth | None
     ) -> list[Event]:
-        """Look at the newest situation; what has changed."""
+        """Check the newest situation; returns the changes."""
         told: list[Event | None] = [
             self._airspeed.update(situation.health, armed=situation.armed, time_us=situation.time_us),
             self._judge(Aid.GROUND_STATION, situation.gcs_age_s, parameters.gcs_loss_s, situation.time_us),

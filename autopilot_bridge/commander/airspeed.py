@@ -1,11 +1,11 @@
-"""Watching the airspeed sensor of an aircraft in flight."""
+"""Monitoring of an aircraft's airspeed sensor in flight."""
 
 from autopilot_bridge.commander.events import AirspeedChanged
 from autopilot_bridge.commander.health import VehicleHealth
 
 
 class AirspeedWatch:
-    """Tells when the sensor is given up while armed, and when it is used again."""
+    """Reports when the sensor is disabled while armed, and when it is used again."""
 
     __slots__ = ("_valid",)
 
@@ -13,7 +13,7 @@ class AirspeedWatch:
         self._valid = True
 
     def update(self, health: VehicleHealth, *, armed: bool, time_us: int) -> AirspeedChanged | None:
-        """Look at the newest health; the change, if there is one."""
+        """Check the newest health; returns the change, or None."""
         if not armed or not health.has_airspeed:
             self._valid = True
         elif health.airspeed is not self._valid:

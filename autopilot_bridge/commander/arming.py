@@ -23,16 +23,16 @@ _MANDATORY: Final = frozenset(
         Reason.MISSION_INVALID,
     }
 )
-"""What even a forced arming needs (ArduPilot; PX4 checks everything always)."""
+"""Requirements that hold even for a forced arming (ArduPilot; PX4 always checks everything)."""
 
 MODE_REASONS: Final = frozenset({Reason.MODE_NOT_ARMABLE, Reason.MISSION_MISSING, Reason.MISSION_INVALID})
-"""Reasons that lie in the chosen mode, not in the vehicle."""
+"""Reasons that depend on the selected mode, not on the vehicle."""
 
 
 def shortfalls(
     mode: FlightMode, situation: Situation, policy: CommanderPolicy, parameters: CommanderParameters
 ) -> tuple[Reason, ...]:
-    """What a mode needs and does not have, in the order a pilot would mend it; empty when it can be flown."""
+    """The unmet requirements of a mode, in the order to resolve them; empty when it can be flown."""
     needs = policy.mode_needs[mode]
     health = situation.health
     reasons = []
@@ -64,10 +64,10 @@ def mode_obstacle(
     *,
     locked: bool,
 ) -> Reason | None:
-    """Why a mode can't be commanded now; on the ground almost any can, in flight it must be possible.
+    """Why a mode can't be commanded now: on the ground almost any can, in flight its needs must be met.
 
     Args:
-        locked: what a broken geofence asked for is flown, in another mode.
+        locked: the vehicle flies the action of a fence breach, in another mode.
     """
     if situation.terminated:
         return Reason.TERMINATED
@@ -91,10 +91,10 @@ def arming_reasons(
     *,
     forced: bool = False,
 ) -> tuple[Reason, ...]:
-    """Every reason against arming in `mode`; empty when the vehicle may be armed.
+    """All reasons against arming in `mode`; empty when the vehicle may be armed.
 
     Args:
-        forced: the client sent the override number; it skips checks only where the policy says so.
+        forced: the client sent the override number; it skips checks only if the policy allows it.
     """
     reasons: list[Reason] = []
     health = situation.health
@@ -149,7 +149,7 @@ def arming_reasons(
 
 
 def _fence_reasons(situation: Situation, fence: FenceParameters) -> list[Reason]:
-    """What is wrong with the geofence, or with the place the vehicle stands at."""
+    """The problems of the geofence, or of the vehicle's position relative to it."""
     if not fence.counts_breaches:
         return [Reason.OUTSIDE_FENCE] if situation.outside_fence else []
     watched = fence.enabled or fence.auto_enable is not AutoEnable.OFF

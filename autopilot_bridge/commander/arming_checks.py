@@ -1,4 +1,4 @@
-"""The arming checks of one vehicle: their newest result, and when it is told unasked (ArduPilot's prearm)."""
+"""The arming checks of one vehicle: their newest result, and when it is reported (ArduPilot's prearm)."""
 
 from autopilot_bridge.commander.arming import MODE_REASONS, arming_reasons
 from autopilot_bridge.commander.modes import FlightMode
@@ -9,10 +9,10 @@ from autopilot_bridge.commander.verdict import Reason
 
 
 class ArmingChecks:
-    """Runs the arming checks and keeps what they found.
+    """Runs the arming checks and keeps their result.
 
     Attributes:
-        reasons: everything against arming.
+        reasons: all reasons against arming.
     """
 
     __slots__ = ("_policy", "_reported_us", "reasons")
@@ -24,7 +24,7 @@ class ArmingChecks:
 
     @property
     def passed(self) -> bool:
-        """Nothing is against arming; ArduPilot shows what lies in the mode only when somebody arms."""
+        """No reason against arming; ArduPilot shows those that depend on the mode only when a client arms."""
         if self._policy.standby_when_armable:
             return not self.reasons
         return MODE_REASONS.issuperset(self.reasons)
@@ -32,12 +32,12 @@ class ArmingChecks:
     def run(
         self, mode: FlightMode, situation: Situation, parameters: CommanderParameters
     ) -> tuple[Reason, ...]:
-        """Look again; what is against arming in a mode."""
+        """Run the checks; returns the reasons against arming in a mode."""
         self.reasons = arming_reasons(mode, situation, self._policy, parameters)
         return self.reasons
 
     def report_due(self, time_us: int) -> bool:
-        """What is against arming is to be told again, unasked."""
+        """It is time to repeat the report of the reasons against arming."""
         interval_us = self._policy.prearm_report_s * 1e6
         if interval_us <= 0.0 or self.passed or time_us - self._reported_us < interval_us:
             return False

@@ -6,7 +6,7 @@ from autopilot_bridge.commander.parameters import CommanderParameters
 
 
 class BatteryMonitor:
-    """Follows the battery. Voltage must stay low for `battery_timer_s`: sag under load is forgiven."""
+    """Monitors the battery. Voltage must stay low for `battery_timer_s`, so sag under load has no effect."""
 
     __slots__ = ("_critical_since_us", "_low_since_us", "level")
 
@@ -18,7 +18,7 @@ class BatteryMonitor:
     def update(
         self, health: VehicleHealth, parameters: CommanderParameters, time_us: int
     ) -> BatteryWarning | None:
-        """Judge the newest battery reading; the warning when the level rose."""
+        """Evaluate the newest battery reading; returns the warning when the level rose."""
         if not health.battery:
             return None
         before = self.level

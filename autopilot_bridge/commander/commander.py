@@ -1,7 +1,7 @@
 """The commander: which mode is flown, whether motors may turn, what a failsafe does. Flavour-neutral.
 
-Everything it decides on comes from the navigation filter, the sensors, the parameters and people's requests.
-Requests answer with a `Verdict`; what happens is told in typed events, which flavours turn into texts.
+Its decisions use the navigation filter, the sensors, the parameters and the requests of clients and pilots.
+A request returns a `Verdict`; events are typed, and flavours convert them into texts.
 """
 
 from collections.abc import Callable
@@ -58,29 +58,29 @@ class Commander:
     """Owns mode, arming state, home and failsafes of one vehicle, and runs its flight task.
 
     Args:
-        context: what flight tasks see; the autopilot shares its navigation state, setpoint and frame
+        context: the data that flight tasks see; the autopilot shares its navigation state, setpoint and frame
             through it.
         policy: the flavour's rules.
-        parameters: time-outs, thresholds, actions.
+        parameters: timeouts, thresholds, actions.
         vehicle: makes the flight tasks of this class of vehicle.
-        health: judge of sensors and navigation.
+        health: evaluates sensors and navigation.
         land_detector: writes `context.landed_state`.
-        thrust: the collective given by the motors, 0..1.
+        thrust: returns the collective thrust of the motors, 0..1.
         missions: the stored mission plan.
         fence: the stored fence plan.
-        mission_valid: whether the stored plan can be flown (asked only when there is one).
+        mission_valid: returns whether the stored plan can be flown (called only when there is one).
 
     Attributes:
         mode: the mode being flown, shown in HEARTBEAT.
-        commanded_mode: the mode last asked for; differs from `mode` during a failsafe that keeps it (PX4).
+        commanded_mode: the last commanded mode; differs from `mode` during a failsafe that keeps it (PX4).
         armed: motors may turn.
         booted: the boot phase is over.
-        pilot: sticks and ground-station heartbeats come in here.
-        setpoints: streamed setpoints come in here.
-        home: where to return to.
+        pilot: receives sticks and ground-station heartbeats.
+        setpoints: receives streamed setpoints.
+        home: the position to return to.
         battery: warning level.
-        failsafes: conditions that are up.
-        fence: the geofence, and what of it is broken.
+        failsafes: the active failsafe conditions.
+        fence: the geofence and its breaches.
         vehicle: makes the flight tasks.
         tasks: the flight task being flown.
         guidance: requests that send the vehicle somewhere.
@@ -152,7 +152,7 @@ class Commander:
 
     @property
     def landed(self) -> bool:
-        """Standing on the ground, the land detector is sure."""
+        """The land detector reports that the vehicle stands on the ground."""
         return self.context.on_ground
 
     @property
@@ -162,12 +162,12 @@ class Commander:
 
     @property
     def armable(self) -> bool:
-        """The arming checks pass; ArduPilot shows obstacles that lie in the mode only when somebody arms."""
+        """The arming checks pass; ArduPilot shows obstacles of the mode only when a client arms."""
         return self._checks.passed
 
     @property
     def arming_reasons(self) -> tuple[Reason, ...]:
-        """What the newest arming checks have found."""
+        """The result of the newest arming checks."""
         return self._checks.reasons
 
     @property
@@ -191,7 +191,7 @@ class Commander:
         return SystemStatus.STANDBY if self.booted else self.policy.boot_status
 
     def drain_events(self) -> list[Event]:
-        """Everything that happened since the last call, in order."""
+        """All events since the last call, in order."""
         events, self._events = self._events, []
         return events
 
@@ -200,7 +200,7 @@ class Commander:
         self._events.append(event)
 
     def set_mode(self, mode: FlightMode) -> Verdict:
-        """Command a mode. On the ground almost any is taken; in flight it must be possible now."""
+        """Command a mode. On the ground almost any is accepted; in flight its requirements must be met."""
         self._health.update(self.time_us)
         self._refresh()
         locked = self.failsafes.recovers_from_fence and mode is not self.mode
@@ -215,15 +215,15 @@ class Commander:
         return ACCEPTED
 
     def change_mode(self, mode: FlightMode) -> None:
-        """The flight itself goes on in another mode: a task is done, a link is heard again."""
+        """Continue the flight in another mode: a task is finished, or a link is available again."""
         self._command(mode)
         self._enter(mode)
 
     def end_mission(self, mode: FlightMode | None = None) -> None:
-        """The mission flown is over.
+        """End the mission being flown.
 
         Args:
-            mode: what its last item asks for; None: the policy's mode follows.
+            mode: the mode that its last item requires; None: the policy's mode follows.
         """
         after = self.policy.mission_end_mode
         follows = mode or after
@@ -238,7 +238,7 @@ class Commander:
             self._mission_over = stays
 
     def arm(self, *, forced: bool = False) -> Verdict:
-        """Let the motors turn, when every check passes."""
+        """Arm the motors when every check passes."""
         if self.armed:
             return ACCEPTED
         self._refresh()
@@ -269,7 +269,7 @@ class Commander:
         return ACCEPTED
 
     def terminate(self) -> None:
-        """Flight termination: motors off, for good."""
+        """Flight termination: stop the motors permanently."""
         self.terminated = True
         if self.armed:
             self._disarm(DisarmReason.TERMINATION)
@@ -277,7 +277,7 @@ class Commander:
         self.commanded_mode = FlightMode.TERMINATION
 
     def check_arming(self) -> tuple[Reason, ...]:
-        """Run the arming checks now and announce what fails."""
+        """Run the arming checks now and announce the failed ones."""
         self._refresh()
         reasons = self._checks.run(self.commanded_mode, self.situation, self.parameters)
         if reasons:
@@ -285,7 +285,7 @@ class Commander:
         return reasons
 
     def set_home_here(self) -> bool:
-        """Home is where the vehicle is; False while that is not known."""
+        """Set home to the vehicle's position; False while the position is not known."""
         return self.situation.position and self.home.command_here()
 
     def update(self, time_us: int) -> None:
@@ -305,7 +305,7 @@ class Commander:
         self._follower.follow()
 
     def _supervise(self, time_us: int) -> None:
-        """What needs no haste: sensors, arming checks, home, battery, failsafes and the mode they ask for."""
+        """The slow part: sensors, arming checks, home, battery, failsafes and the modes they require."""
         if not self.booted and time_us >= self.policy.boot_s * 1e6:
             self.booted = True
             self.emit(Booted(time_us=time_us))
@@ -339,7 +339,7 @@ class Commander:
         self.emit(ArmingDenied(time_us=self.time_us, mode=mode, reasons=reasons, check_only=check_only))
 
     def _refresh(self) -> None:
-        """Bring the situation up to date."""
+        """Update the situation."""
         self._events += self._survey.update(
             self.parameters,
             mode=self.commanded_mode,
@@ -372,7 +372,7 @@ class Commander:
             self._checks.run(mode, self.situation, self.parameters)
 
     def _select(self) -> None:
-        """Fly the commanded mode, or what the strongest failsafe asks for."""
+        """Fly the commanded mode, or the action of the strongest failsafe."""
         self._memory.note(self.failsafes.started, self.commanded_mode)
         action = self.failsafes.due(self.time_us, self.parameters)
         if not self.armed or action <= FailsafeAction.WARN:
@@ -415,7 +415,7 @@ class Commander:
             self._enter(self.commanded_mode)
 
     def _follow_landing(self) -> None:
-        """Tell of take-off and landing, and stop motors that nobody needs on the ground."""
+        """Report take-off and landing, and stop motors that are not needed on the ground."""
         event = self._disarming.follow(self.context)
         if event is not None:
             self.emit(event)
@@ -429,13 +429,13 @@ class Commander:
             self.set_mode(FlightMode.POSITION if self.situation.position else FlightMode.ALTITUDE)
 
     def _start_mission_by_throttle(self) -> None:
-        """ArduCopter: armed on the ground in AUTO, the mission starts when the throttle stick is raised."""
+        """ArduCopter: armed on the ground in AUTO, a raised throttle stick starts the mission."""
         raised = self.policy.mission_waits_for_start and self.situation.throttle_high
         if raised and self.armed and self.landed and self.mode is FlightMode.MISSION:
             self.guidance.start_mission()
 
     def _rewind_mission(self) -> None:
-        """Disarmed: where the firmware has it so, the mission begins again at its first item."""
+        """After disarming, restart the mission at its first item where the firmware does so."""
         restart, missions = self.policy.mission_restart, self.missions
         flown = missions.current + 1 >= len(missions.items)
         if restart is MissionRestart.AT_DISARM or (restart is MissionRestart.AFTER_LAST_ITEM and flown):

@@ -1,4 +1,4 @@
-"""Has the vehicle crashed? It lies still, leaning, and not at all as the attitude loop wants it.
+"""Crash detection: the vehicle does not move, is tilted, and its attitude differs from the setpoint.
 
 Source: ArduCopter 4.6, `crash_check.cpp` (FS_CRASH_CHECK).
 """
@@ -22,7 +22,7 @@ _EXEMPT: Final = frozenset((FlightMode.ACRO,))
 
 
 class CrashCheck:
-    """Watches one flight; asked at 10 Hz."""
+    """Monitors one flight; called at 10 Hz."""
 
     __slots__ = ("_acceleration_m_s2", "_since_us")
 
@@ -31,7 +31,7 @@ class CrashCheck:
         self._since_us: int | None = None
 
     def update(self, situation: Situation, context: FlightContext) -> Crashed | None:
-        """Look at the vehicle; what there is to tell once it has lain so for two seconds."""
+        """Check the vehicle; returns the event once it has been in this state for two seconds."""
         if context.attitude_setpoint is None:
             return None
         for axis, newest in enumerate(context.nav[nav.ACC_NED_M_S2].tolist()):
@@ -62,5 +62,5 @@ class CrashCheck:
 
 
 def _angle(a: list[float], b: list[float]) -> float:
-    """Between two attitudes."""
+    """The angle between two attitudes."""
     return 2.0 * math.acos(min(1.0, abs(sum(x * y for x, y in zip(a, b, strict=True)))))

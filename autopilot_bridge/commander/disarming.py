@@ -9,7 +9,7 @@ from autopilot_bridge.flight.context import FlightContext
 
 
 class AutoDisarm:
-    """Follows one armed period: take-off, landing, and when the motors are to be stopped."""
+    """Monitors one armed period: take-off, landing, and when the motors must stop."""
 
     __slots__ = ("_flew", "_landed_since_us", "_policy", "_waiting_since_us")
 
@@ -26,11 +26,11 @@ class AutoDisarm:
         self._waiting_since_us = time_us
 
     def restart(self, time_us: int) -> None:
-        """Somebody commanded a mode: wait anew for the take-off."""
+        """A client has commanded a mode: restart the wait for the take-off."""
         self._waiting_since_us = time_us
 
     def follow(self, context: FlightContext) -> Event | None:
-        """Note take-off and landing of an armed vehicle; the event of it, if any."""
+        """Detect take-off and landing of an armed vehicle; returns their event, if any."""
         if not context.armed:
             return None
         time_us = context.time_us
@@ -48,7 +48,7 @@ class AutoDisarm:
     def due(
         self, mode: FlightMode, context: FlightContext, tasks: TaskRunner, parameters: CommanderParameters
     ) -> DisarmReason | None:
-        """Why the motors should stop now, on the ground; None while they should not."""
+        """Why the motors must stop now, on the ground; None: no reason."""
         if not context.armed or not context.on_ground:
             return None
         policy, time_us = self._policy, context.time_us

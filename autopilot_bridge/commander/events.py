@@ -1,4 +1,4 @@
-"""What happened to the vehicle, as typed events. Flavours turn them into the texts a ground station shows."""
+"""Events of the vehicle, with types. Flavours convert them into the texts that a ground station shows."""
 
 import math
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class DisarmReason(Enum):
 
 
 class FailsafeKind(Enum):
-    """Conditions with a failsafe of their own."""
+    """Conditions with a separate failsafe."""
 
     OFFBOARD_LOST = auto()
     GCS_LOST = auto()
@@ -37,23 +37,23 @@ class FailsafeKind(Enum):
 
 
 class Aid(Enum):
-    """What a flight leans on, and may be lost."""
+    """An aid of the flight that may be lost."""
 
     GROUND_STATION = auto()
     STICKS = auto()
-    GPS = auto()  # as far as the navigation filter uses it
+    GPS = auto()  # as used by the navigation filter
 
 
 class FailsafeAction(IntEnum):
-    """What a failsafe does. The order is the precedence: the greatest of all active actions is flown."""
+    """The action of a failsafe. The order is the precedence: the greatest of all active actions is flown."""
 
     NONE = 0
     WARN = 1
-    POSITION = 2  # fall back to position, altitude or stabilised flight by stick
+    POSITION = 2  # fall back to position, altitude or stabilised mode, flown by stick
     ALTITUDE = 3
     STABILIZED = 4
     HOLD = 5
-    CIRCLE = 6  # where the aircraft is, without a position if need be (ArduPlane)
+    CIRCLE = 6  # at the present place, if necessary without a position (ArduPlane)
     BRAKE = 7
     FENCE_POINT = 8  # to the fence's return point in GUIDED (ArduPlane)
     RETURN = 9
@@ -90,7 +90,7 @@ class SystemStatus(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Event:
-    """Something that happened, and when (microseconds since boot)."""
+    """An event, with its time (microseconds since boot)."""
 
     time_us: int
 
@@ -102,7 +102,7 @@ class Booted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationReady(Event):
-    """The navigation filter has a position for the first time, or again."""
+    """The navigation filter has a position for the first time, or again after a loss."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,7 +115,7 @@ class ModeChanged(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeDenied(Event):
-    """A mode was asked for that cannot be entered."""
+    """A requested mode cannot be entered."""
 
     mode: FlightMode | None
     reason: Reason
@@ -136,7 +136,7 @@ class Disarmed(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArmingDenied(Event):
-    """Somebody asked to arm; these checks failed."""
+    """A client or pilot requested arming; these checks failed."""
 
     mode: FlightMode
     reasons: tuple[Reason, ...]
@@ -145,12 +145,12 @@ class ArmingDenied(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DisarmingDenied(Event):
-    """Somebody asked to disarm in the air."""
+    """A client or pilot requested disarming in the air."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandDenied(Event):
-    """A command was refused with a reason worth a text."""
+    """A command was refused with a reason that is reported as a text."""
 
     command: int
     reason: Reason
@@ -158,7 +158,7 @@ class CommandDenied(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailsafeActivated(Event):
-    """A failsafe condition came up and its action is taken."""
+    """A failsafe condition became active and its action is taken."""
 
     kind: FailsafeKind
     action: FailsafeAction
@@ -166,7 +166,7 @@ class FailsafeActivated(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailsafeCleared(Event):
-    """The condition of a failsafe went away, which had asked for an action."""
+    """The condition of an active failsafe has cleared."""
 
     kind: FailsafeKind
     action: FailsafeAction
@@ -184,10 +184,10 @@ class LandingDetected(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionItemReached(Event):
-    """An item of the mission is done; `index` counts as the stored plan does.
+    """An item of the mission is finished; `index` counts as in the stored plan.
 
-    `distance_m`: from its place, for an item that an aircraft flew past; NaN for others. `navigation`: it was
-    flown; False for DO_ and CONDITION_ items.
+    `distance_m`: distance from its position, for an item that an aircraft flew past; NaN for others.
+    `navigation`: it was flown; False for DO_ and CONDITION_ items.
     """
 
     index: int
@@ -197,28 +197,28 @@ class MissionItemReached(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionFinished(Event):
-    """The last item of the mission is done; `landed`: it ended on the ground."""
+    """The last item of the mission is finished; `landed`: it ended on the ground."""
 
     landed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HomeSet(Event):
-    """Home has a new place."""
+    """Home has a new position."""
 
     home: GeodeticPosition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FenceBreached(Event):
-    """A wall of the geofence was passed; `walls` are `FenceType` bits that are newly broken."""
+    """The vehicle has crossed a wall of the geofence; `walls` are the newly breached `FenceType` bits."""
 
     walls: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FenceSwitched(Event):
-    """The geofence switched itself (FENCE_AUTOENABLE); `walls` are `FenceType` bits."""
+    """The geofence was switched automatically (FENCE_AUTOENABLE); `walls` are `FenceType` bits."""
 
     walls: int
     on: bool
@@ -226,7 +226,7 @@ class FenceSwitched(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ItemCommanded(Event):
-    """An item of the mission is due that equipment, or another part of the autopilot, carries out."""
+    """A mission item is due that equipment or another part of the autopilot executes."""
 
     index: int
 
@@ -242,7 +242,7 @@ class BatteryWarning(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AidChanged(Event):
-    """Something that the flight leans on was lost, or is back `after_s` seconds."""
+    """An aid of the flight was lost, or is available again after `after_s` seconds."""
 
     aid: Aid
     present: bool
@@ -256,7 +256,7 @@ class NavigationLost(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crashed(Event):
-    """The vehicle lies still, far from the attitude it should have."""
+    """The vehicle does not move, and its attitude is far from the setpoint."""
 
     angle_error_deg: float
     acceleration_m_s2: float
@@ -264,21 +264,21 @@ class Crashed(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AirspeedChanged(Event):
-    """The airspeed sensor was given up in flight, or is used again."""
+    """The airspeed sensor was disabled in flight, or is used again."""
 
     valid: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RebootRequested(Event):
-    """A client asked for a reboot and it may happen (disarmed)."""
+    """A client requested a reboot, and it is allowed (disarmed)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaunchDetected(Event):
-    """An aircraft's take-off begins: the launch was felt, or none is waited for.
+    """An aircraft's take-off begins: the launch was detected, or no detection is required.
 
-    `acceleration_m_s2` along the body, `delay_s` until power comes.
+    `acceleration_m_s2` along the body, `delay_s` until power is applied.
     """
 
     acceleration_m_s2: float
@@ -287,7 +287,7 @@ class LaunchDetected(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TakeoffStarted(Event):
-    """An aircraft's take-off has power: over ground so fast, to a height over home on a heading."""
+    """An aircraft's take-off has motor power: its ground speed, target height over home and heading."""
 
     ground_speed_m_s: float
     height_m: float
@@ -296,7 +296,7 @@ class TakeoffStarted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandingApproachStarted(Event):
-    """An aircraft is on its final approach, so high over home."""
+    """An aircraft is on its final approach, with its height over home."""
 
     height_m: float
 
@@ -312,13 +312,13 @@ class FlareStarted(Event):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LandingAborted(Event):
-    """A landing was broken off; the aircraft climbs to a height over home (NaN: as it was set before)."""
+    """A landing was aborted; the aircraft climbs to a height over home (NaN: the height set before)."""
 
     height_m: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AltitudeChanged(Event):
-    """A streamed setpoint asked an aircraft for another height over home."""
+    """A streamed setpoint commanded another height over home to an aircraft."""
 
     height_m: float

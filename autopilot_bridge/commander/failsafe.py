@@ -1,8 +1,8 @@
-"""Failsafes: conditions with a time-out and an action each, and which action wins.
+"""Failsafes: conditions, each with a timeout and an action, and the choice among the actions.
 
-PX4 keeps the commanded mode in mind and flies the strongest action while its condition lasts (some actions
-stay until a person chooses a mode). ArduPilot changes the mode once and does not change it back. Both read
-this monitor.
+PX4 keeps the commanded mode and flies the strongest action while its condition lasts (some actions stay until
+a client or pilot selects a mode). ArduPilot changes the mode once and does not change it back. Both use this
+monitor.
 """
 
 import math
@@ -25,9 +25,9 @@ from autopilot_bridge.commander.situation import Situation
 
 _LINKS: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST, FailsafeKind.MANUAL_LOST_LONG})
 _BY_ACCURATE_POSITION: Final = frozenset({FlightMode.MISSION, FlightMode.HOLD})
-"""Modes that a low accuracy of the position ends (PX4 COM_POS_LOW_ACT)."""
+"""Modes that end at a low accuracy of the position (PX4 COM_POS_LOW_ACT)."""
 _LATCHING: Final = frozenset({FailsafeKind.GCS_LOST, FailsafeKind.MANUAL_LOST, FailsafeKind.GEOFENCE})
-"""Kinds whose RETURN stays although the condition clears (PX4's ClearCondition::OnModeChangeOrDisarm)."""
+"""Kinds whose RETURN continues after the condition clears (PX4's ClearCondition::OnModeChangeOrDisarm)."""
 _NOT_OVERRIDABLE: Final = frozenset({FailsafeKind.POSITION_LOST})
 
 
@@ -57,11 +57,11 @@ class _Active:
 
 
 class FailsafeMonitor:
-    """Which failsafe conditions are up, since when, and what they ask for.
+    """Keeps the active failsafe conditions, their start times and their actions.
 
     Args:
-        policy: whether the commanded mode stays commanded during a failsafe (PX4) or is replaced by it; what
-            the modes need.
+        policy: whether the commanded mode is kept during a failsafe (PX4) or replaced by it, and the
+            requirements of the modes.
     """
 
     __slots__ = (
@@ -85,17 +85,17 @@ class FailsafeMonitor:
 
     @property
     def kinds(self) -> frozenset[FailsafeKind]:
-        """Conditions that are up, whatever their action."""
+        """The active conditions, whatever their action."""
         return frozenset(kind for kind, active in self._active.items() if active.present)
 
     @property
     def recovers_from_fence(self) -> bool:
-        """The geofence is broken, and what that asked for is flown."""
+        """The geofence is breached, and the vehicle flies the action of the breach."""
         active = self._active.get(FailsafeKind.GEOFENCE)
         return active is not None and active.present and active.action > FailsafeAction.WARN
 
     def update(self, situation: Situation, parameters: CommanderParameters) -> list[Event]:
-        """Judge every condition; returns what came up or cleared. `started` holds this update's new ones."""
+        """Evaluate every condition; returns the events. `started` holds the conditions that are new."""
         events: list[Event] = []
         self.started = []
         time_us = situation.time_us
@@ -109,8 +109,8 @@ class FailsafeMonitor:
             elif active is not None and present:
                 active.present = True
                 if kind is FailsafeKind.GEOFENCE and situation.fence_breaches != self._fence_breaches:
-                    self.started.append((kind, action))  # broken once more, farther out
-                active.action = action  # its parameter may have been changed meanwhile
+                    self.started.append((kind, action))  # breached again, farther out
+                active.action = action  # its parameter may have changed since
             elif active is not None:
                 if active.present:
                     events.append(FailsafeCleared(time_us=time_us, kind=kind, action=active.action))
@@ -122,7 +122,7 @@ class FailsafeMonitor:
         return events
 
     def action(self, time_us: int, parameters: CommanderParameters) -> FailsafeAction:
-        """The strongest action asked for now; a lost link holds for `action_delay_s` first."""
+        """The strongest action of all active conditions; a lost link holds for `action_delay_s` first."""
         strongest = FailsafeAction.NONE
         for kind, active in self._active.items():
             if active.overridden:
@@ -138,13 +138,13 @@ class FailsafeMonitor:
         return strongest
 
     def due(self, time_us: int, parameters: CommanderParameters) -> FailsafeAction:
-        """What is to be done now: while it lasts where the commanded mode is kept, else as it comes up."""
+        """The action to take now: while it lasts if the commanded mode is kept, else once at its start."""
         if self._keeps_mode:
             return self.action(time_us, parameters)
         action = max((action for _, action in self.started), default=FailsafeAction.NONE)
         self.started.clear()
         if action > FailsafeAction.WARN:
-            # what is up already and left to nobody goes before a weaker newcomer
+            # An active action that was not overridden takes precedence over a new, weaker one.
             action = max(action, self.action(time_us, parameters))
         return action
 
@@ -155,7 +155,9 @@ class FailsafeMonitor:
         return self.action(time_us, parameters) > FailsafeAction.WARN
 
     def override(self) -> None:
-        """A person chose a mode: what is up now is left to them until it clears and comes up again."""
+        """A client or pilot selected a mode: active failsafes are ignored until they clear and start
+        again.
+        """
         for kind in list(self._active):
             active = self._active[kind]
             if kind in _NOT_OVERRIDABLE or active.action >= FailsafeAction.TERMINATE:
@@ -232,20 +234,20 @@ class FailsafeMonitor:
 
     @staticmethod
     def _fence_action(situation: Situation, parameters: CommanderParameters) -> FailsafeAction:
-        """The geofence's action; far outside it is no use to fly back (ArduCopter)."""
+        """The geofence's action; far outside, ArduCopter lands instead of returning."""
         fence = parameters.fence
         if fence.action > FailsafeAction.WARN and 0.0 < fence.give_up_m < situation.fence_away_m:
             return FailsafeAction.LAND
         return fence.action
 
     def _exempt(self, kind: FailsafeKind, mode: FlightMode, exempt: frozenset[FlightMode]) -> bool:
-        """The mode flies on without that link."""
+        """The mode continues without that link."""
         if self._policy.failsafe_lasts and kind in self._active:
             return False
         return mode in exempt
 
     def _position_lost(self, situation: Situation, parameters: CommanderParameters) -> bool:
-        """Without a position for too long in a mode that needs one."""
+        """No position for too long in a mode that needs one."""
         if situation.position:
             self._position_lost_us = None
             return False
@@ -254,13 +256,13 @@ class FailsafeMonitor:
         if situation.time_us - self._position_lost_us < parameters.position_loss_s * 1e6:
             return False
         if not self._keeps_mode and FailsafeKind.POSITION_LOST in self._active:
-            return True  # the mode it has chosen needs no position any more
+            return True  # the failsafe's own mode needs no position
         if situation.mode is FlightMode.OFFBOARD:
             return situation.setpoint_needs_position
         return Need.POSITION in self._policy.mode_needs[situation.mode]
 
     def _tilted(self, situation: Situation, parameters: CommanderParameters) -> bool:
-        """Beyond the limits of roll or pitch for too long, in the air."""
+        """Roll or pitch beyond its limit for too long, in the air."""
         tilted = situation.airborne and (
             0.0 < parameters.attitude_roll_max_rad < abs(situation.roll_rad)
             or 0.0 < parameters.attitude_pitch_max_rad < abs(situation.pitch_rad)
@@ -279,7 +281,7 @@ def failsafe_mode(
     """The mode of an action, or the next safer one that can be flown now.
 
     Args:
-        sticks_valid: a pilot is there: in a stick mode they land it themselves (PX4 COM_POSCTL_NAVL 0).
+        sticks_valid: stick input is present: in a stick mode the pilot lands (PX4 COM_POSCTL_NAVL 0).
     """
     if action is FailsafeAction.DESCEND and situation.mode in STICK_MODES and sticks_valid:
         return FlightMode.ALTITUDE

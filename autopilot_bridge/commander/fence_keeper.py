@@ -1,4 +1,4 @@
-"""The geofence within the commander: from where it is watched, and what checks and failsafes know of it."""
+"""The geofence within the commander: the position that it checks, and its data for failsafes."""
 
 from collections.abc import Callable
 
@@ -14,13 +14,13 @@ from autopilot_bridge.navigation import layout as nav
 
 
 class FenceKeeper:
-    """Watches the geofence with the vehicle's position, and answers what lies within it.
+    """Checks the geofence with the vehicle's position, and answers which positions are inside.
 
     Args:
         watch: the state of the geofence.
-        context: what flight tasks see; they ask it what is within the fence.
-        health: knows the place the GPS receiver gives.
-        parameters: gives those in force.
+        context: the data that flight tasks see; they check through it whether a position is inside.
+        health: provides the position of the GPS receiver.
+        parameters: returns the present parameters.
     """
 
     __slots__ = ("_context", "_health", "_parameters", "_watch")
@@ -39,7 +39,7 @@ class FenceKeeper:
         context.within_fence = self.allows
 
     def update(self, situation: Situation) -> list[Event]:
-        """Look where the vehicle is and write what there is of the fence into `situation`; what to tell."""
+        """Check the vehicle's position and write the fence's state into `situation`; returns the events."""
         watch, context, parameters = self._watch, self._context, self._parameters()
         position: tuple[float, float, float] | None = None
         if parameters.by_gps:
@@ -67,10 +67,10 @@ class FenceKeeper:
         return told
 
     def allows(self, place_ned_m: Array) -> bool:
-        """A place is inside of what is on."""
+        """True when a position is inside all enabled walls."""
         north, east, down = place_ned_m.tolist()
         return self._watch.allows((north, east, down), self._context.frame, self._parameters())
 
     def return_place(self) -> Place | None:
-        """Where a breach leads to, when its action is to fly to a point; None: nowhere is known."""
+        """The target of a breach whose action is to fly to a point; None: not known."""
         return fence_return_place(self._context, self._watch, self._parameters())

@@ -1,4 +1,4 @@
-"""Where the geofence looks ahead to, and where a breach of it leads (ArduPlane's return point).
+"""The position ahead that the geofence checks, and the return point of a breach (ArduPlane).
 
 Source: PX4 1.16 GeofenceBreachAvoidance (GF_PREDICT), ArduPlane 4.6 fence.cpp (FENCE_RET_*).
 """
@@ -17,13 +17,13 @@ from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.return_place import nearest_rally
 from autopilot_bridge.navigation import layout as nav
 
-_RADII_AHEAD: Final = 2.0  # of an aircraft's loiter circle
+_RADII_AHEAD: Final = 2.0  # in radii of an aircraft's loiter circle
 _AIRCRAFT_DOWN_M: Final = 5.0
 _MOVING_M_S: Final = 0.5
 
 
 def place_ahead(context: FlightContext, place_ned_m: Point) -> Point:
-    """Where the vehicle can't help getting to: a multicopter brakes, an aircraft turns into a circle."""
+    """The position that the vehicle can't avoid reaching: a multicopter brakes, an aircraft circles."""
     north, east, down = place_ned_m
     v_north, v_east, v_down = context.nav[nav.VEL_NED_M_S].tolist()
     speed = math.hypot(v_north, v_east)
@@ -43,14 +43,14 @@ def place_ahead(context: FlightContext, place_ned_m: Point) -> Point:
 
 
 def _braking_m(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
-    """Way to a stop, the deceleration built up at limited jerk."""
+    """Stopping distance, with a deceleration that builds up at limited jerk."""
     return speed_m_s * (0.5 * speed_m_s / acceleration_m_s2 + acceleration_m_s2 / jerk_m_s3)
 
 
 def fence_return_place(
     context: FlightContext, watch: FenceWatch, parameters: FenceParameters
 ) -> Place | None:
-    """Where ArduPlane's GUIDED action goes: the return point, a rally point, home; None: nowhere is known."""
+    """The target of ArduPlane's GUIDED action: the return point, a rally point or home; None: not known."""
     home = context.home_ned_m
     if not math.isfinite(float(home.sum())) or context.frame is None:
         return None

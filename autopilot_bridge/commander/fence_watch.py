@@ -1,4 +1,4 @@
-"""Watching the geofence: which walls are on, which are broken, and when a breach is a new one.
+"""Monitoring of the geofence: which walls are enabled, which are breached, and when a breach is a new one.
 
 Source: PX4 1.16 navigator/geofence, ArduPilot 4.6 AC_Fence (check, backup fences, auto-enable).
 """
@@ -25,9 +25,9 @@ class FenceWatch:
 
     Attributes:
         geofence: the walls.
-        broken: those the vehicle is outside of now.
-        breaches: new breaches so far.
-        breach_time_us: of the newest.
+        broken: the walls that the vehicle is outside of now.
+        breaches: number of new breaches so far.
+        breach_time_us: time of the newest breach.
         distance_m: how far outside the height limits and the circle the vehicle is.
     """
 
@@ -59,15 +59,15 @@ class FenceWatch:
         self._home: Place | None = None
 
     def present(self, parameters: FenceParameters) -> bool:
-        """There is something to keep to, on or off."""
+        """A geofence is set up, enabled or not."""
         return parameters.has_cylinder or (parameters.shapes and self.geofence.uploaded)
 
     def enabled(self, parameters: FenceParameters) -> bool:
-        """It is on."""
+        """The geofence is enabled."""
         return bool(self.active(parameters))
 
     def active(self, parameters: FenceParameters) -> FenceType:
-        """The walls that count now."""
+        """The walls that are enabled now."""
         if not (parameters.enabled or self._auto_on):
             return _NOTHING
         return parameters.walls & ~self._off
@@ -77,12 +77,12 @@ class FenceWatch:
         self._off = self._off & ~walls if on else self._off | walls
 
     def forget_switches(self) -> None:
-        """Only the parameters say what is on."""
+        """Only the parameters decide which walls are enabled."""
         self._off = _NOTHING
         self._auto_on = False
 
     def allows(self, place_ned_m: Place, frame: LocalFrame | None, parameters: FenceParameters) -> bool:
-        """A place is inside of what is on."""
+        """True when a position is inside all enabled walls."""
         walls = self.active(parameters)
         return not self.geofence.broken(place_ned_m, self._home, frame, parameters, walls)
 
@@ -98,7 +98,7 @@ class FenceWatch:
         airborne: bool,
         landing: bool,
     ) -> list[Event]:
-        """Look where the vehicle is (None: not known, nothing changes); what there is to tell."""
+        """Check the vehicle's position (None: not known, nothing changes); returns the events."""
         events: list[Event] = []
         self._home = home_ned_m
         if not (self.broken or self._auto_on or self.present(parameters)):
@@ -135,7 +135,7 @@ class FenceWatch:
         return events
 
     def _backups(self, broken: FenceType, beyond: dict[FenceType, float]) -> FenceType:
-        """Walls broken once more, farther out."""
+        """Walls that are breached again, farther out."""
         again = _NOTHING
         for wall, limit_m in self._backup_m.items():
             if wall in broken and beyond.get(wall, 0.0) >= limit_m:
@@ -163,7 +163,7 @@ class FenceWatch:
         landing: bool,
         height_m: float,
     ) -> None:
-        """FENCE_AUTOENABLE."""
+        """Switch the geofence automatically (FENCE_AUTOENABLE)."""
         rule, before = parameters.auto_enable, self._auto_on
         if rule is AutoEnable.OFF or parameters.enabled:
             self._auto_on = False
@@ -186,7 +186,7 @@ class FenceWatch:
 def _beyond(
     place: Place, home: Place | None, parameters: FenceParameters, broken: FenceType
 ) -> dict[FenceType, float]:
-    """How far outside each broken wall of the cylinder a place is, m."""
+    """How far outside each breached wall of the cylinder a position is, m."""
     if home is None:
         return {}
     height_m = home[2] - place[2]

@@ -21,7 +21,7 @@ _NOTHING: Final[tuple[Event, ...]] = ()
 
 
 class PhaseWatch:
-    """Compares the phase of the task being flown with what it was 20 ms ago."""
+    """Compares the phase of the task being flown with the phase 20 ms before."""
 
     __slots__ = ("_phase", "_task")
 

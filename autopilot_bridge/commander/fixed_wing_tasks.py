@@ -71,16 +71,16 @@ class FixedWingTasks:
 
     @property
     def asks_attitude(self) -> bool:
-        """The offboard stream asks for positions, velocities or attitudes."""
+        """The offboard stream commands positions, velocities or attitudes."""
         return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
 
     @property
     def follows_thrust(self) -> bool:
-        """Guided flying follows attitudes."""
+        """Guided flight follows attitude setpoints."""
         return self.guided.kind is GuidedKind.ATTITUDE
 
     def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
-        """The task a mode starts with."""
+        """The initial task of a mode."""
         manual = _MANUAL.get(mode)
         if manual is not None:
             return ManualTask(manual)
@@ -109,28 +109,28 @@ class FixedWingTasks:
         return LoiterTask()
 
     def hold(self) -> FlightTask:
-        """Circle here."""
+        """Circle at the present position."""
         return LoiterTask()
 
     def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
-        """Take off straight ahead; the heading is that of runway or launcher."""
+        """Take off straight ahead; the heading is that of the runway or launcher."""
         known = bool(np.isfinite(place.ned_m[0:2]).all())
         return TakeoffTask(height_m, place_ned_m=place.ned_m if known else None)
 
     def hold_after_takeoff(self, task: FlightTask | None) -> FlightTask:
-        """Circle at the place and the height the take-off was to reach."""
+        """Circle at the target position and height of the take-off."""
         return LoiterTask(task.place_ned_m) if isinstance(task, TakeoffTask) else LoiterTask()
 
     def reposition(self, place: Place) -> FlightTask:
-        """Fly to a place and circle there."""
+        """Fly to a position and circle there."""
         return LoiterTask(place.ned_m, place.radius_m, place.speed_m_s)
 
     def guide_to(self, context: FlightContext, place: Place) -> None:
-        """Give the guided task a place to circle at."""
+        """Set the position at which the guided task circles."""
         self.guided.set_position(context, place.ned_m, radius_m=place.radius_m, airspeed_m_s=place.speed_m_s)
 
     def orbit(self, circle: Circle) -> FlightTask:
-        """Circle around a place."""
+        """Circle around a position."""
         radius_m = circle.radius_m
         if not circle.clockwise:
             radius_m = -(abs(self._context.fixed_wing.loiter_radius_m) if radius_m is None else radius_m)
@@ -145,7 +145,7 @@ class FixedWingTasks:
         return isinstance(task, LandTask | DescendTask | ReturnTask | MissionTask)
 
     def wants_up(self, context: FlightContext) -> bool:
-        """A take-off is under way, or power is asked for."""
+        """A take-off is in progress, or power is commanded."""
         setpoint = context.setpoint
         if context.phase is FlightPhase.TAKEOFF:
             return True
@@ -155,11 +155,11 @@ class FixedWingTasks:
         return math.isnan(throttle) or throttle > _LIFTING_THROTTLE
 
     def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
-        """Phases of take-off and landing, wherever in a plan or a return they are flown."""
+        """Phases of take-off and landing, also when they are part of a plan or a return."""
         return self._phases.update(_flown_by(task), context)
 
     def distance_to(self, item: MissionItem, context: FlightContext) -> float:
-        """Horizontal, from the place of a waypoint or a circle."""
+        """Horizontal distance from the position of a waypoint or a circle."""
         target = target_of(item, context) if is_waypoint(item) else None
         if target is None:
             return math.nan
@@ -167,7 +167,7 @@ class FixedWingTasks:
         return math.hypot(north_m - float(target[0]), east_m - float(target[1]))
 
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
-        """The circle being flown, once it is captured, whatever task it belongs to."""
+        """The circle being flown, once it is captured, in any task."""
         loiter = _loiter_of(task)
         if loiter is None or not loiter.circling:
             return None
@@ -175,7 +175,7 @@ class FixedWingTasks:
         return CircleFlown(loiter.radius_m, north_m, east_m, down_m)
 
     def speed_kind(self, kind: int) -> SpeedKind:
-        """PX4's aircraft take any speed for an airspeed; ArduPlane knows a ground speed too."""
+        """PX4's aircraft use any speed as an airspeed; ArduPlane has a ground speed too."""
         if kind == SpeedKind.GROUND_SPEED and self._policy.ground_speed_apart:
             return SpeedKind.GROUND_SPEED
         return SpeedKind.AIRSPEED
@@ -183,7 +183,7 @@ class FixedWingTasks:
     def with_speeds(
         self, parameters: FixedWingFlightParameters, speeds_m_s: Mapping[SpeedKind, float]
     ) -> Any:
-        """The cruising airspeed, within the limits; a least ground speed is not flown."""
+        """The cruising airspeed, within the limits; a minimum ground speed is not flown."""
         wanted = speeds_m_s.get(SpeedKind.AIRSPEED)
         if wanted is None:
             return parameters
@@ -192,7 +192,7 @@ class FixedWingTasks:
 
 
 def _flown_by(task: FlightTask | None) -> FlightTask | None:
-    """The task that flies for a plan or a return, else the task itself."""
+    """The task that a plan or a return runs, else the task itself."""
     while task is not None and isinstance(task, (MissionTask, ReturnTask)):
         task = task.sub_task
     return task

@@ -19,7 +19,7 @@ Place = tuple[float, float, float]
 
 
 class Geofence:
-    """Says whether a place is outside. Plans that make no sense are ignored, shape by shape.
+    """Decides whether a position is outside. Invalid shapes of a plan are ignored one by one.
 
     Args:
         plan: the store of the uploaded fence.
@@ -45,7 +45,7 @@ class Geofence:
         return self._plan.version
 
     def return_point(self, frame: LocalFrame) -> Point | None:
-        """Where ArduPlane goes back to: the plan's return point, else the middle of its first inclusion."""
+        """ArduPlane's return point: that of the plan, else the centre of its first inclusion."""
         self._compile(frame)
         if self._return_point is not None:
             return self._return_point
@@ -69,10 +69,10 @@ class Geofence:
         parameters: FenceParameters,
         walls: FenceType,
     ) -> FenceType:
-        """Which of `walls` a place is outside of; none for a place that is not known.
+        """The walls among `walls` that a position is outside of; none for an unknown position.
 
-        Every exclusion shape must be kept out of; of several inclusion shapes one is enough, or all must be
-        kept, as the parameters say.
+        A position must be outside every exclusion shape; it must be inside one or inside all of the inclusion
+        shapes, as the parameters define.
         """
         north_m, east_m, down_m = place_ned_m
         broken = FenceType(0)

@@ -1,4 +1,4 @@
-"""What a pilot may tune about the geofence, in neutral names."""
+"""The geofence parameters of a pilot, in neutral names."""
 
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
@@ -21,11 +21,11 @@ ALL_FENCES: Final = FenceType.HEIGHT_MAX | FenceType.CIRCLE | FenceType.SHAPES |
 
 
 class AutoEnable(IntEnum):
-    """FENCE_AUTOENABLE: when the fence switches itself on and off."""
+    """FENCE_AUTOENABLE: when the fence is switched automatically."""
 
     OFF = 0
     ON_TAKEOFF = 1
-    ON_TAKEOFF_KEPT = 2  # only the floor goes off for a landing
+    ON_TAKEOFF_KEPT = 2  # for a landing only the floor is switched off
     WHEN_ARMED = 3
 
 
@@ -34,26 +34,28 @@ class FenceParameters:
     """The geofence.
 
     Attributes:
-        enabled: it counts.
-        action: what a breach does.
-        radius_m, height_max_m: cylinder around home; 0 switches that wall off.
-        floor: there is a smallest height, once the vehicle was above it, until it lands.
+        enabled: the geofence is enabled.
+        action: the action of a breach.
+        radius_m, height_max_m: cylinder around home; 0 disables that wall.
+        floor: there is a minimum height, from the time when the vehicle was above it until it lands.
         height_min_m: that height over home.
-        shapes: uploaded polygons and circles count.
-        margin_m: kept from the height limits by returns.
-        inclusions_join: one inclusion shape is enough (PX4; FENCE_OPTIONS bit 1); else all must be kept.
-        predicts: a breach that can't be avoided any more is one (PX4 GF_PREDICT).
-        by_gps: the receiver's position counts, not the filter's (PX4 GF_SOURCE).
-        locks_mode: no other mode while what a breach has begun is flown (FENCE_OPTIONS bit 0).
-        auto_enable: when it switches itself.
+        shapes: uploaded polygons and circles are used.
+        margin_m: distance that returns keep from the height limits.
+        inclusions_join: being inside one inclusion shape is enough (PX4; FENCE_OPTIONS bit 1); else inside
+            all.
+        predicts: a breach that can't be avoided any more counts as a breach (PX4 GF_PREDICT).
+        by_gps: the receiver's position is checked, not the filter's (PX4 GF_SOURCE).
+        locks_mode: no other mode is accepted while the action of a breach is flown (FENCE_OPTIONS bit 0).
+        auto_enable: when it is switched automatically.
         give_up_m: farther outside the vehicle lands at once (ArduCopter); 0: never.
-        backup_radius_m, backup_height_m: so much farther out a wall counts as broken once more
-            (ArduPilot); 0: once is enough.
+        backup_radius_m, backup_height_m: distance farther out at which a wall counts as breached again
+            (ArduPilot); 0: only once.
         return_to_rally: the action FENCE_POINT goes to a rally point (FENCE_RET_RALLY).
-        return_height_m: at this height over home; 0: between the height limits (FENCE_RET_ALT).
-        counts_breaches: breaches are told wall by wall (ArduPilot).
-        walls: those that are set up, whether or not the fence is on.
-        has_cylinder: there are some besides the uploaded shapes.
+        return_height_m: height of the action FENCE_POINT over home; 0: between the height limits
+            (FENCE_RET_ALT).
+        counts_breaches: breaches are reported for each wall (ArduPilot).
+        walls: the walls that are set up, whether or not the fence is enabled.
+        has_cylinder: there are walls besides the uploaded shapes.
     """
 
     enabled: bool = False
@@ -89,11 +91,11 @@ class FenceParameters:
         ):
             if there:
                 walls |= wall
-        # asked for ten times a second
+        # used ten times a second
         object.__setattr__(self, "walls", walls)
         object.__setattr__(self, "has_cylinder", bool(walls & ~FenceType.SHAPES))
 
     @property
     def bounds_targets(self) -> bool:
-        """Places to fly to must lie inside: always (ArduPilot), or where a breach does something (PX4)."""
+        """Target positions must be inside: always (ArduPilot), or if a breach has an action (PX4)."""
         return self.counts_breaches or self.action > FailsafeAction.WARN

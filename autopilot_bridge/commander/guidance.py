@@ -1,4 +1,4 @@
-"""Requests that send the vehicle somewhere: take off, go there, circle, return, fly the mission, pause."""
+"""Requests for movement: take off, fly to a position, circle, return, fly the mission, pause."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ _MIN_TAKEOFF_M: Final = 0.3
 
 
 class Guidance:
-    """Carries out requests for movement. Positions are local NED metres; NaN: as it is."""
+    """Executes requests for movement. Positions are local NED metres; NaN: unchanged."""
 
     def __init__(self, commander: Commander) -> None:
         self._commander = commander
         self._vehicle = commander.vehicle
         self._parameters: Any = commander.context.parameters
-        self._speeds_m_s: dict[SpeedKind, float] = {}  # commanded ones, over the parameters'
+        self._speeds_m_s: dict[SpeedKind, float] = {}  # commanded speeds, which replace the parameters'
 
     def set_parameters(self, parameters: Any) -> None:
-        """New flight parameters (a pilot changed one); a commanded speed lasts on."""
+        """Use new flight parameters (a parameter has changed); commanded speeds stay."""
         if parameters != self._parameters:
             self._parameters = parameters
             self._apply_speeds()
 
     def forget_speed(self) -> None:
-        """Back to the parameters' speeds; a commanded speed lasts until the next mode."""
+        """Return to the parameters' speeds; a commanded speed lasts until the next mode."""
         self._speeds_m_s.clear()
         self._apply_speeds()
 
     def _apply_speeds(self) -> None:
-        """The flight parameters with the commanded speeds in place of theirs."""
+        """Set the flight parameters with the commanded speeds instead of their own."""
         changed = self._vehicle.with_speeds(self._parameters, self._speeds_m_s)
         self._commander.context.parameters = changed
 
@@ -55,9 +55,9 @@ class Guidance:
     ) -> Verdict:
         """Climb to a height; NaN: the parameter's height over home.
 
-        Where taking off is a mode of its own it can be commanded before arming. Elsewhere the vehicle must
-        be armed, on the ground, in the mode that flies to places. An aircraft circles around the place when
-        it is up.
+        If take-off is a separate mode, it can be commanded before arming. Otherwise the vehicle must be
+        armed, on the ground, in the mode that flies to positions. An aircraft circles around the position
+        after the climb.
         """
         commander = self._commander
         height_m = self._height_over_home(down_m)
@@ -89,7 +89,7 @@ class Guidance:
         return ACCEPTED
 
     def land(self) -> Verdict:
-        """Land here."""
+        """Land at the present position."""
         return self._commander.set_mode(FlightMode.LAND)
 
     def return_home(self) -> Verdict:
@@ -97,7 +97,7 @@ class Guidance:
         return self._commander.set_mode(FlightMode.RETURN)
 
     def go_around(self, height_m: float = math.nan) -> Verdict:
-        """Break off a landing, climb to a height over home (NaN: the parameter's) and come back to it."""
+        """Abort a landing, climb to a height over home (NaN: the parameter's) and fly the approach again."""
         task = self._commander.tasks.task
         if isinstance(task, GoAroundTask) and task.go_around(self._commander.context, height_m):
             return ACCEPTED
@@ -113,13 +113,13 @@ class Guidance:
         speed_m_s: float = math.nan,
         radius_m: float = math.nan,
     ) -> Verdict:
-        """Fly to a place and hold there; changes to the mode that does so.
+        """Fly to a position and hold there, in the mode for it.
 
         Args:
-            north_m, east_m, down_m: the place.
+            north_m, east_m, down_m: the position.
             yaw_rad: heading there (multicopter).
-            speed_m_s: on the way; not positive: the parameter's.
-            radius_m: of an aircraft's circle there, positive clockwise; 0 or NaN: the parameter's.
+            speed_m_s: speed on the way; not positive: the parameter's.
+            radius_m: radius of an aircraft's circle there, positive clockwise; 0 or NaN: the parameter's.
         """
         commander = self._commander
         fence, frame = commander.parameters.fence, commander.context.frame
@@ -156,7 +156,7 @@ class Guidance:
         yaw_rate_rad_s: float = math.nan,
         speed_m_s: float | None = None,
     ) -> None:
-        """Give the guided task (the one `guided` returned) a place to fly to."""
+        """Give the guided task (the one `guided` returned) a target position."""
         place = Place(
             ned_m=np.array(position_ned_m),
             yaw_rad=yaw_rad,
@@ -166,14 +166,14 @@ class Guidance:
         self._vehicle.guide_to(self._commander.context, place)
 
     def go_to_place(self, place: Place | None) -> None:
-        """Have the guided task fly to a place, in GUIDED; None: it stays as it is."""
+        """Make the guided task fly to a position, in GUIDED; None: no change."""
         if place is not None and self.guided() is not None:
             self._vehicle.guide_to(self._commander.context, place)
 
     def guided(self) -> Any:
-        """The task that flies guided targets, made the active one; None where there is nothing to guide.
+        """Activate and return the task that flies guided targets; None if there is none to guide.
 
-        On the ground only a takeoff is flown (ArduPilot).
+        On the ground only a take-off is flown (ArduPilot).
         """
         commander = self._commander
         if not commander.airborne or commander.mode not in (FlightMode.GUIDED, FlightMode.GUIDED_NOGPS):
@@ -185,12 +185,12 @@ class Guidance:
         return guided
 
     def change_heading(self, heading_rad: float, *, course: bool, acceleration_m_s2: float) -> Verdict:
-        """Fly a heading, or a course over ground, until something else is asked for (GUIDED).
+        """Fly a heading, or a course over ground, until another command (GUIDED).
 
         Args:
             heading_rad: clockwise from north.
-            course: over ground; else through the air.
-            acceleration_m_s2: lateral, of the turn; not positive, or NaN: the bank limit's.
+            course: course over ground; else heading through the air.
+            acceleration_m_s2: lateral acceleration of the turn; not positive, or NaN: that of the bank limit.
         """
         guided = self._guided_aircraft()
         if guided is None:
@@ -200,7 +200,7 @@ class Guidance:
         return ACCEPTED
 
     def change_altitude(self, down_m: float, *, rate_m_s: float) -> Verdict:
-        """Go to a height (GUIDED); a rate of NaN: as fast as the limits allow."""
+        """Fly to a height (GUIDED); a rate of NaN: as fast as the limits allow."""
         guided = self._guided_aircraft()
         if guided is None:
             return failed(Reason.WRONG_MODE)
@@ -208,7 +208,7 @@ class Guidance:
         return ACCEPTED
 
     def change_airspeed(self, airspeed_m_s: float, *, acceleration_m_s2: float) -> Verdict:
-        """Go to an equivalent airspeed (GUIDED); an acceleration of NaN: as the limits allow."""
+        """Fly an equivalent airspeed (GUIDED); an acceleration of NaN: as the limits allow."""
         guided = self._guided_aircraft()
         if guided is None:
             return failed(Reason.WRONG_MODE)
@@ -216,7 +216,7 @@ class Guidance:
         return ACCEPTED
 
     def _guided_aircraft(self) -> Any:
-        """The guided task of an aircraft, whose heading, height and airspeed can be changed one by one."""
+        """The guided task of an aircraft, whose heading, height and airspeed can be changed separately."""
         guided = self.guided() if self._commander.mode is FlightMode.GUIDED else None
         return guided if hasattr(guided, "set_heading") else None
 
@@ -230,7 +230,7 @@ class Guidance:
         east_m: float,
         down_m: float,
     ) -> Verdict:
-        """Circle around a place; a negative radius circles counter-clockwise."""
+        """Circle around a position; a negative radius circles counter-clockwise."""
         commander = self._commander
         circle = Circle(
             centre_ned_m=_place(north_m, east_m, down_m).ned_m,
@@ -253,7 +253,7 @@ class Guidance:
         return verdict
 
     def change_speed(self, speed_m_s: float, *, kind: int) -> None:
-        """DO_CHANGE_SPEED, until the next mode; `kind` is a `SpeedKind`; <= 0: the parameters' again."""
+        """DO_CHANGE_SPEED, until the next mode; `kind` is a `SpeedKind`; <= 0: the parameters' speed."""
         if not math.isfinite(speed_m_s):
             return
         if speed_m_s <= 0.0:
@@ -268,14 +268,14 @@ class Guidance:
         self._tell_speed(changed, speed)
 
     def _tell_speed(self, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Have the task being flown, and one put aside for a pause, take the speed."""
+        """Set the speed of the task being flown, and of one that is paused."""
         tasks = self._commander.tasks
         for task in (tasks.task, tasks.paused):
             if isinstance(task, SpeedTask):
                 task.change_speed(self._commander.context, kind, speed_m_s)
 
     def turn(self, turn: Turn) -> None:
-        """Point the nose somewhere, holding the place (CONDITION_YAW in GUIDED)."""
+        """Point the nose in a direction while holding the position (CONDITION_YAW in GUIDED)."""
         commander = self._commander
         if not commander.airborne or commander.mode is not commander.policy.reposition_mode:
             return
@@ -295,7 +295,7 @@ class Guidance:
         return verdict
 
     def pause(self) -> Verdict:
-        """Hold here for now, without a mode change."""
+        """Hold the present position without a mode change."""
         tasks = self._commander.tasks
         if self._commander.mode not in (FlightMode.MISSION, FlightMode.GUIDED):
             return failed(Reason.WRONG_MODE)
@@ -306,7 +306,7 @@ class Guidance:
         return ACCEPTED
 
     def resume(self) -> Verdict:
-        """Go on with what was paused."""
+        """Continue the paused task."""
         tasks = self._commander.tasks
         if self._commander.mode not in (FlightMode.MISSION, FlightMode.GUIDED):
             return failed(Reason.WRONG_MODE)
@@ -324,11 +324,11 @@ class Guidance:
 
 
 def _within(value: float, limit: float) -> float:
-    """`value`, or NaN for what is not finite or beyond any sense."""
+    """`value`, or NaN if it is not finite or beyond the limit."""
     return value if abs(value) <= limit else math.nan
 
 
 def _place(north_m: float, east_m: float, down_m: float, **how: Any) -> Place:
-    """A place; coordinates beyond any sense become NaN."""
+    """A position; coordinates that are too large become NaN."""
     ned_m = np.array([_within(value, _MAX_DISTANCE_M) for value in (north_m, east_m, down_m)])
     return Place(ned_m=ned_m, **how)

@@ -1,8 +1,8 @@
-"""Which sensors and which parts of the navigation solution may be trusted right now.
+"""Which sensors and which parts of the navigation solution can be trusted now.
 
 The commander's checks, failsafes and SYS_STATUS all read one `VehicleHealth`. `HealthMonitor` fills it from
-the newest sensor readings (late, frozen or impossible samples count as broken) and from what the navigation
-filter says of itself.
+the newest sensor readings (late, frozen or impossible samples count as failed) and from the state that the
+navigation filter reports.
 """
 
 import math
@@ -22,7 +22,7 @@ _STALE_US: Final = {
     "battery": 3_000_000,
     "airspeed": 1_000_000,
 }
-_FROZEN_SAMPLES: Final = 20  # judged at 10 Hz: the same for 2 s is frozen (PX4's DataValidator)
+_FROZEN_SAMPLES: Final = 20  # at 10 Hz: unchanged for 2 s counts as frozen (PX4's DataValidator)
 _MAX_RATE_RAD_S: Final = 40.0
 _MAX_ACCEL_M_S2: Final = 250.0
 _PRESSURE_PA: Final = (10_000.0, 120_000.0)
@@ -34,7 +34,7 @@ _FIX_3D: Final = 3
 
 
 class NavigationStatus(Protocol):
-    """What the commander asks the navigation filter about itself."""
+    """The state of the navigation filter that the commander reads."""
 
     @property
     def attitude_valid(self) -> bool: ...
@@ -54,7 +54,7 @@ class NavigationStatus(Protocol):
 
 @dataclass(slots=True)
 class VehicleHealth:
-    """Health of one vehicle; every flag is False until proven."""
+    """Health of one vehicle; every flag is False until a check has passed."""
 
     gyro: bool = False
     accelerometer: bool = False
@@ -77,7 +77,7 @@ class VehicleHealth:
 
 
 class _Watch:
-    """Freshness of one sensor: late samples and values that never change."""
+    """Freshness of one sensor: detects late samples and values that never change."""
 
     __slots__ = ("_equal", "_last", "_last_time_us", "_may_repeat", "_reading", "_stale_us")
 
@@ -102,13 +102,13 @@ class _Watch:
 
 
 class HealthMonitor:
-    """Keeps a `VehicleHealth` up to date.
+    """Updates a `VehicleHealth`.
 
     Args:
         readings: the vehicle's newest sensor samples.
-        navigation: the filter's own judgement.
+        navigation: the filter's own state.
         airspeed: the vehicle has, and needs, a pitot tube.
-        gps_may_repeat: fixes that are the same to the last digit are no sign of a receiver that is stuck.
+        gps_may_repeat: fixes with identical values do not count as a frozen receiver.
     """
 
     __slots__ = (
@@ -144,7 +144,7 @@ class HealthMonitor:
         self._rangefinder = _Watch(readings.rangefinder, _STALE_US["barometer"])
 
     def gps_position_ned(self, frame: LocalFrame | None) -> tuple[float, float, float] | None:
-        """Where the receiver says the vehicle is, local NED; None while it doesn't know."""
+        """The receiver's position in local NED; None while it has none."""
         if frame is None or not self.health.gps:
             return None
         gps = self._readings.gps.values
@@ -156,7 +156,7 @@ class HealthMonitor:
         return frame.ned_from_geodetic(lat, lon, alt)
 
     def update(self, time_us: int) -> None:
-        """Judge every source; called by the commander at 10 Hz."""
+        """Check every source; called by the commander at 10 Hz."""
         health, readings, navigation = self.health, self._readings, self.navigation
         imu_alive = self._imu.alive(time_us)
         values = readings.imu.values.tolist()

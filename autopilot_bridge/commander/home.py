@@ -1,4 +1,4 @@
-"""Home: where the vehicle returns to, and the reference of relative altitudes."""
+"""Home: the position to return to, and the reference of relative altitudes."""
 
 import math
 from collections.abc import Callable
@@ -13,16 +13,16 @@ _SETTLING_M: Final = 0.1
 
 
 class Home:
-    """Keeps home as a geodetic position and mirrors it into the flight context's local frame.
+    """Stores home as a geodetic position and copies it into the flight context's local frame.
 
     Args:
-        context: where it is mirrored into.
-        emit: takes the news of every new home.
+        context: gets the local copy.
+        emit: receives the event of every new home.
 
     Attributes:
         position: home, or None while unknown.
         yaw_rad: heading there; NaN when a client set home.
-        commanded: a client chose it: arming does not move it.
+        commanded: a client has set it: arming does not move it.
     """
 
     __slots__ = ("_context", "_emit", "_frame", "commanded", "position", "yaw_rad")
@@ -36,26 +36,26 @@ class Home:
         self.commanded = False
 
     def follow_frame(self) -> None:
-        """Keep the local copy right when the filter's origin moves."""
+        """Update the local copy when the filter's origin moves."""
         if self._context.frame is not self._frame and self.position is not None:
             self._mirror()
 
     def command(self, lat_deg: float, lon_deg: float, alt_m: float) -> bool:
-        """A client chose home; False when that can't be."""
+        """A client has set home; False for an invalid position."""
         if not self._set(lat_deg, lon_deg, alt_m):
             return False
         self.commanded = True
         return True
 
     def command_here(self) -> bool:
-        """A client wants home where the vehicle is, for now; False while that is not known."""
+        """A client sets home to the vehicle's position, until arming; False while that is not known."""
         if not self._set_here():
             return False
         self.commanded = False
         return True
 
     def begin_flight(self) -> None:
-        """At arming home is here, unless a client chose it."""
+        """At arming, set home to the vehicle's position, unless a client has set it."""
         if not self.commanded:
             self._set_here()
 
@@ -70,7 +70,7 @@ class Home:
         return self._set(lat_deg, lon_deg, alt_m, yaw_rad=float(context.nav[nav.EULER_RAD][2]))
 
     def _set(self, lat_deg: float, lon_deg: float, alt_m: float, *, yaw_rad: float = math.nan) -> bool:
-        """Home is there; False for no place on Earth, or while the vehicle does not know its own."""
+        """Set home; False for an invalid position, or while the vehicle's own position is not known."""
         if self._context.frame is None:
             return False
         try:
@@ -83,11 +83,11 @@ class Home:
         return True
 
     def settle(self, *, settled: bool, once_a_second: bool) -> None:
-        """Before arming: home where the vehicle stands.
+        """Before arming: set home to the vehicle's position.
 
         Args:
-            settled: the position is taken as good; until then home follows it: the altitude moves.
-            once_a_second: this is a moment to follow.
+            settled: the position is accurate; until then home follows it, because the altitude still changes.
+            once_a_second: home may be updated in this call.
         """
         if self.commanded:
             return
@@ -95,7 +95,7 @@ class Home:
             self._set_here()
 
     def _moved_m(self) -> float:
-        """Distance of the vehicle from home, vertical distance included; infinite while unknown."""
+        """Distance of the vehicle from home, vertical distance included; infinite while not known."""
         if self.position is None:
             return math.inf
         distance_m = math.dist(self._context.nav[nav.POS_NED_M].tolist(), self._context.home_ned_m.tolist())

@@ -1,4 +1,4 @@
-"""The mode a short loss of the radio has replaced, to come back to (ArduPlane)."""
+"""The mode that a short loss of the radio has replaced, to be restored later (ArduPlane)."""
 
 from collections.abc import Iterable
 
@@ -7,10 +7,10 @@ from autopilot_bridge.commander.modes import FlightMode
 
 
 class ModeMemory:
-    """Remembers the mode from before a failsafe of the radio until something else decides.
+    """Stores the mode from before a failsafe of the radio until another decision replaces it.
 
     Args:
-        active: the flavour comes back to it; else nothing is ever remembered.
+        active: the flavour restores the mode; else nothing is stored.
     """
 
     __slots__ = ("_active", "_mode")
@@ -20,17 +20,17 @@ class ModeMemory:
         self._mode: FlightMode | None = None
 
     def note(self, started: Iterable[tuple[FailsafeKind, FailsafeAction]], mode: FlightMode) -> None:
-        """Failsafes came up in a mode; only a first, short loss of the radio is undone."""
+        """Failsafes started in a mode; only a first, short loss of the radio is reversed later."""
         for kind, action in started:
             if action > FailsafeAction.WARN:
                 self._mode = mode if self._active and kind is FailsafeKind.MANUAL_LOST else None
 
     def forget(self) -> None:
-        """Somebody chose a mode."""
+        """A client or pilot has selected a mode."""
         self._mode = None
 
     def recall(self, told: Iterable[Event]) -> FlightMode | None:
-        """The mode to come back to now that the radio is heard again; None: stay."""
+        """The mode to restore because the radio is back; None: no change."""
         for event in told:
             if isinstance(event, FailsafeCleared) and event.kind is FailsafeKind.MANUAL_LOST:
                 mode, self._mode = self._mode, None

@@ -1,6 +1,6 @@
-"""Flight modes, flavour-neutral, and what each needs before it can be flown.
+"""Flight modes, flavour-neutral, and the requirements of each mode.
 
-Both firmwares name and number their modes differently; what a mode flies is much the same. A flavour maps its
+Both firmwares name and number their modes differently, but fly almost the same in them. A flavour maps its
 `custom_mode` numbers to these.
 """
 
@@ -11,7 +11,7 @@ from typing import Final
 
 
 class FlightMode(Enum):
-    """What the vehicle is flying, or is told to fly."""
+    """The mode that the vehicle flies, or that is commanded."""
 
     MANUAL = "manual"  # PX4 MANUAL; on a multicopter flown like STABILIZED
     STABILIZED = "stabilized"  # PX4 STABILIZED, ArduPilot STABILIZE
@@ -50,7 +50,7 @@ class FlightMode(Enum):
 
 
 class Need(Flag):
-    """What must be there for a mode to be flown."""
+    """A requirement of a mode."""
 
     NONE = 0
     ATTITUDE = auto()
@@ -120,7 +120,7 @@ STICK_MODES: Final = frozenset(
         FlightMode.AUTOTUNE,
     }
 )
-"""Modes whose setpoint is the pilot's sticks."""
+"""Modes flown by the pilot's sticks."""
 
 GUIDED_MODES: Final = frozenset({FlightMode.OFFBOARD, FlightMode.GUIDED, FlightMode.GUIDED_NOGPS})
 """Modes that follow streamed setpoints."""

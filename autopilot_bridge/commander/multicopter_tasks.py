@@ -62,16 +62,16 @@ class MulticopterTasks:
 
     @property
     def asks_attitude(self) -> bool:
-        """The offboard stream asks for positions, velocities or attitudes."""
+        """The offboard stream commands positions, velocities or attitudes."""
         return self.offboard.kind in (OffboardKind.TRAJECTORY, OffboardKind.ATTITUDE)
 
     @property
     def follows_thrust(self) -> bool:
-        """Guided flying follows attitudes."""
+        """Guided flight follows attitude setpoints."""
         return self.guided.kind is GuidedKind.ATTITUDE
 
     def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
-        """The task a mode starts with."""
+        """The initial task of a mode."""
         context, policy = self._context, self._policy
         parameters: Any = context.parameters
         manual = _MANUAL.get(mode)
@@ -112,7 +112,7 @@ class MulticopterTasks:
         return HoldTask()
 
     def hold(self) -> FlightTask:
-        """Brake and stay here."""
+        """Brake and hold the position."""
         return HoldTask()
 
     def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
@@ -120,15 +120,15 @@ class MulticopterTasks:
         return TakeoffTask(height_m, yaw_rad=yaw_rad)
 
     def hold_after_takeoff(self, task: FlightTask | None) -> FlightTask:
-        """Hold the place where the climb was to end."""
+        """Hold the target position of the climb."""
         return HoldTask(task.place_ned_m) if isinstance(task, TakeoffTask) else HoldTask()
 
     def reposition(self, place: Place) -> FlightTask:
-        """Fly to a place and hold it."""
+        """Fly to a position and hold it."""
         return RepositionTask(place.ned_m, yaw_rad=place.yaw_rad, speed_m_s=place.speed_m_s)
 
     def guide_to(self, context: FlightContext, place: Place) -> None:
-        """Give the guided task a place to fly to."""
+        """Set the target position of the guided task."""
         self._target[:] = place.ned_m
         self.guided.set_position(
             context,
@@ -139,7 +139,7 @@ class MulticopterTasks:
         )
 
     def orbit(self, circle: Circle) -> FlightTask:
-        """Circle around a place."""
+        """Circle around a position."""
         speed = circle.speed_m_s
         if not circle.clockwise:
             parameters: Any = self._context.parameters
@@ -149,7 +149,7 @@ class MulticopterTasks:
         return OrbitTask(circle.centre_ned_m, circle.radius_m, speed, yaw_behaviour=yaw)
 
     def turn(self, context: FlightContext, active: FlightTask | None, turn: Turn) -> FlightTask | None:
-        """Point the nose somewhere, holding the place or going on with a streamed motion."""
+        """Point the nose in a direction while holding the position or continuing a streamed motion."""
         guided = self.guided
         kind = guided.kind if active is guided else GuidedKind.HOLD
         if kind in (GuidedKind.VELOCITY, GuidedKind.ACCELERATION, GuidedKind.TRAJECTORY):
@@ -163,30 +163,30 @@ class MulticopterTasks:
         return isinstance(task, LandTask | PrecisionLandTask | ReturnTask | MissionTask)
 
     def wants_up(self, context: FlightContext) -> bool:
-        """Whatever turns the motors faster than idle lifts."""
+        """True when the task would turn the motors faster than idle."""
         return bool(context.setpoint[sp.LEVEL] > sp.IDLE) or context.phase is FlightPhase.TAKEOFF
 
     def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
-        """Nothing: a multicopter's phases are modes."""
+        """No events: a multicopter's phases are modes."""
         return ()
 
     def distance_to(self, item: MissionItem, context: FlightContext) -> float:
-        """NaN: a multicopter stops there."""
+        """NaN: a multicopter stops at an item's position."""
         return math.nan
 
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
-        """The circle of an `OrbitTask`, once on it."""
+        """The circle of an `OrbitTask`, once the vehicle is on it."""
         if not isinstance(task, OrbitTask) or not task.circling:
             return None
         north_m, east_m, down_m = (float(value) for value in task.centre_ned_m)
         return CircleFlown(math.copysign(task.radius_m, task.velocity_m_s), north_m, east_m, down_m)
 
     def speed_kind(self, kind: int) -> SpeedKind:
-        """Climb, descent, and everything else the ground speed."""
+        """Climb and descent speeds; all other kinds are the ground speed."""
         return SpeedKind(kind) if kind in (SpeedKind.CLIMB, SpeedKind.DESCENT) else SpeedKind.GROUND_SPEED
 
     def with_speeds(self, parameters: FlightParameters, speeds_m_s: Mapping[SpeedKind, float]) -> Any:
-        """Cruise, return, climb and descend speeds; air and ground speed are one."""
+        """Cruise, return, climb and descend speeds; air and ground speed are the same."""
         changes: dict[str, Any] = {}
         if SpeedKind.GROUND_SPEED in speeds_m_s:
             cruise = min(speeds_m_s[SpeedKind.GROUND_SPEED], parameters.max_speed_m_s)

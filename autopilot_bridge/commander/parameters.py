@@ -1,4 +1,4 @@
-"""What a pilot may tune in the commander, in neutral names; flavours fill it from their own parameters."""
+"""The commander's parameters, in neutral names; flavours fill them from their own parameters."""
 
 import math
 from dataclasses import dataclass
@@ -11,31 +11,31 @@ from flightsim.checks import check_fields, require_finite
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommanderParameters:
-    """Time-outs, thresholds and actions of arming and failsafes.
+    """Timeouts, thresholds and actions of arming and failsafes.
 
     Attributes:
         offboard_loss_s: age of the last setpoint at which OFFBOARD counts as lost.
-        gcs_loss_s, manual_loss_s: the same for ground-station heartbeats and for sticks; 0 switches it off.
-        gcs_loss_exempt, manual_loss_exempt: commanded modes that fly on without that link.
-        stick_timeout_s: age at which stick input is forgotten.
-        action_delay_s: hold this long before a link failsafe acts, so that a person can step in.
-        battery_*_remaining: remaining fraction below which the level is reached; 0 switches it off.
-        battery_*_v: voltage below which the level is reached after `battery_timer_s`; 0 switches it off.
+        gcs_loss_s, manual_loss_s: the same for ground-station heartbeats and for sticks; 0 disables it.
+        gcs_loss_exempt, manual_loss_exempt: commanded modes that continue without that link.
+        stick_timeout_s: age at which stick input expires.
+        action_delay_s: time for which a link failsafe holds before it acts, so that the pilot can take over.
+        battery_*_remaining: remaining fraction below which the level is reached; 0 disables it.
+        battery_*_v: voltage below which the level is reached after `battery_timer_s`; 0 disables it.
         position_loss_s: how long the filter may be without a position before the failsafe acts.
-        position_accuracy_max_m: with a worse 1-sigma accuracy there is no position (twice and a half of it
+        position_accuracy_max_m: with a worse 1-sigma accuracy there is no position (2.5 times this value
             once there was one); infinite: never.
-        position_accuracy_low_m: worse than this a mission and a hold end; 0 switches it off.
-        manual_long_loss_*: a second stage of lost sticks (ArduPlane); 0 s switches it off.
-        attitude_roll_max_rad, attitude_pitch_max_rad: beyond them for `attitude_time_s` the attitude is
-            excessive; 0 switches it off.
+        position_accuracy_low_m: with a worse accuracy a mission and a hold end; 0 disables it.
+        manual_long_loss_*: a second stage of lost sticks (ArduPlane); 0 s disables it.
+        attitude_roll_max_rad, attitude_pitch_max_rad: beyond these for `attitude_time_s` the attitude is
+            excessive; 0 disables it.
         fence: the geofence.
-        disarm_preflight_s, disarm_landed_s: automatic disarming; 0 or less switches it off.
-        stick_override: moved sticks take over from automatic flight (PX4 COM_RC_OVERRIDE, bit 0).
-        stick_override_offboard: and from OFFBOARD (bit 1).
+        disarm_preflight_s, disarm_landed_s: automatic disarming; 0 or less disables it.
+        stick_override: moved sticks end automatic flight (PX4 COM_RC_OVERRIDE, bit 0).
+        stick_override_offboard: they also end OFFBOARD (bit 1).
         stick_override_threshold: stick travel, 0..1, that counts as moved.
         crash_check: a vehicle that has crashed is disarmed (FS_CRASH_CHECK).
-        follow_enabled: the mode that follows a target may be chosen (FOLL_ENABLE).
-        check_arming: False skips the arming checks that may be skipped.
+        follow_enabled: the mode that follows a target can be selected (FOLL_ENABLE).
+        check_arming: False skips the optional arming checks.
     """
 
     offboard_loss_s: float

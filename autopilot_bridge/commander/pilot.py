@@ -1,4 +1,4 @@
-"""What people send the vehicle: sticks and the heartbeats of ground stations, each with its age."""
+"""The pilot's input: sticks and the heartbeats of ground stations, each with its age."""
 
 import math
 from typing import Final
@@ -11,14 +11,14 @@ THROTTLE_HIGH: Final = -0.8  # above this the throttle stick is not down
 
 
 class PilotInput:
-    """Newest sticks and the time they came.
+    """Newest stick positions and their time of arrival.
 
     Args:
         built_in_radio: without any sender the sticks are centred and the throttle is down (ArduPilot's
-            SITL); else there are no sticks (PX4).
+            SITL); else there is no stick input (PX4).
 
     Attributes:
-        muted: the radio is being calibrated, sticks steer nothing.
+        muted: the radio is being calibrated; its sticks have no effect.
     """
 
     __slots__ = ("_built_in_radio", "_gcs_time_us", "_sticks", "_time_us", "muted", "radio_failed_since_us")
@@ -42,44 +42,44 @@ class PilotInput:
         self._time_us = time_us
 
     def lose_signal(self, lost: bool, time_us: int) -> None:
-        """The radio's signal is lost, sticks arrive no more; or it is back."""
+        """The radio's signal is lost, and no stick input arrives; or the signal is back."""
         if lost and self.radio_failed_since_us is None:
             self.radio_failed_since_us = time_us
         elif not lost:
             self.radio_failed_since_us = None
 
     def release(self) -> None:
-        """The sender lets go of the sticks."""
+        """The sender releases the sticks."""
         self._time_us = -1
         self._sticks = _NO_INPUT
 
     def hear_gcs(self, time_us: int) -> None:
-        """A ground station's heartbeat."""
+        """A heartbeat of a ground station was received."""
         self._gcs_time_us = time_us
 
     def sticks(self, time_us: int, timeout_s: float) -> ManualInput:
-        """What the flight task sees: the newest sticks while they are young, else none (or the radio's)."""
+        """The stick input of the flight task: the newest until it expires, then none (or the radio's)."""
         if self._time_us >= 0 and (time_us - self._time_us) * 1e-6 <= timeout_s:
             return self._sticks
         return _RADIO_AT_REST if self._built_in_radio and self.radio_failed_since_us is None else _NO_INPUT
 
     def sticks_age_s(self, time_us: int, timeout_s: float) -> float:
-        """Since there were sticks; infinite when there never were."""
+        """Age of the newest stick input; infinite when there was none."""
         age_s = (time_us - self._time_us) * 1e-6 if self._time_us >= 0 else math.inf
         if not self._built_in_radio:
             return age_s
         if age_s <= timeout_s:
-            return 0.0  # an override holds until it is forgotten
+            return 0.0  # an override holds until it expires
         failed_us = self.radio_failed_since_us
         return 0.0 if failed_us is None else min(age_s, (time_us - failed_us) * 1e-6)
 
     def gcs_age_s(self, time_us: int) -> float:
-        """Since a ground station was heard; infinite when none ever was."""
+        """Time since the last heartbeat of a ground station; infinite when there was none."""
         return (time_us - self._gcs_time_us) * 1e-6 if self._gcs_time_us >= 0 else math.inf
 
 
 def stick_travel(now: ManualInput, before: ManualInput) -> float:
-    """How far the pilot moved roll or pitch, 0..2; 0 while there is nobody at the sticks."""
+    """How far the pilot moved roll or pitch, 0..2; 0 without stick input."""
     if not (now.valid and before.valid):
         return 0.0
     return max(abs(now.roll - before.roll), abs(now.pitch - before.pitch))

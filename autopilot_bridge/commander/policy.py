@@ -1,4 +1,4 @@
-"""What a flavour fixes in the commander: boot timeline, mode rules, answers. Data, not code."""
+"""What a flavour defines in the commander: boot timeline, mode rules, answers. Data, not code."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
 
 
 class MissionRestart(Enum):
-    """When a stored mission begins again at its first item."""
+    """When a stored mission restarts at its first item."""
 
     NEVER = auto()
     AFTER_LAST_ITEM = auto()  # at a disarm after its last item (PX4)
@@ -30,55 +30,56 @@ class CommanderPolicy:
         position_ready_s: earliest time at which the navigation solution counts as a position.
         home_s: earliest time at which home is set.
         armable_modes: modes in which arming is allowed.
-        ground_modes: modes that can be chosen while disarmed.
+        ground_modes: modes that can be selected while disarmed.
         flown_modes: modes that can be entered in flight.
-        kept_after_disarm: a disarm goes back to the last commanded mode of these (PX4); empty: the mode
-            stays.
-        takeoff_mode: taking off is a mode of its own (PX4), not something GUIDED does (ArduPilot).
+        kept_after_disarm: after disarming, the last commanded mode of these is restored (PX4); empty: the
+            mode stays.
+        takeoff_mode: take-off is a separate mode (PX4), not a task of GUIDED (ArduPilot).
         reposition_mode: mode in which the vehicle flies to a commanded place.
         mission_return_is_mode: a return item of a mission changes the mode (PX4).
         mission_waits_for_start: on the ground a mission starts on command only, not by being armed
             (ArduPilot).
         mission_first_item: 1 where item 0 is home (ArduPilot).
-        manual_control_always: sticks are there without anybody sending them (ArduPilot's simulated radio).
-        recovers: the commanded mode comes back by itself when a failsafe condition clears (PX4);
-            else a failsafe is a mode change like any other (ArduPilot).
-        fallback_land: what lands the vehicle when there is no position; None: nothing, the action's mode is
-            flown all the same, by dead reckoning (ArduPlane).
+        manual_control_always: there is stick input without any sender (ArduPilot's simulated radio).
+        recovers: the commanded mode is restored when a failsafe condition clears (PX4);
+            else a failsafe is a normal mode change (ArduPilot).
+        fallback_land: the mode that lands the vehicle when there is no position; None: none, the action's
+            mode is flown anyway, by dead reckoning (ArduPlane).
         critical_on_warning: system status is CRITICAL for failsafes that only warn, too (ArduPilot).
         active_when_landed: system status is ACTIVE as soon as armed (PX4), not only in the air.
         standby_when_armable: system status is UNINIT while not armable in the commanded mode (PX4).
         preflight_disarm_extra_s: added to the automatic disarming before takeoff (PX4: spool-up).
         disarm_landed_everywhere: the short disarm after landing works in every mode (PX4), not only in the
-            ones that land by themselves.
-        prearm_report_s: interval at which failing arming checks are announced unasked; 0: never.
+            modes that land automatically.
+        prearm_report_s: interval at which failing arming checks are announced without a request; 0: never.
         arming_denied, mode_denied, disarm_in_air_denied: results of refused requests.
-        gcs_needed_to_arm: with a ground-station failsafe set, arming waits for a ground station (PX4); else
-            only one that was heard and lost is in the way.
-        mode_needs: what each mode needs; ArduPlane flies most modes without a position, by dead reckoning.
-        position_needed_to_arm: in every mode (ArduPlane), not only in those that fly by it.
+        gcs_needed_to_arm: with a ground-station failsafe set, arming requires a ground station (PX4); else
+            only a ground station that was connected and lost prevents arming.
+        mode_needs: the requirements of each mode; ArduPlane flies most modes without a position, by dead
+            reckoning.
+        position_needed_to_arm: in every mode (ArduPlane), not only in those that need a position to fly.
         initialising_mode: shown until the boot phase is over (ArduPlane); None: the boot mode from the start.
-        boot_status: MAV_STATE until then, where the policy doesn't go by armability.
-        takeoff_by_command: NAV_TAKEOFF as a command takes off (not on ArduPlane).
+        boot_status: MAV_STATE until then, where the policy does not use armability.
+        takeoff_by_command: the command NAV_TAKEOFF starts a take-off (not on ArduPlane).
         orbit_mode: mode in which a commanded circle is flown; an aircraft holds by circling.
         failsafe_disarms_landed: a failsafe that acts on the ground stops the motors (ArduCopter).
-        failsafe_lasts: the failsafe of a lost link lasts until the link is back, although the mode it has
-            chosen is one that would have been left alone (ArduPlane).
-        landing_ignores_links: a lost link doesn't end a landing (ArduPlane).
-        radio_restores_mode: the mode comes back when a radio does before the second stage of its failsafe
-            (ArduPlane).
-        ground_speed_apart: a commanded ground speed isn't an airspeed (ArduPlane's least ground speed).
-        plans: how it goes through a plan.
+        failsafe_lasts: the failsafe of a lost link lasts until the link is back, even if its own mode
+            is exempt from that failsafe (ArduPlane).
+        landing_ignores_links: a lost link does not end a landing (ArduPlane).
+        radio_restores_mode: the mode is restored when the radio is back before the second stage of its
+            failsafe (ArduPlane).
+        ground_speed_apart: a commanded ground speed is not an airspeed (ArduPlane's minimum ground speed).
+        plans: how it flies a plan.
         fence_in_status: SYS_STATUS shows the geofence (ArduPilot).
-        fence_bounds_targets: a place to fly to outside the geofence is refused (not on ArduPlane).
-        gps_shown_when_used: SYS_STATUS shows the GPS only while its position may be flown by (PX4);
-            clients take the bit for the vehicle's position.
-        mission_end_mode: mode after the last item of a mission, in the air; None: stays. A mode that is
-            `kept_after_disarm` follows a mission that ends on the ground too, from the disarm on (PX4).
-        mission_restart: when a mission begins again at its first item.
-        landing_blocks_arming: a landing sequence that was begun is in the way of arming until mode or mission
+        fence_bounds_targets: a target position outside the geofence is refused (not on ArduPlane).
+        gps_shown_when_used: SYS_STATUS shows the GPS only while its position may be used for flight (PX4);
+            clients read the bit as that of the vehicle's position.
+        mission_end_mode: mode after the last item of a mission, in the air; None: unchanged. A mode that is
+            `kept_after_disarm` also follows a mission that ends on the ground, after disarming (PX4).
+        mission_restart: when a mission restarts at its first item.
+        landing_blocks_arming: a landing sequence that was begun prevents arming until mode or mission
             change, unless the mission starts with a take-off (ArduPlane).
-        force_arm_skips_checks: the override number arms without checks, except those that stay mandatory.
+        force_arm_skips_checks: the override number arms without checks, except the mandatory ones.
     """
 
     boot_mode: FlightMode

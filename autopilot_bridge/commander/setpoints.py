@@ -1,4 +1,4 @@
-"""The stream of setpoints that offboard (PX4) and guided (ArduPilot) flying follow, and its age."""
+"""The stream of setpoints for offboard (PX4) and guided (ArduPilot) flight, and its age."""
 
 import math
 from typing import Any
@@ -7,9 +7,9 @@ from autopilot_bridge.commander.vehicle_tasks import VehicleTasks
 
 
 class SetpointStream:
-    """Newest streamed setpoint: the tasks that fly it, when it came, what it needs.
+    """Newest streamed setpoint: the tasks that fly it, its time of arrival, its requirements.
 
-    The stream is taken in every mode, since PX4 enters OFFBOARD only while one is running.
+    The stream is accepted in every mode, since PX4 enters OFFBOARD only while a stream is running.
 
     Args:
         vehicle: makes the vehicle's tasks.
@@ -27,29 +27,29 @@ class SetpointStream:
 
     @property
     def offboard(self) -> Any:
-        """The task that flies setpoints as they come (PX4); which class depends on the vehicle."""
+        """The task that flies setpoints directly (PX4); its class depends on the vehicle."""
         return self._vehicle.offboard
 
     @property
     def guided(self) -> Any:
-        """The task that flies targets smoothly (ArduPilot); which class depends on the vehicle."""
+        """The task that flies smoothly to targets (ArduPilot); its class depends on the vehicle."""
         return self._vehicle.guided
 
     def note(self, time_us: int, *, needs_position: bool) -> None:
-        """A setpoint was taken."""
+        """A setpoint was accepted."""
         self._time_us = time_us
         self.needs_position = needs_position
 
     def age_s(self, time_us: int) -> float:
-        """Since the newest setpoint; infinite when there is none."""
+        """Age of the newest setpoint; infinite when there is none."""
         return (time_us - self._time_us) * 1e-6 if self._time_us >= 0 else math.inf
 
     @property
     def attitude_setpoints(self) -> bool:
-        """The offboard stream asks for positions, velocities or attitudes (PX4 shows it in base_mode)."""
+        """The offboard stream commands positions, velocities or attitudes (PX4 shows it in base_mode)."""
         return self._vehicle.asks_attitude
 
     @property
     def thrust_setpoints(self) -> bool:
-        """Guided flying follows attitudes (ArduPilot shows it in base_mode)."""
+        """Guided flight follows attitude setpoints (ArduPilot shows it in base_mode)."""
         return self._vehicle.follows_thrust

@@ -1,4 +1,4 @@
-"""What arming checks and failsafes look at: one snapshot of the vehicle, refreshed at 50 Hz."""
+"""The input of arming checks and failsafes: one snapshot of the vehicle, updated at 50 Hz."""
 
 import math
 from dataclasses import dataclass, field
@@ -17,24 +17,25 @@ class Situation:
         time_us: vehicle time.
         mode: the commanded mode.
         armed, airborne: motors may turn; off the ground.
-        landing: what is flown is landing.
+        landing: the vehicle is landing.
         ready: the boot timeline allows arming.
         health: sensors and navigation.
-        position: navigation gives a position, and has been doing so long enough after boot.
-        setpoint_age_s: since the last streamed setpoint; infinite when there is none.
-        setpoint_needs_position: the stream asks for positions or velocities.
-        gcs_age_s: since the last heartbeat of a ground station; infinite when none was ever heard.
-        sticks_age_s: since the last stick input; infinite when there is none, 0 for a built-in radio.
-        sticks_at_arming: there were sticks when the vehicle was armed.
+        position: navigation provides a position, for long enough after boot.
+        setpoint_age_s: age of the last streamed setpoint; infinite when there is none.
+        setpoint_needs_position: the stream commands positions or velocities.
+        gcs_age_s: age of the last heartbeat of a ground station; infinite when none was received.
+        sticks_age_s: age of the last stick input; infinite when there is none, 0 for a built-in radio.
+        sticks_at_arming: there was stick input when the vehicle was armed.
         throttle_high: the throttle stick is up.
         home_set: home is known.
         mission_problem: why the stored mission can't be flown; None when it can.
-        landing_sequence: the mission mode is chosen, and a landing that the mission has begun blocks arming.
+        landing_sequence: the mission mode is selected, and a landing that the mission has begun blocks
+            arming.
         battery_level: warning level.
-        outside_fence: beyond the geofence.
-        fence_present: there is a geofence to keep to.
-        fence_breaches: new breaches of it so far.
-        fence_away_m: how far beyond its cylinder.
+        outside_fence: the vehicle is outside the geofence.
+        fence_present: a geofence is set up.
+        fence_breaches: number of new breaches so far.
+        fence_away_m: how far the vehicle is outside the fence's cylinder.
         position_accuracy_m: 1-sigma of the horizontal position; NaN while not known.
         roll_rad, pitch_rad: attitude.
         tilt_rad: angle between the body's down axis and the vertical.

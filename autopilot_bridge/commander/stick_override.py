@@ -7,7 +7,7 @@ from autopilot_bridge.flight.context import ManualInput
 
 
 class StickOverride:
-    """Compares the sticks with where they were when a mode was commanded."""
+    """Compares the sticks with their positions at the last mode command."""
 
     __slots__ = ("_at_command",)
 
@@ -15,11 +15,11 @@ class StickOverride:
         self._at_command = ManualInput()
 
     def restart(self, sticks: ManualInput) -> None:
-        """A mode was commanded, or the vehicle armed, with the sticks here."""
+        """A mode was commanded, or the vehicle was armed, with these stick positions."""
         self._at_command = sticks
 
     def wanted(self, mode: FlightMode, sticks: ManualInput, parameters: CommanderParameters) -> bool:
-        """In flight: a pilot takes over."""
+        """True when the pilot takes over in flight."""
         if not sticks.valid:
             return False
         offboard = mode is FlightMode.OFFBOARD

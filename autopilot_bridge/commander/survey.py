@@ -1,4 +1,4 @@
-"""Bringing the snapshot that checks and failsafes look at up to date."""
+"""Update of the snapshot that arming checks and failsafes read."""
 
 import math
 from typing import Final
@@ -22,15 +22,15 @@ _POSITION_HYSTERESIS: Final = (
 
 
 class Survey:
-    """Gathers a `Situation` from where its parts are known; the geofence and the commander add their own.
+    """Fills a `Situation` from its sources; the geofence and the commander add their own parts.
 
     Args:
-        situation: what is written.
-        context: navigation, sticks and what is flown.
+        situation: the snapshot to update.
+        context: navigation, sticks and the flight task's state.
         policy: the flavour's boot timeline.
-        setpoints, pilot: how old their newest input is.
-        home: whether it is known.
-        battery: its warning level.
+        setpoints, pilot: provide the age of their newest input.
+        home: provides whether home is known.
+        battery: provides the warning level.
     """
 
     __slots__ = ("_battery", "_context", "_home", "_pilot", "_policy", "_setpoints", "_situation")
@@ -62,11 +62,11 @@ class Survey:
         terminated: bool,
         mission_problem: Reason | None,
     ) -> list[Event]:
-        """Look at everything; whether a position has just become known, or is lost.
+        """Update everything; returns the event when a position has become known, or was lost.
 
         Args:
-            mode: the commanded one.
-            terminated: the flight is.
+            mode: the commanded mode.
+            terminated: the flight was terminated.
             mission_problem: why the stored mission can't be flown.
         """
         situation, context = self._situation, self._context

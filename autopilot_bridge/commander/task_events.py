@@ -1,4 +1,4 @@
-"""What the flight task tells, turned into modes and events."""
+"""Converts the events of the flight task into modes and events of the vehicle."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class TaskFollower:
-    """Follows the active flight task for the commander."""
+    """Reads the events of the active flight task for the commander."""
 
     __slots__ = ("_commander",)
 
@@ -22,7 +22,7 @@ class TaskFollower:
         self._commander = commander
 
     def follow(self) -> None:
-        """Take what the task has told since the last call; 50 Hz."""
+        """Handle the events of the task since the last call; called at 50 Hz."""
         commander = self._commander
         for phase in commander.vehicle.watch(commander.tasks.task, commander.context):
             commander.emit(phase)

@@ -1,4 +1,4 @@
-"""The flight task being flown: which one a mode starts with, and running it."""
+"""The flight task being flown: the initial task of each mode, and its execution."""
 
 from collections.abc import Callable
 
@@ -20,8 +20,8 @@ class TaskRunner:
 
     Attributes:
         task: the active task; None while disarmed.
-        mission_started: a client started the mission.
-        paused: the task was put aside for a pause.
+        mission_started: a client has started the mission.
+        paused: the task that is paused.
     """
 
     def __init__(self, context: FlightContext, vehicle: VehicleTasks) -> None:
@@ -34,25 +34,25 @@ class TaskRunner:
 
     @property
     def lifting_off(self) -> bool:
-        """On the ground, and the task wants up: the automatic disarming waits."""
+        """On the ground, and the task would take off: the automatic disarming waits."""
         return self._context.on_ground and self._vehicle.wants_up(self._context)
 
     @property
     def ends_on_ground(self) -> bool:
-        """The task lands by itself, and a landing ends the flight."""
+        """The task lands automatically, and a landing ends the flight."""
         return self._vehicle.ends_on_ground(self.task)
 
     @property
     def orbit(self) -> CircleFlown | None:
-        """The circle the vehicle is on, None while it is on none."""
+        """The circle being flown; None: no circle."""
         return self._vehicle.circle_of(self.task)
 
     def prepare(self, mode: FlightMode, source: TaskSource) -> None:
-        """The next entry of `mode` flies this task instead of its usual one."""
+        """The next entry of `mode` starts this task instead of its usual one."""
         self._prepared = (mode, source)
 
     def enter(self, mode: FlightMode) -> None:
-        """Fly what a mode starts with; nothing while disarmed."""
+        """Start the initial task of a mode; no task while disarmed."""
         if self._prepared is not None and self._prepared[0] is not mode:
             self._prepared = None
         if mode is not FlightMode.MISSION:

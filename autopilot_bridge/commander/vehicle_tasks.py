@@ -1,6 +1,6 @@
-"""What a class of vehicle flies: the flight task of every mode and request, as one object.
+"""The flight tasks of a class of vehicle, for every mode and request, as one object.
 
-The commander, its task runner and its guidance are the same for every vehicle. They know flight tasks only
+The commander, its task runner and its guidance are the same for every vehicle. They use flight tasks only
 through this protocol; `MulticopterTasks` and `FixedWingTasks` implement it.
 """
 
@@ -24,14 +24,15 @@ from autopilot_bridge.mission_plan import MissionItem
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """A place to fly to, and how.
+    """A target position, with its heading, speed and radius.
 
     Attributes:
-        ned_m: local NED, (3,); NaN components: as it is.
-        yaw_rad: heading there; NaN: free. Aircraft don't take it.
-        yaw_rate_rad_s: how the nose turns there; NaN: not given. Aircraft don't take it.
+        ned_m: local NED, (3,); NaN components: unchanged.
+        yaw_rad: heading there; NaN: free. Not used by aircraft.
+        yaw_rate_rad_s: yaw rate there; NaN: not given. Not used by aircraft.
         speed_m_s: ground speed of a multicopter, equivalent airspeed of an aircraft; None: the parameter's.
-        radius_m: of an aircraft's circle there, positive clockwise seen from above; None: the parameter's.
+        radius_m: radius of an aircraft's circle there, positive clockwise seen from above; None: the
+            parameter's.
     """
 
     ned_m: NDArray[np.float64]
@@ -46,11 +47,11 @@ class Circle:
     """A circle to fly.
 
     Attributes:
-        centre_ned_m: local NED, (3,); NaN components: as it is.
+        centre_ned_m: local NED, (3,); NaN components: unchanged.
         radius_m: None: the parameter's.
         speed_m_s: None: the parameter's.
         clockwise: direction seen from above.
-        yaw_behaviour: ORBIT_YAW_BEHAVIOUR; aircraft don't take it.
+        yaw_behaviour: ORBIT_YAW_BEHAVIOUR; not used by aircraft.
     """
 
     centre_ned_m: NDArray[np.float64]
@@ -61,7 +62,7 @@ class Circle:
 
 
 class CircleFlown(NamedTuple):
-    """The circle the vehicle is on; a negative radius is counter-clockwise."""
+    """The circle being flown; a negative radius is counter-clockwise."""
 
     radius_m: float
     north_m: float
@@ -71,21 +72,21 @@ class CircleFlown(NamedTuple):
 
 @runtime_checkable
 class GoAroundTask(Protocol):
-    """A flight task whose landing can be broken off."""
+    """A flight task whose landing can be aborted."""
 
     def go_around(self, ctx: FlightContext, height_m: float = math.nan) -> bool:
-        """Climb to a height over home (NaN: the parameter's) and come back to the approach.
+        """Climb to a height over home (NaN: the parameter's) and fly the approach again.
 
-        False when there is nothing to break off.
+        False when there is no landing to abort.
         """
         ...
 
 
 class LandDetector(Protocol):
-    """Judges whether the vehicle is on the ground."""
+    """Detects whether the vehicle is on the ground."""
 
     def update(self, ctx: FlightContext, thrust: float) -> LandedState:
-        """Judge, and write `landed_state`, `ground_contact` and `maybe_landed` of the context."""
+        """Update, and write `landed_state`, `ground_contact` and `maybe_landed` of the context."""
         ...
 
 
@@ -93,8 +94,8 @@ class VehicleTasks(Protocol):
     """Makes the flight tasks of one vehicle.
 
     Attributes:
-        offboard: the task that flies streamed setpoints as they come (PX4).
-        guided: the task that flies targets smoothly (ArduPilot).
+        offboard: the task that flies streamed setpoints directly (PX4).
+        guided: the task that flies smoothly to targets (ArduPilot).
     """
 
     offboard: Any
@@ -102,75 +103,75 @@ class VehicleTasks(Protocol):
 
     @property
     def asks_attitude(self) -> bool:
-        """The offboard stream asks for positions, velocities or attitudes (PX4 shows it in base_mode)."""
+        """The offboard stream commands positions, velocities or attitudes (PX4 shows it in base_mode)."""
         ...
 
     @property
     def follows_thrust(self) -> bool:
-        """Guided flying follows attitudes (ArduPilot shows it in base_mode)."""
+        """Guided flight follows attitude setpoints (ArduPilot shows it in base_mode)."""
         ...
 
     def of_mode(self, mode: FlightMode, *, mission_started: bool) -> FlightTask:
-        """The task a mode starts with.
+        """The initial task of a mode.
 
         Args:
             mode: the mode entered.
-            mission_started: a client started the mission (where the policy waits for that on the ground).
+            mission_started: a client has started the mission (where the policy requires that on the ground).
         """
         ...
 
     def hold(self) -> FlightTask:
-        """Stay here."""
+        """Hold the present position."""
         ...
 
     def takeoff(self, height_m: float | None, yaw_rad: float | None, place: Place) -> FlightTask:
         """Take off.
 
         Args:
-            height_m: over home; None: the parameter.
+            height_m: height over home; None: the parameter.
             yaw_rad: heading of a multicopter's climb; None: the present one.
-            place: where an aircraft circles when it is up; NaN: where the climb ends.
+            place: the position at which an aircraft circles after the climb; NaN: where the climb ends.
         """
         ...
 
     def hold_after_takeoff(self, task: FlightTask | None) -> FlightTask:
-        """What is flown when a take-off is done: the height asked for, not the one reached."""
+        """The task after a take-off: it holds the commanded height, not the height that was reached."""
         ...
 
     def reposition(self, place: Place) -> FlightTask:
-        """Fly to a place and stay there."""
+        """Fly to a position and stay there."""
         ...
 
     def guide_to(self, context: FlightContext, place: Place) -> None:
-        """Give the guided task a place to fly to."""
+        """Set the target position of the guided task."""
         ...
 
     def orbit(self, circle: Circle) -> FlightTask:
-        """Circle around a place."""
+        """Circle around a position."""
         ...
 
     def turn(self, context: FlightContext, active: FlightTask | None, turn: Turn) -> FlightTask | None:
-        """CONDITION_YAW: point the nose somewhere; the task for it, or None when the active one does it."""
+        """CONDITION_YAW: turn the nose. Returns the task for it; None when the active task does it."""
         ...
 
     def ends_on_ground(self, task: FlightTask | None) -> bool:
-        """The task lands by itself, and a landing ends the flight."""
+        """The task lands automatically, and a landing ends the flight."""
         ...
 
     def wants_up(self, context: FlightContext) -> bool:
-        """On the ground, what is flown would lift off: the automatic disarming waits."""
+        """On the ground, the task would take off: the automatic disarming waits."""
         ...
 
     def watch(self, task: FlightTask | None, context: FlightContext) -> Sequence[Event]:
-        """What the active task has come to since the last call, as far as pilots are told."""
+        """The phase events of the active task since the last call that are reported to pilots."""
         ...
 
     def distance_to(self, item: MissionItem, context: FlightContext) -> float:
-        """How far off an item an aircraft passed it, m; NaN where nobody is told."""
+        """The distance at which an aircraft passed an item, m; NaN where it is not reported."""
         ...
 
     def circle_of(self, task: FlightTask | None) -> CircleFlown | None:
-        """The circle being flown, as ORBIT_EXECUTION_STATUS tells it; None while there is none."""
+        """The circle being flown, as reported in ORBIT_EXECUTION_STATUS; None: no circle."""
         ...
 
     def speed_kind(self, kind: int) -> SpeedKind:
@@ -178,5 +179,5 @@ class VehicleTasks(Protocol):
         ...
 
     def with_speeds(self, parameters: Any, speeds_m_s: Mapping[SpeedKind, float]) -> Any:
-        """Flight parameters with commanded speeds in place of theirs."""
+        """Flight parameters with the commanded speeds instead of their own."""
         ...

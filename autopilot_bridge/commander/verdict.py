@@ -1,4 +1,4 @@
-"""The commander's answer to a request, and why."""
+"""The commander's answer to a request, with its reasons."""
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum, auto
@@ -18,7 +18,7 @@ class Result(IntEnum):
 
 
 class Reason(Enum):
-    """Why something is not possible now; each flavour words it its own way."""
+    """Why something is not possible now; each flavour has its own texts."""
 
     BOOTING = auto()
     GYRO = auto()
@@ -42,12 +42,12 @@ class Reason(Enum):
     MODE_UNKNOWN = auto()
     MODE_UNAVAILABLE = auto()
     OUTSIDE_FENCE = auto()
-    FENCE_MISSING = auto()  # it is on and there is none
+    FENCE_MISSING = auto()  # enabled, but no geofence is set up
     FENCE_PARAMETERS = auto()  # its limits contradict each other
-    FENCE_RECOVERY = auto()  # what a breach has begun is still flown
+    FENCE_RECOVERY = auto()  # the action of a breach is still flown
     TERMINATED = auto()
     CALIBRATING = auto()
-    LEANING = auto()  # standing too far from level
+    LEANING = auto()  # tilted too far
     THROTTLE_HIGH = auto()
     LANDING_SEQUENCE = auto()
     NOT_LANDED = auto()
@@ -67,7 +67,7 @@ class Verdict:
 
     @property
     def accepted(self) -> bool:
-        """True when the request is being done."""
+        """True when the request is executed."""
         return self.result is Result.ACCEPTED
 
 
@@ -75,5 +75,5 @@ ACCEPTED: Final = Verdict(result=Result.ACCEPTED)
 
 
 def failed(*reasons: Reason) -> Verdict:
-    """MAV_RESULT_FAILED: valid, tried, and not done."""
+    """MAV_RESULT_FAILED: valid, but not executed."""
     return Verdict(result=Result.FAILED, reasons=reasons)

@@ -1,4 +1,4 @@
-"""A link as an autopilot's MAVLink channel: sequence numbers and signatures of its own, peers told apart."""
+"""A link as an autopilot's MAVLink channel: own sequence numbers and signatures, one parser for each peer."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -12,7 +12,7 @@ from autopilot_bridge.services.channel import MavlinkMessage
 from autopilot_bridge.telemetry.line import LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
 
-_MAX_PACKET: Final = 1400  # bytes: one datagram that no network splits
+_MAX_PACKET: Final = 1400  # bytes: one datagram that no network fragments
 _MEMORY_PEER: Final[PeerId] = ("memory", 0)
 
 
@@ -20,11 +20,11 @@ class LinkChannel:
     """One link of one autopilot.
 
     Args:
-        name: how the channel is called in tables and reports; unique per autopilot.
-        link: where bytes go and come from.
+        name: the name of the channel in tables and reports; unique per autopilot.
+        link: sends and receives the bytes.
         system_id, component_id: the autopilot's.
-        line: what the link can carry; None: whatever there is.
-        signing: signs and checks what passes; None: nothing is.
+        line: the capacity of the link; None: unlimited.
+        signing: signs sent frames and checks received frames; None: no signing.
 
     Attributes:
         motion: set by the autopilot that the channel is added to.
@@ -62,21 +62,21 @@ class LinkChannel:
         self._encoder = FrameEncoder(system_id, component_id)
         self._intake: Intake[PeerId] = Intake(None if signing is None else signing.admit)
         self._peers = PeerExchange(link)
-        self._forward = getattr(link, "forward", None)  # of a link that several vehicles share
+        self._forward = getattr(link, "forward", None)  # of a link shared by several vehicles
 
     @property
     def congested(self) -> bool:
-        """The link's queue is filling: lists should pause."""
+        """The link's queue is filling: parameter lists should pause."""
         return self.link.congested or (self.line is not None and self.line.congested)
 
     @property
     def counters(self) -> ParserCounters:
-        """Where every received byte went, over all peers; `sources` is left out."""
+        """Counters of all received bytes, over all peers; `sources` is left out."""
         return self._intake.counters
 
     @property
     def overrun_bytes(self) -> int:
-        """Bytes that were dropped unread, because their sender had too much waiting."""
+        """Bytes that were dropped unread, because too many bytes of their sender were waiting."""
         return self._intake.overrun_bytes
 
     @property
@@ -93,7 +93,7 @@ class LinkChannel:
         self._send(self._encoder.encode_payload(message_id, payload))
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
-        """Send what is due together, a packet of a network at most at a time."""
+        """Send the payloads that are due together, in packets of at most one datagram."""
         packet = self.motion.frames(motion, self._encoder) if motion and self.motion is not None else b""
         if payloads:
             most = _MAX_PACKET
@@ -108,7 +108,7 @@ class LinkChannel:
             self._send(packet)
 
     def send_frame(self, raw: bytes) -> None:
-        """Forward somebody else's frame as it is: with its own signature, or none."""
+        """Forward a frame of another system unchanged: with its own signature, or without one."""
         if self._forward is None:
             self._pass_on(raw)
         else:
@@ -135,7 +135,7 @@ class LinkChannel:
         self.link.send(data)
 
     def receive(self) -> list[tuple[PeerId, list[Frame]]]:
-        """Good frames that have arrived, by peer, as many as there is time for."""
+        """Valid frames that have arrived, by peer, as many as the time budget allows."""
         arrived = self.link.receive()
         intake = self._intake
         if not arrived and not intake.waiting:
@@ -145,20 +145,20 @@ class LinkChannel:
         return served
 
     def parse(self, data: bytes, peer: PeerId = _MEMORY_PEER) -> list[Frame]:
-        """The good frames in bytes of one peer, which may come in any pieces, at once."""
+        """The valid frames in bytes of one peer, which may be split at any place."""
         return self._intake.parse(peer, data)
 
     def exchange(self, frame: Frame, peer: PeerId) -> None:
-        """Pass a frame of one peer of the link on to those of the others that it is meant for."""
+        """Forward a frame of one peer of the link to the other peers that it is addressed to."""
         for other in self._peers.others(frame, peer):
             self.link.send(frame.raw, other)
 
 
 class PeerExchange:
-    """What the peers of one link have to say to each other.
+    """Routes frames between the peers of one link.
 
     Args:
-        link: any; those with one peer at a time have nothing to pass on.
+        link: any link; one with a single peer at a time has nothing to forward.
     """
 
     __slots__ = ("_forget", "_link", "_loops", "_router")
@@ -170,7 +170,7 @@ class PeerExchange:
         self._loops = LoopGuard()
 
     def others(self, frame: Frame, peer: PeerId) -> list[PeerId]:
-        """Learn from a frame, and tell which other peers of the link it is to be sent to."""
+        """Learn from a frame, and return the other peers of the link that it is to be sent to."""
         peers = self._link.peers
         if len(peers) < 2:
             return []
@@ -184,7 +184,7 @@ class PeerExchange:
         return [] if found and self._loops.comes_round(frame.raw, peer) else found
 
     def forget(self, strangers: set[PeerId]) -> None:
-        """Don't send to those who sent nothing that could be understood."""
+        """Send nothing to peers that have sent no valid frame."""
         if self._forget is not None:
             for peer in strangers:
                 self._forget(peer)

@@ -1,4 +1,4 @@
-"""What a SITL world holds: vehicles, place, air and seed. Data only; `Sitl` builds it."""
+"""The content of a SITL world: vehicles, place, air and seed. Data only; `Sitl` builds it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,12 +14,12 @@ from flightsim.payload import GroundTargetParameters, MagneticField, PayloadPara
 from flightsim.sensors import GpsParameters, SensorSuiteParameters
 
 FIXED_EPOCH_UNIX_US: Final = 1_735_689_600_000_000
-"""2025-01-01T00:00:00Z: the moment of boot unless asked otherwise, so that equal flights give equal logs."""
+"""2025-01-01T00:00:00Z: the default time of boot, so that equal flights give equal logs."""
 
 TEAM_SPACING_M: Final[Mapping[AirframeKind, float]] = MappingProxyType(
     {AirframeKind.MULTICOPTER: 5.0, AirframeKind.FIXED_WING: 25.0}
 )
-"""Room beside each vehicle; between two of different kinds, that of the larger one."""
+"""Space beside each vehicle; between two vehicles of different kinds, the larger of both values."""
 MAX_VEHICLES: Final = 250
 
 
@@ -29,14 +29,14 @@ HOMES: Final[Mapping[str, Home]] = MappingProxyType(
         "ardupilot": Home(lat_deg=-35.3632621, lon_deg=149.1652374, alt_m=584.0, heading_deg=353.0),
     }
 )
-"""Where each firmware's own SITL stands: Zurich and Canberra."""
+"""The default place of each firmware's own SITL: Zurich and Canberra."""
 
 
 def parse_home(text: str) -> Home:
     """Home from "lat,lon,alt[,heading]", as ArduPilot's SITL writes it.
 
     Raises:
-        ValueError: the text is not that, or a number is out of range.
+        ValueError: the text has another form, or a number is out of range.
     """
     try:
         numbers = [float(part) for part in text.split(",")]
@@ -56,14 +56,14 @@ class VehicleSpecification:
         system_id: MAVLink system id, 1..250.
         model: name of one of our models or of an aircraft in the `jsbsim` package, or a path.
         flavour: "px4" or "ardupilot".
-        offset_ne_m: where it stands, north and east of home.
+        offset_ne_m: its place, north and east of home.
         parameters: autopilot parameters that differ from the flavour's defaults.
-        launch: how an aircraft gets into the air: "runway", "catapult" or "hand"; None: as its description
-            says.
-        payload: what it carries for its mission; by default nothing.
-        gps: its receiver, one of `flightsim.sensors.RECEIVERS`: "differential" is about as exact as the
+        launch: how an aircraft is launched: "runway", "catapult" or "hand"; None: as its description
+            defines.
+        payload: its mission payload; by default none.
+        gps: its receiver, one of `flightsim.sensors.RECEIVERS`: "differential" is about as accurate as the
             receivers in the firmwares' own simulators, "standalone" as a receiver without corrections.
-        sensors: all its sensors, in place of the usual ones and of `gps`; None: the usual ones.
+        sensors: all its sensors, instead of the usual ones and of `gps`; None: the usual ones.
     """
 
     system_id: int = 1
@@ -95,9 +95,9 @@ class SitlConfiguration:
         environment: wind, turbulence, date.
         seed: root of every random stream.
         physics_rate_hz: steps per second.
-        unix_epoch_us: what the vehicles' clocks call the moment of boot.
-        targets: on the ground, for cameras to see.
-        magnetic_field: for survey magnetometers to measure.
+        unix_epoch_us: the time of boot by the vehicles' clocks.
+        targets: targets on the ground that cameras can detect.
+        magnetic_field: the field that survey magnetometers measure.
     """
 
     vehicles: tuple[VehicleSpecification, ...] = (VehicleSpecification(),)
@@ -134,20 +134,21 @@ def team(
     heading_deg: float = 0.0,
     gps: str = "differential",
 ) -> tuple[VehicleSpecification, ...]:
-    """`count` vehicles with system ids 1, 2, ... standing in a row to the right of the first.
+    """`count` vehicles with system ids 1, 2, ... in a row to the right of the first.
 
     Args:
-        count: how many.
-        model: of all of them, or one for each.
-        flavour: of all of them.
+        count: number of vehicles.
+        model: of all vehicles, or one for each.
+        flavour: of all vehicles.
         parameters: that differ from the flavour's defaults.
-        launch: how the aircraft among them get into the air.
-        heading_deg: the way they point; the row is at a right angle to it, so that runways are side by side.
-        gps: receiver of all of them.
+        launch: how the aircraft of the team are launched.
+        heading_deg: heading of all vehicles; the row is perpendicular to it, so that runways are side by
+            side.
+        gps: receiver of all vehicles.
 
     Raises:
-        ValueError: count is not in 1..250, or doesn't fit the models; a launch of multicopters.
-        AirframeError: a model that can't be used.
+        ValueError: count is not in 1..250, or differs from the number of models; a launch of multicopters.
+        AirframeError: a model can't be used.
     """
     if not 1 <= count <= MAX_VEHICLES:
         raise ValueError(f"vehicle count {count} is not in 1..{MAX_VEHICLES}")

@@ -1,4 +1,4 @@
-"""Units that can fail although their samples come by messages: external odometry, the avoidance sensor."""
+"""Units that can fail although messages carry their samples: external odometry, the avoidance sensor."""
 
 import math
 from typing import Final, NamedTuple
@@ -7,13 +7,13 @@ from autopilot_bridge.navigation.external import SAMPLE_SIZE
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 
 OBSTACLE_SECTORS: Final = 72
-"""Of OBSTACLE_DISTANCE."""
+"""Number of sectors in OBSTACLE_DISTANCE."""
 
 _NAN4: Final = (math.nan,) * 4
 
 
 class EntryUnit(NamedTuple):
-    """A unit, the size of its samples and about how many come in a second."""
+    """A unit, the size of its samples and their approximate rate per second."""
 
     target: FaultTarget
     size: int
@@ -46,4 +46,4 @@ ENTRY_UNITS: Final = (
         10.0,
     ),
 )
-"""Position m, attitude and velocity m/s of odometry; distances m by sector."""
+"""Values of the samples. Odometry: position m, attitude, velocity m/s; obstacles: distance m by sector."""

@@ -1,7 +1,7 @@
-"""MAV_CMD_INJECT_FAILURE on a simulated vehicle: sensors, motors, servos, and what comes in by radio.
+"""MAV_CMD_INJECT_FAILURE on a simulated vehicle: sensors, motors, servos, and data received by radio.
 
-Source: FAILURE_UNIT and FAILURE_TYPE of MAVLink's common.xml. A unit or a type that the vehicle has not is
-UNSUPPORTED, an instance beyond those it has too.
+Source: FAILURE_UNIT and FAILURE_TYPE of MAVLink's common.xml. A unit, a type or an instance that the vehicle
+does not have is UNSUPPORTED.
 """
 
 from typing import Final
@@ -28,19 +28,19 @@ _SERVOS: Final = (Role.AILERON, Role.ELEVATOR, Role.THROTTLE, Role.RUDDER, Role.
 """Servo instances from 1, in ArduPilot's channel order."""
 
 _EFFECTIVENESS: Final = {_OK: 1.0, _OFF: 0.0, _WRONG: 0.5}
-"""Of an actuator: a damaged propeller, a slipped linkage (WRONG)."""
+"""Effectiveness of an actuator; WRONG stands for a damaged propeller or a slipped linkage."""
 
 _HEARD_WITHOUT_SIGNAL: Final = frozenset({mavlink.MAV_CMD_INJECT_FAILURE})
 
 
 class FailureInjector:
-    """Takes FAILURE_UNIT, FAILURE_TYPE and instance (0: all of them).
+    """Executes FAILURE_UNIT, FAILURE_TYPE and instance (0: all of them).
 
-    It is the autopilot's `Simulation` too: failures of what comes in by messages, and the simulator's
-    parameters.
+    It is also the autopilot's `Simulation`: it applies failures to data received by messages, and the
+    simulator's parameters.
 
     Args:
-        vehicle: whose actuators fail.
+        vehicle: the vehicle whose actuators fail.
         sensors: its sensors.
     """
 
@@ -57,7 +57,7 @@ class FailureInjector:
         }
 
     def attend(self, parts: AutopilotParts) -> None:
-        """An autopilot has booted: its pilot and its parameters are looked after from now on."""
+        """An autopilot has booted: use its pilot input and its parameters from now on."""
         self._commander = parts.commander
         self._deaf = False
         parameters = SimulatorParameters(self._vehicle, self._sensors, self.fail_radio, self.weaken_motors)
@@ -65,7 +65,7 @@ class FailureInjector:
         parameters.apply(parts.parameters)
 
     def inject(self, unit: int, failure: int, instance: int) -> Result:
-        """Switch a failure; UNSUPPORTED for a unit or a failure the vehicle has not."""
+        """Switch a failure on or off; UNSUPPORTED for a unit or a failure that the vehicle does not have."""
         if unit == mavlink.FAILURE_UNIT_SYSTEM_MOTOR:
             return self._motor(failure, instance)
         if unit == mavlink.FAILURE_UNIT_SYSTEM_SERVO:
@@ -84,15 +84,15 @@ class FailureInjector:
             return Result.UNSUPPORTED
         return Result.ACCEPTED
 
-    # what comes in by messages
+    # data received by messages
 
     def spoil(self, unit: int, values: NDArray[np.float64]) -> bool:
-        """Spoil a sample that came by a message; False when it doesn't arrive."""
+        """Apply a failure to a sample received by a message; False when the sample is lost."""
         point = self._entries[unit]
         return point.deliver(values)
 
     def deaf_to(self, command: int | None) -> bool:
-        """The autopilot hears nothing of ground stations, but the command that ends the failure.
+        """True: the autopilot receives no messages, except the command that ends the failure.
 
         Args:
             command: MAV_CMD of a COMMAND_LONG or COMMAND_INT; None: another message.
@@ -100,14 +100,14 @@ class FailureInjector:
         return self._deaf and command not in _HEARD_WITHOUT_SIGNAL
 
     def fail_radio(self, failed: bool) -> None:
-        """The pilot's sticks arrive no more, or again."""
+        """Interrupt or restore the pilot's stick input."""
         if self._commander is not None:
             self._commander.pilot.lose_signal(failed, self._commander.time_us)
 
     # actuators
 
     def weaken_motors(self, mask: int, effectiveness: float) -> None:
-        """Motors of a bit mask (bit 0: the first) get weaker; the others are sound."""
+        """Set the effectiveness of the motors in a bit mask (bit 0: the first); the others are sound."""
         for index in range(self._motors):
             self._vehicle.set_motor_effectiveness(index, effectiveness if mask >> index & 1 else 1.0)
 

@@ -1,4 +1,4 @@
-"""The people beside an aircraft that is launched by catapult or hand."""
+"""The launch of an aircraft by catapult or hand."""
 
 from typing import Final
 
@@ -6,15 +6,15 @@ from autopilot_bridge.commander import Commander
 from flightsim.vehicle import Vehicle
 
 LAUNCH_DELAY_S: Final = 3.0
-"""From when the aircraft is seen ready, until it is launched."""
+"""Time from the moment when the aircraft is ready until its launch."""
 _SLOW_STEPS: Final = 5
 
 
 class LaunchCrew:
-    """Launches an aircraft some seconds after it is armed and wants to take off.
+    """Launches an aircraft some seconds after it is armed and its task starts to take off.
 
-    Nobody launches an aircraft whose autopilot doesn't ask for it: armed in a mode that rests on the ground
-    it stays where it is.
+    An aircraft is launched only when its autopilot requests it: an aircraft that is armed in a mode that
+    stays on the ground is not launched.
 
     Args:
         vehicle: the aircraft on its launcher.
@@ -32,7 +32,7 @@ class LaunchCrew:
         self._ready_since_us: int | None = None
 
     def watch(self, time_us: int) -> bool:
-        """Look at the aircraft; True when it has been launched, and the crew may go."""
+        """Check the aircraft; True when it has been launched, and no further call is needed."""
         if time_us < self._next_us:
             return False
         self._next_us = time_us + self._look_us

@@ -1,4 +1,4 @@
-"""The log of a SITL (.tlog): packets as the vehicles send them, taken apart when they are handed over."""
+"""The log of a SITL (.tlog): packets as sent by the vehicles, split into frames when the log is flushed."""
 
 from pathlib import Path
 
@@ -8,10 +8,10 @@ from autopilot_bridge.tlog import FLUSH_BYTES, FLUSH_INTERVAL_US, TlogWriter
 
 
 class PacketLog(TlogWriter):
-    """A log to which channels of ours are recorded; see `TlogWriter`.
+    """A log that records our channels; see `TlogWriter`.
 
     Attributes:
-        records: how many were handed over.
+        records: number of frames handed to the operating system.
     """
 
     __slots__ = ("_packets", "_times_us")
@@ -22,15 +22,15 @@ class PacketLog(TlogWriter):
         self._packets: list[bytes] = []
 
     def write_packet(self, time_us: int, packet: bytes) -> None:
-        """Append the frames of a packet that a channel of ours has sent.
+        """Append the frames of a packet that one of our channels has sent.
 
         Args:
             time_us: microseconds of the Unix epoch.
-            packet: one or more frames, one behind the other.
+            packet: one or more consecutive frames.
 
         Raises:
-            TlogError: a packet since the last flush does not end with a frame (those before it are written),
-                the log is closed, or the disk is full.
+            TlogError: a packet since the last flush does not end with a frame (the packets before it are
+            written), the log is closed, or the disk is full.
         """
         self._times_us.append(time_us)
         self._packets.append(packet)
@@ -40,11 +40,11 @@ class PacketLog(TlogWriter):
             self.flush()
 
     def write(self, time_us: int, frame: bytes) -> None:
-        """Append one frame, in its turn."""
+        """Append one frame, after the packets before it."""
         self.write_packet(time_us, frame)
 
     def flush(self) -> None:
-        """Hand everything to the operating system.
+        """Write everything to the operating system.
 
         Raises:
             TlogError: a packet does not end with a frame, the log is closed, or the disk is full.
@@ -55,7 +55,7 @@ class PacketLog(TlogWriter):
             raise TlogError(wrong)
 
     def _take_apart(self) -> str:
-        """Turn the packets into records; what is wrong with them."""
+        """Split the packets into records; returns the error, or an empty text."""
         data, count, wrong = packet_records(self._times_us, self._packets)
         self._times_us.clear()
         self._packets.clear()

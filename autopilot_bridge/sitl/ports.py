@@ -12,7 +12,7 @@ _ARDUPILOT_SERIAL_PORTS: Final = (5760, 5762, 5763)
 
 @dataclass(frozen=True, slots=True)
 class Port:
-    """One link to open for a vehicle: where, and which streams run on it ("onboard" or "gcs")."""
+    """One link of a vehicle: its address, and the streams that run on it ("onboard" or "gcs")."""
 
     address: Address
     role: str

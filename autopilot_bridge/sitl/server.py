@@ -1,4 +1,4 @@
-"""SITL for other people's clients: opens links, keeps pace with the wall clock, runs until told to stop."""
+"""SITL for external clients: opens links, keeps pace with the wall clock, runs until it is stopped."""
 
 import contextlib
 import gc
@@ -20,12 +20,12 @@ _WAIT_S: Final = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaceReport:
-    """How well the server keeps pace.
+    """How well the server keeps pace with the wall clock.
 
     Attributes:
         time_us: vehicle time.
         speedup: simulated seconds per wall second since the last report.
-        slipped_s: wall seconds given up in all because the machine was too slow.
+        slipped_s: total wall time that was lost because the machine was too slow, s.
     """
 
     time_us: int
@@ -35,8 +35,8 @@ class PaceReport:
 
 @contextlib.contextmanager
 def objects_kept() -> Iterator[None]:
-    """Take what exists now out of Python's search for garbage: a full search through it takes more than a
-    tenth of a second, in which nobody flies.
+    """Exclude the existing objects from Python's garbage collection: a full collection takes more than a
+    tenth of a second, during which the simulation stands still.
     """
     gc.collect()
     gc.freeze()
@@ -59,7 +59,7 @@ class SitlServer:
         self.sitl = sitl
         self._monotonic = monotonic
         self._speedup = speedup
-        self._first: Link | None = None  # that was opened
+        self._first: Link | None = None  # the first link opened
         self._clock = (
             None if speedup is None else RealTimeClock(speedup, monotonic=monotonic, wait=self._wait)
         )
@@ -72,14 +72,14 @@ class SitlServer:
         """Open the links of every vehicle.
 
         Args:
-            ports: links per vehicle; None: where clients of each flavour look for them.
-            shared: links that all vehicles speak on together.
+            ports: links per vehicle; None: the default ports of each flavour's clients.
+            shared: links that all vehicles share.
 
         Returns:
             (vehicle, port, address as opened) of every link.
 
         Raises:
-            LinkError: a port is busy or a device missing; links opened before are closed again.
+            LinkError: a port is busy or a device missing; links that were opened before are closed again.
         """
         opened: list[tuple[SitlVehicle, Port, str]] = []
         with contextlib.ExitStack() as undo:
@@ -110,15 +110,15 @@ class SitlServer:
         return link
 
     def _capacity(self, link: Link) -> float | None:
-        """Bytes that a link carries in a second of vehicle time: a serial line does not know of a speedup."""
+        """Bytes that a link carries in a second of vehicle time; a speedup does not change a serial line."""
         capacity: float | None = getattr(link, "bytes_per_s", None)
         return None if capacity is None or self._speedup is None else capacity / self._speedup
 
     def wait_for_client(self, stopped: Callable[[], bool]) -> bool:
-        """Wait for somebody on the first link that was opened (ArduPilot's `tcp:0:wait`); False when stopped.
+        """Wait for a client on the first opened link (ArduPilot's `tcp:0:wait`); False when stopped.
 
         Raises:
-            ValueError: none was.
+            ValueError: no link was opened.
         """
         link = self._first
         if link is None:
@@ -166,11 +166,11 @@ class SitlServer:
 
     @property
     def slipped_s(self) -> float:
-        """Wall seconds given up in all."""
+        """Total wall time lost, s."""
         return 0.0 if self._clock is None else self._clock.slipped_s
 
     def _wait(self, seconds: float) -> None:
-        """Sleep, but hand over at once what arrives meanwhile: replies should not wait for the next step."""
+        """Sleep, but deliver messages at once when they arrive: replies should not wait for the next step."""
         deadline_s = self._monotonic() + seconds
         while True:
             left_s = deadline_s - self._monotonic()

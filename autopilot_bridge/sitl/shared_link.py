@@ -1,4 +1,4 @@
-"""One link for several vehicles, as behind one telemetry radio: each frame goes to the vehicle it is for."""
+"""One link for several vehicles, as behind one telemetry radio: frames go to the addressed vehicle."""
 
 from autopilot_bridge.links import Link, LinkCounters, PeerId, Reach
 from autopilot_bridge.mavlink import Frame, Intake
@@ -8,18 +8,19 @@ from autopilot_bridge.sitl.switchboard import AUTOPILOT_COMPONENT, Switchboard
 
 
 class SharedLink:
-    """A link that several vehicles speak on.
+    """A link that several vehicles share.
 
-    Everybody's frames reach the clients. A client's frame goes to the vehicle whose system it is addressed
-    to, or to all of them when it is addressed to none of them; and to other clients by the routing rules.
+    The frames of all vehicles reach the clients. A client's frame goes to the vehicle whose system id it is
+    addressed to, or to all vehicles when it is addressed to none of them; and to other clients by the routing
+    rules.
 
     Args:
-        link: where bytes go and come from.
-        reach: who can get at it.
+        link: sends and receives the bytes.
+        reach: which processes can reach the link.
 
     Attributes:
         link: as given.
-        echoes: frames of the vehicles' own that somebody brought back; they are dropped.
+        echoes: the vehicles' own frames that a client sent back; they are dropped.
     """
 
     def __init__(self, link: Link, *, reach: Reach) -> None:
@@ -28,7 +29,7 @@ class SharedLink:
         self._reach = reach
         self._intake: Intake[PeerId] = Intake()
         self._peers = PeerExchange(link)
-        self._known: set[PeerId] = set()  # a frame of theirs was believed
+        self._known: set[PeerId] = set()  # peers that have sent an accepted frame
         self._loops = LoopGuard()
         self._members: dict[int, tuple[Switchboard, LinkChannel]] = {}
 
@@ -41,7 +42,7 @@ class SharedLink:
             switchboard: of the vehicle.
             system_id: of the vehicle.
             role: which default streams run on it ("onboard" or "gcs").
-            bytes_per_s: the vehicle's part of what the link carries.
+            bytes_per_s: the vehicle's share of the link's capacity.
         """
         port = _Port(self, system_id)
         channel = switchboard.open(port, role=role, reach=self._reach, bytes_per_s=bytes_per_s)
@@ -50,7 +51,7 @@ class SharedLink:
         return channel
 
     def poll(self) -> None:
-        """Hand what has arrived to the vehicles and clients it is for."""
+        """Deliver received frames to the vehicles and clients that they are addressed to."""
         arrived = self.link.receive()
         intake = self._intake
         if not arrived and not intake.waiting:
@@ -71,7 +72,7 @@ class SharedLink:
                 self.link.send(frame.raw, other)
 
     def _believing(self, frame: Frame) -> list[tuple[Switchboard, LinkChannel]]:
-        """The vehicles a frame is for, or that may know the way, and that believe it."""
+        """The vehicles that get a frame: the addressed one or else all, if they accept its signature."""
         if frame.component_id == AUTOPILOT_COMPONENT and frame.system_id in self._members:
             self.echoes += 1
             return []
@@ -80,19 +81,19 @@ class SharedLink:
         return [member for member in members if member[1].signing is None or member[1].signing.admit([frame])]
 
     def forward(self, raw: bytes, member: int) -> None:
-        """Send a frame that came to vehicle `member` on another link; from several vehicles, once."""
+        """Send a frame that vehicle `member` received on another link, once if several have received it."""
         if not self._loops.comes_round(raw, member):
             self.link.send(raw)
 
     def leave(self, member: int) -> None:
-        """A vehicle is gone; the last one closes the link."""
+        """Remove a vehicle; the last one closes the link."""
         self._members.pop(member, None)
         if not self._members:
             self.link.close()
 
 
 class _Port:
-    """What one vehicle has of a shared link; what comes in is brought by `SharedLink.poll`."""
+    """One vehicle's part of a shared link; `SharedLink.poll` delivers the received frames."""
 
     __slots__ = ("_member", "_shared", "channel")
 

@@ -1,7 +1,8 @@
-"""Signing of the vehicles of a SITL: whose key, what each link takes, and how a client brings another key.
+"""Signing of the vehicles of a SITL: the keys, what each link accepts, and how a client sets another key.
 
 The rules are the firmware's (ArduPilot `GCS_Signing.cpp`; PX4 has some since 1.17): no key is changed while
-armed, and it is taken on a link that only the owner can reach, or from the holder of the present key.
+armed, and a key is accepted on a link that only the owner can reach, or in a frame signed with the present
+key.
 """
 
 import os
@@ -21,14 +22,14 @@ from autopilot_bridge.mavlink.signing import INTERNAL, MINUTE, RADIO, REQUIRED, 
 
 _KEY_REMOVED: Final = "Signing key removed"
 _KEY_TAKEN: Final = "Signing key set"
-_NOT_STORED: Final = ", but can't be stored"  # a restart forgets it
-_WHILE_ARMED: Final = "ERROR: Won't setup signing when armed"  # ArduPilot's words
+_NOT_STORED: Final = ", but can't be stored"  # a restart loses the key
+_WHILE_ARMED: Final = "ERROR: Won't setup signing when armed"  # ArduPilot's text
 _NOT_TRUSTED: Final = "Signing key refused: link not trusted"
 _NOT_REMOVABLE: Final = "Signing key can't be removed"
 
 
 class UnsignedFrom(StrEnum):
-    """From whom unsigned frames are taken while there is a key."""
+    """The links on which unsigned frames are accepted while there is a key."""
 
     NONE = "none"
     SERIAL = "serial"
@@ -44,24 +45,24 @@ POLICIES: Final[Mapping[UnsignedFrom, Mapping[Reach, LinkSigningPolicy]]] = Mapp
         UnsignedFrom.ALL: {Reach.CABLE: TRUSTED, Reach.MACHINE: TRUSTED, Reach.NETWORK: UNSIGNED_TOO},
     }
 )
-"""What a link takes, by who can get at it; links within the process are never signed."""
+"""What a link accepts, by the processes that can reach it; links within the process are never signed."""
 
 
 class SigningStore:
-    """Keys and times of vehicles in a file, so that time doesn't go back over a restart.
+    """Stores keys and times of vehicles in a file, so that time does not go back over a restart.
 
     One line for each vehicle: system id, timestamp, key in hexadecimal digits. Only its owner can read it.
 
     Args:
         path: the file; it need not exist.
-        on_failure: told why, when the file can't be written any more. The vehicles fly on, and what ought to
-            be there is written with the next change, if that can be.
+        on_failure: called with the reason when the file can't be written any more. The vehicles keep flying,
+            and the next change tries to write the whole content again.
 
     Attributes:
-        failure: why the file is not what it ought to be; empty: it is.
+        failure: why the file is not up to date; empty: it is.
 
     Raises:
-        SigningKeyError: the file is something else, can't be read, or will not be writable.
+        SigningKeyError: the file has another content, can't be read, or can't be written.
     """
 
     def __init__(self, path: Path, on_failure: Callable[[str], None] | None = None) -> None:
@@ -92,12 +93,12 @@ class SigningStore:
             ) from error
 
     def load(self, system_id: int) -> tuple[int, SigningKey | None] | None:
-        """Timestamp to go on from, a minute later than any that was used, and the key; None: never stored."""
+        """Timestamp to start from, a minute later than any that was used, and the key; None: never stored."""
         found = self._vehicles.get(system_id)
         return None if found is None else (found[0] + MINUTE, found[1])
 
     def save(self, system_id: int, state: SigningState) -> None:
-        """Store a vehicle's key and time; the file is replaced whole, or left as it is (`failure`)."""
+        """Store a vehicle's key and time; the file is replaced completely, or kept as it is (`failure`)."""
         self._vehicles[system_id] = (state.timestamp, state.key)
         before, self.failure = self.failure, ""
         try:
@@ -108,7 +109,7 @@ class SigningStore:
                 self._on_failure(self.failure)
 
     def _write(self, *, replace: bool) -> None:
-        """Write all there is beside the file, and put it into the file's place or, for a trial, away."""
+        """Write everything to a temporary file; then move it to the file's place, or in a trial delete it."""
         lines = [
             f"{number} {timestamp}{'' if key is None else ' ' + key.secret.hex()}\n"
             for number, (timestamp, key) in sorted(self._vehicles.items())
@@ -129,11 +130,11 @@ class SigningParameters:
     """How the vehicles sign.
 
     Attributes:
-        key: of all vehicles; None: none until a client sets one, or the stored one.
-        unsigned_from: from whom unsigned frames are taken while there is a key.
+        key: of all vehicles; None: no key until a client sets one, or the stored key.
+        unsigned_from: links on which unsigned frames are accepted while there is a key.
         removable: a client that may set a key may also switch signing off.
-        clock: time as a timestamp, for clients that live in real time; None: the vehicles' own clock.
-        store: where keys and times are kept; None: nowhere.
+        clock: time as a timestamp, for clients in real time; None: the vehicles' own clock.
+        store: where keys and times are stored; None: nowhere.
     """
 
     key: SigningKey | None = None
@@ -150,7 +151,7 @@ class VehicleSigning:
         parameters: as given to the SITL.
         system_id: the vehicle's.
         clock: the vehicle's time as a timestamp.
-        armed: asked when somebody brings a key.
+        armed: returns whether the vehicle is armed, when a client sends a key.
 
     Attributes:
         state: key, time and streams.
@@ -179,7 +180,7 @@ class VehicleSigning:
         )
 
     def link(self, reach: Reach) -> LinkSigning:
-        """The signing of one more link."""
+        """The signing of one additional link."""
         if reach is Reach.PROCESS:
             return LinkSigning(self.state, link_id=0, policy=INTERNAL)
         number, self._links = self._links, self._links + 1
@@ -190,15 +191,15 @@ class VehicleSigning:
         )
 
     def take_setup(self, frame: Frame, link: LinkSigning, reach: Reach) -> str | None:
-        """SETUP_SIGNING: take the key, or say why not.
+        """SETUP_SIGNING: accept the key, or return the reason of the refusal.
 
         Args:
-            frame: as `LinkSigning.admit` let it pass.
-            link: by which it came.
+            frame: as passed by `LinkSigning.admit`.
+            link: the link on which it came.
             reach: of that link.
 
         Returns:
-            A text for the sender; None when the message was for somebody else.
+            A text for the sender; None when the message was addressed to another system or component.
         """
         message = decode(frame)
         if message.target_system != self._system_id or message.target_component not in (0, 1):
@@ -227,7 +228,7 @@ class VehicleSigning:
 
 
 def told(text: str) -> mavlink.MAVLink_statustext_message:
-    """A text for who brought a key."""
+    """The STATUSTEXT for the client that sent a key."""
     good = text in (_KEY_TAKEN, _KEY_REMOVED)
     severity = mavlink.MAV_SEVERITY_INFO if good else mavlink.MAV_SEVERITY_ERROR
     return mavlink.MAVLink_statustext_message(severity, text.encode())

@@ -1,6 +1,6 @@
-"""SIM_* parameters: how users' scripts break an ArduPilot SITL, and a little of PX4's.
+"""SIM_* parameters: how users' scripts inject failures into an ArduPilot SITL, and some of PX4's.
 
-A parameter acts when it changes, and what it breaks is the simulated world's. Sources: parameter descriptions
+A parameter acts when it changes, and acts on the simulated world only. Sources: parameter descriptions
 of ArduPilot 4.6's SITL and of PX4 1.16's simulated sensors.
 """
 
@@ -28,16 +28,16 @@ _MAX_WIND_M_S: Final = 60.0
 _WIND_OVER_HEIGHT: Final = ("SIM_WIND_T", "SIM_WIND_T_ALT", "SIM_WIND_T_COEF")
 _SQUARE_ROOT: Final = 0.0  # of SIM_WIND_T
 _LINEAR: Final = 2.0
-_W20_PER_TURBULENCE: Final = 5.0  # MIL-F-8785C near the ground: along the wind about a fifth of W20
+_W20_PER_TURBULENCE: Final = 5.0  # MIL-F-8785C near the ground: longitudinal turbulence of about W20/5
 
 
 class SimulatorParameters:
-    """Applies them to one vehicle.
+    """Applies SIM_* parameters to one vehicle.
 
     Args:
-        vehicle, sensors: what they act on.
-        fail_radio: the pilot's radio fails, or works.
-        weaken_motors: (bit mask, effectiveness): these motors get weaker.
+        vehicle, sensors: the objects that they act on.
+        fail_radio: interrupts (True) or restores (False) the pilot's radio.
+        weaken_motors: (bit mask, effectiveness): reduces the effectiveness of these motors.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class SimulatorParameters:
         self._applied: dict[str, Any] = {}
 
     def apply(self, store: ParameterStore) -> None:
-        """Take note of the values at boot; those that differ from their defaults act."""
+        """Record the values at boot; those that differ from their defaults act at once."""
         for name in _GROUP_OF:
             definition = store.find(name)
             if definition is not None and store.get(name) != definition.convert(definition.default):
@@ -101,7 +101,7 @@ class SimulatorParameters:
             wind_at_20_ft_m_s=_W20_PER_TURBULENCE * turbulence_m_s,
         )
 
-    # what a group of parameters asks for
+    # the fault that a group of parameters defines
 
     def _gps(self, store: ParameterStore) -> Fault:
         if number(store, "SIM_GPS_DISABLE", 0.0):
@@ -116,7 +116,7 @@ class SimulatorParameters:
         return (FaultType.WRONG, {"bias": bias}) if any(bias) else _SOUND
 
     def _glitch(self, lat_deg: float, lon_deg: float, up_m: float) -> tuple[float, float, float]:
-        """Degrees of latitude and longitude as metres to the north and east, where the vehicle is now."""
+        """Offsets in degrees of latitude and longitude as metres north and east, where the vehicle is."""
         lat_rad, lon_rad, alt_m = self._vehicle.truth[t.LAT_RAD : t.ALT_M + 1].tolist()
         here = GeodeticPosition(lat_deg=math.degrees(lat_rad), lon_deg=math.degrees(lon_rad), alt_m=alt_m)
         lat_deg = clamp(here.lat_deg + lat_deg, -90.0, 90.0)
@@ -181,7 +181,7 @@ class SimulatorParameters:
 def _profile(speed_m_s: float, law: float, height_m: float, gradient_1_s: float) -> WindProfile:
     """Wind over height by SIM_WIND_T of ArduPilot 4.6.3.
 
-    0: it grows with the square root of height up to SIM_WIND_T_ALT; 2: linearly; otherwise it is the same.
+    0: it grows with the square root of height up to SIM_WIND_T_ALT; 2: linearly; otherwise it is constant.
     """
     if law == _SQUARE_ROOT:
         return WindProfile(law=WindLaw.POWER, exponent=0.5, reference_height_m=height_m, top_m=height_m)

@@ -1,7 +1,7 @@
-"""The one visible wiring: world, vehicles and links, stepped together.
+"""The wiring of a simulation: world, vehicles and links, stepped together.
 
-In a step each vehicle makes its own, in turn (`SitlVehicle.step`). Then the world's clock moves on and what
-links have brought is handed to the autopilots.
+In a step each vehicle is stepped in turn (`SitlVehicle.step`). Then the world's clock advances, and the data
+received on links are passed to the autopilots.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ from flightsim.payload import GroundTargets
 from flightsim.world import World, WorldParameters
 
 TruthListener = Callable[[int, bytes], None]
-"""Called with vehicle time (microseconds) and a frame of truth."""
+"""Called with vehicle time (microseconds) and a truth frame."""
 
 _NOT_SIGNED: Final = SigningParameters()
 
@@ -29,16 +29,16 @@ class Sitl:
     """A world of vehicles under autopilots, advanced step by step.
 
     Args:
-        configuration: what it holds.
-        signing: how the vehicles sign what they say, and what they believe.
-        cards: the vehicles' memory cards; None: empty ones in memory, without logs.
+        configuration: the content of the world.
+        signing: how the vehicles sign their frames, and which frames they accept.
+        cards: the vehicles' memory cards; None: empty cards in memory, without logs.
 
     Attributes:
         configuration: as given.
         world: vehicles and air.
         vehicles: with sensors, autopilots and links.
         targets: on the ground.
-        shared_links: those that several vehicles speak on.
+        shared_links: the links that several vehicles share.
 
     Raises:
         ValueError: a model, flavour or parameter that does not exist or is out of range.
@@ -112,7 +112,7 @@ class Sitl:
             listener(time_us, frame)
 
     def poll(self) -> None:
-        """Take what has arrived on all links, as much of it as there is time for."""
+        """Receive from all links, as much as the time budget allows."""
         for shared in self.shared_links:
             shared.poll()
         for vehicle in self.vehicles:
@@ -121,7 +121,7 @@ class Sitl:
             look_after(self._time_us)
 
     def attend(self, look_after: Callable[[int], None]) -> None:
-        """Have a shell looked after, with vehicle time, whenever real links are."""
+        """Register a function that is called with vehicle time whenever real links are polled."""
         self._attended.append(look_after)
 
     def filenos(self) -> list[int]:
@@ -138,8 +138,8 @@ class Sitl:
         Args:
             link: an open link.
             role: which default streams run on it ("onboard" or "gcs").
-            reach: who can get at it.
-            bytes_per_s: what it carries in a second of vehicle time; each vehicle gets an equal part.
+            reach: which processes can reach the link.
+            bytes_per_s: its capacity in a second of vehicle time; each vehicle gets an equal share.
         """
         shared = SharedLink(link, reach=reach)
         part = None if bytes_per_s is None else bytes_per_s / len(self.vehicles)
@@ -149,7 +149,7 @@ class Sitl:
         return shared
 
     def poll_every(self, interval_us: int) -> None:
-        """Look at real links every so often (vehicle time); memory links need no polling."""
+        """Set the interval at which real links are polled (vehicle time); memory links need no polling."""
         self._poll_us = max(self._step_us, interval_us)
         self._next_poll_us = self._time_us + self._poll_us
 
@@ -166,8 +166,9 @@ class Sitl:
         Args:
             index: of the vehicle.
             role: which default streams run on it.
-            bytes_per_s: what it carries in a second of vehicle time.
-            reach: whose link it stands for; of this process, it is trusted and never signed.
+            bytes_per_s: its capacity in a second of vehicle time.
+            reach: the kind of link that it represents; a link within this process is trusted and never
+                signed.
         """
         vehicle = self.vehicles[index]
         ours, theirs = memory_pair(f"vehicle{index + 1}", f"client{index + 1}")
@@ -176,14 +177,15 @@ class Sitl:
         return theirs
 
     def record(self, log: PacketLog, on_failure: Callable[[str], None] | None = None) -> list[MemoryLink]:
-        """Log what every vehicle says on a link of its own, and the truth, stamped with the vehicles' clock.
+        """Log every vehicle's messages on a separate link, and the truth, stamped with the vehicles' clock.
 
         Args:
-            on_failure: told once, why, when the log takes no more: it ends there, and the vehicles fly on.
-                None: the step raises that TlogError.
+            on_failure: called once with the reason when the log can't be written any more: the log ends
+                there, and the
+                vehicles keep flying. None: the step raises that TlogError.
 
         Returns:
-            The client's ends of those links, by which the vehicles can be spoken to.
+            The client's ends of those links, on which a client can send messages to the vehicles.
         """
         epoch_us = self.configuration.unix_epoch_us
         links = [self.connect(index) for index in range(len(self.vehicles))]
@@ -206,13 +208,13 @@ class Sitl:
         return links
 
     def on_truth(self, listener: TruthListener) -> None:
-        """Have truth frames delivered at 50 Hz, for the log and the score."""
+        """Register a listener for truth frames at 50 Hz, for the log and the score."""
         self._truth_listeners.append(listener)
         if self._next_truth_us == NEVER_US:
             self._next_truth_us = self._time_us + self._truth_interval_us
 
     def close(self) -> None:
-        """Close every link, and what the autopilots have open."""
+        """Close every link, and the open files of the autopilots."""
         for vehicle in self.vehicles:
             vehicle.autopilot.close()
             for channel in list(vehicle.channels):

@@ -1,8 +1,8 @@
-"""The links of one vehicle: what comes in goes to the autopilot and to whom it is meant for.
+"""The links of one vehicle: received frames go to the autopilot and to the systems they are addressed to.
 
-Frames are passed on by the MAVLink routing rules between links, and between the clients that share one. What
-is for another component of the vehicle goes there; while that was never heard, to the autopilot, which may
-answer for it (ArduPilot).
+Frames are forwarded by the MAVLink routing rules between links, and between the clients that share one. A
+frame for another component of the vehicle goes there; as long as no message of that component was received,
+it goes to the autopilot, which may answer for it (ArduPilot).
 """
 
 from collections.abc import Sequence
@@ -24,13 +24,13 @@ class Switchboard:
     """The open links of one vehicle.
 
     Args:
-        autopilot: hears and speaks on all of them.
+        autopilot: receives and sends on all of them.
         system_id: the vehicle's.
         signing: keys of the vehicle.
 
     Attributes:
         channels: the open links.
-        echoes: frames of the autopilot's own that came back on a link; they are dropped.
+        echoes: the autopilot's own frames that came back on a link; they are dropped.
         signing: as given.
     """
 
@@ -54,13 +54,14 @@ class Switchboard:
         bytes_per_s: float | None = None,
         reach: Reach | None = None,
     ) -> LinkChannel:
-        """Give the autopilot one more link.
+        """Add a link to the autopilot.
 
         Args:
             name: unique per vehicle; None: made from the link.
             role: which default streams run on it ("onboard", "gcs" or "payload").
-            bytes_per_s: what the link carries in a second of vehicle time; streams are thinned to fit.
-            reach: who can get at it; None: only this process when it is a memory link, else the network.
+            bytes_per_s: the link's capacity in a second of vehicle time; streams are reduced to fit.
+            reach: which processes can reach it; None: only this process when it is a memory link, else the
+                network.
         """
         if name is None:
             name = f"{role}{len(self.channels)} {link.description}"
@@ -78,7 +79,7 @@ class Switchboard:
         return channel
 
     def close(self, channel: LinkChannel) -> None:
-        """Take a link away; the link itself is closed too."""
+        """Remove a channel and close its link."""
         self.channels.remove(channel)
         if self._autopilot is not None:
             self._autopilot.remove_channel(channel)
@@ -87,7 +88,7 @@ class Switchboard:
         channel.link.close()
 
     def restart(self, autopilot: Autopilot | None) -> None:
-        """Give the links to an autopilot that starts; None: there is none, and nobody answers."""
+        """Connect the links to an autopilot that starts; None: there is no autopilot, and nothing answers."""
         self._autopilot = autopilot
         if autopilot is not None:
             for channel in self.channels:
@@ -99,22 +100,23 @@ class Switchboard:
             channel.send_own_frame(raw)
 
     def poll(self) -> None:
-        """Take what has arrived on all links."""
+        """Receive from all links."""
         for channel in self.channels:
             for peer, frames in channel.receive():
                 self.take(channel, frames, peer)
 
     def take(self, channel: LinkChannel, frames: Sequence[Frame], peer: PeerId | None = None) -> None:
-        """Hand frames that came in on a channel to the autopilot, and to the links and clients they are for.
+        """Pass frames received on a channel to the autopilot, and to the addressed links and clients.
 
         Args:
-            peer: who of several on the link sent them; None: there is one, or the link sees to the others.
+            peer: the sender among several on the link; None: there is only one, or the link routes between
+                them.
         """
         own = self._system_id
         several = len(self.channels) > 1
         for frame in frames:
             if frame.system_id == own and frame.component_id == AUTOPILOT_COMPONENT:
-                self.echoes += 1  # its own words, brought back by somebody's bridge
+                self.echoes += 1  # its own frames, sent back by a bridge
                 continue
             if frame.message_id == SETUP_SIGNING:
                 self._take_key(frame, channel)

@@ -1,7 +1,7 @@
 """Truth as MAVLink frames, for log and score only: HIL_STATE_QUATERNION, as PX4 sends its ground truth.
 
 The frames carry the vehicle's system id and the component id of the simulator (`SIMULATOR_COMPONENT`), so
-that no reader takes them for the autopilot's word. Ground targets have a system of their own,
+that no reader takes them for frames of the autopilot. Ground targets have a separate system id,
 `TARGET_SYSTEM`; the first is component 1.
 """
 
@@ -29,7 +29,7 @@ _MESSAGE_ID: Final = mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION
 
 @kernel
 def _fill(truth: NDArray[np.float64], out: NDArray[np.void], time_us: int) -> None:
-    """Layout of `flightsim.truth` to the wire's units."""
+    """Convert the layout of `flightsim.truth` to the wire's units."""
     r = out[0]
     r.time_usec = time_us
     for i in range(4):
@@ -71,17 +71,17 @@ class TruthEncoder:
         return self._encoder.encode_payload(_MESSAGE_ID, self._record.tobytes())
 
     def encode_text(self, text: str) -> bytes:
-        """A STATUSTEXT of the simulator's, for people; severity critical."""
+        """A STATUSTEXT of the simulator, for users; severity critical."""
         return self._encoder.encode(
             mavlink.MAVLink_statustext_message(mavlink.MAV_SEVERITY_CRITICAL, text[:50].encode("ascii"))
         )
 
 
 class TargetTruthEncoder:
-    """Packs where the ground targets are.
+    """Packs the positions of the ground targets.
 
     Args:
-        targets: of the world.
+        targets: the world's targets.
         home: origin of their frame.
     """
 
@@ -95,7 +95,7 @@ class TargetTruthEncoder:
         self._encoders = [FrameEncoder(TARGET_SYSTEM, number + 1) for number in range(len(targets))]
 
     def encode(self, time_us: int) -> list[bytes]:
-        """A HIL_STATE_QUATERNION frame for each target, as they are at a vehicle time."""
+        """A HIL_STATE_QUATERNION frame for each target, with its state at a vehicle time."""
         if not self._encoders:
             return []
         self._targets.step(time_us)

@@ -1,4 +1,4 @@
-"""One vehicle of a SITL: JSBSim's vehicle, sensors, autopilot, payload and links, and what reboots it.
+"""One vehicle of a SITL: JSBSim's vehicle, sensors, autopilot, payload and links, and its reboots.
 
 Execution order of a step: vehicle dynamics, sensors, autopilot (navigation, slow loop, control, streams),
 payload.
@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 NEVER_US: Final = 1 << 62
 REBOOT_US: Final = 1_000_000
-"""From when a rebooting autopilot goes down until it starts again."""
+"""Time from the shutdown of a rebooting autopilot until it starts again."""
 
 
 class SitlVehicle:
@@ -53,11 +53,11 @@ class SitlVehicle:
     Attributes:
         vehicle: the JSBSim vehicle.
         sensors: its sensor suite; `sensors.faults` switches failures.
-        failures: takes MAV_CMD_INJECT_FAILURE.
+        failures: executes MAV_CMD_INJECT_FAILURE.
         autopilot: the emulated autopilot.
-        payload: what it carries, as MAVLink components on a link of their own; None: nothing.
-        links: its open links, who is heard on them, and the key it signs with.
-        crashed: the vehicle is a wreck; clients were told.
+        payload: its payload, as MAVLink components on a separate link; None: no payload.
+        links: its open links with their peers, and its signing key.
+        crashed: the vehicle has crashed; clients were informed.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class SitlVehicle:
         self._starts_again = flavour.reboot_starts_again
         self._boot_us = 0
         self._power: PowerAction | None = None
-        self._power_us = NEVER_US  # when it goes down, or boots
+        self._power_us = NEVER_US  # time of the shutdown or the boot
         self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us)
         self._actuators = self.autopilot.actuators  # written in place
         self._crew_of = partial(LaunchCrew, self.vehicle, step_us=world.step_us)
@@ -138,7 +138,7 @@ class SitlVehicle:
             )
 
     def _fit(self, payload: Payload) -> None:
-        """Put the payload's components onto a link of their own."""
+        """Connect the payload's components on a separate link."""
         ours, theirs = memory_pair("vehicle", "payload")
         station = PayloadStation(payload, system_id=self.specification.system_id, send=theirs.send)
         channel = self.open(ours, role="payload")
@@ -153,7 +153,7 @@ class SitlVehicle:
 
     @property
     def echoes(self) -> int:
-        """Frames of its own that came back on a link; they were dropped."""
+        """The vehicle's own frames that came back on a link; they were dropped."""
         return self.links.echoes
 
     def step(self, time_us: int) -> None:
@@ -178,7 +178,7 @@ class SitlVehicle:
         self._power, self._power_us = action, 0
 
     def _power_cycle(self, time_us: int) -> None:
-        """The autopilot goes down, to boot again a moment later unless it was shut down; or it boots."""
+        """Shut the autopilot down, to boot after `REBOOT_US` unless it is to stay down; or boot it."""
         if self._power is None:
             self._boot_us, self._power_us = time_us, NEVER_US
             self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us + time_us)
@@ -206,24 +206,24 @@ class SitlVehicle:
         bytes_per_s: float | None = None,
         reach: Reach | None = None,
     ) -> LinkChannel:
-        """Give the autopilot one more link; see `Switchboard.open`."""
+        """Add a link to the autopilot; see `Switchboard.open`."""
         return self.links.open(link, name=name, role=role, bytes_per_s=bytes_per_s, reach=reach)
 
     def close(self, channel: LinkChannel) -> None:
-        """Take a link away; the link itself is closed too."""
+        """Remove a channel and close its link."""
         self.links.close(channel)
 
     def poll(self) -> None:
-        """Hand everything that has arrived to the autopilot, and forward what is for somebody else."""
+        """Pass all received frames to the autopilot, and forward those for other systems."""
         self.links.poll()
 
     def take(self, channel: LinkChannel, frames: Sequence[Frame]) -> None:
-        """Hand frames that came in on a channel to the autopilot and to the channels they are meant for."""
+        """Pass frames received on a channel to the autopilot and to the channels they are addressed to."""
         self.links.take(channel, frames)
 
 
 def usual_sensors(specification: VehicleSpecification, *, aircraft: bool) -> SensorSuiteParameters:
-    """What a vehicle of this kind carries; its receiver starts as in the firmware's own SITL."""
+    """The sensors of a vehicle of this kind; its receiver starts as in the firmware's own SITL."""
     timeline: tuple[GpsFixStage, ...] = FIX_AT_BOOT
     if specification.flavour == "ardupilot":
         timeline = RTK_FIX_AFTER_10_S if specification.gps == "differential" else FIX_AFTER_10_S
@@ -232,7 +232,7 @@ def usual_sensors(specification: VehicleSpecification, *, aircraft: bool) -> Sen
 
 
 def _envelope(airframe: Airframe, configuration: SitlConfiguration) -> "FlightEnvelope":
-    """What an aircraft can do, found by trimming its model."""
-    from flightsim.flight_envelope import flight_envelope  # brings scipy, which a multicopter needs not
+    """The flight envelope of an aircraft, found by trimming its model."""
+    from flightsim.flight_envelope import flight_envelope  # imports scipy, which a multicopter does not need
 
     return flight_envelope(airframe, home=configuration.place, environment=configuration.environment)

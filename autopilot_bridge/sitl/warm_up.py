@@ -1,8 +1,8 @@
-"""Compiling the flight code before anybody watches.
+"""Compilation of the flight code before the start of a flight.
 
-The kernels of simulation, navigation and control are compiled when they are first called. In a SITL that
-keeps pace with the wall clock that would stop the vehicle for seconds, in the air too, so a throwaway vehicle
-flies a little of everything first. With a warm compile cache it costs a fraction of a second.
+The kernels of simulation, navigation and control are compiled at their first call. In a SITL that keeps pace
+with the wall clock this would stop the vehicle for seconds, even in the air, so a temporary vehicle
+flies each kind of manoeuvre first. With a filled compile cache this takes a fraction of a second.
 """
 
 import math
@@ -32,15 +32,15 @@ _MODELS: Final = {AirframeKind.MULTICOPTER: "iris", AirframeKind.FIXED_WING: "ae
 
 
 def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpecification(),)) -> None:
-    """Fly a throwaway vehicle of each kind through take-off, an approach, a circle, a descent and streams.
+    """Fly a temporary vehicle of each kind through take-off, an approach, a circle, a descent and streams.
 
-    Once in a process: a kind that has flown does not fly again.
+    Each kind is flown only once in a process.
 
     Args:
-        vehicles: those that are to fly; only their kinds matter.
+        vehicles: the vehicles of the flight; only their kinds matter.
 
     Raises:
-        AirframeError: a model that can't be used.
+        AirframeError: a model can't be used.
     """
     for kind in sorted({load_airframe(vehicle.model).kind for vehicle in vehicles}):
         _compile(kind)
@@ -49,7 +49,7 @@ def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpeci
 @cache
 def _compile(kind: AirframeKind) -> None:
     specification = VehicleSpecification(model=_MODELS[kind])
-    # rough air and another's estimate of the position may come at any time of a flight
+    # turbulence and external position estimates may come at any time of a flight
     air = Environment.from_wind(speed_m_s=2.0, from_deg=0.0, turbulence="light")
     sitl = Sitl(SitlConfiguration(vehicles=(specification,), environment=air))
     link = sitl.connect(0)
@@ -83,7 +83,7 @@ def _fly_multicopter(sitl: Sitl) -> None:
 
 
 def _tell_odometry(sitl: Sitl) -> None:
-    """A velocity as visual odometry gives it."""
+    """Send a velocity as visual odometry does."""
     autopilot = sitl.vehicles[0].autopilot
     autopilot.parameters.set("EKF2_EV_CTRL", 4)
     values = np.full(SAMPLE_SIZE, math.nan)
