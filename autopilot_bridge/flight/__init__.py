@@ -1,4 +1,4 @@
-"""Flight tasks: each flies one kind of flying by writing the control setpoint. Flavour-neutral."""
+"""Flight tasks: each flies one kind of manoeuvre by writing the control setpoint. Flavour-neutral."""
 
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState, ManualInput
 from autopilot_bridge.flight.goto import GotoTask, RepositionTask

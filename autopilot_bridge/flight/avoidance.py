@@ -1,8 +1,8 @@
 """Stop before obstacles: PX4's collision prevention, ArduPilot's AC_Avoid for pilots and streamed velocities.
 
-A commanded horizontal velocity is limited so that the vehicle still comes to rest before the margin. What
-points away from an obstacle stays as it is. PX4 slows down the whole velocity; ArduPilot lets the part along
-the obstacle go on (slide).
+A commanded horizontal velocity is limited so that the vehicle can stop before the margin. A velocity away
+from an obstacle is not limited. PX4 slows down the whole velocity; ArduPilot keeps the component along the
+obstacle (slide).
 """
 
 import math
@@ -12,11 +12,11 @@ from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
 
 _LEAST_M_S: Final = 1e-3
-_SLIDES: Final = 2  # passes over the circle: two walls make a corner
+_SLIDES: Final = 2  # iterations over all sectors: two walls make a corner
 
 
 def _stopping(ctx: FlightContext) -> tuple[float, float]:
-    """(deceleration, delay) of a stop: the jerk limit costs twice its ramp (as in PX4)."""
+    """(deceleration, delay) of a stop: the jerk limit adds twice the duration of its ramp (as in PX4)."""
     p, limits = ctx.multicopter.avoidance, ctx.multicopter
     deceleration = min(p.deceleration_m_s2, limits.acceleration_m_s2)
     return deceleration, p.delay_s + 2.0 * deceleration / limits.jerk_m_s3
@@ -25,7 +25,7 @@ def _stopping(ctx: FlightContext) -> tuple[float, float]:
 def limited_velocity(
     ctx: FlightContext, north_m_s: float, east_m_s: float, heading_rad: float
 ) -> tuple[float, float]:
-    """A horizontal velocity, NED, as far as obstacles let the vehicle fly it."""
+    """A horizontal velocity, NED, limited by the obstacles."""
     p, obstacles = ctx.multicopter.avoidance, ctx.surroundings.obstacles
     speed = math.hypot(north_m_s, east_m_s)
     if speed < _LEAST_M_S:
@@ -53,7 +53,7 @@ def limited_velocity(
 def _slid(
     ctx: FlightContext, north: float, east: float, heading_rad: float, timeout_us: int
 ) -> tuple[float, float]:
-    """Without the part towards each obstacle that is too fast for its distance."""
+    """The velocity without the components towards obstacles that are too fast for the distance."""
     p, obstacles = ctx.multicopter.avoidance, ctx.surroundings.obstacles
     if obstacles.newest_us < 0 or ctx.time_us - obstacles.newest_us > timeout_us:
         return north, east

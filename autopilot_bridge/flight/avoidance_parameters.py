@@ -1,4 +1,4 @@
-"""How far a vehicle stays away from obstacles: PX4's CP_*, ArduPilot's AVOID_*."""
+"""Parameters of the distance from obstacles: PX4's CP_*, ArduPilot's AVOID_*."""
 
 import math
 from dataclasses import dataclass
@@ -8,18 +8,18 @@ from flightsim.checks import check_fields, require_not_negative, require_positiv
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AvoidanceParameters:
-    """How far to stay away.
+    """Distance from obstacles.
 
     Attributes:
-        enabled: pilots are kept from obstacles (CP_DIST not negative; AVOID_ENABLE bit 1 with PRX1_TYPE).
-        guided: so are streamed velocities (ArduPilot).
-        margin_m: kept from obstacles (CP_DIST, AVOID_MARGIN).
+        enabled: for pilots (CP_DIST not negative; AVOID_ENABLE bit 1 with PRX1_TYPE).
+        guided: for streamed velocities too (ArduPilot).
+        margin_m: distance from obstacles (CP_DIST, AVOID_MARGIN).
         delay_s: of sensor and control (CP_DELAY).
         guard_rad: obstacles within this angle of the direction of flight count (PX4).
-        go_without_data: fly also where no sensor looks (CP_GO_NO_DATA; ArduPilot always).
+        go_without_data: fly also in directions without a sensor (CP_GO_NO_DATA; ArduPilot always).
         slide: along obstacles (AVOID_BEHAVE 0).
-        timeout_s: what was told longer ago counts no more.
-        deceleration_m_s2: with which it stops (AVOID_ACCEL_MAX).
+        timeout_s: older measurements are not used.
+        deceleration_m_s2: deceleration of the stop (AVOID_ACCEL_MAX).
     """
 
     enabled: bool = False

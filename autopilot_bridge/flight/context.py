@@ -1,6 +1,7 @@
-"""What a flight task sees: one mutable context per vehicle, filled by the autopilot before each 50 Hz update.
+"""The data for flight tasks: one mutable context per vehicle, filled by the autopilot before each 50 Hz
+update.
 
-Everything here comes from the navigation filter, the parameters and the pilot; never from truth or a clock.
+All values come from the navigation filter, the parameters and the pilot; never from truth or a clock.
 Positions are local NED metres at the filter's origin.
 """
 
@@ -44,7 +45,7 @@ class LandedState(IntEnum):
 
 
 class FlightPhase(IntEnum):
-    """What the active task is doing, as far as the landed state shows it."""
+    """The phase of the active task, as far as the landed state shows it."""
 
     CRUISE = 0
     TAKEOFF = 1
@@ -53,8 +54,9 @@ class FlightPhase(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ManualInput:
-    """Sticks as MANUAL_CONTROL means them, -1..1: positive is right, stick forward,
-    up, clockwise. `valid` is False while no pilot is heard, `simulated` where nobody moves them."""
+    """Sticks as in MANUAL_CONTROL, -1..1: positive is right, stick forward, up, clockwise. `valid` is False
+    without input from a pilot; `simulated` is True for a simulated radio with untouched sticks.
+    """
 
     roll: float = 0.0
     pitch: float = 0.0  # positive: stick forward, fly forward
@@ -90,19 +92,19 @@ class WaypointStarted:
 
 @dataclass(frozen=True, slots=True)
 class MissionFinished:
-    """The last item of the plan is done; the vehicle holds where it is."""
+    """The last item of the plan is finished; the vehicle holds its position."""
 
 
 @dataclass(frozen=True, slots=True)
 class MissionModeRequested:
-    """A mission item hands the vehicle over to another kind of flying (NAV_RETURN_TO_LAUNCH)."""
+    """A mission item requires another mode (NAV_RETURN_TO_LAUNCH)."""
 
     command: int
 
 
 @dataclass(frozen=True, slots=True)
 class HomeChangeRequested:
-    """A mission item asks for a new home (DO_SET_HOME), local NED."""
+    """A mission item commands a new home (DO_SET_HOME), local NED."""
 
     north_m: float
     east_m: float
@@ -111,21 +113,21 @@ class HomeChangeRequested:
 
 @dataclass(frozen=True, slots=True)
 class ItemCommanded:
-    """An item of the plan that other equipment or another part of the autopilot carries out."""
+    """An item of the plan that other equipment or another part of the autopilot executes."""
 
     seq: int
 
 
 @dataclass(frozen=True, slots=True)
 class TaskFinished:
-    """The active task is done."""
+    """The active task is finished."""
 
     task: str
 
 
 @dataclass(frozen=True, slots=True)
 class TouchedDown:
-    """A landing task felt the ground for good."""
+    """A landing task has detected the final touchdown."""
 
 
 FlightEvent = (
@@ -147,26 +149,26 @@ class FlightContext:
         time_us: vehicle time of this update.
         dt_s: time since the previous update (the task period).
         nav: navigation state, layout `navigation.layout` (shared with the filter).
-        attitude_setpoint: q_ned_from_frd that the attitude loop follows, a view; None: nobody tells.
-        health: what the filter says of its own state; None before the first solution.
+        attitude_setpoint: q_ned_from_frd that the attitude loop follows, a view; None: not available.
+        health: the filter's own state; None before the first solution.
         setpoint: control setpoint, layout `control.setpoint` or `control.fixed_wing_setpoint` (shared with
             the controller); tasks write it.
         home_ned_m: home in the local frame, (3,); NaN while unset.
         home_yaw_rad: heading at home, NaN while unset.
-        parameters: limits and habits of flight, of the vehicle's kind (`multicopter`, `fixed_wing`).
+        parameters: limits and preferences of flight, of the vehicle's kind (`multicopter`, `fixed_wing`).
         landed_state: newest result of the land detector.
-        ground_contact: the land detector feels the ground but isn't sure yet.
+        ground_contact: the land detector has detected ground contact but not yet the landing.
         maybe_landed: the thrust is low and nothing moves; one step before ON_GROUND.
         phase: whether the active task takes off or lands.
         armed: motors may turn.
         sticks: newest pilot input.
         frame: local frame of the filter's origin, None before it is known.
         rally: the uploaded rally points; None: there are none.
-        roi: the region of interest, by the mission or a command, until the mode changes; None: there is none.
-        nose_on_roi: whatever is flown, the nose turns to it (a mission decides for itself).
-        surroundings: what others tell of targets and obstacles.
-        within_fence: says whether a place, local NED, (3,), is inside the geofence; None: nobody knows.
-        events: what happened since the autopilot last emptied the list.
+        roi: the region of interest, by the mission or a command, until the mode changes; None: none.
+        nose_on_roi: the nose points to it in every task (a mission decides for itself).
+        surroundings: targets and obstacles that other systems have reported.
+        within_fence: returns whether a position, local NED, (3,), is inside the geofence; None: not known.
+        events: the events since the autopilot last emptied the list.
         hover_thrust: the controller's estimate, 0..1.
     """
 
@@ -234,7 +236,7 @@ class FlightContext:
         self.hover_thrust = 0.5
 
     def look_at(self, roi: RegionOfInterest | None, *, nose: bool = False) -> None:
-        """Have a region of interest from now on; with `nose` whatever is flown turns the nose to it."""
+        """Set a region of interest; with `nose` the nose points to it in every task."""
         self.roi = roi
         self.nose_on_roi = nose and roi is not None
 
@@ -243,7 +245,7 @@ class FlightContext:
         """The parameters of a multicopter.
 
         Raises:
-            TypeError: the vehicle is none.
+            TypeError: the vehicle is no multicopter.
         """
         parameters = self.parameters
         if not isinstance(parameters, FlightParameters):
@@ -255,7 +257,7 @@ class FlightContext:
         """The parameters of a fixed wing.
 
         Raises:
-            TypeError: the vehicle is none.
+            TypeError: the vehicle is no fixed wing.
         """
         parameters = self.parameters
         if isinstance(parameters, FlightParameters):
@@ -264,12 +266,12 @@ class FlightContext:
 
     @property
     def on_ground(self) -> bool:
-        """The land detector is sure of the ground."""
+        """The land detector reports ground."""
         return self.landed_state is LandedState.ON_GROUND
 
     @property
     def position_valid(self) -> bool:
-        """The horizontal position may be flown by."""
+        """The horizontal position can be used for flight."""
         health = self.health
         return health is not None and (
             health.position_horizontal_relative or health.position_horizontal_absolute
@@ -277,12 +279,12 @@ class FlightContext:
 
     @property
     def velocity_valid(self) -> bool:
-        """The horizontal velocity may be flown by."""
+        """The horizontal velocity can be used for flight."""
         return self.health is not None and self.health.velocity_horizontal
 
     @property
     def altitude_valid(self) -> bool:
-        """The vertical position and velocity may be flown by."""
+        """The vertical position and velocity can be used for flight."""
         return self.health is not None and self.health.position_vertical_absolute
 
     @property

@@ -1,4 +1,4 @@
-"""What tasks share that fly smoothly where they are in the air, and rest while the vehicle stands."""
+"""The common part of tasks that fly smoothly in the air, and stay idle on the ground."""
 
 from abc import ABC, abstractmethod
 
@@ -9,7 +9,7 @@ from autopilot_bridge.flight.task import TaskStatus
 
 
 class CruiseTask(ABC):
-    """A flight task that never lifts off by itself: on the ground it keeps the motors at idle."""
+    """A flight task that never takes off by itself: on the ground it keeps the motors at idle."""
 
     __slots__ = ("_motion", "_ramp")
 
@@ -36,8 +36,8 @@ class CruiseTask(ABC):
 
     @abstractmethod
     def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
-        """Set out from the present state."""
+        """Start from the present state."""
 
     @abstractmethod
     def _fly(self, ctx: FlightContext, motion: SmoothMotion) -> TaskStatus:
-        """Steer the motion, which is in step with the vehicle, and write the setpoint."""
+        """Update the motion, which is synchronised with the vehicle, and write the setpoint."""

@@ -1,4 +1,4 @@
-"""Follow a target that tells where it is: PX4's Follow Target, ArduCopter's FOLLOW."""
+"""Follow a target that reports its position: PX4's Follow Target, ArduCopter's FOLLOW."""
 
 import math
 from typing import Final
@@ -10,16 +10,16 @@ from autopilot_bridge.flight.motion import SmoothMotion
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
 
-_BRAKE_SHARE: Final = 0.5  # of the acceleration limit, in coming to the place
-_TURN_AT_M: Final = 1.0  # no facing of a target nearer than this
+_BRAKE_SHARE: Final = 0.5  # of the acceleration limit, when approaching the position
+_TURN_AT_M: Final = 1.0  # the nose does not point to a target nearer than this
 _NAV_HEIGHT: Final = nav_layout.HEIGHT_ABOVE_GROUND_M
 
 
 class FollowTask(CruiseTask):
-    """Keep a place in relation to the target; stop and hold while it isn't heard. Never DONE.
+    """Hold a position relative to the target; stop and hold while no messages are received. Never DONE.
 
     Attributes:
-        following: the target is being followed.
+        following: the vehicle is following the target.
     """
 
     __slots__ = ("_direction_rad", "following")
@@ -76,13 +76,13 @@ class FollowTask(CruiseTask):
         motion.steer(ctx, self._yaw(ctx, p, motion, target))
 
     def _offset(self, ctx: FlightContext, p: FollowParameters) -> tuple[float, float]:
-        """(north, east) from the target; it turns with the target's course, and not too fast."""
+        """(north, east) from the target; it turns with the target's course, at a limited speed."""
         forward, right, _ = p.offset_m
         if not p.along_course:
             return forward, right
         course = ctx.surroundings.leader.course_rad
         if math.isnan(self._direction_rad):
-            # until it moves, from the side the vehicle is on
+            # until it moves: on the vehicle's side
             here = ctx.nav[nav_layout.POS_NED_M]
             known = ctx.surroundings.leader.at(ctx.time_us)
             if math.isfinite(course):
@@ -102,7 +102,7 @@ class FollowTask(CruiseTask):
     def _height(
         self, ctx: FlightContext, p: FollowParameters, target_down: float, target_sink: float
     ) -> tuple[float, float]:
-        """(down coordinate to be at, its rate)."""
+        """(wanted down coordinate, its rate)."""
         offset = p.offset_m[2]
         if p.height is FollowHeight.TARGET:
             return target_down + offset, target_sink

@@ -8,7 +8,7 @@ from flightsim.checks import check_fields, require_not_negative, require_positiv
 
 
 class FollowHeight(IntEnum):
-    """What the height is counted from."""
+    """The reference of the height."""
 
     HOME = 0  # FLW_TGT_ALT_M 0
     GROUND = 1  # FLW_TGT_ALT_M 1
@@ -26,18 +26,18 @@ class FollowYaw(IntEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FollowParameters:
-    """Where to fly in relation to the target.
+    """The position relative to the target.
 
     Attributes:
-        enabled: the mode may be chosen (FOLL_ENABLE).
-        system_id: whom to follow; 0: whoever is heard first (FOLL_SYSID).
+        enabled: the mode can be selected (FOLL_ENABLE).
+        system_id: the system to follow; 0: the first one received (FOLL_SYSID).
         offset_m: forward, right (or north, east) from the target, and down from the height's reference.
         along_course: the offset turns with the target's course (FOLL_OFS_TYPE 1).
-        height: what the height is counted from.
+        height: the reference of the height.
         relative_altitude: the target's altitudes are over its home, and ours over ours (FOLL_ALT_TYPE 1).
-        max_distance_m: a target farther away isn't followed; infinite: always (FOLL_DIST_MAX).
-        timeout_s: not heard for this long: the vehicle stops.
-        gain_1_s: of the distance from where to be (FOLL_POS_P).
+        max_distance_m: a target farther away is not followed; infinite: always (FOLL_DIST_MAX).
+        timeout_s: the vehicle stops when no message was received for this time.
+        gain_1_s: of the distance from the wanted position (FOLL_POS_P).
         smoothing_s: time constant of the turn with the target's course (FLW_TGT_RS).
         swing_speed_m_s: greatest speed around the target (FLW_TGT_MAX_VEL).
         yaw: where the nose points.

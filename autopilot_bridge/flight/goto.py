@@ -1,4 +1,4 @@
-"""Fly to a place and hold there."""
+"""Fly to a position and hold there."""
 
 import math
 
@@ -15,16 +15,16 @@ _WANTS_UP_M = 0.3
 
 
 class GotoTask:
-    """Fly straight to a place with limited speed, acceleration and jerk, then hold it. DONE on arrival.
+    """Fly straight to a position with limited speed, acceleration and jerk, then hold it. DONE on arrival.
 
-    From the ground it takes off when the place is above the vehicle (as PX4 does on DO_REPOSITION).
+    On the ground it takes off when the position is above the vehicle (as PX4 does on DO_REPOSITION).
 
     Args:
-        position_ned_m: place, (3,); NaN components mean the place where the vehicle comes to rest.
+        position_ned_m: position, (3,); NaN components: where the vehicle comes to rest.
         yaw_rad: heading; NaN: by the vehicle's yaw behaviour.
-        turn: a commanded turn there, flown while `yaw_rad` is NaN.
+        turn: a commanded turn on the way, flown while `yaw_rad` is NaN.
         speed_m_s: None: the cruise speed.
-        acceptance_m: distance at which the place is reached; None: the parameter.
+        acceptance_m: distance at which the position counts as reached; None: the parameter.
     """
 
     __slots__ = (
@@ -70,7 +70,7 @@ class GotoTask:
         yaw_rad: float = math.nan,
         speed_m_s: float | None = None,
     ) -> None:
-        """Fly somewhere else from now on, without a stop in between."""
+        """Set another target, without a stop."""
         self._wanted[:] = position_ned_m
         self._yaw_rad = yaw_rad
         self._speed_m_s = speed_m_s
@@ -79,13 +79,13 @@ class GotoTask:
             self._begin(ctx, self._motion)
 
     def set_yaw(self, yaw_rad: float, yaw_rate_rad_s: float) -> None:
-        """The heading, or how it turns, from now on; NaN: not given. The rate ends with GUID_TIMEOUT."""
+        """Set the heading or its rate; NaN: not given. The rate ends after GUID_TIMEOUT."""
         self._yaw_rad = yaw_rad
         self._yaw_rate_rad_s = yaw_rate_rad_s
         self._yaw_age_s = 0.0
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Change the speed on the way (DO_CHANGE_SPEED)."""
+        """Change the speed (DO_CHANGE_SPEED)."""
         if kind in (SpeedKind.AIRSPEED, SpeedKind.GROUND_SPEED):
             self._speed_m_s = speed_m_s
         if self._motion is not None:
@@ -129,7 +129,7 @@ class GotoTask:
         return TaskStatus.DONE if self._reached else TaskStatus.RUNNING
 
     def _steer(self, ctx: FlightContext, motion: SmoothMotion) -> None:
-        """One tick of the heading."""
+        """Update the heading by one tick."""
         rate_rad_s = self._yaw_rate_rad_s
         if math.isnan(rate_rad_s):
             motion.steer(ctx, self._yaw_rad, self._place, turn=self._turn)
@@ -146,7 +146,7 @@ class GotoTask:
 
 
 class RepositionTask(GotoTask):
-    """DO_REPOSITION: a `GotoTask` that holds the place for good and is never DONE."""
+    """DO_REPOSITION: a `GotoTask` that keeps holding the position and is never DONE."""
 
     __slots__ = ()
 

@@ -1,4 +1,4 @@
-"""Leaving the ground: motors idle until a task wants up, spool up, then thrust rises smoothly to lift-off.
+"""Leaving the ground: motors idle until a task commands a climb, spool up, then thrust rises to lift-off.
 
 PX4's take-off states (`Takeoff`): disarmed, spool-up, ready, ramp-up, flight.
 """
@@ -19,7 +19,7 @@ _LEAVE_GROUND_S: Final = 4.0
 
 
 class GroundState(IntEnum):
-    """How far the vehicle has left the ground."""
+    """The stage of leaving the ground."""
 
     RESTING = 0
     SPOOLING = 1
@@ -28,7 +28,7 @@ class GroundState(IntEnum):
 
 
 class TakeoffRamp:
-    """Holds a task back while the vehicle stands, and lifts it off when the task wants up.
+    """Keeps the vehicle on the ground until the task commands a climb, then lifts it off.
 
     Attributes:
         state: see `GroundState`.
@@ -48,7 +48,7 @@ class TakeoffRamp:
         self._since_s = 0.0
 
     def update(self, ctx: FlightContext, wants_up: bool, climb_speed_m_s: float) -> bool:
-        """True when the task may fly by its own setpoint; otherwise the setpoint has been written here."""
+        """True when the task's own setpoint may be flown; otherwise this method has written the setpoint."""
         self._since_s += ctx.dt_s
         if not ctx.armed:
             self._enter(GroundState.RESTING if ctx.on_ground else GroundState.FLYING)
@@ -83,7 +83,7 @@ class TakeoffRamp:
         ramp_time_s = ctx.multicopter.takeoff_ramp_time_s
         part = 1.0 if ramp_time_s <= 0.0 else min(1.0, self._since_s / ramp_time_s)
         clear_setpoint(ctx.setpoint, sp.TRAJECTORY)
-        # level until the legs are free: the ground would turn any tilt into a slide
+        # level until lift-off: on the ground any tilt would cause a slide
         ctx.setpoint[6:8] = 0.0
         ctx.setpoint[5] = _RAMP_START_M_S * (1.0 - part) - climb_speed_m_s * part
         ctx.setpoint[sp.YAW_RAD] = math.nan

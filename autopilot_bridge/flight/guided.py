@@ -1,4 +1,4 @@
-"""Targets from outside, flown smoothly: ArduPilot's GUIDED.
+"""External targets, flown smoothly: ArduPilot's GUIDED.
 
 Position targets need not be repeated; velocity, acceleration and attitude targets expire after GUID_TIMEOUT
 and the vehicle stops. Attitude thrust is a climb rate: 0.5 holds the height, 1 is the full climb speed
@@ -24,7 +24,7 @@ from autopilot_bridge.navigation import layout as nav_layout
 
 
 class GuidedKind(IntEnum):
-    """What is being flown."""
+    """The kind of the present target."""
 
     HOLD = 0
     POSITION = 1
@@ -32,14 +32,14 @@ class GuidedKind(IntEnum):
     ACCELERATION = 3
     TRAJECTORY = 4  # position and velocity together, streamed
     ATTITUDE = 5
-    HEADING = 6  # a fixed wing's: straight on in a direction
+    HEADING = 6  # of a fixed wing: a constant direction
 
 
 class GuidedTask:
-    """Position, velocity, acceleration and attitude targets. On the ground they lift nothing: take off first.
+    """Position, velocity, acceleration and attitude targets. They cause no take-off: command it first.
 
     Attributes:
-        kind: what is being flown.
+        kind: the kind of the present target.
     """
 
     __slots__ = (
@@ -82,7 +82,7 @@ class GuidedTask:
         self._ramp: TakeoffRamp | None = None
 
     def set_hold(self, ctx: FlightContext) -> None:
-        """Stop and hold (an unusable target)."""
+        """Stop and hold (after an unusable target)."""
         self.kind = GuidedKind.HOLD
         self._hold = HoldTask()
         self._hold.activate(ctx)
@@ -96,11 +96,11 @@ class GuidedTask:
         yaw_rate_rad_s: float = math.nan,
         speed_m_s: float | None = None,
     ) -> None:
-        """Fly to a place and stay; NaN components: keep the present ones. A yaw rate expires."""
+        """Fly to a position and stay; NaN components: keep the present ones. A yaw rate expires."""
         _asked_for_yaw(ctx, yaw_rad, yaw_rate_rad_s)
         target = np.array(position_ned_m, dtype=np.float64)
         if self.kind is GuidedKind.POSITION and self._goto is not None and self._goto_started:
-            # a repeated target isn't a new leg
+            # a repeated target is not a new leg
             if speed_m_s is not None or not np.array_equal(target, self._position, equal_nan=True):
                 self._goto.set_target(ctx, target, speed_m_s=speed_m_s)
         else:
@@ -111,7 +111,9 @@ class GuidedTask:
         self.kind = GuidedKind.POSITION
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Another speed on the way to a place (DO_CHANGE_SPEED); streamed targets say theirs themselves."""
+        """Set another speed on the way to a position (DO_CHANGE_SPEED); streamed targets contain their own
+        speed.
+        """
         if self.kind is GuidedKind.POSITION and self._goto is not None:
             self._goto.change_speed(ctx, kind, speed_m_s)
 
@@ -124,7 +126,7 @@ class GuidedTask:
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
-        """Fly at a velocity until the time-out; NaN components are zero."""
+        """Fly at a velocity until the timeout; NaN components are zero."""
         if self.kind is not GuidedKind.VELOCITY or self._motion is None:
             self._motion = SmoothMotion(ctx, speed_m_s=ctx.multicopter.max_speed_m_s)
         self._velocity[:] = np.nan_to_num(np.array(velocity_ned_m_s, dtype=np.float64), nan=0.0)
@@ -140,7 +142,7 @@ class GuidedTask:
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
-        """Accelerate until the time-out; NaN components are zero."""
+        """Accelerate until the timeout; NaN components are zero."""
         if self.kind is not GuidedKind.ACCELERATION or self._motion is None:
             self._motion = SmoothMotion(ctx)
         self._acceleration[:] = np.nan_to_num(np.array(acceleration_ned_m_s2, dtype=np.float64), nan=0.0)
@@ -157,7 +159,7 @@ class GuidedTask:
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
-        """Track a streamed position with its velocity and acceleration, until the time-out."""
+        """Track a streamed position with its velocity and acceleration, until the timeout."""
         self._position[:] = position_ned_m
         self._velocity[:] = velocity_ned_m_s
         self._acceleration[:] = acceleration_ned_m_s2
@@ -175,7 +177,7 @@ class GuidedTask:
         *,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
-        """Fly an attitude until the time-out; `climb` 0..1 is a climb rate, 0.5 none."""
+        """Fly an attitude until the timeout; `climb` 0..1 is a climb rate, 0.5: no climb."""
         p = ctx.multicopter
         share = 2.0 * (min(1.0, max(0.0, climb)) - 0.5)
         self._climb_m_s = share * (p.climb_speed_m_s if share > 0.0 else p.descend_speed_m_s)
@@ -193,7 +195,7 @@ class GuidedTask:
         self._age_s = 0.0
 
     def set_turn(self, turn: Turn) -> None:
-        """Turn as commanded while the target stays (CONDITION_YAW)."""
+        """Turn as commanded while the target is kept (CONDITION_YAW)."""
         self._turn = turn
         self._yaw_rad = self._yaw_rate_rad_s = math.nan
 
@@ -280,6 +282,6 @@ class GuidedTask:
 
 
 def _asked_for_yaw(ctx: FlightContext, *values: float) -> None:
-    """A target that says where the nose points, or how it turns, ends the region of interest."""
+    """A target with a yaw or a yaw rate ends the region of interest."""
     if ctx.nose_on_roi and any(math.isfinite(value) for value in values):
         ctx.look_at(None)

@@ -1,4 +1,4 @@
-"""Tasks that stay: idle on the ground, hold, brake."""
+"""Tasks that hold a position: idle on the ground, hold, brake."""
 
 import math
 
@@ -23,13 +23,13 @@ class IdleTask:
 
 
 class HoldTask(CruiseTask):
-    """Brake within the limits, then hold the place; or fly to a given place and hold that.
+    """Brake within the limits, then hold the position; or fly to a given position and hold it.
 
-    On the ground it rests with motors at idle. Without a position it stops by velocity, without that it
+    On the ground it stays at idle. Without a position it stops by velocity; without a velocity it
     flies level.
 
     Args:
-        position_ned_m: place to hold, (3,); None: where the vehicle comes to rest.
+        position_ned_m: position to hold, (3,); None: where the vehicle comes to rest.
         yaw_rad: heading to hold; None: the present one.
     """
 
@@ -41,7 +41,7 @@ class HoldTask(CruiseTask):
         self._yaw_rad = math.nan if yaw_rad is None else yaw_rad
 
     def _begin(self, ctx: FlightContext, motion: SmoothMotion) -> None:
-        """Nothing to set: the present state is where it starts."""
+        """Nothing to set: the motion starts from the present state."""
 
     def _fly(self, ctx: FlightContext, motion: SmoothMotion) -> TaskStatus:
         if self._target is None:
@@ -54,7 +54,7 @@ class HoldTask(CruiseTask):
 
 
 class BrakeTask(CruiseTask):
-    """Stop as hard as the limits allow and hold (ArduPilot BRAKE); DONE when stopped."""
+    """Stop as fast as the limits allow and hold (ArduPilot BRAKE); DONE when stopped."""
 
     __slots__ = ("_done",)
 

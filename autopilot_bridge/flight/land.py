@@ -1,4 +1,4 @@
-"""Landing: descend, slow down near the ground, feel it, rest."""
+"""Landing: descend, slow down near the ground, detect touchdown, idle."""
 
 import math
 
@@ -11,7 +11,7 @@ from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 from autopilot_bridge.navigation import layout as nav_layout
 
-_OVER_PLACE_M = 1.0  # a given place must be this close before the descent starts
+_OVER_PLACE_M = 1.0  # distance from a given position at which the descent starts
 _THRUST_GONE_M_S2 = 20.0  # downwards, more than gravity: thrust to its minimum
 _RELIEF_M_S3 = 4.0  # how fast thrust is taken away on ground contact
 _NAV_HEIGHT = nav_layout.HEIGHT_ABOVE_GROUND_M
@@ -29,14 +29,14 @@ def descent_speed(height_m: float, parameters: FlightParameters) -> float:
 
 
 class LandTask:
-    """Land here, or at a given place. DONE on the ground, with motors at idle and a `TouchedDown` event.
+    """Land here, or at a given position. DONE on the ground, with motors at idle and a `TouchedDown` event.
 
-    The place is held by position, or by velocity when there is no position, or the vehicle sinks level when
-    there is neither. Ground contact levels the vehicle and takes thrust away little by little, until the
-    landing is believed; from then on the motors idle, whatever the land detector thinks later.
+    The vehicle holds the position; without a position it holds the velocity; without both it descends level.
+    Ground contact levels the vehicle and reduces the thrust gradually, until the landing is detected; from
+    then on the motors idle, whatever the land detector reports later.
 
     Args:
-        position_ned_m: place to land at, (3,) (down is ignored); None: where the vehicle comes to rest.
+        position_ned_m: position to land at, (3,) (down is ignored); None: where the vehicle comes to rest.
         yaw_rad: heading; None: the present one.
     """
 
@@ -88,7 +88,7 @@ class LandTask:
         motion.steer(ctx, motion.heading.yaw_rad if math.isnan(self._yaw_rad) else self._yaw_rad)
         motion.write(ctx)
         if self._down:
-            ctx.setpoint[2] = math.nan  # by speed alone: the height of the ground isn't known
+            ctx.setpoint[2] = math.nan  # by speed alone: the height of the ground is not known
             ctx.setpoint[8] = 0.0
             self._contact_s = self._contact_s + ctx.dt_s if ctx.ground_contact else 0.0
             if ctx.ground_contact:
@@ -105,7 +105,7 @@ class LandTask:
         target = self._target
         north, east = 0.0, 0.0
         if target is not None:
-            # the last metre to the place is flown on the way down
+            # the last metre to the position is flown during the descent
             gain = 0.5 * ctx.multicopter.trajectory_p_1_s
             north = gain * float(target[0] - motion.trajectory.position_ned_m[0])
             east = gain * float(target[1] - motion.trajectory.position_ned_m[1])

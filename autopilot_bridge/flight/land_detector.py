@@ -1,8 +1,8 @@
-"""Is the vehicle on the ground? Three stages with hysteresis, as PX4's `MulticopterLandDetector`.
+"""Land detection in three stages with hysteresis, as PX4's `MulticopterLandDetector`.
 
-Ground contact: low thrust, or a commanded descent that doesn't happen, and no vertical motion.
-Maybe landed: contact, low thrust, no rotation, no horizontal motion (where that is known).
-Landed: maybe landed for the trigger time. In turbulence and in a free descent something always moves.
+Ground contact: low thrust, or a commanded descent without a descent, and no vertical motion.
+Maybe landed: contact, low thrust, no rotation, no horizontal motion (if it is known).
+Landed: maybe landed for the trigger time. In turbulence and in a free descent there is always some motion.
 """
 
 import math
@@ -30,14 +30,14 @@ class LandDetectorParameters:
 
 
 class LandDetector:
-    """Judges the landed state at the task rate.
+    """Determines the landed state at the task rate.
 
     Args:
         parameters: thresholds.
-        on_ground: where the vehicle starts.
+        on_ground: the vehicle starts on the ground.
 
     Attributes:
-        state: newest judgement.
+        state: newest result.
     """
 
     __slots__ = ("_contact_s", "_landed_s", "_maybe_s", "_parameters", "state")
@@ -48,16 +48,16 @@ class LandDetector:
         self.state = LandedState.ON_GROUND if on_ground else LandedState.IN_AIR
 
     def update(self, ctx: FlightContext, thrust: float) -> LandedState:
-        """Judge, and write `landed_state`, `ground_contact` and `maybe_landed` of the context.
+        """Update, and write `landed_state`, `ground_contact` and `maybe_landed` of the context.
 
         Args:
             ctx: newest navigation state and the setpoint flown.
-            thrust: collective given by the motors, 0..1 (`MulticopterController.thrust`).
+            thrust: collective thrust of the motors, 0..1 (`MulticopterController.thrust`).
         """
         p = self._parameters
         if not ctx.armed:
-            # motors don't turn: an unforced disarm happens on the ground only; a forced one in the air is
-            # falling
+            # The motors do not turn: an unforced disarm happens on the ground only; after a forced one in the
+            # air the vehicle is falling.
             if self.state is not LandedState.ON_GROUND and self._falling(ctx):
                 return self._store(ctx, False, False)
             self._contact_s = self._maybe_s = self._landed_s = math.inf
@@ -79,7 +79,7 @@ class LandDetector:
             and math.hypot(float(velocity[0]), float(velocity[1])) > p.horizontal_speed_max_m_s
         )
         rotating = math.hypot(float(rates[0]), float(rates[1])) > p.rotation_max_rad_s
-        # stages need the one before and their own time
+        # each stage needs the one before and its own time
         contact = self._count(
             "_contact_s", (low_thrust or descending) and not vertical, p.contact_time_s, ctx.dt_s
         )

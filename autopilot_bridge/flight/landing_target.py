@@ -1,4 +1,6 @@
-"""The place to land at, of what a detector sees (PX4's landing target estimator, ArduPilot's AC_PrecLand)."""
+"""The landing place from a detector's measurements (PX4's landing target estimator, ArduPilot's
+AC_PrecLand).
+"""
 
 from typing import Final
 
@@ -11,14 +13,14 @@ Array = NDArray[np.float64]
 
 _SLOWEST_M_S2: Final = 0.05
 ACQUIRED_S: Final = 2.0
-"""Not seen for this long: out of sight (PX4 LTEST, ArduPilot LANDING_TARGET_TIMEOUT_MS)."""
+"""A target not seen for this time is lost (PX4 LTEST, ArduPilot LANDING_TARGET_TIMEOUT_MS)."""
 
 
 class LandingTargetTrack:
-    """Its place in local NED; it is taken to stand still.
+    """The position of the target in local NED; the target is assumed not to move.
 
     Attributes:
-        motion: the filter behind it.
+        motion: the filter of the position.
     """
 
     __slots__ = ("motion",)
@@ -27,20 +29,20 @@ class LandingTargetTrack:
         self.motion = TargetMotion(acceleration_m_s2=_SLOWEST_M_S2, still=True)
 
     def take(self, time_us: int, position_ned_m: Array, *, sigma_m: float) -> bool:
-        """A sighting; False when it is refused."""
+        """Add a measurement; False when it is refused."""
         return self.motion.take(time_us, position_ned_m, None, sigma_m=sigma_m)
 
     def age_s(self, time_us: int) -> float:
-        """Since it was seen; infinite when it never was."""
+        """Time since the last measurement; infinite when there was none."""
         return self.motion.age_s(time_us)
 
     def place(self, time_us: int) -> tuple[float, float] | None:
-        """(north, east) now; None while it is out of sight."""
+        """(north, east) now; None while the target is lost."""
         if self.motion.age_s(time_us) > ACQUIRED_S:
             return None
         known = self.motion.at(time_us)
         return None if known is None else (float(known[0][0]), float(known[0][1]))
 
     def forget(self) -> None:
-        """Nothing is known of it."""
+        """Forget the target."""
         self.motion.forget()

@@ -1,4 +1,4 @@
-"""ArduPilot's LOITER: the sticks move the vehicle, and it stays where they leave it."""
+"""ArduPilot's LOITER: the sticks move the vehicle, and it holds the position when they are centred."""
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.hold import HoldTask
@@ -7,10 +7,10 @@ from autopilot_bridge.flight.task import FlightTask, TaskStatus
 
 
 class LoiterTask:
-    """Flies by the sticks of a pilot, and holds while there is none.
+    """Flies by the sticks of a pilot, and holds without a pilot.
 
-    A simulated radio that nobody touches is no pilot: its throttle is down, and the vehicle would sink to
-    the ground.
+    A simulated radio with untouched sticks does not count as a pilot: its throttle is down, and the vehicle
+    would descend to the ground.
     """
 
     __slots__ = ("_hold", "_pilot", "_task")

@@ -1,4 +1,4 @@
-"""Flying by the sticks: rates, attitude, height, position."""
+"""Flight by the sticks: rates, attitude, height, position."""
 
 import math
 from enum import IntEnum
@@ -21,7 +21,7 @@ _NAV_YAW = 27
 
 
 class ManualMode(IntEnum):
-    """What the sticks mean."""
+    """The meaning of the sticks."""
 
     ACRO = 0  # body rates and thrust
     STABILIZED = 1  # tilt, yaw rate and thrust
@@ -47,12 +47,12 @@ def throttle_thrust(throttle: float, hover_thrust: float, minimum: float) -> flo
 
 
 class ManualTask:
-    """Flies what the pilot's sticks say; without a pilot they count as centred.
+    """Flies by the pilot's sticks; without a pilot they count as centred.
 
     POSITION degrades to ALTITUDE without a horizontal velocity.
 
     Args:
-        kind: what the sticks mean.
+        kind: the meaning of the sticks.
     """
 
     __slots__ = ("_hold_down_m", "_motion", "_ramp", "_yaw_rad", "kind")
@@ -99,7 +99,9 @@ class ManualTask:
         return TaskStatus.RUNNING
 
     def _turn(self, ctx: FlightContext, yaw: float) -> float:
-        """Advance the heading by the yaw stick; returns the rate. The lead over the vehicle stays small."""
+        """Advance the heading by the yaw stick; returns the rate. The heading's lead over the vehicle is
+        limited.
+        """
         rate = yaw * ctx.multicopter.manual_yaw_rate_rad_s
         self._yaw_rad += rate * ctx.dt_s
         lead = math.remainder(self._yaw_rad - float(ctx.nav[_NAV_YAW]), 2.0 * math.pi)

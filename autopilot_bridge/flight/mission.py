@@ -1,4 +1,4 @@
-"""Flying an uploaded plan (MAVLink mission protocol), through its waypoints without needless stops."""
+"""Flight of an uploaded plan (MAVLink mission protocol), through its waypoints without unnecessary stops."""
 
 import math
 from dataclasses import dataclass
@@ -42,13 +42,13 @@ _LOOK_AHEAD_M: Final = 150.0
 _YAW_REACHED_RAD: Final = math.radians(5.0)
 _NAV_YAW: Final = 27
 _SAME_PLACE_M: Final = 0.1
-_SLOW_M_S: Final = 0.3  # a curve that ends slower than twice this ends in a stop
-_WIDE_M: Final = 1e3  # no corner at the end of a curve: the leg behind it goes straight on
+_SLOW_M_S: Final = 0.3  # a curve that ends at less than twice this speed ends in a stop
+_WIDE_M: Final = 1e3  # no corner at the end of a curve: the next leg continues straight
 
 
 @dataclass(slots=True)
 class _Leg:
-    """The leg being flown to a waypoint; along a curve where there is one."""
+    """The leg being flown to a waypoint; along a curve if there is one."""
 
     start: Array
     target: Array
@@ -63,16 +63,16 @@ class _Leg:
 
 
 class MissionTask(PlanTask):
-    """A plan flown by a multicopter (`PlanTask`), without needless stops.
+    """A plan flown by a multicopter (`PlanTask`), without unnecessary stops.
 
-    Waypoints without a hold time are passed at the speed their corner, the acceptance radius and the legs
-    behind them allow. NAV_RETURN_TO_LAUNCH is flown here and also reported as `MissionModeRequested`. The
-    nose follows a region of interest.
+    Waypoints without a hold time are passed at the speed that their corner, the acceptance radius and the
+    next legs allow. NAV_RETURN_TO_LAUNCH is flown here and also reported as `MissionModeRequested`. The nose
+    follows a region of interest.
 
     Args:
-        store: the plan; its `current` is kept up to date.
+        store: the plan; its `current` is updated.
         first_item: 1 where item 0 is home (ArduPilot).
-        habits: how the firmware goes through a plan.
+        habits: how the firmware flies a plan.
     """
 
     __slots__ = ("_leg", "_motion", "_nose", "_ramp", "_speed_m_s", "_turning")
@@ -102,7 +102,7 @@ class MissionTask(PlanTask):
         return ReturnTask(self._store, first_item=self._first_item, habits=self._habits)
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Fly on at this speed until an item or a command changes it, the present leg included."""
+        """Fly at this speed until an item or a command changes it, the present leg included."""
         horizontal = kind in (SpeedKind.AIRSPEED, SpeedKind.GROUND_SPEED)
         if horizontal:
             self._speed_m_s = speed_m_s
@@ -115,12 +115,12 @@ class MissionTask(PlanTask):
             leg.passing_m_s, leg.turn_in_m = self._corner(ctx, self._seq, leg.start, leg.target, leg.radius_m)
 
     def _begin_flown(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
-        """Begin an item that is flown; False when there is nothing to do."""
+        """Begin an item that is flown; False when there is nothing to fly."""
         command = item.command
         target = target_of(item, ctx)
         if target is None:
             return False
-        self._turning = None  # CONDITION_YAW lasts until the next place
+        self._turning = None  # CONDITION_YAW lasts until the next position
         if command in (Command.NAV_TAKEOFF, Command.NAV_VTOL_TAKEOFF):
             base = float(ctx.home_ned_m[2])
             base = float(ctx.nav[nav_layout.POS_NED_M][2]) if math.isnan(base) else base
@@ -172,7 +172,7 @@ class MissionTask(PlanTask):
     def _begin_leg(
         self, ctx: FlightContext, item: MissionItem, target: Array, came_from: Array | None
     ) -> bool:
-        """A waypoint, or a loiter at a place."""
+        """Begin a waypoint, or a loiter at a position."""
         motion = self._motion
         if motion is None:
             return False
@@ -204,14 +204,14 @@ class MissionTask(PlanTask):
     def _curve(
         self, ctx: FlightContext, seq: int, start: Array, velocity: Array, *, ends: bool = False
     ) -> SplineCurve:
-        """The curve of a spline waypoint: on from the velocity at its start, towards what comes behind it.
+        """The curve of a spline waypoint: from the velocity at its start, towards the item after it.
 
         Args:
-            ends: as if the plan ended there (the look-ahead goes no further).
+            ends: as if the plan ended there (the look-ahead stops there).
         """
         items = self._store.items
         target = target_of(items[seq], ctx)
-        assert target is not None  # the caller has looked
+        assert target is not None  # checked by the caller
         speed = self._cruise(ctx)
         distance = float(np.linalg.norm(target - start))
         moving = float(np.linalg.norm(velocity))
@@ -237,7 +237,7 @@ class MissionTask(PlanTask):
         )
 
     def _next_place(self, ctx: FlightContext, seq: int) -> tuple[int, Array] | None:
-        """The waypoint flown next behind an item, if it follows without a jump or a wait."""
+        """The waypoint flown after an item, if it follows without a jump or a wait."""
         for later in range(seq + 1, len(self._store.items)):
             item = self._store.items[later]
             if is_navigation(item):
@@ -279,7 +279,7 @@ class MissionTask(PlanTask):
         return speed, turn_in_distance(path, radii, speed, ctx.multicopter)
 
     def _into_spline(self, ctx: FlightContext, seq: int, start: Array, target: Array) -> tuple[float, float]:
-        """Speed at which a straight leg ends where a curve goes on; no turn begins before it."""
+        """Speed at the end of a straight leg before a curve; no turn begins before it."""
         leg = target - start
         length = float(np.linalg.norm(leg))
         if target_of(self._store.items[seq], ctx) is None or length < _SAME_PLACE_M:
@@ -303,7 +303,7 @@ class MissionTask(PlanTask):
         return TaskStatus.DONE if self._finished else TaskStatus.RUNNING
 
     def _wanted_yaw(self, ctx: FlightContext, otherwise: float) -> float:
-        """Heading of the region of interest, where the nose follows it."""
+        """Heading of the region of interest, if the nose follows it."""
         roi = ctx.roi
         if roi is None or not ctx.multicopter.nose_follows_roi:
             return otherwise
@@ -332,7 +332,7 @@ class MissionTask(PlanTask):
             if inside and ahead <= leg.turn_in_m + float(motion.trajectory.limits[SPEED]) * ctx.dt_s:
                 self._complete(ctx, item, leg.target)
             elif ahead < -leg.radius_m:
-                leg.passing_m_s = 0.0  # missed: come back to it
+                leg.passing_m_s = 0.0  # missed: return to it
                 motion.begin_leg()
             return
         if not leg.arrived and inside and (motion.stopped or _flat_distance(point, leg.target) < 0.3):
@@ -343,14 +343,14 @@ class MissionTask(PlanTask):
                 self._complete(ctx, item, leg.target)
 
     def _fly_spline(self, ctx: FlightContext, motion: SmoothMotion, leg: _Leg, spline: SplineFlight) -> None:
-        """One tick along the curve; its end is a waypoint like any other."""
+        """One tick along the curve; its end is a normal waypoint."""
         trajectory = motion.trajectory
         if not ctx.position_valid:
             motion.brake(ctx)
             motion.steer(ctx, leg.yaw_rad, turn=self._turning)
             motion.write(ctx)
             return
-        if spline.done:  # from here on it is a place to hold, or to pass on from
+        if spline.done:  # from here on its end is a position to hold, or to pass
             leg.spline = None
             motion.begin_leg()
             if spline.speed_m_s > 2.0 * _SLOW_M_S:

@@ -1,4 +1,4 @@
-"""Smooth motion as most tasks need it: trajectory generator, heading, and what to do without a position."""
+"""Smooth motion for most tasks: trajectory generator, heading, and flight without a position."""
 
 import math
 from typing import Final
@@ -59,7 +59,7 @@ class SmoothMotion:
         self.restart(ctx)
 
     def restart(self, ctx: FlightContext) -> None:
-        """Take over from the trajectory flown until now, or from the vehicle's own state."""
+        """Continue from the trajectory flown until now, or from the vehicle's own state."""
         setpoint, nav = ctx.setpoint, ctx.nav
         position, velocity = nav[nav_layout.POS_NED_M], nav[nav_layout.VEL_NED_M_S]
         old = setpoint[0:9]
@@ -85,7 +85,7 @@ class SmoothMotion:
             self._yaw_resets = ctx.health.yaw_resets
 
     def synchronise(self, ctx: FlightContext) -> None:
-        """Follow jumps of the filter's estimate, and start afresh where a position comes back."""
+        """Follow jumps of the filter's estimate, and restart when the position is available again."""
         health = ctx.health
         if health is None:
             return
@@ -107,7 +107,9 @@ class SmoothMotion:
         self._synchronised = ctx.position_valid
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Another speed on the leg being flown; None: the parameters'. A corner is finished as it is."""
+        """Set another speed on the present leg; None: the parameters'. A corner in progress is not
+        changed.
+        """
         p, limits = ctx.multicopter, self.trajectory.limits
         if kind is SpeedKind.CLIMB:
             limits[SPEED_UP] = p.climb_speed_m_s if speed_m_s is None else speed_m_s
@@ -118,7 +120,7 @@ class SmoothMotion:
             limits[SPEED] = min(max(speed, _SLOWEST_LEG_M_S), p.max_speed_m_s)
 
     def begin_leg(self) -> None:
-        """The next leg starts where the moving point is."""
+        """Begin the next leg at the moving point."""
         self._leg_start[:] = self.trajectory.position_ned_m
         self.trajectory.limits[SPEED_TURN] = math.inf
 
@@ -130,13 +132,13 @@ class SmoothMotion:
         self.trajectory.follow_leg(self._leg_start, end_ned_m, end_speed_m_s, ctx.dt_s, turn_in_m=turn_in_m)
 
     def turn_into_leg(self, start_ned_m: Array) -> None:
-        """The leg starts at a corner (the waypoint before), which is rounded at the present speed."""
+        """Begin a leg at a corner (the waypoint before), which is rounded at the present speed."""
         self._leg_start[:] = start_ned_m
         north, east = (float(v) for v in self.trajectory.velocity_ned_m_s[0:2])
         self.trajectory.limits[SPEED_TURN] = max(_SLOWEST_TURN_M_S, math.hypot(north, east))
 
     def ahead_m(self, end_ned_m: Array) -> float:
-        """Distance still to go along the leg; negative beyond its end."""
+        """Remaining distance along the leg; negative beyond its end."""
         point, start = self.trajectory.position_ned_m, self._leg_start
         leg_n, leg_e = float(end_ned_m[0] - start[0]), float(end_ned_m[1] - start[1])
         north, east = float(end_ned_m[0] - point[0]), float(end_ned_m[1] - point[1])
@@ -146,7 +148,7 @@ class SmoothMotion:
         return (north * leg_n + east * leg_e) / length
 
     def brake(self, ctx: FlightContext) -> None:
-        """One tick towards standing still."""
+        """One tick of braking to a stop."""
         self.trajectory.stretch = 1.0
         self.trajectory.track_velocity(0.0, 0.0, 0.0, ctx.dt_s)
 
@@ -166,10 +168,10 @@ class SmoothMotion:
         yaw_rate_rad_s: float = 0.0,
         turn: Turn | None = None,
     ) -> None:
-        """One tick of the heading: to `yaw_rad`; where that is NaN, by a commanded turn, or else by the
-        vehicle's yaw behaviour; to the region of interest before all, where the nose is on it.
+        """One tick of the heading: to `yaw_rad`; if that is NaN, by a commanded turn, or else by the
+        vehicle's yaw behaviour. A region of interest takes precedence if the nose points to it.
 
-        `yaw_rate_rad_s` is the rate at which the wanted heading turns itself.
+        `yaw_rate_rad_s` is the rate of the wanted heading.
         """
         if turn is not None and math.isnan(yaw_rad) and not ctx.nose_on_roi:
             self.heading.follow(turn, ctx.multicopter, ctx.dt_s)
@@ -194,7 +196,7 @@ class SmoothMotion:
         self.heading.turn_to(wanted, ctx.multicopter, ctx.dt_s, target_rate_rad_s=yaw_rate_rad_s)
 
     def write(self, ctx: FlightContext) -> None:
-        """Write the control setpoint, leaving out what the filter doesn't know."""
+        """Write the control setpoint, without the quantities that the filter does not know."""
         setpoint = ctx.setpoint
         clear_setpoint(setpoint, sp.TRAJECTORY)
         self.trajectory.write(setpoint)

@@ -1,4 +1,4 @@
-"""Turning the nose of a multicopter beside what its task asks for: to a region of interest."""
+"""Pointing the nose of a multicopter at a region of interest, whatever heading its task commands."""
 
 import math
 
@@ -16,7 +16,9 @@ class Nose:
         self._heading = YawSteering()
 
     def point(self, ctx: FlightContext, yaw_rad: float, turn: Turn | None = None) -> None:
-        """Turn towards a heading; where that is NaN, as commanded; without a turn the task's own stays."""
+        """Turn towards a heading; if it is NaN, by the commanded turn; without a turn the task's heading is
+        kept.
+        """
         setpoint = ctx.setpoint
         if setpoint[sp.LEVEL] != sp.TRAJECTORY:
             return

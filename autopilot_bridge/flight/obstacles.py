@@ -1,7 +1,7 @@
-"""Distances to what is around the vehicle, by direction: what OBSTACLE_DISTANCE and DISTANCE_SENSOR tell.
+"""Distances to obstacles around the vehicle, by direction: from OBSTACLE_DISTANCE and DISTANCE_SENSOR.
 
-The horizontal circle has 72 sectors of 5 degrees, clockwise from the nose. A sector knows its distance, when
-it was told, and whether there was anything within reach.
+The horizontal circle has 72 sectors of 5 degrees, clockwise from the nose. A sector stores its distance, the
+time of the measurement, and whether anything was within range.
 """
 
 import math
@@ -17,11 +17,11 @@ SECTOR_RAD: Final = math.tau / SECTORS
 
 
 class ObstacleMap:
-    """The circle.
+    """The obstacle distances on the circle.
 
     Attributes:
-        distances_m: by sector; infinite: nothing within reach; NaN: never told.
-        told_us: when each was told; -1: never.
+        distances_m: by sector; infinite: nothing within range; NaN: never measured.
+        told_us: time of each measurement; -1: never.
     """
 
     __slots__ = ("distances_m", "newest_us", "told_us")
@@ -32,12 +32,12 @@ class ObstacleMap:
         self.newest_us = -1
 
     def take(self, first_rad: float, width_rad: float, distance_m: float, time_us: int) -> None:
-        """One direction: the sectors it covers at least in part get its distance.
+        """Add a measurement: it sets the distance of all sectors that its direction overlaps.
 
         Args:
-            first_rad: middle of the direction, clockwise from the nose.
+            first_rad: centre of the direction, clockwise from the nose.
             width_rad: its full angle.
-            distance_m: infinite: nothing within reach.
+            distance_m: infinite: nothing within range.
         """
         half = max(0.0, 0.5 * width_rad)
         first = math.floor((first_rad - half) / SECTOR_RAD + 0.5 + 1e-9)
@@ -62,18 +62,18 @@ class ObstacleMap:
         guard_rad: float,
         timeout_us: int,
     ) -> float:
-        """Greatest speed in a direction from which the vehicle still stops before the margin.
+        """Greatest speed in a direction from which the vehicle can stop before the margin.
 
-        Of a sector at angle a from the direction with distance d, the room along the direction is
-        (d - margin) / cos(a). With the delay T and the deceleration b: v T + v^2 / (2 b) = room.
+        For a sector at angle a from the direction with distance d, the free distance along the direction is
+        (d - margin) / cos(a). With the delay T and the deceleration b: v T + v^2 / (2 b) = free distance.
 
         Args:
             direction_rad: clockwise from the nose.
             guard_rad: sectors within this angle count.
-            timeout_us: sectors told before that count no more.
+            timeout_us: sectors measured longer ago are not used.
 
         Returns:
-            Infinite where nothing is in the way; 0 at the margin.
+            Infinite without an obstacle; 0 at the margin.
         """
         limit = math.inf
         reach = math.ceil(guard_rad / SECTOR_RAD)
@@ -96,7 +96,7 @@ class ObstacleMap:
         return limit
 
     def known(self, direction_rad: float, time_us: int, *, timeout_us: int) -> bool:
-        """Somebody has told of this direction lately."""
+        """This direction was measured within `timeout_us`."""
         sector = round(direction_rad / SECTOR_RAD) % SECTORS
         told = int(self.told_us[sector])
         return told >= 0 and time_us - told <= timeout_us

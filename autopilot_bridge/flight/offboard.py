@@ -1,4 +1,4 @@
-"""Setpoints from outside, flown as they come: PX4's Offboard."""
+"""External setpoints, flown directly: PX4's Offboard."""
 
 import math
 from enum import IntEnum
@@ -21,7 +21,7 @@ Vector = Array | tuple[float, float, float]
 
 
 class OffboardKind(IntEnum):
-    """What the latest setpoint controls."""
+    """The quantity that the latest setpoint controls."""
 
     NONE = 0
     TRAJECTORY = 1
@@ -32,10 +32,10 @@ class OffboardKind(IntEnum):
 class OffboardTask:
     """Flies the latest setpoint without smoothing. Before the first one it holds.
 
-    The caller (commander) watches for lost setpoints; here the last one stays in force.
+    The caller (commander) detects lost setpoints; here the last one stays active.
 
     Attributes:
-        kind: what the latest setpoint controls.
+        kind: the quantity that the latest setpoint controls.
     """
 
     __slots__ = ("_active", "_hold", "_latest", "_ramp", "kind")
@@ -55,7 +55,7 @@ class OffboardTask:
         yaw_rad: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
-        """New trajectory setpoint; NaN components aren't controlled."""
+        """Set a new trajectory setpoint; NaN components are not controlled."""
         clear_setpoint(self._latest, sp.TRAJECTORY)
         self._latest[sp.POS_NED_M] = position_ned_m
         self._latest[sp.VEL_NED_M_S] = velocity_ned_m_s
@@ -70,7 +70,7 @@ class OffboardTask:
         thrust: float,
         rates_frd_rad_s: Vector = NAN3,
     ) -> None:
-        """New attitude setpoint with collective thrust 0..1; finite rates add as feed-forward."""
+        """Set a new attitude setpoint with collective thrust 0..1; finite rates are added as feed-forward."""
         clear_setpoint(self._latest, sp.ATTITUDE)
         self._latest[sp.Q_NED_FROM_FRD] = q_ned_from_frd
         self._latest[sp.RATES_FRD_RAD_S] = rates_frd_rad_s
@@ -78,7 +78,7 @@ class OffboardTask:
         self.kind = OffboardKind.ATTITUDE
 
     def set_rates(self, rates_frd_rad_s: Vector, thrust: float) -> None:
-        """New body-rate setpoint with collective thrust 0..1."""
+        """Set a new body-rate setpoint with collective thrust 0..1."""
         clear_setpoint(self._latest, sp.RATES)
         self._latest[sp.RATES_FRD_RAD_S] = rates_frd_rad_s
         self._latest[sp.THRUST] = thrust
@@ -108,7 +108,7 @@ class OffboardTask:
         if self.kind is OffboardKind.NONE:
             return self._hold.update(ctx)
         if self.kind is not OffboardKind.TRAJECTORY:
-            # thrust is the sender's: no ramp, but no power without arming either
+            # the thrust comes from the sender: no ramp, but no thrust while disarmed
             if not ctx.armed:
                 clear_setpoint(ctx.setpoint, sp.OFF)
             elif ctx.on_ground and not self._wants_up(ctx):

@@ -28,7 +28,7 @@ class OrbitYaw(IntEnum):
 
 
 def circle_ahead(ctx: FlightContext, radius_m: float) -> Array:
-    """Centre of the circle that starts here and lies ahead (ArduPilot CIRCLE), local NED (3,)."""
+    """Centre of the circle that starts at the vehicle and lies ahead (ArduPilot CIRCLE), local NED (3,)."""
     position = ctx.nav[nav_layout.POS_NED_M]
     yaw = float(ctx.nav[27])
     return np.array(
@@ -44,13 +44,13 @@ class OrbitTask(CruiseTask):
     """Fly to the nearest point of a circle, then around it at constant speed; DONE after `turns`, if given.
 
     Args:
-        centre_ned_m: centre and height, (3,); NaN components: of the place where the task starts; None: one
-            radius ahead, so that the circle starts here (ArduPilot CIRCLE).
+        centre_ned_m: centre and height, (3,); NaN components: those of the start position; None: one
+            radius ahead, so that the circle starts at the vehicle (ArduPilot CIRCLE).
         radius_m: None: the parameter. Its sign is ignored.
         velocity_m_s: ground speed, positive clockwise seen from above; None: the parameter. Limited by the
             centripetal acceleration.
         yaw_behaviour: where the nose points.
-        turns: number of turns, None for ever.
+        turns: number of turns; None: unlimited.
 
     Attributes:
         centre_ned_m, radius_m, velocity_m_s: the circle flown.
@@ -167,7 +167,7 @@ class OrbitTask(CruiseTask):
         v, r = self._speed_m_s, self.radius_m
         position, velocity = trajectory.position_ned_m, trajectory.velocity_ned_m_s
         acceleration = trajectory.acceleration_ned_m_s2
-        # what is left of the way onto the circle dies out smoothly
+        # the remaining distance from the circle decays smoothly
         fade = math.exp(-dt)
         before = self._phase_rad - step
         north, east, down = (float(x) for x in self.centre_ned_m)

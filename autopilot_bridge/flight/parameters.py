@@ -1,4 +1,6 @@
-"""Limits and habits of flight, in the meaning PX4 (MPC_*, RTL_*) and ArduPilot (WPNAV_*, RTL_*) share."""
+"""Limits and preferences of flight, in the common meaning of PX4 (MPC_*, RTL_*) and ArduPilot (WPNAV_*,
+RTL_*).
+"""
 
 import math
 from dataclasses import dataclass, field
@@ -27,7 +29,7 @@ _MAY_BE_ZERO: Final = frozenset(
 
 
 class YawBehaviour(IntEnum):
-    """Where the nose points on the way when nobody asked for a yaw (MPC_YAW_MODE | WP_YAW_BEHAVIOR)."""
+    """Where the nose points on the way without a commanded yaw (MPC_YAW_MODE | WP_YAW_BEHAVIOR)."""
 
     KEEP = 0
     TOWARDS_TARGET = 1

@@ -1,21 +1,21 @@
-"""What firmwares do differently with the items of a plan. Data, not code."""
+"""Differences between the firmwares in the flight of a plan. Data, not code."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlanHabits:
-    """How one firmware goes through a plan.
+    """How one firmware flies a plan.
 
     Attributes:
-        conditions: CONDITION_ items hold up the DO_ items behind them, beside the flight to the next place
-            (ArduPilot); else they are passed over (PX4).
-        tags: DO_JUMP_TAG finds its JUMP_TAG (ArduPilot).
-        item_radius: a waypoint's own acceptance radius counts (PX4, ArduPlane; ArduCopter has one for all).
-        holds: a waypoint's hold time is waited for (PX4, ArduCopter; ArduPlane has none).
+        conditions: CONDITION_ items delay the DO_ items after them, during the flight to the next position
+            (ArduPilot); else they are skipped (PX4).
+        tags: DO_JUMP_TAG jumps to its JUMP_TAG (ArduPilot).
+        item_radius: a waypoint's own acceptance radius is used (PX4, ArduPlane; ArduCopter has one for all).
+        holds: a waypoint's hold time is flown (PX4, ArduCopter; ArduPlane has none).
         passes_by: a waypoint's param3 is how far beyond it the next leg begins (ArduPlane).
-        hurries: loiters and delays are not waited for (a return along the plan).
-        silent: items are not reported as begun and reached: the plan is not the stored one.
+        hurries: loiter times and delays are skipped (a return along the plan).
+        silent: the start and end of items are not reported: the plan is not the stored one.
     """
 
     conditions: bool = False

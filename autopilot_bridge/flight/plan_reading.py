@@ -1,4 +1,4 @@
-"""What a mission item means: commands, frames, targets."""
+"""The meaning of a mission item: commands, frames, targets."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from autopilot_bridge.navigation import layout as nav_layout
 
 
 class Command(IntEnum):
-    """MAV_CMD numbers the mission task acts on."""
+    """MAV_CMD numbers that the mission task executes."""
 
     NAV_WAYPOINT = 16
     NAV_LOITER_UNLIM = 17
@@ -48,7 +48,7 @@ class Command(IntEnum):
 
 
 _GLOBAL: Final = frozenset({0, 5})  # MAV_FRAME_GLOBAL, _INT: above mean sea level
-_RELATIVE: Final = frozenset({3, 6, 10, 11})  # above home; terrain is taken as level with home
+_RELATIVE: Final = frozenset({3, 6, 10, 11})  # above home; terrain is assumed level with home
 _LOCAL_NED: Final = 1
 _WAYPOINTS: Final = frozenset({Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT})
 _NOT_FLOWN: Final = frozenset({Command.NAV_ROI})  # a region of interest in spite of its name
@@ -57,29 +57,29 @@ JUMPS: Final = frozenset({Command.DO_JUMP, Command.DO_JUMP_TAG})
 MARKERS: Final = frozenset(
     {Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.DO_GO_AROUND, Command.JUMP_TAG}
 )
-"""Items that do nothing when the plan comes to them."""
+"""Items that have no effect in a plan."""
 
 
 def is_navigation(item: MissionItem) -> bool:
-    """The item moves or holds the vehicle (MAV_CMD_NAV_*), so that it ends when that is done."""
+    """The item moves or holds the vehicle (MAV_CMD_NAV_*), so it ends when the manoeuvre ends."""
     return item.command <= Command.NAV_LAST and item.command not in _NOT_FLOWN
 
 
 def is_waypoint(item: MissionItem) -> bool:
-    """The item is a place to fly to or through."""
+    """The item is a position to fly to or through."""
     return item.command in _WAYPOINTS
 
 
 def is_passed_through(item: MissionItem) -> bool:
-    """The vehicle needs not stop there."""
+    """The vehicle need not stop there."""
     return is_waypoint(item) and not item.param1 > 0.0 and item.autocontinue
 
 
 def target_of(item: MissionItem, ctx: FlightContext) -> Array | None:
-    """Place of an item in local NED, (3,); None when it can't be known (no frame, no home, nonsense).
+    """Position of an item in local NED, (3,); None when it is not known (no frame, no home, invalid values).
 
-    Latitude and longitude 0, or NaN, mean "here", as autopilots take them for take-off, land and loiter
-    items.
+    Latitude and longitude 0, or NaN, mean the present position, as in autopilots for take-off, land and
+    loiter items.
     """
     here = ctx.nav[nav_layout.POS_NED_M]
     if item.frame == _LOCAL_NED:
@@ -108,7 +108,7 @@ def target_of(item: MissionItem, ctx: FlightContext) -> Array | None:
 
 
 def jump_target(item: MissionItem, items: Sequence[MissionItem]) -> int | None:
-    """Sequence number a DO_JUMP or DO_JUMP_TAG leads to; None when there is no such item."""
+    """Sequence number of the target of a DO_JUMP or DO_JUMP_TAG; None when there is no such item."""
     if not math.isfinite(item.param1):
         return None
     target = round(item.param1)
@@ -127,7 +127,7 @@ def landing_start(items: Sequence[MissionItem]) -> int | None:
 
 
 def in_landing_sequence(missions: MissionStore) -> bool:
-    """The current item is part of the landing: behind DO_LAND_START, or the landing itself."""
+    """The current item is part of the landing: after DO_LAND_START, or the landing itself."""
     items, current = missions.items, missions.current
     if not 0 <= current < len(items):
         return False

@@ -1,4 +1,4 @@
-"""What flying an uploaded plan takes on any vehicle: the order of its items, jumps, conditions, DO_ items."""
+"""The common part of flying an uploaded plan: the order of its items, jumps, conditions, DO_ items."""
 
 import math
 from abc import ABC, abstractmethod
@@ -42,15 +42,16 @@ _WAITS: Final = frozenset({Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TURNS, C
 class PlanTask(ABC):
     """Executes the items of a store, from its current one; DONE (and holding) after the last.
 
-    A new plan or another current item, seen in the store, takes effect at the next update. DO_ items act at
-    once; with `PlanHabits.conditions` they act beside the flight to the next place, held up by CONDITION_
-    items, and what the flight overtakes is dropped. Items for equipment are told as `ItemCommanded`. What
-    takes time is either a task of its own (`_sub`) or a leg, which the vehicle's class flies itself.
+    A new plan or another current item in the store takes effect at the next update. DO_ items act at once.
+    With `PlanHabits.conditions` they act during the flight to the next position, delayed by CONDITION_ items,
+    and those that did not act before the arrival are dropped. Items for equipment are reported as
+    `ItemCommanded`. An item that takes time is either a separate task (`_sub`) or a leg, which the vehicle's
+    class flies.
 
     Args:
-        store: the plan; its `current` is kept up to date.
+        store: the plan; its `current` is updated.
         first_item: 1 where item 0 is home (ArduPilot).
-        habits: how the firmware goes through a plan.
+        habits: how the firmware flies a plan.
     """
 
     __slots__ = (
@@ -82,37 +83,37 @@ class PlanTask(ABC):
 
     @abstractmethod
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Fly on at this speed until an item or a command changes it, the present leg included."""
+        """Fly at this speed until an item or a command changes it, the present leg included."""
 
     @abstractmethod
     def _forget_leg(self) -> None:
-        """No leg is flown any more."""
+        """Discard the present leg."""
 
     @abstractmethod
     def _hold_task(self) -> FlightTask:
-        """Stays here."""
+        """The task that holds the present position."""
 
     @abstractmethod
     def _return_task(self) -> FlightTask:
-        """Flies home."""
+        """The task that flies home."""
 
     @abstractmethod
     def _begin_flown(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
-        """Begin an item that is flown, as `_sub` or as a leg; False when there is nothing to do.
+        """Begin an item that is flown, as `_sub` or as a leg; False when there is nothing to fly.
 
-        `came_from`: the place the leg before has led to; None: wherever the vehicle is.
+        `came_from`: the end of the previous leg; None: the vehicle's position.
         """
 
     def _turn(self, ctx: FlightContext, item: MissionItem) -> None:  # noqa: B027
-        """CONDITION_YAW begins; an aircraft can't."""
+        """Begin a CONDITION_YAW; not possible on an aircraft."""
 
     def _turned(self, ctx: FlightContext) -> bool:
-        """CONDITION_YAW is done."""
+        """CONDITION_YAW is finished."""
         return True
 
     @abstractmethod
     def activate(self, ctx: FlightContext) -> None:
-        """Take over from the present state, and begin the current item."""
+        """Continue from the present state, and begin the current item."""
 
     @abstractmethod
     def update(self, ctx: FlightContext) -> TaskStatus:
@@ -124,7 +125,7 @@ class PlanTask(ABC):
         return None if self._finished or self._seq < 0 else self._store.items[self._seq]
 
     def _tell(self, ctx: FlightContext, event: FlightEvent) -> None:
-        """Report progress, unless the plan is a private one."""
+        """Report progress, unless the plan is not the stored one."""
         if not self._habits.silent:
             ctx.events.append(event)
 
@@ -137,7 +138,7 @@ class PlanTask(ABC):
         self._begin(ctx, max(self._store.current, self._first_item), None)
 
     def _begin(self, ctx: FlightContext, seq: int, came_from: Array | None) -> None:
-        """Make `seq` the current item, running through items that take no time."""
+        """Make `seq` the current item, and execute items that take no time."""
         items = self._store.items
         self._sub = None
         self._forget_leg()
@@ -195,7 +196,7 @@ class PlanTask(ABC):
         return seq + 1
 
     def _act(self, ctx: FlightContext, item: MissionItem, seq: int) -> None:
-        """A DO_ item: do it."""
+        """Execute a DO_ item."""
         if item.command == Command.DO_CHANGE_SPEED:
             self._change_by_item(ctx, item)
         elif item.command == Command.DO_SET_HOME:
@@ -221,10 +222,10 @@ class PlanTask(ABC):
             for each in (SpeedKind.GROUND_SPEED, SpeedKind.CLIMB, SpeedKind.DESCENT):
                 self.change_speed(ctx, each, None)
 
-    # items beside the flight to the next place
+    # items during the flight to the next position
 
     def _go_on_beside(self, ctx: FlightContext) -> None:
-        """Act on the items that are due beside what is flown, up to a condition that isn't met."""
+        """Execute the items that are due during the flight, up to a condition that is not met."""
         while self._beside:
             seq = self._beside[0]
             item = self._store.items[seq]
@@ -238,7 +239,7 @@ class PlanTask(ABC):
             self._beside.popleft()
 
     def _do_the_rest(self, ctx: FlightContext) -> None:
-        """There is nothing to fly beside which the items could wait: those before a condition act."""
+        """Without a flight, the items before the first condition are executed and the others are dropped."""
         while self._beside:
             seq = self._beside.popleft()
             item = self._store.items[seq]
@@ -268,10 +269,10 @@ class PlanTask(ABC):
             self._condition_left_s -= ctx.dt_s
         return self._condition_left_s <= 0.0
 
-    # what is looked at
+    # region of interest
 
     def _roi_place(self, ctx: FlightContext) -> Array | None:
-        """Place of the region of interest, local NED, (3,); None: there is none."""
+        """Position of the region of interest, local NED, (3,); None: there is none."""
         roi = ctx.roi
         if roi is None or self._finished:
             return None
@@ -286,7 +287,7 @@ class PlanTask(ABC):
     # items that take time
 
     def _begin_timed(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> bool:
-        """Begin an item that takes time; False when there is nothing to do."""
+        """Begin an item that takes time; False when there is nothing to fly."""
         if self._habits.hurries and item.command in _WAITS:
             item = replace(item, command=Command.NAV_WAYPOINT, param1=0.0, param2=0.0, param3=0.0)
         if item.command == Command.NAV_DELAY:
@@ -302,7 +303,7 @@ class PlanTask(ABC):
         return self._begin_flown(ctx, item, came_from)
 
     def _follow_store(self, ctx: FlightContext) -> None:
-        """Take over a new plan, or another current item; let the items beside the flight act."""
+        """Start a new plan, or another current item; execute the items during the flight."""
         if self._store.version != self._version:
             self._restart(ctx)
         elif self._store.current != self._seq and not self._finished:
@@ -314,7 +315,7 @@ class PlanTask(ABC):
         before = len(ctx.events)
         status = task.update(ctx)
         if len(ctx.events) != before:
-            # the sub-task's own end is not the mission's
+            # the end of the sub-task is not the end of the mission
             ctx.events[before:] = [e for e in ctx.events[before:] if not isinstance(e, TaskFinished)]
         if self._finished:
             return
@@ -328,15 +329,15 @@ class PlanTask(ABC):
             self._complete(ctx, item, self._came_from(ctx))
 
     def _sub_done(self, ctx: FlightContext, item: MissionItem, status: TaskStatus) -> bool:
-        """The task of the current item has done what the item asks for."""
+        """The task of the current item has completed the item."""
         return status is TaskStatus.DONE
 
     def _came_from(self, ctx: FlightContext) -> Array | None:
-        """Where the leg after a finished sub-task starts; None: wherever the vehicle is."""
+        """Where the leg after a finished sub-task starts; None: at the vehicle's position."""
         return None
 
     def _complete(self, ctx: FlightContext, item: MissionItem, came_from: Array | None) -> None:
-        """The current item is done: report, and go on."""
+        """The current item is finished: report it, and continue."""
         self._tell(ctx, WaypointReached(self._seq, navigation=is_navigation(item)))
         last = self._seq + 1 >= len(self._store.items)
         if last or not item.autocontinue:

@@ -1,8 +1,8 @@
-"""Land at a target that a detector sees: PX4's Precision Land, ArduCopter's LAND with PLND_ENABLED.
+"""Land at a target measured by a detector: PX4's Precision Land, ArduCopter's LAND with PLND_ENABLED.
 
-Above the target first, then down while it is held under the vehicle. What happens when it is lost on the way,
-or never seen, is the flavour's (`PrecisionParameters.lost`). The last of the descent, and all of it when
-there is no target, is the plain landing.
+The vehicle flies above the target, then descends while the target is below it. The flavour defines what
+happens when the target is lost on the way, or never seen (`PrecisionParameters.lost`). The end of the
+descent, and the whole descent without a target, is a normal landing.
 """
 
 import math
@@ -19,36 +19,36 @@ from autopilot_bridge.flight.precision_parameters import Precision, PrecisionPar
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
 
-_CONE: Final = 0.15  # what may be off grows with the height: m per m
-_AWAY: Final = 2.0  # and the descent pauses at so many times that
+_CONE: Final = 0.15  # the allowed offset grows with the height: m per m
+_AWAY: Final = 2.0  # the descent pauses at this multiple of the allowed offset
 _GAIN_1_S: Final = 0.8
 _BRAKE_SHARE: Final = 0.5
 _NAV_HEIGHT: Final = nav_layout.HEIGHT_ABOVE_GROUND_M
-_FIRST_LOOK_S: Final = 3.0  # until it is decided that nothing is in sight
+_FIRST_LOOK_S: Final = 3.0  # after this time without a detection, no target is in sight
 _SLOWEST_LAND_M_S: Final = 0.3
 
 
 class PrecisionPhase(IntEnum):
-    """Where the landing is."""
+    """The phase of the landing."""
 
-    LOOK = 0  # nothing seen yet
+    LOOK = 0  # no detection yet
     ALIGN = 1  # over the target
     DESCEND = 2
     SEARCH = 3
     HOVER = 4
-    FINAL = 5  # a plain landing from here on
+    FINAL = 5  # a normal landing from here on
 
 
 class PrecisionLandTask:
     """The landing; DONE on the ground.
 
     Args:
-        position_ned_m: where the target is about, (3,) (down is ignored); None: here.
+        position_ned_m: approximate position of the target, (3,) (down is ignored); None: here.
         yaw_rad: heading; None: the present one.
-        required: search for the target (PX4 NAV_LAND param2 2); else land plainly when it isn't seen.
+        required: search for the target (PX4 NAV_LAND param2 2); else a normal landing if it is not seen.
 
     Attributes:
-        phase: where it is.
+        phase: see `PrecisionPhase`.
     """
 
     __slots__ = (
@@ -112,7 +112,7 @@ class PrecisionLandTask:
         motion.steer(ctx, motion.heading.yaw_rad if math.isnan(self._yaw_rad) else self._yaw_rad)
         motion.write(ctx)
         if self.phase is PrecisionPhase.DESCEND:
-            ctx.setpoint[sp.POS_NED_M][2] = math.nan  # by speed alone: the height of the ground isn't known
+            ctx.setpoint[sp.POS_NED_M][2] = math.nan  # by speed alone: the height of the ground is not known
             ctx.setpoint[sp.ACC_NED_M_S2][2] = 0.0
         return TaskStatus.RUNNING
 
@@ -125,7 +125,7 @@ class PrecisionLandTask:
         return ctx.height_above_home_m if math.isnan(height_m) else height_m
 
     def _land_plainly(self, ctx: FlightContext, place: tuple[float, float] | None) -> TaskStatus:
-        """The rest is a landing; at the target while that is known."""
+        """Fly the rest as a normal landing; at the target while its position is known."""
         self._go(PrecisionPhase.FINAL)
         where = None if place is None else np.array([place[0], place[1], math.nan])
         yaw_rad = None if math.isnan(self._yaw_rad) else self._yaw_rad
@@ -141,7 +141,7 @@ class PrecisionLandTask:
         height_m: float,
         seen: tuple[float, float],
     ) -> None:
-        """Over the target, and down while it is below."""
+        """Fly above the target, and descend while it is below."""
         north = seen[0] - float(ctx.nav[nav_layout.POS_NED_M][0])
         east = seen[1] - float(ctx.nav[nav_layout.POS_NED_M][1])
         off_m = math.hypot(north, east)
@@ -182,7 +182,9 @@ class PrecisionLandTask:
     def _without_target(
         self, ctx: FlightContext, motion: SmoothMotion, p: PrecisionParameters, height_m: float
     ) -> TaskStatus | None:
-        """Go to where it should be, wait, search, or land plainly; a status when the landing took over."""
+        """Fly to the expected position, wait, search, or land; returns a status when the landing took
+        over.
+        """
         if self.phase in (PrecisionPhase.ALIGN, PrecisionPhase.DESCEND):
             if height_m <= p.final_m:
                 return self._land_plainly(ctx, None)
@@ -225,7 +227,7 @@ class PrecisionLandTask:
         return None
 
     def _at_place(self, ctx: FlightContext, motion: SmoothMotion) -> bool:
-        """Fly to where the target is about; True when the vehicle is there."""
+        """Fly to the approximate position of the target; True when the vehicle is there."""
         if self._place is None:
             motion.brake(ctx)
             return motion.stopped
@@ -234,20 +236,20 @@ class PrecisionLandTask:
         return math.hypot(float(self._place[0] - here[0]), float(self._place[1] - here[1])) < 1.0
 
     def _sinks(self, ctx: FlightContext, motion: SmoothMotion) -> None:
-        """Too high to see anything: down first."""
+        """Descend: the vehicle is too high for a detection."""
         here = motion.trajectory.position_ned_m if self._place is None else self._place
         place = (float(here[0]), float(here[1]))
         self._approach(ctx, motion, place, ctx.multicopter.land_descend_speed_m_s)
 
     def _climbs(self, ctx: FlightContext, motion: SmoothMotion, p: PrecisionParameters) -> bool:
-        """Up to the height of the search; True when the vehicle is there."""
+        """Climb to the height of the search; True when the vehicle is there."""
         home_down = float(ctx.home_ned_m[2])
         down = (0.0 if math.isnan(home_down) else home_down) - p.search_m
         if math.isnan(down):
             down = self._lost_down_m
         here = motion.trajectory.position_ned_m
         if math.isnan(down) or down > float(here[2]):
-            down = float(here[2])  # never down for a search
+            down = float(here[2])  # never descend for a search
         error = down - float(here[2])
         speed = max(-ctx.multicopter.climb_speed_m_s, _GAIN_1_S * error)
         motion.trajectory.stretch = 1.0
@@ -262,7 +264,7 @@ def landing_task(
     *,
     precision: Precision = Precision.NONE,
 ) -> LandTask | PrecisionLandTask:
-    """A landing at a place (None: here), at a target where one is to be looked for."""
+    """A landing at a position (None: here), with a precision landing where required."""
     if precision is Precision.NONE and not ctx.multicopter.precision.enabled:
         return LandTask(position_ned_m, yaw_rad)
     return PrecisionLandTask(position_ned_m, yaw_rad, required=precision is not Precision.OPPORTUNISTIC)

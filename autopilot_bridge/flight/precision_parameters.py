@@ -1,4 +1,4 @@
-"""Landing at a target that is seen: PX4's PLD_*, ArduPilot's PLND_*."""
+"""Parameters of a landing at a detected target: PX4's PLD_*, ArduPilot's PLND_*."""
 
 import math
 from dataclasses import dataclass
@@ -8,35 +8,36 @@ from flightsim.checks import check_fields, require_not_negative
 
 
 class Precision(IntEnum):
-    """Whether a landing looks for a target (PRECISION_LAND_MODE)."""
+    """Whether a landing uses a target (PRECISION_LAND_MODE)."""
 
     NONE = 0
-    OPPORTUNISTIC = 1  # when it is seen; else a plain landing
-    REQUIRED = 2  # it is searched
+    OPPORTUNISTIC = 1  # when it is seen; else a normal landing
+    REQUIRED = 2  # the vehicle searches for it
 
 
 class TargetLost(IntEnum):
-    """What is done when the target isn't seen (PLND_STRICT; PX4 searches)."""
+    """The action when the target is not seen (PLND_STRICT; PX4 searches)."""
 
     LAND = 0  # where the vehicle is
-    SEARCH = 1  # climb, look for it a few times, then land
+    SEARCH = 1  # climb and search for it a few times, then land
     HOVER = 2  # stay above, until it is seen
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrecisionParameters:
-    """How a precision landing goes.
+    """Parameters of a precision landing.
 
     Attributes:
-        enabled: LAND looks for a target by itself (PLND_ENABLED); PX4 only where a mode or an item asks.
-        wait_s: the target not seen for this long while going down: lost (PLD_BTOUT, PLND_TIMEOUT).
-        align_m: nearer than this above the target the vehicle goes down (PLD_HACC_RAD, PLND_XY_DIST_MAX).
-        final_m: below this height it goes down whatever is seen (PLD_FAPPR_ALT, PLND_ALT_MIN).
-        greatest_m: above this height no target is looked for (PLND_ALT_MAX).
-        search_m: height over home from which it is searched (PLD_SRCH_ALT); NaN: the height it was lost at.
-        search_s: how long (PLD_SRCH_TOUT).
-        searches: how often (PLD_MAX_SRCH, PLND_RET_MAX).
-        lost: what follows when it isn't seen.
+        enabled: LAND always uses a target (PLND_ENABLED); PX4 only when a mode or an item requires it.
+        wait_s: a target not seen for this time during the descent is lost (PLD_BTOUT, PLND_TIMEOUT).
+        align_m: horizontal distance from the target below which the vehicle descends (PLD_HACC_RAD,
+            PLND_XY_DIST_MAX).
+        final_m: below this height it descends without a target too (PLD_FAPPR_ALT, PLND_ALT_MIN).
+        greatest_m: above this height no target is used (PLND_ALT_MAX).
+        search_m: height over home of the search (PLD_SRCH_ALT); NaN: the height at which it was lost.
+        search_s: duration of a search (PLD_SRCH_TOUT).
+        searches: number of searches (PLD_MAX_SRCH, PLND_RET_MAX).
+        lost: the action when it is not seen.
     """
 
     enabled: bool = False

@@ -1,4 +1,4 @@
-"""What a plan or a command tells the vehicle to look at (MAV_CMD_DO_SET_ROI and its kin)."""
+"""The region of interest set by a plan or a command (MAV_CMD_DO_SET_ROI and related commands)."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from autopilot_bridge.flight.yaw import wrap_pi
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav_layout
 
-_NEAREST_M: Final = 0.5  # right under or over it no heading is better than another
+_NEAREST_M: Final = 0.5  # within this distance, right above or below it, the heading is not defined
 
 
 class RoiMode(IntEnum):
@@ -38,10 +38,10 @@ class RegionOfInterest:
     """A region of interest.
 
     Attributes:
-        mode: what kind it is.
+        mode: its kind.
         place_ned_m: local NED, (3,), of a LOCATION.
         index: item of a WAYPOINT.
-        yaw_offset_rad: beside the direction of the NEXT_WAYPOINT.
+        yaw_offset_rad: added to the direction of the NEXT_WAYPOINT.
     """
 
     mode: RoiMode
@@ -51,10 +51,10 @@ class RegionOfInterest:
 
 
 def roi_of(item: MissionItem, ctx: FlightContext) -> RegionOfInterest | None:
-    """What an item of `ROI_COMMANDS` asks to look at; None: at nothing any more.
+    """The region of interest of an item of `ROI_COMMANDS`; None: the item ends it.
 
     DO_SET_ROI and NAV_ROI carry their kind in param1 (PX4); ArduPilot's DO_SET_ROI is always a location,
-    and its all-zero place ends it.
+    and an all-zero position ends it.
     """
     mode = _BY_COMMAND.get(Command(item.command))
     if mode is None:
@@ -73,13 +73,13 @@ def roi_of(item: MissionItem, ctx: FlightContext) -> RegionOfInterest | None:
 
 
 def roi_heading(ctx: FlightContext) -> float:
-    """Heading to a region of interest that is a place; NaN while there is none."""
+    """Heading to a region of interest that is a position; NaN if there is none."""
     roi = ctx.roi
     return math.nan if roi is None else heading_to(ctx, roi.place_ned_m, roi.yaw_offset_rad)
 
 
 def heading_to(ctx: FlightContext, place_ned_m: Array | None, offset_rad: float = 0.0) -> float:
-    """Heading from the vehicle to a place; NaN where there is none."""
+    """Heading from the vehicle to a position; NaN if there is none."""
     if place_ned_m is None or not ctx.position_valid:
         return math.nan
     here = ctx.nav[nav_layout.POS_NED_M]

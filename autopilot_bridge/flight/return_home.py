@@ -1,4 +1,4 @@
-"""Return to home and land: PX4's Return and ArduPilot's RTL, told apart by parameters only."""
+"""Return to home and land: PX4's Return and ArduPilot's RTL, which differ in parameters only."""
 
 import math
 from enum import IntEnum
@@ -20,7 +20,7 @@ from autopilot_bridge.navigation import layout as nav_layout
 
 
 class ReturnPhase(IntEnum):
-    """Where the return stands."""
+    """The phase of the return."""
 
     CLIMB = 0
     FLY = 1
@@ -32,10 +32,11 @@ class ReturnPhase(IntEnum):
 
 
 def return_height(distance_m: float, height_m: float, parameters: FlightParameters) -> float:
-    """Height over home to fly home at.
+    """Height over home of the flight home.
 
-    Never lower than now; otherwise the return altitude, and near home only as high as the cone around home
-    (PX4 RTL_CONE_ANG within RTL_MIN_DIST; ArduPilot RTL_CONE_SLOPE everywhere) asks for.
+    It is never lower than the present height; otherwise it is the return altitude, and near home only the
+    height that the cone around home requires (PX4 RTL_CONE_ANG within RTL_MIN_DIST; ArduPilot RTL_CONE_SLOPE
+    everywhere).
     """
     p = parameters
     wanted = min(p.return_altitude_m, p.return_height_max_m)
@@ -49,18 +50,18 @@ def return_height(distance_m: float, height_m: float, parameters: FlightParamete
 class ReturnTask:
     """Climb, fly home, descend, wait, land. Without a home or a position it lands where it is.
 
-    Home is the place that `choose_return` gives: a rally point or the landing of the plan may take its place.
-    With a negative loiter time it stays over home (PX4 RTL_LAND_DELAY = -1), with a height to stay at it
-    hovers there in the end (ArduPilot RTL_ALT_FINAL).
+    The target is the place from `choose_return`: a rally point or the landing of the plan may replace home.
+    With a negative loiter time the vehicle stays over home (PX4 RTL_LAND_DELAY = -1); with a final height it
+    hovers at that height in the end (ArduPilot RTL_ALT_FINAL).
 
     Args:
-        store: the plan, whose landing the parameters may send the return to; None: there is none.
-        first_item: the first item that is flown, as the mission task has it.
-        habits: how the firmware goes through a plan.
+        store: the plan whose landing the return may use, by the parameters; None: there is none.
+        first_item: the first item that is flown, as in the mission task.
+        habits: how the firmware flies a plan.
 
     Attributes:
         phase: see `ReturnPhase`.
-        place: where the return leads; None: nowhere.
+        place: the target of the return; None: there is none.
     """
 
     __slots__ = (
@@ -125,7 +126,7 @@ class ReturnTask:
         self._target[2] = float(home[2]) - height
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Another speed on the way home (DO_CHANGE_SPEED); the landing has speeds of its own."""
+        """Set another speed on the way home (DO_CHANGE_SPEED); the landing has its own speeds."""
         if isinstance(self._plan, SpeedTask):
             self._plan.change_speed(ctx, kind, speed_m_s)
         if self._motion is None:
@@ -136,7 +137,7 @@ class ReturnTask:
         self._motion.change_speed(ctx, kind, speed_m_s)
 
     def _fly_plan(self, ctx: FlightContext) -> bool:
-        """Go on along the plan, or with its landing; False where there is none."""
+        """Continue along the plan, or with its landing; False if there is none."""
         # a plan may send the vehicle home, and a return may fly the plan
         from autopilot_bridge.flight.mission import MissionTask
 
@@ -170,7 +171,7 @@ class ReturnTask:
         return away < horizontal_m and height_error < ctx.multicopter.acceptance_altitude_m and motion.stopped
 
     def _advance(self, ctx: FlightContext, motion: SmoothMotion, place: ReturnPlace) -> None:
-        """Go on to the next phase when this one is done."""
+        """Begin the next phase when this one is finished."""
         p = ctx.multicopter
         ground_down = float(place.ned_m[2])
         low_down = max(float(self._target[2]), ground_down - p.return_descend_altitude_m)

@@ -1,4 +1,4 @@
-"""Where a return leads: home, a rally point, or the landing of the plan (PX4 RTL_TYPE | ArduPilot RALLY_*).
+"""The target of a return: home, a rally point, or the landing of the plan (PX4 RTL_TYPE | ArduPilot RALLY_*).
 
 Source: PX4 1.16 navigator/rtl (findRtlDestination), ArduPilot 4.6 AP_Rally.
 """
@@ -25,13 +25,14 @@ _RALLY_POINT: Final = 5100  # MAV_CMD_NAV_RALLY_POINT
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReturnPlace:
-    """Where a return leads.
+    """The target of a return.
 
     Attributes:
-        ned_m: the place, local NED, (3,); its down is the ground that heights of the return are over.
-        altitude_down_m: down coordinate of the altitude to return at; NaN: the parameter's.
+        ned_m: the position, local NED, (3,); its down is the ground reference of the return's heights.
+        altitude_down_m: down coordinate of the return altitude; NaN: the parameter's.
         rally: it is a rally point.
-        landing: sequence number at which the plan's landing begins; None: it lands, or circles, at the place.
+        landing: sequence number at which the plan's landing begins; None: the vehicle lands, or circles,
+            there.
     """
 
     ned_m: Array
@@ -41,7 +42,7 @@ class ReturnPlace:
 
 
 def plan_landing(store: MissionStore | None) -> int | None:
-    """Where the landing of a plan begins: its DO_LAND_START, else its landing item; None: it has none."""
+    """Where the landing of a plan begins: its DO_LAND_START, else its landing item; None: no landing."""
     if store is None:
         return None
     start = landing_start(store.items)
@@ -57,12 +58,12 @@ def choose_return(
     landing: int | None,
     store: MissionStore | None,
 ) -> ReturnPlace | None:
-    """Where a return leads from here; None while there is no home.
+    """The target of a return from here; None while there is no home.
 
     Args:
-        rule: which rally points count.
-        destination: what else does.
-        landing: where the plan's landing begins; None: it has none.
+        rule: which rally points are considered.
+        destination: which other targets are considered.
+        landing: where the plan's landing begins; None: no landing.
         store: the plan.
     """
     if not math.isfinite(float(ctx.home_ned_m.sum())):
@@ -75,7 +76,7 @@ def choose_return(
     if destination is ReturnDestination.LANDING_OR_RALLY:
         candidates = [place for place in (landing_place, rally) if place is not None] or [home]
     else:
-        # among the rally points alone, where home doesn't compete (ArduPilot)
+        # only among the rally points if home is not considered (ArduPilot)
         alone = rally is not None and not rule.home_competes
         candidates = [place for place in (None if alone else home, landing_place, rally) if place is not None]
     best = candidates[0]
@@ -86,7 +87,7 @@ def choose_return(
 
 
 def nearest_rally(ctx: FlightContext, rule: RallyRule) -> ReturnPlace | None:
-    """The nearest rally point that counts; None: there is none."""
+    """The nearest rally point that the rule allows; None: there is none."""
     if not rule.used or ctx.rally is None:
         return None
     nearest: ReturnPlace | None = None
@@ -114,13 +115,13 @@ def nearest_rally(ctx: FlightContext, rule: RallyRule) -> ReturnPlace | None:
 def way_back(
     ctx: FlightContext, store: MissionStore, first_item: int, landing: int | None, *, shorter: bool
 ) -> tuple[MissionStore, int | None]:
-    """The way along a plan: (plan, where to begin) forward to its landing, or a plan back to home.
+    """The way along a plan: (plan, first item) forward to its landing, or a plan back to home.
 
-    The second is None for the way back, which is a plan of its own.
+    The second value is None for the way back, which is a separate plan.
 
     Args:
-        landing: where the plan's landing begins; None: it has none.
-        shorter: take the way with fewer waypoints; else forward wherever there is a landing.
+        landing: where the plan's landing begins; None: no landing.
+        shorter: take the way with fewer waypoints; else forward if there is a landing.
     """
     items = store.items
     current = max(first_item, min(store.current, len(items) - 1))
@@ -149,7 +150,7 @@ def _closest(ctx: FlightContext, items: tuple[MissionItem, ...], first_item: int
 
 
 def _landing_place(ctx: FlightContext, store: MissionStore | None, landing: int | None) -> ReturnPlace | None:
-    """The plan's landing, placed where its landing item is."""
+    """The plan's landing, at the position of its landing item."""
     if store is None or landing is None:
         return None
     for item in store.items[landing:]:

@@ -1,4 +1,4 @@
-"""A return along the plan: forward to its landing, or back the way the vehicle has come."""
+"""A return along the plan: forward to its landing, or back along the flown way."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReturnPlan:
-    """Which plan is flown.
+    """The plan that a return flies.
 
     Attributes:
-        store: the plan; for the way back one of its own.
+        store: the plan; for the way back a separate plan.
         first_item: the first item that is flown.
-        habits: how it is flown; a return doesn't wait on the way.
+        habits: how it is flown; a return skips the waiting times.
     """
 
     store: MissionStore
@@ -53,5 +53,5 @@ class ReturnPlan:
         return cls(store=store, first_item=first_item, habits=habits)
 
     def task(self, make: Callable[..., PlanTask]) -> PlanTask:
-        """The task that flies it."""
+        """The task that flies the plan."""
         return make(self.store, first_item=self.first_item, habits=self.habits)

@@ -1,4 +1,4 @@
-"""What decides where a return leads, as parameters."""
+"""The parameters that define the target of a return."""
 
 import math
 from dataclasses import dataclass
@@ -6,7 +6,9 @@ from enum import IntEnum
 
 
 class ReturnDestination(IntEnum):
-    """Where a return may end: PX4 RTL_TYPE | ArduPilot RTL_AUTOLAND. Rally points are `RallyRule`'s."""
+    """The possible targets of a return: PX4 RTL_TYPE | ArduPilot RTL_AUTOLAND. Rally points are
+    `RallyRule`'s.
+    """
 
     HOME = 0  # circle over home; land by `return_loiter_time_s` (RTL_TYPE 0)
     LANDING_SEQUENCE = 1  # straight to the plan's landing sequence (RTL_AUTOLAND 2)
@@ -25,12 +27,12 @@ class RallyRule:
     """Which rally points a return considers.
 
     Attributes:
-        used: any at all.
-        home_competes: home is taken when it is closer (PX4 RTL_TYPE 0 and 3 | RALLY_INCL_HOME).
-        limit_m: farther ones are not taken (RALLY_LIMIT_KM); infinite: no limit.
+        used: rally points are considered at all.
+        home_competes: home is used when it is closer (PX4 RTL_TYPE 0 and 3 | RALLY_INCL_HOME).
+        limit_m: points farther away are not used (RALLY_LIMIT_KM); infinite: no limit.
         within_fence: only those inside the geofence (ArduCopter).
-        altitude_is_ground: a point's altitude is that of its ground, the return's heights are over it (PX4);
-            else it is the altitude to return at (ArduPilot).
+        altitude_is_ground: a point's altitude is that of its ground, and the return's heights are over it
+            (PX4); else it is the return altitude (ArduPilot).
     """
 
     used: bool = True

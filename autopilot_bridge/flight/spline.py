@@ -24,10 +24,11 @@ class SplineCurve:
 
     Args:
         start_ned_m, end_ned_m: where it begins and ends, (3,).
-        start_tangent_m, end_tangent_m: directions there; as long as the curve follows them, (3,).
+        start_tangent_m, end_tangent_m: tangents at the ends, (3,); their length is the curve's parameter
+            speed.
         parameters: accelerations and vertical speeds.
         speed_m_s: along the curve.
-        end_speed_m_s: at its end; 0: it is a stop.
+        end_speed_m_s: speed at its end; 0: a stop.
 
     Attributes:
         length_m: of the curve.
@@ -101,7 +102,9 @@ class SplineCurve:
         return float(self._speeds[0])
 
     def speed_at(self, along_m: float) -> float:
-        """Highest speed after a distance along the curve; creeping at the end, so that it is reached."""
+        """Highest speed after a distance along the curve; a small speed at the end, so that the end is
+        reached.
+        """
         speed = float(np.interp(along_m, self._along_m, self._speeds))
         return max(speed, _SLOWEST_M_S) if along_m < self.length_m else speed
 
@@ -118,7 +121,7 @@ class SplineCurve:
 
 
 class SplineFlight:
-    """A moving point on a curve: how far along it is, and how fast.
+    """A moving point on a curve: its distance along the curve, and its speed.
 
     Attributes:
         along_m: distance along the curve.
@@ -139,7 +142,7 @@ class SplineFlight:
         return self.along_m >= self.curve.length_m
 
     def advance(self, dt_s: float) -> tuple[Array, Array, Array]:
-        """One tick; the motion there, as `SplineCurve.motion_at`."""
+        """Advance one tick; returns the motion there, as `SplineCurve.motion_at`."""
         limit = self.curve.speed_at(self.along_m)
         self.speed_m_s = min(limit, self.speed_m_s + self._acceleration * dt_s)
         self.along_m = min(self.curve.length_m, self.along_m + self.speed_m_s * dt_s)

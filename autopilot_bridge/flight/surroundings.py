@@ -1,4 +1,4 @@
-"""What others tell a vehicle of what is around it: whom to follow, where to land, what is in the way."""
+"""What other systems report of the surroundings: the target to follow, the landing target, obstacles."""
 
 from autopilot_bridge.flight.landing_target import LandingTargetTrack
 from autopilot_bridge.flight.obstacles import ObstacleMap
@@ -6,10 +6,10 @@ from autopilot_bridge.flight.target_motion import TargetMotion
 
 
 class Surroundings:
-    """Kept up to date by the services that hear of it, read by flight tasks.
+    """Updated by the services that receive the messages, read by flight tasks.
 
     Attributes:
-        leader: the target that is followed.
+        leader: the target to follow.
         landing_target: the place to land at.
         obstacles: distances around the vehicle.
     """

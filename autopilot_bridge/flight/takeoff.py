@@ -18,10 +18,11 @@ _ARRIVAL_SPEED_M_S: Final = 0.5
 class TakeoffTask:
     """Spool up, lift off, climb straight up to a height over home, hold there. DONE on arrival.
 
-    A vehicle that flies already only climbs; one that is above the height stays where it is.
+    A vehicle that is already flying only climbs; one above the height holds its position.
 
     Args:
-        altitude_above_home_m: height to reach; None: the parameter. Over the start while home is unset.
+        altitude_above_home_m: height to reach; None: the parameter. Over the start position while home is
+            unset.
         climb_speed_m_s: None: the parameter.
         yaw_rad: heading during the climb; None: the present one.
     """

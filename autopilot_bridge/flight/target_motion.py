@@ -1,7 +1,7 @@
-"""Where something that reports itself is, and how it moves: a Kalman filter of constant velocity.
+"""Position and velocity of a target that reports itself: a Kalman filter of constant velocity.
 
-One variance for all axes; states are position and velocity in local NED. Gaps are bridged by the velocity;
-what comes late is refused, what can't be is taken for a new beginning after `_LOST` in a row.
+One variance for all axes; states are position and velocity in local NED. Gaps are extrapolated with the
+velocity; late measurements are refused; after `_LOST` implausible measurements in a row the filter restarts.
 """
 
 import math
@@ -23,8 +23,8 @@ class TargetMotion:
     """The filter.
 
     Args:
-        acceleration_m_s2: 1-sigma of the target's.
-        still: it is known to stand still.
+        acceleration_m_s2: 1-sigma of the target's acceleration.
+        still: the target is known not to move.
 
     Attributes:
         heard_us: time of the newest measurement; -1: never.
@@ -54,7 +54,7 @@ class TargetMotion:
         self.forget()
 
     def forget(self) -> None:
-        """Nothing is known of it."""
+        """Forget the target."""
         self.heard_us = self._time_us = -1
         self.course_rad = math.nan
         self._refused_in_a_row = 0
@@ -62,11 +62,11 @@ class TargetMotion:
     def take(
         self, time_us: int, position_ned_m: Array, velocity_ned_m_s: Array | None, *, sigma_m: float
     ) -> bool:
-        """Take a measurement of `time_us`; False when it is refused.
+        """Fuse a measurement taken at `time_us`; False when it is refused.
 
         Args:
             position_ned_m: local NED, finite.
-            velocity_ned_m_s: None: not told.
+            velocity_ned_m_s: None: not reported.
             sigma_m: 1-sigma of the position, each axis.
         """
         variance = sigma_m * sigma_m
@@ -97,14 +97,14 @@ class TargetMotion:
         return True
 
     def at(self, time_us: int) -> tuple[Array, Array] | None:
-        """(position, velocity) at a time from the newest measurement on; None: nothing is known."""
+        """(position, velocity) at a time at or after the newest measurement; None: not known."""
         if self.heard_us < 0:
             return None
         ahead_s = max(0, time_us - self._time_us) * 1e-6
         return self._x[0] + ahead_s * self._x[1], self._x[1].copy()
 
     def age_s(self, time_us: int) -> float:
-        """Since the newest measurement; infinite when there was none."""
+        """Age of the newest measurement; infinite when there was none."""
         return math.inf if self.heard_us < 0 else (time_us - self.heard_us) * 1e-6
 
     def _begin(self, time_us: int, position: Array, velocity: Array | None, variance: float) -> None:

@@ -1,4 +1,6 @@
-"""What a flight task is: one kind of flying, updated at 50 Hz, that writes the control setpoint."""
+"""The interface of a flight task: one kind of manoeuvre, updated at 50 Hz, that writes the control
+setpoint.
+"""
 
 import math
 from enum import IntEnum
@@ -9,22 +11,22 @@ from autopilot_bridge.flight.context import Array, FlightContext
 
 
 class TaskStatus(IntEnum):
-    """Whether a task has still something to do. A task that is DONE goes on holding when updated again."""
+    """Whether a task is finished. A task that is DONE keeps holding when it is updated again."""
 
     RUNNING = 0
     DONE = 1
 
 
 class FlightTask(Protocol):
-    """One kind of flying.
+    """One kind of manoeuvre.
 
-    `activate` is called once, when the commander makes the task the active one; `update` every 20 ms while
-    it is. A task that can't do its work (no position) degrades to what can be held and never writes
-    nonsense.
+    `activate` is called once, when the commander makes the task the active one; `update` every 20 ms while it
+    is active. A task that can't be flown (no position) degrades to a state that can be held, and never writes
+    invalid values.
     """
 
     def activate(self, ctx: FlightContext) -> None:
-        """Take over from whatever flew before, from the present state."""
+        """Continue from the present state of the vehicle."""
         ...
 
     def update(self, ctx: FlightContext) -> TaskStatus:
@@ -33,7 +35,7 @@ class FlightTask(Protocol):
 
 
 class SpeedKind(IntEnum):
-    """Which speed a DO_CHANGE_SPEED is about; AIRSPEED and GROUND_SPEED are one on a multicopter."""
+    """The kind of speed in a DO_CHANGE_SPEED; AIRSPEED and GROUND_SPEED are the same on a multicopter."""
 
     AIRSPEED = 0
     GROUND_SPEED = 1
@@ -43,14 +45,14 @@ class SpeedKind(IntEnum):
 
 @runtime_checkable
 class SpeedTask(Protocol):
-    """A flight task that takes a new speed on the leg it is flying (DO_CHANGE_SPEED)."""
+    """A flight task that accepts a new speed on the present leg (DO_CHANGE_SPEED)."""
 
     def change_speed(self, ctx: FlightContext, kind: SpeedKind, speed_m_s: float | None) -> None:
-        """Fly on at this speed; None: at the one of the context's parameters."""
+        """Fly at this speed; None: at the speed of the context's parameters."""
         ...
 
 
 def clear_setpoint(setpoint: Array, level: float) -> None:
-    """Blank every field (NaN: not controlled) and set the level."""
+    """Clear every field (NaN: not controlled) and set the level."""
     setpoint[:] = math.nan
     setpoint[sp.LEVEL] = level

@@ -43,10 +43,11 @@ _TURNED_M_S: Final = 0.3  # this close to the velocity behind a corner the turn 
 
 @kernel
 def braking_speed(distance: float, end_speed: float, acc: float, jerk: float, gain: float) -> float:
-    """Speed at `distance` before a point to be passed at `end_speed`.
+    """Speed at `distance` before a point that is passed at `end_speed`.
 
-    Far out the square-root profile of constant deceleration, shortened by the way needed to build that
-    deceleration up from full acceleration; near a stop the linear law `gain * distance`.
+    Far from the point, it is the square-root profile of constant deceleration, shortened by the distance
+    needed to build up that deceleration from full acceleration; near a stop it is the linear law `gain *
+    distance`.
     """
     a = _BRAKE_SHARE * acc
     if distance <= 0.0:
@@ -59,7 +60,7 @@ def braking_speed(distance: float, end_speed: float, acc: float, jerk: float, ga
 
 @kernel
 def _room(distance: float, speed: float, acc: float, jerk: float) -> float:
-    """Distance left for braking once a present acceleration towards the point has been taken back."""
+    """Distance left for braking after a present acceleration towards the point has been removed."""
     if acc <= 0.0 or speed <= 0.0:
         return distance
     return max(0.0, distance - (speed + acc * acc / (3.0 * jerk)) * acc / jerk)
@@ -93,8 +94,9 @@ def _approach_leg(
 ) -> None:
     """Horizontal velocity of the state towards a velocity along and to the left of a leg's direction.
 
-    The way across comes first and what is left of the acceleration goes along: a vehicle that leaves a
-    corner at once for full speed would have nothing left to turn with, and overshoot.
+    The velocity across the leg comes first, and the rest of the acceleration acts along it: a vehicle that
+    accelerated at once to full speed after a corner would have no acceleration left for the turn, and would
+    overshoot.
     """
     dv_along = v_along - (s[3] * ux + s[4] * uy)
     dv_left = v_left - (s[3] * uy - s[4] * ux)
@@ -154,7 +156,7 @@ def _join_leg(
     back = _room(off, closing, pull, lim[JERK])
     profile = braking_speed(back, 0.0, _CROSS_ACC_SHARE * lim[ACC], lim[JERK], lim[GAIN])
     v_cross = min(0.6 * max(speed, 1.0), profile)
-    sideways = max(v_cross, abs(closing))  # what isn't taken back yet counts too
+    sideways = max(v_cross, abs(closing))  # includes the acceleration not yet removed
     v_along = math.sqrt(max(0.0, speed * speed - sideways * sideways))
     _approach_leg(s, ux, uy, v_along, side * v_cross, lim[ACC], lim[JERK], dt)
 
@@ -174,7 +176,7 @@ def _follow_leg(
     v_limit_z = lim[SPEED_UP] if end[2] < s[2] else lim[SPEED_DOWN]
     z_target, slope_rate = end[2], 0.0
     if flat < 0.5 or remaining < 1e-6:
-        # a vertical leg, or a short one: straight to its end
+        # a vertical or short leg: straight to its end
         vx, vy = 0.0, 0.0
         if remaining > 1e-6:
             rate, pull = (s[3] * rx + s[4] * ry) / remaining, (s[6] * rx + s[7] * ry) / remaining
@@ -200,10 +202,10 @@ def _follow_leg(
             if math.isfinite(lim[SPEED_TURN]) and math.hypot(tx - s[3], ty - s[4]) < _TURNED_M_S:
                 lim[SPEED_TURN] = math.inf
             if math.isfinite(lim[SPEED_TURN]):
-                # in a corner: from one leg's velocity to the other's; where it ends was planned
+                # in a corner: from one leg's velocity to the other's; its end was planned
                 _approach2(s, tx, ty, lim[ACC], lim[JERK], dt)
             else:
-                # what speed there is across the leg is missing along it
+                # speed across the leg reduces the speed along it
                 across = s[4] * ux - s[3] * uy
                 along_limit = math.sqrt(max(0.04 * speed * speed, speed * speed - across * across))
                 _join_leg(s, rx, ry, ux, uy, min(v, along_limit), lim, dt)
@@ -248,7 +250,7 @@ class TrajectoryGenerator:
         self.set_limits(parameters, speed_m_s=speed_m_s)
 
     def set_limits(self, parameters: FlightParameters, *, speed_m_s: float | None = None) -> None:
-        """Take the limits of the parameters; `speed_m_s` replaces the cruise speed, within the maximum."""
+        """Set the limits from the parameters; `speed_m_s` replaces the cruise speed, within the maximum."""
         speed = parameters.cruise_speed_m_s if speed_m_s is None else speed_m_s
         self.limits[:] = (
             min(max(speed, 0.05), parameters.max_speed_m_s),
@@ -279,7 +281,7 @@ class TrajectoryGenerator:
         self.stretch = 1.0
 
     def wait_for(self, vehicle_ned_m: Array, error_max_m: float) -> None:
-        """Slow the next tick down when the vehicle can't follow, to a stop at `error_max_m` (PX4
+        """Slow the next tick down when the vehicle lags behind, to a stop at `error_max_m` (PX4
         MPC_XY_ERR_MAX).
         """
         north = float(vehicle_ned_m[0]) - float(self._state[0])
@@ -303,7 +305,7 @@ class TrajectoryGenerator:
             start_ned_m, end_ned_m: the leg, (3,).
             end_speed_m_s: speed at which its end is passed; 0: stop there.
             dt_s: length of the tick.
-            turn_in_m: distance before the end at which that speed is reached, for the turn to begin.
+            turn_in_m: distance before the end at which that speed is reached and the turn begins.
         """
         _follow_leg(
             self._state, start_ned_m, end_ned_m, end_speed_m_s, turn_in_m, self.limits, dt_s * self.stretch

@@ -40,7 +40,7 @@ class Turn:
         self.rate_max_rad_s = rate_max_rad_s
 
     def left_rad(self, heading_rad: float) -> float:
-        """The angle still to turn by from a heading, positive clockwise; fixed at the first call."""
+        """The remaining angle of the turn from a heading, positive clockwise; fixed at the first call."""
         if math.isnan(self._left_rad):
             if self._relative:
                 self._left_rad = math.copysign(self._angle_rad, -1.0 if self._direction < 0 else 1.0)
@@ -51,7 +51,7 @@ class Turn:
         return self._left_rad
 
     def advance(self, turned_rad: float) -> None:
-        """The heading has turned."""
+        """Record that the heading has turned by an angle."""
         self._left_rad -= turned_rad
 
     @property
@@ -87,7 +87,9 @@ class YawSteering:
         rate_max_rad_s: float | None = None,
         target_rate_rad_s: float = 0.0,
     ) -> None:
-        """One tick of the shorter way to `target_rad`, which turns at a rate itself; NaN stops the turn."""
+        """One tick of the shorter way to `target_rad`, which may itself turn at a rate; NaN stops the
+        turn.
+        """
         rate_max = parameters.yaw_rate_max_rad_s if rate_max_rad_s is None else rate_max_rad_s
         wanted = 0.0
         if math.isfinite(target_rad):
@@ -113,7 +115,7 @@ class YawSteering:
 
 
 def _rate(error_rad: float, rate_max_rad_s: float, parameters: FlightParameters) -> float:
-    """Rate at which an angle is turned, slowing down towards its end."""
+    """Rate of a turn by an angle, slowing down towards its end."""
     size = abs(error_rad)
     braking = math.sqrt(1.6 * parameters.yaw_acceleration_rad_s2 * size)
     return math.copysign(min(rate_max_rad_s, _GAIN_1_S * size, braking), error_rad)

@@ -1,7 +1,7 @@
 """MAVLink components beside the autopilot: camera (100), gimbal (154), survey magnetometer (158).
 
-Each speaks for one device of `flightsim.payload`. They are sans-IO: decoded messages and device outputs in,
-frames out.
+Each represents one device of `flightsim.payload`. They do no I/O: they take decoded messages and device
+outputs, and produce frames.
 """
 
 from autopilot_bridge.payload.camera import CAMERA_COMPONENT, CameraComponent

@@ -1,8 +1,9 @@
-"""The camera as a MAVLink component: camera protocol v2, and LANDING_TARGET for what its detector finds.
+"""The camera as a MAVLink component: camera protocol v2, and LANDING_TARGET for the targets it detects.
 
 Source: MAVLink camera protocol v2 (mavlink.io/en/services/camera.html) and the LANDING_TARGET message.
 Detections carry angles off the optical axis; their tangents are the normalized image coordinates (seed 004,
-equation 36). The camera has no receiver of its own: where photos were taken is what the autopilot told.
+equation 36). The camera has no GPS receiver: the place of a photo is the position that the autopilot has
+sent.
 """
 
 from collections.abc import Callable
@@ -37,36 +38,36 @@ _LENS_INTERVAL_US: Final = 100_000
 
 
 class PictureKeeper(Protocol):
-    """Makes files of what the camera takes."""
+    """Makes files of the camera's photos and videos."""
 
     def photo(self, time_us: int, notes: dict[str, float]) -> str:
-        """Keep a photo; the name that clients are told, "" when it is not kept."""
+        """Store a photo; returns the name reported to clients, "" when it is not stored."""
 
     def start_video(self, time_us: int) -> None:
-        """Begin to keep a video."""
+        """Begin to store a video."""
 
     def stop_video(self, time_us: int) -> None:
-        """Finish it."""
+        """End the video."""
 
 
 class CameraComponent(Component):
-    """Takes photos and videos, zooms, focuses, follows things, and tells what its detector found.
+    """Takes photos and videos, zooms, focuses, tracks detections, and reports the detected targets.
 
     Args:
         camera: the device.
         system_id: of the vehicle.
-        send: takes packed frames.
-        gimbal: what it hangs on; None: fixed to the body.
-        gimbal_device_id: of that gimbal; 0: none.
+        send: sends packed frames.
+        gimbal: the gimbal that carries it; None: fixed to the body.
+        gimbal_device_id: id of that gimbal; 0: none.
 
     Attributes:
-        stream: a video stream that somebody serves; None: there is none.
-        keeper: makes files of photos and videos; None: they are counted only.
+        stream: a video stream with a running server; None: there is none.
+        keeper: makes files of photos and videos; None: photos and videos are only counted.
         mode: CAMERA_MODE.
         lens, storage, tracker, trigger, heard: the parts.
-        photo_quality: of JPEG files, to 100.
-        definition: the file that describes it, and its settings.
-        recording_since_us: None: no video is being taken.
+        photo_quality: quality of JPEG files, up to 100.
+        definition: the camera definition file and the camera's settings.
+        recording_since_us: start of the running video; None: no video is being recorded.
     """
 
     def __init__(
@@ -125,7 +126,9 @@ class CameraComponent(Component):
         return self._time_us
 
     def step(self, time_us: int) -> None:
-        """Streams, photos of a running series, a moving lens, the status while something runs."""
+        """Send streams, take the photos of a series, move the lens, and send the status while something
+        runs.
+        """
         super().step(time_us)
         self.definition.step(time_us)
         if self.trigger.running and self.trigger.due(time_us):
@@ -145,17 +148,19 @@ class CameraComponent(Component):
 
     @property
     def orientation(self) -> Quaternion | None:
-        """q_ned_from_mount: by the gimbal's own reference, or by the attitude heard; None: not known."""
+        """q_ned_from_mount: from the gimbal's own reference, or from the received attitude; None: not
+        known.
+        """
         if self._gimbal is not None:
             w, x, y, z = self._gimbal.measured_q_ned_from_gimbal.tolist()
             return w, x, y, z
         q_ned_from_frd = self.heard.q_ned_from_frd
         return None if q_ned_from_frd is None else product(q_ned_from_frd, self._q_frd_from_mount)
 
-    # what commands do
+    # actions of commands
 
     def take_photo(self) -> bool:
-        """Take one now; False: the card is full."""
+        """Take a photo now; False: the card is full."""
         if self.storage.full:
             self.trigger.stop()
             self.tell_status()
@@ -168,7 +173,7 @@ class CameraComponent(Component):
         return True
 
     def start_recording(self, status_hz: float) -> bool:
-        """Begin a video; False: one is being taken, or the card is full."""
+        """Begin a video; False: a video is already being recorded, or the card is full."""
         if self.recording_since_us is not None or self.storage.full:
             return False
         self.recording_since_us = self._lens_us = self._time_us
@@ -180,7 +185,7 @@ class CameraComponent(Component):
         return True
 
     def stop_recording(self) -> bool:
-        """Finish the video; False: none is being taken."""
+        """End the video; False: no video is being recorded."""
         if self.recording_since_us is None:
             return False
         self.storage.used_mib += VIDEO_MIB_S * 1e-6 * (self._time_us - self.recording_since_us)
@@ -191,7 +196,7 @@ class CameraComponent(Component):
         return True
 
     def move_lens(self) -> None:
-        """A continuous zoom or focus begins, or anything about the lens has changed."""
+        """A continuous zoom or focus has begun, or another property of the lens has changed."""
         self._lens_us = self._time_us
         self.tell_settings()
 
@@ -225,7 +230,7 @@ class CameraComponent(Component):
 
     @property
     def recorded_mib(self) -> float:
-        """Size of the video that is being taken."""
+        """Size of the video that is being recorded."""
         since_us = self.recording_since_us
         return 0.0 if since_us is None else VIDEO_MIB_S * 1e-6 * (self._time_us - since_us)
 

@@ -1,4 +1,4 @@
-"""The commands of camera protocol v2, and older ones that people still send (DO_DIGICAM_CONTROL, ...)."""
+"""The commands of camera protocol v2, and older ones that clients still send (DO_DIGICAM_CONTROL, ...)."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -24,7 +24,7 @@ _MODES: Final = (
     mavlink.CAMERA_MODE_VIDEO,
     mavlink.CAMERA_MODE_IMAGE_SURVEY,
 )
-_REPEATED_US: Final = 3_000_000  # a single photo asked for again within it is the same photo
+_REPEATED_US: Final = 3_000_000  # a single photo requested again within this time is the same photo
 _MAX_STATUS_HZ: Final = 50.0
 _OLD_REQUESTS: Final[Mapping[int, int]] = {
     mavlink.MAV_CMD_REQUEST_CAMERA_INFORMATION: mavlink.MAVLINK_MSG_ID_CAMERA_INFORMATION,
@@ -35,7 +35,7 @@ _OLD_REQUESTS: Final[Mapping[int, int]] = {
 
 
 class CameraCommands:
-    """What a camera component does when it is told.
+    """Executes the commands for a camera component.
 
     Attributes:
         handlers: by MAV_CMD.
@@ -80,7 +80,9 @@ class CameraCommands:
     # photos and videos
 
     def _start_capture(self, message: Any, sender: Sender) -> int | None:
-        """p1 camera, p2 interval s, p3 how many (0: for ever), p4 sequence number of a single photo."""
+        """p1 camera, p2 interval s, p3 number of photos (0: unlimited), p4 sequence number of a single
+        photo.
+        """
         camera = self._camera
         _, interval_s, count_value, sequence_value, *_ = parameters(message)
         count, sequence = whole(count_value, -1), whole(sequence_value, 0)
@@ -110,7 +112,7 @@ class CameraCommands:
         return _ACCEPTED
 
     def _start_video(self, message: Any, sender: Sender) -> int | None:
-        """p1 stream (0: all), p2 how often to tell the status meanwhile, Hz."""
+        """p1 stream (0: all), p2 rate of the status messages during the video, Hz."""
         stream, status_hz, *_ = parameters(message)
         if whole(stream, -1) not in (0, STREAM_ID) or not 0.0 <= status_hz <= _MAX_STATUS_HZ:
             return _DENIED
@@ -125,7 +127,7 @@ class CameraCommands:
         return _ACCEPTED
 
     def _trigger_control(self, message: Any, sender: Sender) -> int | None:
-        """p1 enable (1, 0, -1: leave), p2 reset the sequence (1), p3 pause (1, 0, -1: leave)."""
+        """p1 enable (1, 0, -1: unchanged), p2 reset the sequence (1), p3 pause (1, 0, -1: unchanged)."""
         enable, reset, pause = (whole(value, -1) for value in parameters(message)[:3])
         if enable not in (-1, 0, 1) or reset not in (-1, 0, 1) or pause not in (-1, 0, 1):
             return _DENIED
@@ -139,7 +141,7 @@ class CameraCommands:
         return _ACCEPTED
 
     def _trigger_distance(self, message: Any, sender: Sender) -> int | None:
-        """p1 metres between photos (0: off, -1: leave), p3 one at once (1)."""
+        """p1 metres between photos (0: off, -1: unchanged), p3 one photo at once (1)."""
         distance_m, _, at_once, *_ = parameters(message)
         if distance_m != -1.0 and not self._camera.trigger.set_distance(distance_m):
             return _DENIED
@@ -148,7 +150,7 @@ class CameraCommands:
         return _ACCEPTED
 
     def _trigger_interval(self, message: Any, sender: Sender) -> int | None:
-        """p1 milliseconds between photos (0: off, -1: leave)."""
+        """p1 milliseconds between photos (0: off, -1: unchanged)."""
         if message.param1 == -1.0:
             return _ACCEPTED
         accepted = self._camera.trigger.set_cycle(1e-3 * message.param1, self._camera.time_us)
@@ -184,7 +186,7 @@ class CameraCommands:
         return self._drive_lens(message, lens.focus if lens.has_focus else None)
 
     def _drive_lens(self, message: Any, drive: Callable[[int, float], bool] | None) -> int:
-        """p1 how p2 is meant, p2 how far."""
+        """p1 kind of the value, p2 value."""
         if drive is None:
             return _UNSUPPORTED
         if not drive(whole(message.param1, -1), message.param2):
@@ -228,14 +230,14 @@ class CameraCommands:
 
     def _send_stream_status(self, number: float) -> int:
         def tell(stream: VideoStream, fov_deg: float) -> None:
-            # MAVSDK 4.1 asks for the status only, and learns the address from nothing but the information
+            # MAVSDK 4.1 requests only the status, but reads the address only from the information
             self._camera.send(stream.information(fov_deg))
             self._camera.send(stream.status(fov_deg))
 
         return self._with_stream(number, tell)
 
     def _with_stream(self, number: float, act: Callable[[VideoStream, float], None]) -> int:
-        """Do something with the stream of a number (0: all) and the field of view, degrees."""
+        """Apply a function to the stream of a number (0: all) and the field of view, degrees."""
         stream = self._camera.stream
         if stream is None:
             return _UNSUPPORTED
@@ -244,7 +246,7 @@ class CameraCommands:
         act(stream, math.degrees(self._camera.lens.fov_rad[0]))
         return _ACCEPTED
 
-    # following things
+    # tracking
 
     def _track_point(self, message: Any, sender: Sender) -> int | None:
         x, y, radius, *_ = parameters(message)
@@ -262,7 +264,7 @@ class CameraCommands:
         self._camera.send(self._camera.tracker.message())
         return _ACCEPTED
 
-    # what is asked for again
+    # data requested again
 
     def _send_photo(self, index: float) -> int:
         """CAMERA_IMAGE_CAPTURED of a photo by its index; -1: the newest."""
@@ -280,7 +282,7 @@ class CameraCommands:
         return _ACCEPTED
 
     def _old_request(self, message: Any, sender: Sender) -> int | None:
-        """Commands from before REQUEST_MESSAGE."""
+        """Commands that are older than REQUEST_MESSAGE."""
         return self._camera.request(_OLD_REQUESTS[message.command])
 
     def _old_stream_information(self, message: Any, sender: Sender) -> int | None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from autopilot_bridge.payload.camera import CameraComponent
 
 VERSION: Final = 1
-"""Clients keep the file by it: raise it with every change of what is in there."""
+"""Clients cache the file by this number: increase it with every change of the content."""
 FILE: Final = "camera.xml"
 URI: Final = f"mftp:///{FILE}"
 _TICK_US: Final = 20_000
@@ -31,14 +31,14 @@ _UNKNOWN: Final = int(mavlink.PARAM_ACK_VALUE_UNSUPPORTED)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSetting:
-    """One setting: a small number that has a name for each of its values.
+    """One setting: a small number, with a name for each of its values.
 
     Attributes:
         name: of the parameter.
-        description: for people.
+        description: text for users.
         default: value.
-        options: (name, value) of all values there are.
-        get, set: of the component.
+        options: (name, value) of all possible values.
+        get, set: read and write the component's value.
     """
 
     name: str
@@ -57,15 +57,15 @@ class CameraDefinition:
         self.name = "bus"
         self.settings = _settings(camera)
         self._files = FileTransferService(GeneratedStore({FILE: lambda _: definition(self.settings)}))
-        self._next_tick_us: int | None = None  # nobody has asked for a file yet
+        self._next_tick_us: int | None = None  # no file was requested yet
         self._list: list[int] = []
 
     def send(self, message: Any) -> None:
-        """What the file service says (it takes this for its channel)."""
+        """Send a message of the file service (which uses this object as its channel)."""
         self._camera.send(message)
 
     def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> None:
-        """Take FTP and PARAM_EXT messages."""
+        """Handle FTP and PARAM_EXT messages."""
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
                 self._files.handle(message, Source(self, *sender), time_us)
@@ -82,7 +82,7 @@ class CameraDefinition:
                 self._set(message)
 
     def step(self, time_us: int) -> None:
-        """Go on with files and lists."""
+        """Continue files and lists."""
         if self._list:
             self._tell(self._list.pop(0))
         if self._next_tick_us is not None and time_us >= self._next_tick_us:
@@ -90,7 +90,7 @@ class CameraDefinition:
             self._files.tick(time_us)
 
     def tell(self, name: str) -> None:
-        """A setting was changed by a command: say so."""
+        """Report a setting that a command has changed."""
         self._tell(self._index(name))
 
     def _index(self, name: str) -> int:
@@ -132,7 +132,7 @@ def definition(settings: tuple[CameraSetting, ...]) -> bytes:
         item = ElementTree.SubElement(
             parameters, "parameter", name=setting.name, type="uint8", default=str(setting.default)
         )
-        if setting.name == "CAM_MODE":  # clients have a control of their own for it
+        if setting.name == "CAM_MODE":  # clients have a separate control for it
             item.set("control", "0")
         ElementTree.SubElement(item, "description").text = setting.description
         options = ElementTree.SubElement(item, "options")
@@ -184,7 +184,7 @@ def _settings(camera: "CameraComponent") -> tuple[CameraSetting, ...]:
 
 
 def _number(value: Any) -> int:
-    """The first byte of a value, which decoders take for text."""
+    """The first byte of a value, which decoders return as text."""
     if isinstance(value, str):
         value = value.encode("latin-1", "replace")
     return value[0] if len(value) else 0

@@ -1,7 +1,7 @@
-"""Zoom and focus by the camera protocol: SET_CAMERA_ZOOM, SET_CAMERA_FOCUS, and what CAMERA_SETTINGS tells.
+"""Zoom and focus by the camera protocol: SET_CAMERA_ZOOM, SET_CAMERA_FOCUS, and their report CAMERA_SETTINGS.
 
-Zoom is told in percent of its range, even in focal length. Focus is told in percent from the nearest distance
-(0) to infinity (100), even in 1 / distance.
+Zoom is reported in percent of its range, linear in focal length. Focus is reported in percent from the
+nearest distance (0) to infinity (100), linear in 1 / distance.
 """
 
 import math
@@ -21,7 +21,7 @@ class CameraLens:
 
     Args:
         camera: the device.
-        sensor_width_mm: turns its field of view into focal lengths.
+        sensor_width_mm: converts its field of view into focal lengths.
     """
 
     def __init__(self, camera: Camera, *, sensor_width_mm: float) -> None:
@@ -33,22 +33,22 @@ class CameraLens:
 
     @property
     def focal_mm(self) -> float:
-        """Focal length now."""
+        """Present focal length."""
         return self._focal_mm * self._camera.zoom
 
     @property
     def has_zoom(self) -> bool:
-        """There is a range to zoom in."""
+        """The zoom range is not empty."""
         return self._camera.parameters.max_zoom > 1.0
 
     @property
     def has_focus(self) -> bool:
-        """Focusing makes a difference."""
+        """Focusing has an effect."""
         return self._camera.parameters.blur_px_m > 0.0
 
     @property
     def fov_rad(self) -> tuple[float, float]:
-        """Horizontal and vertical field of view now."""
+        """Present horizontal and vertical field of view."""
         model, zoom = self._camera.parameters.model, self._camera.zoom
         return (
             2.0 * math.atan(math.tan(0.5 * model.horizontal_fov_rad) / zoom),
@@ -70,13 +70,13 @@ class CameraLens:
         return 100.0 * (1.0 - self._camera.parameters.min_focus_m / distance_m)
 
     def reset(self) -> None:
-        """Widest, automatic focus."""
+        """Set the widest angle and automatic focus."""
         self._camera.zoom = 1.0
         self._camera.focus_distance_m = None
         self._zoom_rate = self._focus_rate = 0.0
 
     def zoom(self, kind: int, value: float) -> bool:
-        """Follow SET_CAMERA_ZOOM; False: not accepted, and nothing changed."""
+        """Execute SET_CAMERA_ZOOM; False: not accepted, and nothing changed."""
         if not (self.has_zoom and math.isfinite(value)):
             return False
         camera, longest = self._camera, self._camera.parameters.max_zoom
@@ -108,7 +108,7 @@ class CameraLens:
         return True
 
     def focus(self, kind: int, value: float) -> bool:
-        """Follow SET_CAMERA_FOCUS; False: not accepted, and nothing changed."""
+        """Execute SET_CAMERA_FOCUS; False: not accepted, and nothing changed."""
         if not self.has_focus:
             return False
         if kind in (mavlink.FOCUS_TYPE_AUTO, mavlink.FOCUS_TYPE_AUTO_CONTINUOUS):
@@ -141,11 +141,11 @@ class CameraLens:
 
     @property
     def moving(self) -> bool:
-        """A continuous change is under way."""
+        """A continuous change is in progress."""
         return self._zoom_rate != 0.0 or self._focus_rate != 0.0
 
     def move(self, elapsed_s: float) -> None:
-        """Go on with a continuous change, until the end of the range."""
+        """Advance a continuous change, until the end of the range."""
         camera, longest = self._camera, self._camera.parameters.max_zoom
         if self._zoom_rate:
             camera.zoom = camera.zoom * longest ** (self._zoom_rate * elapsed_s / _FULL_ZOOM_S)
@@ -158,7 +158,7 @@ class CameraLens:
                 self._focus_rate = 0.0
 
     def _hold(self) -> None:
-        """Keep what autofocus has found."""
+        """Keep the distance found by autofocus."""
         if self._camera.focus_distance_m is None:
             self._camera.focus_distance_m = self._camera.autofocus_m
 

@@ -1,4 +1,4 @@
-"""What the camera component tells: each function makes one message of its present state."""
+"""The messages of the camera component: each function makes one message of its present state."""
 
 import math
 from typing import TYPE_CHECKING, Any, Final
@@ -18,7 +18,7 @@ _FILM_WIDTH_MM: Final = 36.0
 _FORWARD: Final = (1.0, 0.0, 0.0)
 _NO_NUMBER: Final = 255
 _UNKNOWN_DEGE7: Final = 2**31 - 1
-_FARTHEST_M: Final = 20_000.0  # beyond, the ground is no plane
+_FARTHEST_M: Final = 20_000.0  # at greater distances the ground is no plane
 
 
 def information(camera: "CameraComponent") -> Any:
@@ -71,7 +71,7 @@ def capture_status(camera: "CameraComponent", time_us: int) -> Any:
 
 
 def image_captured(camera: "CameraComponent", time_us: int, index: int, name: str) -> Any:
-    """CAMERA_IMAGE_CAPTURED: place by the autopilot, orientation as the camera knows it."""
+    """CAMERA_IMAGE_CAPTURED: position from the autopilot, orientation as known to the camera."""
     here = camera.heard.located(time_us)
     q = camera.orientation
     relative_alt_m = camera.heard.relative_alt_m
@@ -91,7 +91,7 @@ def image_captured(camera: "CameraComponent", time_us: int, index: int, name: st
 
 
 def photo_notes(camera: "CameraComponent") -> dict[str, float]:
-    """What goes into a photo's file."""
+    """The data for a photo's file."""
     notes = {
         "focal_mm": camera.lens.focal_mm,
         "quality": camera.photo_quality,
@@ -110,7 +110,7 @@ def photo_notes(camera: "CameraComponent") -> dict[str, float]:
 
 
 def fov_status(camera: "CameraComponent", time_us: int) -> Any:
-    """CAMERA_FOV_STATUS: where the camera is, and the ground in the middle of its picture."""
+    """CAMERA_FOV_STATUS: the camera's position, and the ground point at the centre of its picture."""
     here, q = camera.heard.located(time_us), camera.orientation
     ground = None if here is None or q is None else ground_point(camera, here, rotate(q, _FORWARD))
     width_rad, height_rad = camera.lens.fov_rad
@@ -125,7 +125,7 @@ def fov_status(camera: "CameraComponent", time_us: int) -> Any:
 
 
 def tracking_geo_status(camera: "CameraComponent", time_us: int) -> Any:
-    """CAMERA_TRACKING_GEO_STATUS: where on the ground the tracked thing is."""
+    """CAMERA_TRACKING_GEO_STATUS: the ground position of the tracked target."""
     tracker, here, q = camera.tracker, camera.heard.located(time_us), camera.orientation
     place, distance_m, heading_rad = None, math.nan, math.nan
     if tracker.thing is not None and here is not None and q is not None:
@@ -154,7 +154,7 @@ def tracking_geo_status(camera: "CameraComponent", time_us: int) -> Any:
 def ground_point(
     camera: "CameraComponent", here: GeodeticPosition, ray_ned: tuple[float, float, float]
 ) -> GeodeticPosition | None:
-    """Where a ray meets level ground at home's height; None: nowhere near."""
+    """The point where a ray meets level ground at home's height; None: no such point within range."""
     height_m = here.alt_m - camera.heard.home_alt_m
     north, east, down = ray_ned
     if not (height_m > 0.0 and down > 0.0 and height_m / down * math.hypot(north, east) < _FARTHEST_M):

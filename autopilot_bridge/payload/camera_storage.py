@@ -1,4 +1,4 @@
-"""What a camera has taken and where it is kept: counts, the log of photos, the memory card."""
+"""The camera's memory: photo count, log of the photos, and the memory card."""
 
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -11,8 +11,8 @@ IMAGE_MIB: Final = 4.0
 VIDEO_MIB_S: Final = 1.0
 STORAGE_ID: Final = 1
 PHOTO_QUALITY: Final = 92
-"""Of JPEG files, unless it is set."""
-_REMEMBERED: Final = 20_000  # photos that can be asked for again
+"""Default quality of JPEG files."""
+_REMEMBERED: Final = 20_000  # photos that can be requested again
 
 
 @dataclass(slots=True)
@@ -20,9 +20,9 @@ class CameraStorage:
     """One card.
 
     Attributes:
-        used_mib: of it.
-        images: taken since it was formatted (or the log was reset).
-        log: CAMERA_IMAGE_CAPTURED of each, by index.
+        used_mib: used space.
+        images: number of photos since it was formatted (or the log was reset).
+        log: CAMERA_IMAGE_CAPTURED of each photo, by index.
     """
 
     used_mib: float = 0.0
@@ -31,16 +31,16 @@ class CameraStorage:
 
     @property
     def available_mib(self) -> float:
-        """Left on it."""
+        """Free space."""
         return max(0.0, CAPACITY_MIB - self.used_mib)
 
     @property
     def full(self) -> bool:
-        """No photo more fits."""
+        """There is no space for another photo."""
         return self.available_mib < IMAGE_MIB
 
     def add_photo(self, message: Any) -> None:
-        """Keep a photo and what is told of it."""
+        """Store a photo and its message."""
         self.used_mib += IMAGE_MIB
         self.log[message.image_index] = message
         self.images += 1
@@ -48,7 +48,7 @@ class CameraStorage:
             del self.log[next(iter(self.log))]
 
     def format(self, *, reset_log: bool) -> None:
-        """Forget what is on the card; with `reset_log` photos are counted from 0 again."""
+        """Delete the content of the card; with `reset_log` photos are counted from 0 again."""
         self.used_mib = 0.0
         if reset_log:
             self.images = 0

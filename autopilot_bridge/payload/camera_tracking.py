@@ -1,6 +1,6 @@
-"""Following a thing in the picture (CAMERA_TRACK_POINT, CAMERA_TRACK_RECTANGLE) among what is detected.
+"""Tracking of a detection in the picture (CAMERA_TRACK_POINT, CAMERA_TRACK_RECTANGLE).
 
-Places in the picture are shares of its width and height from the upper left corner, as the protocol has them.
+Positions in the picture are fractions of its width and height from the upper left corner, as in the protocol.
 """
 
 import math
@@ -11,14 +11,14 @@ from autopilot_bridge.mavlink import dialect as mavlink
 from flightsim.payload import CameraFrame, Detection, PinholeModel
 
 _COASTING_US: Final = 2_000_000
-_REACH: Final = 0.05  # around a point that is asked for
+_REACH: Final = 0.05  # distance around a requested point
 _GATE: Final = 0.12  # from frame to frame
 _LEAST_SIDE: Final = 0.01
 
 
 @dataclass(frozen=True, slots=True)
 class TrackedThing:
-    """What is followed, as it was seen last."""
+    """The tracked target, with its last position in the picture."""
 
     x: float
     y: float
@@ -29,11 +29,11 @@ class TrackedThing:
 
 
 class CameraTracker:
-    """Follows one detection from frame to frame.
+    """Tracks one detection from frame to frame.
 
     Attributes:
         mode: CAMERA_TRACKING_MODE.
-        thing: what is followed; None: nothing.
+        thing: the tracked target; None: none.
     """
 
     def __init__(self, model: PinholeModel) -> None:
@@ -44,12 +44,12 @@ class CameraTracker:
         self._lost = False
 
     def follow_point(self, x: float, y: float, radius: float) -> bool:
-        """Follow what is at a point; False: nothing is there."""
+        """Track the detection at a point; False: there is none."""
         reach = radius if 0.0 < radius <= 1.0 else _REACH
         return self._begin(mavlink.CAMERA_TRACKING_MODE_POINT, x, y, max(reach, _REACH))
 
     def follow_rectangle(self, left: float, top: float, right: float, bottom: float) -> bool:
-        """Follow what is in a rectangle; False: nothing is in it."""
+        """Track the detection in a rectangle; False: there is none."""
         if not (left < right and top < bottom):
             return False
         half = 0.5 * max(right - left, bottom - top, 2.0 * _LEAST_SIDE)
@@ -57,13 +57,13 @@ class CameraTracker:
         return self._begin(mavlink.CAMERA_TRACKING_MODE_RECTANGLE, *middle, half)
 
     def stop(self) -> None:
-        """Follow nothing."""
+        """Stop tracking."""
         self.mode = int(mavlink.CAMERA_TRACKING_MODE_NONE)
         self.thing = None
         self._lost = False
 
     def tell(self, frame: CameraFrame) -> None:
-        """A new frame."""
+        """Update from a new frame."""
         self._frame = frame
         thing = self.thing
         if thing is None:

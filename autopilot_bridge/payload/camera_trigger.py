@@ -1,4 +1,4 @@
-"""When a camera takes photos by itself: a series of so many at an interval, or by distance flown."""
+"""When a camera takes photos automatically: a series at an interval, or by distance flown."""
 
 import math
 from typing import Final
@@ -12,9 +12,9 @@ class PhotoTrigger:
     """A series in time (IMAGE_START_CAPTURE) and a trigger by distance or time (DO_SET_CAM_TRIGG_*).
 
     Attributes:
-        interval_us: of the running series; 0: single.
+        interval_us: interval of the running series; 0: single photo.
         left: photos of the series still to be taken; `FOREVER`: until stopped.
-        distance_m: between photos along the way; 0: off.
+        distance_m: distance between photos; 0: off.
         enabled: the trigger by distance or cycle runs (DO_TRIGGER_CONTROL).
     """
 
@@ -32,7 +32,7 @@ class PhotoTrigger:
 
     @property
     def series(self) -> bool:
-        """A series is under way."""
+        """A series is in progress."""
         return self.left != 0
 
     @property
@@ -43,7 +43,7 @@ class PhotoTrigger:
         )
 
     def start(self, interval_s: float, count: int, time_us: int) -> bool:
-        """Begin a series of `count` photos (0: for ever) at once; False: the numbers make no sense."""
+        """Begin a series of `count` photos (0: unlimited) at once; False: invalid values."""
         if count < 0 or not MIN_INTERVAL_S <= interval_s <= _MAX_S:
             return False
         self.interval_us = round(interval_s * 1e6)
@@ -57,7 +57,7 @@ class PhotoTrigger:
         self.interval_us = 0
 
     def set_distance(self, distance_m: float) -> bool:
-        """Photos each so many metres; 0: no more."""
+        """Take a photo at every such distance; 0: stop."""
         if not 0.0 <= distance_m <= 1e6:
             return False
         self.distance_m, self._cycle_us = distance_m, 0
@@ -67,7 +67,7 @@ class PhotoTrigger:
         return True
 
     def set_cycle(self, cycle_s: float, time_us: int) -> bool:
-        """Photos each so many seconds; 0: no more."""
+        """Take a photo at every such interval; 0: stop."""
         if cycle_s != 0.0 and not MIN_INTERVAL_S <= cycle_s <= _MAX_S:
             return False
         self._cycle_us, self.distance_m = round(cycle_s * 1e6), 0.0
@@ -76,9 +76,9 @@ class PhotoTrigger:
         return True
 
     def travelled(self, velocity_ned_m_s: tuple[float, float, float], time_us: int) -> bool:
-        """The vehicle told its velocity; True: it is far enough for a photo.
+        """The vehicle has reported its velocity; True: the distance for a photo has been flown.
 
-        The way is what the speed over ground makes of the time between two messages.
+        The distance is the ground speed multiplied by the time between two messages.
         """
         if self.distance_m <= 0.0:
             return False

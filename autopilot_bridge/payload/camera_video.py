@@ -1,4 +1,4 @@
-"""The camera's video stream as MAVLink tells of it."""
+"""The camera's video stream in MAVLink messages."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +11,13 @@ STREAM_ID = 1
 
 @dataclass(slots=True)
 class VideoStream:
-    """One stream that somebody serves.
+    """One stream with a running server.
 
     Attributes:
-        uri: where; RTSP.
+        uri: RTSP address.
         width_px, height_px, rate_hz: of its pictures.
-        bitrate: bits per second, about.
-        running: it gives pictures (VIDEO_STOP_STREAMING).
+        bitrate: approximate bits per second.
+        running: it delivers pictures (VIDEO_STOP_STREAMING).
     """
 
     uri: str
@@ -44,7 +44,7 @@ class VideoStream:
         return mavlink.MAVLink_video_stream_status_message(STREAM_ID, *self._picture(fov_deg))
 
     def _picture(self, fov_deg: float) -> tuple[float, ...]:
-        """What both messages have in common, from the flags to the field of view."""
+        """The common fields of both messages, from the flags to the field of view."""
         flags = int(mavlink.VIDEO_STREAM_STATUS_FLAGS_RUNNING) if self.running else 0
         rotation_deg = 0
         size = (self.width_px, self.height_px)

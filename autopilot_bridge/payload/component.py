@@ -1,4 +1,4 @@
-"""What every MAVLink component of the payload does: heartbeat, streams, requests, acknowledgements.
+"""The common part of all MAVLink components of the payload: heartbeat, streams, requests, acknowledgements.
 
 Source: MAVLink heartbeat protocol, command protocol, and "requesting messages" (mavlink.io/en/services).
 """
@@ -12,10 +12,10 @@ from autopilot_bridge.mavlink import Frame, FrameEncoder, decode
 from autopilot_bridge.mavlink import dialect as mavlink
 
 Builder = Callable[[int], Any]
-"""Makes a message of now; takes vehicle time, microseconds."""
+"""Makes a message of the present state; takes vehicle time, microseconds."""
 
 CommandHandler = Callable[[Any, tuple[int, int]], int | None]
-"""Carries out a command: (COMMAND_LONG or COMMAND_INT, sender) -> MAV_RESULT; None: no answer."""
+"""Executes a command: (COMMAND_LONG or COMMAND_INT, sender) -> MAV_RESULT; None: no answer."""
 
 Answer = Callable[[Any, tuple[int, int]], int]
 """Answers REQUEST_MESSAGE for a message that has parameters of its own -> MAV_RESULT."""
@@ -31,7 +31,7 @@ class Component(ABC):
     Args:
         system_id, component_id: of the component.
         mav_type: MAV_TYPE, for the heartbeat.
-        send: takes packed frames.
+        send: sends packed frames.
         rates_hz: messages that are streamed from the start, by message id.
     """
 
@@ -62,14 +62,14 @@ class Component(ABC):
         self._next_us = _SECOND_US
         self._time_us = 0
 
-    # out
+    # sending
 
     def step(self, time_us: int) -> None:
         """Send the streams that are due."""
         self._time_us = time_us
         if time_us < self._next_us:
             return
-        # who hears a message may at once ask for others, or for none any more
+        # the receiver of a message may at once request others, or stop streams: iterate over a copy
         for message_id, due_us in [item for item in self._due_us.items() if item[1] <= time_us]:
             interval_us = self._intervals_us.get(message_id)
             if interval_us is not None:
@@ -83,13 +83,13 @@ class Component(ABC):
 
     @property
     def time_ms(self) -> int:
-        """Vehicle time as most messages carry it."""
+        """Vehicle time in the unit of most messages."""
         return (self._time_us // 1000) & 0xFFFFFFFF
 
-    # in
+    # receiving
 
     def receive(self, frame: Frame) -> None:
-        """Take one frame from somebody else. Contents are untrusted and never raise."""
+        """Handle one frame of another system or component. Contents are untrusted and never raise."""
         if frame.target_system not in (0, self.system_id):
             return
         if frame.target_component not in (0, self.component_id):
@@ -103,13 +103,13 @@ class Component(ABC):
 
     @abstractmethod
     def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        """Take a message that is not a command and is meant for this component or for all."""
+        """Handle a message that is not a command and is addressed to this component or to all."""
 
     def _on_command(self, message: Any, sender: tuple[int, int]) -> None:
         handler = self._handlers.get(message.command)
         addressed = message.target_component == self.component_id
         if handler is None:
-            # a command to everybody is left to those who know it
+            # an unknown command to all components is not answered
             result = mavlink.MAV_RESULT_UNSUPPORTED if addressed else None
         else:
             result = handler(message, sender)
@@ -130,7 +130,7 @@ class Component(ABC):
         return self.request(message_id) if answer is None else answer(message, sender)
 
     def request(self, message_id: int) -> int:
-        """Send a message now; the MAV_RESULT for who asked for it."""
+        """Send a message now; returns the MAV_RESULT for the request."""
         builder = self._builders.get(message_id)
         if builder is None:
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
@@ -144,7 +144,7 @@ class Component(ABC):
             return int(mavlink.MAV_RESULT_UNSUPPORTED)
         if not math.isfinite(interval_us) or interval_us < -1.0:
             return int(mavlink.MAV_RESULT_DENIED)
-        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:  # without it nobody knows that there is a device
+        if message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:  # clients detect the device by its heartbeat
             return int(mavlink.MAV_RESULT_DENIED)
         if interval_us == -1.0:
             self._intervals_us.pop(message_id, None)
@@ -175,7 +175,7 @@ class Component(ABC):
 
 
 def parameters(message: Any) -> tuple[float, ...]:
-    """The seven of a command, as they would be in a COMMAND_LONG."""
+    """The seven parameters of a command, as in a COMMAND_LONG."""
     if hasattr(message, "param5"):
         last = (message.param5, message.param6, message.param7)
     else:
@@ -184,7 +184,7 @@ def parameters(message: Any) -> tuple[float, ...]:
 
 
 def whole(value: float, default: int) -> int:
-    """A parameter as a whole number; `default` for what is none or beyond 31 bits."""
+    """A parameter as a whole number; `default` if it is not finite or beyond 31 bits."""
     return round(value) if math.isfinite(value) and abs(value) < 2**31 else default
 
 

@@ -1,7 +1,7 @@
-"""The gimbal as a MAVLink component: device and manager of gimbal protocol v2, and the mount of before.
+"""The gimbal as a MAVLink component: device and manager of gimbal protocol v2, and the mount of version 1.
 
-Source: MAVLink gimbal protocol v2 (mavlink.io/en/services/gimbal_v2.html). Whoever has control may point it;
-while nobody has, anybody may.
+Source: MAVLink gimbal protocol v2 (mavlink.io/en/services/gimbal_v2.html). Only the component in control may
+point it; while no component is in control, all components may.
 """
 
 import math
@@ -36,18 +36,18 @@ _ROI_FLAGS: Final = (
     GimbalFlags.ROLL_LOCK | GimbalFlags.PITCH_LOCK | GimbalFlags.YAW_LOCK | GimbalFlags.YAW_IN_EARTH_FRAME
 )
 _LEVEL: Final = int(GimbalFlags.ROLL_LOCK | GimbalFlags.PITCH_LOCK)
-# Manager and device flags have the same numbers for what both know.
+# Manager and device flags have the same numbers where both exist.
 _KNOWN_FLAGS: Final = int(sum(GimbalFlags))
 _MANUAL_RATE_RAD_S: Final = 60.0 * _DEG
 _NAN: Final = math.nan
 
 
 class GimbalComponent(Component):
-    """Points a gimbal as it is told, and tells where it looks.
+    """Points a gimbal as commanded, and reports its direction.
 
     Attributes:
-        control: who may point it.
-        aim: what it looks at by itself.
+        control: the components that may point it.
+        aim: the target that it follows automatically.
     """
 
     def __init__(self, gimbal: Gimbal, *, system_id: int, send: Callable[[bytes], None]) -> None:
@@ -94,7 +94,7 @@ class GimbalComponent(Component):
         )
 
     def step(self, time_us: int) -> None:
-        """Follow a region of interest, and send what is due."""
+        """Follow a region of interest, and send the messages that are due."""
         if self.aim.active and time_us >= self._next_roi_us:
             self._next_roi_us = time_us + _ROI_INTERVAL_US
             direction = self.aim.direction(time_us)
@@ -130,7 +130,7 @@ class GimbalComponent(Component):
     def _point(
         self, flags: int, pitch: float, yaw: float, pitch_rate: float, yaw_rate: float, roll: float = 0.0
     ) -> bool:
-        """Angles in rad, NaN: not given. False for numbers or flags that make no sense."""
+        """Angles in rad, NaN: not given. False for invalid numbers or flags."""
         if any(math.isinf(value) or abs(value) > 1e4 for value in (pitch, yaw, pitch_rate, yaw_rate)):
             return False
         try:
@@ -184,7 +184,7 @@ class GimbalComponent(Component):
         return _ACCEPTED if self._point(max(0, whole(flags, 0)), *angles) else _DENIED
 
     def _on_configure(self, message: Any, sender: Sender) -> int | None:
-        """DO_GIMBAL_MANAGER_CONFIGURE: who is in control, p7 device."""
+        """DO_GIMBAL_MANAGER_CONFIGURE: the components in control, p7 device."""
         values = parameters(message)
         if whole(values[6], 0) not in (0, 1, GIMBAL_COMPONENT):
             return _UNSUPPORTED
@@ -219,7 +219,7 @@ class GimbalComponent(Component):
         return _ACCEPTED
 
     def _on_old_roi(self, message: Any, sender: Sender) -> int | None:
-        """DO_SET_ROI: p1 MAV_ROI; waypoints are the autopilot's, which knows them."""
+        """DO_SET_ROI: p1 MAV_ROI; targets at waypoints are left to the autopilot, which has the mission."""
         match whole(message.param1, -1):
             case mavlink.MAV_ROI_NONE:
                 return self._on_roi_none(message, sender)
@@ -236,7 +236,7 @@ class GimbalComponent(Component):
             return _DENIED
         looks = self.aim.look_at(lat_deg, lon_deg, alt_m, frame)
         if looks is None:
-            return _TEMPORARILY_REJECTED  # it doesn't know where it is itself
+            return _TEMPORARILY_REJECTED  # its own position is not known
         self._next_roi_us = self._time_us
         return _ACCEPTED if looks else _DENIED
 
@@ -250,13 +250,13 @@ class GimbalComponent(Component):
             case mavlink.MAV_MOUNT_MODE_NEUTRAL:
                 self._point(int(GimbalFlags.NEUTRAL), 0.0, 0.0, _NAN, _NAN)
             case mavlink.MAV_MOUNT_MODE_MAVLINK_TARGETING | mavlink.MAV_MOUNT_MODE_GPS_POINT:
-                pass  # where to comes with DO_MOUNT_CONTROL
+                pass  # DO_MOUNT_CONTROL gives the direction
             case _:
                 return _UNSUPPORTED
         return _ACCEPTED
 
     def _on_mount_control(self, message: Any, sender: Sender) -> int | None:
-        """DO_MOUNT_CONTROL: p1 pitch, p2 roll, p3 yaw, degrees, or p4..p6 a place; p7 MAV_MOUNT_MODE."""
+        """DO_MOUNT_CONTROL: p1 pitch, p2 roll, p3 yaw, degrees, or p4..p6 a position; p7 MAV_MOUNT_MODE."""
         pitch, roll, yaw, alt_m, lat_deg, lon_deg, mode = parameters(message)
         if not self.control.may_point(sender):
             return _DENIED
@@ -290,5 +290,5 @@ class GimbalComponent(Component):
 
 
 def _share(value: float) -> float:
-    """Within -1..1; NaN stays."""
+    """Limited to -1..1; NaN stays."""
     return value if math.isnan(value) else max(-1.0, min(1.0, value))

@@ -1,4 +1,4 @@
-"""What a gimbal looks at by itself: a place, or another system that tells where it is."""
+"""The target that a gimbal follows automatically: a position, or another system that reports its position."""
 
 import math
 from typing import Any, Final
@@ -8,7 +8,7 @@ from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES, TERRAIN_FRAMES
 from autopilot_bridge.payload.vehicle_heard import STALE_US, VehicleHeard
 
-_RELATIVE_FRAMES: Final = RELATIVE_FRAMES | TERRAIN_FRAMES  # the ground is taken as level with home
+_RELATIVE_FRAMES: Final = RELATIVE_FRAMES | TERRAIN_FRAMES  # the ground is assumed level with home
 _HAS_POSITION: Final = 1  # of FOLLOW_TARGET.est_capabilities
 _HAS_VELOCITY: Final = 2
 _FASTEST_M_S: Final = 1000.0
@@ -18,7 +18,7 @@ class GimbalAim:
     """A region of interest.
 
     Attributes:
-        system_id: of the system that is followed; 0: none.
+        system_id: id of the followed system; 0: none.
     """
 
     def __init__(self, heard: VehicleHeard) -> None:
@@ -30,15 +30,15 @@ class GimbalAim:
 
     @property
     def active(self) -> bool:
-        """There is something to look at."""
+        """There is a target."""
         return self._place is not None or self.system_id != 0
 
     def clear(self) -> None:
-        """Look at nothing any more."""
+        """Remove the target."""
         self._place, self.system_id = None, 0
 
     def look_at(self, lat_deg: float, lon_deg: float, alt_m: float, frame: int) -> bool | None:
-        """Look at a place; False: it makes no sense; None: where it is can't be told yet."""
+        """Point at a position; False: it is invalid; None: it can't be computed yet."""
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0 and abs(alt_m) < 1e5):
             return False
         if frame in _RELATIVE_FRAMES:
@@ -51,13 +51,13 @@ class GimbalAim:
         return True
 
     def follow(self, system_id: int) -> None:
-        """Look at another system, as soon and as long as it tells where it is."""
+        """Point at another system, as long as it reports its position."""
         if system_id != self.system_id:
             self._place = None
         self.system_id = system_id
 
     def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> None:
-        """Take GLOBAL_POSITION_INT or FOLLOW_TARGET of the system that is followed."""
+        """Handle GLOBAL_POSITION_INT or FOLLOW_TARGET of the followed system."""
         if sender[0] != self.system_id or not self.system_id:
             return
         match message.get_msgId():
@@ -79,9 +79,9 @@ class GimbalAim:
         self._told_us = time_us
 
     def direction(self, time_us: int) -> tuple[float, float] | None:
-        """(pitch, yaw from north), radians, of what is looked at; None: not known now.
+        """(pitch, yaw from north), radians, of the target; None: not known now.
 
-        What moves is taken on in a straight line for up to three seconds after it was heard.
+        A moving target is extrapolated in a straight line for up to three seconds after its last message.
         """
         here, place = self._heard.position, self._place
         if here is None or place is None:

@@ -1,4 +1,6 @@
-"""Who may point a gimbal: primary and secondary control (gimbal protocol v2, DO_GIMBAL_MANAGER_CONFIGURE)."""
+"""Which component may point a gimbal: primary and secondary control (protocol v2,
+DO_GIMBAL_MANAGER_CONFIGURE).
+"""
 
 from typing import Final
 
@@ -13,12 +15,13 @@ _NONSENSE: Final = -99
 
 
 class GimbalControl:
-    """Control of one gimbal. While nobody has it, anybody may point; the vehicle's own autopilot always may.
+    """Control of one gimbal. Without a primary control every component may point; the vehicle's autopilot
+    always may.
 
-    (The autopilot asks for control before it points in a mission, and passes on what its clients may do.)
+    (The autopilot requests control before it points in a mission, and forwards the commands of its clients.)
 
     Attributes:
-        primary, secondary: (system, component); (0, 0): nobody.
+        primary, secondary: (system, component); (0, 0): none.
     """
 
     def __init__(self, system_id: int) -> None:
@@ -27,14 +30,14 @@ class GimbalControl:
         self._autopilot = (system_id, AUTOPILOT)
 
     def may_point(self, sender: Sender) -> bool:
-        """Whether somebody is obeyed."""
+        """True when a sender's commands are executed."""
         return self.primary == NOBODY or sender in (self.primary, self.secondary, self._autopilot)
 
     def configure(self, parameters: tuple[float, ...], sender: Sender) -> bool:
         """Parameters 1 to 4: system and component of the primary, then of the secondary control.
 
-        0: nobody; -1: leave it; -2: the sender takes it; -3: the sender gives it up. False: the numbers make
-        no sense, and nothing has changed.
+        0: none; -1: unchanged; -2: the sender takes control; -3: the sender releases it. False: invalid
+        numbers, and nothing has changed.
         """
         primary = _wanted(parameters[0], parameters[1], self.primary, sender)
         secondary = _wanted(parameters[2], parameters[3], self.secondary, sender)

@@ -1,4 +1,4 @@
-"""What the gimbal component tells, as device and as manager of gimbal protocol v2."""
+"""The messages of the gimbal component, as device and as manager of gimbal protocol v2."""
 
 import math
 from typing import Any, Final
@@ -31,7 +31,7 @@ _POINTS_AT_PLACE: Final = int(mavlink.GIMBAL_MANAGER_CAP_FLAGS_CAN_POINT_LOCATIO
 
 
 def status_flags(gimbal: Gimbal) -> int:
-    """Flags of the command in force, with the frame that yaw is told in."""
+    """Flags of the active command, with the frame in which yaw is reported."""
     flags = int(gimbal.flags) & ~int(GimbalFlags.YAW_IN_VEHICLE_FRAME | GimbalFlags.YAW_IN_EARTH_FRAME)
     locked = flags & GimbalFlags.YAW_LOCK
     frame = GimbalFlags.YAW_IN_EARTH_FRAME if locked else GimbalFlags.YAW_IN_VEHICLE_FRAME

@@ -1,7 +1,7 @@
 """The survey magnetometer as a MAVLink component: NAMED_VALUE_FLOAT "MAG_NT", total field in nT.
 
-MAVLink has no message for the magnitude of the field; a named value is its standard place for such readings.
-In single precision a field of 50,000 nT is told to 0.004 nT.
+MAVLink has no message for the magnitude of the field; a named value is the standard way for such readings.
+In single precision a field of 50,000 nT is reported to 0.004 nT.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ _NAME: Final = fixed_text(TOTAL_FIELD_NAME, 10)
 
 
 class MagnetometerComponent(Component):
-    """Tells every reading as it comes."""
+    """Sends every reading when it comes."""
 
     def __init__(self, *, system_id: int, send: Callable[[bytes], None]) -> None:
         super().__init__(
@@ -37,4 +37,4 @@ class MagnetometerComponent(Component):
         )
 
     def _on_message(self, message: Any, sender: tuple[int, int]) -> None:
-        """Nothing but commands concerns it."""
+        """Ignore the message: the magnetometer uses commands only."""

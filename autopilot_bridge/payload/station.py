@@ -1,4 +1,4 @@
-"""The payload components of one vehicle, on one link of their own."""
+"""The payload components of one vehicle, on one separate link."""
 
 from collections.abc import Callable
 
@@ -12,17 +12,17 @@ from flightsim.payload import Payload
 
 
 class PayloadStation:
-    """Steps a payload and lets its components speak.
+    """Steps a payload and its MAVLink components.
 
     Args:
         payload: the devices.
         system_id: of the vehicle.
-        send: takes the components' frames.
+        send: sends the components' frames.
 
     Attributes:
-        components: those there are.
+        components: all components.
         camera: the camera among them; None: there is none.
-        parser: of what comes in; its counters account for every byte.
+        parser: parser of the received bytes; its counters account for every byte.
     """
 
     def __init__(self, payload: Payload, *, system_id: int, send: Callable[[bytes], None]) -> None:
@@ -48,7 +48,7 @@ class PayloadStation:
             self.components.append(self._magnetometer)
 
     def step(self, time_us: int) -> None:
-        """One physics step: devices, then what they have to say."""
+        """One physics step: the devices, then the messages of their components."""
         payload = self._payload
         payload.step(time_us)
         if self.camera is not None and payload.frame is not None:

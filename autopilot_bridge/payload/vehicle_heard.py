@@ -1,4 +1,4 @@
-"""What devices know of the vehicle they hang on: what its autopilot has told on their bus, no more."""
+"""The payload's knowledge of its vehicle: only the messages that the autopilot has sent on their link."""
 
 import math
 from typing import Any, Final
@@ -14,15 +14,15 @@ _LON_MAX: Final = 1_800_000_000
 
 
 class VehicleHeard:
-    """The newest of position, attitude and time of one vehicle.
+    """The newest position, attitude and time of one vehicle.
 
     Attributes:
-        position: by GLOBAL_POSITION_INT; None: never told.
+        position: from GLOBAL_POSITION_INT; None: never received.
         relative_alt_m: height over home.
         velocity_ned_m_s: over ground.
-        heading_rad: of the nose from north; NaN: not told.
-        q_ned_from_frd: by ATTITUDE; None: never told.
-        armed: by its heartbeat.
+        heading_rad: heading of the nose from north; NaN: not received.
+        q_ned_from_frd: from ATTITUDE; None: never received.
+        armed: from its heartbeat.
     """
 
     def __init__(self, system_id: int) -> None:
@@ -37,7 +37,7 @@ class VehicleHeard:
         self._unix_minus_boot_us: int | None = None
 
     def handle(self, message: Any, sender: tuple[int, int], time_us: int) -> bool:
-        """Take a message; True when it told something new. Contents never raise."""
+        """Handle a message; True when it brought new data. Contents never raise."""
         if sender != (self._system_id, AUTOPILOT):
             return False
         match message.get_msgId():
@@ -58,16 +58,16 @@ class VehicleHeard:
         return True
 
     def located(self, time_us: int) -> GeodeticPosition | None:
-        """The position while it is fresh; None: not known."""
+        """The position if it is recent; None: not known."""
         return self.position if time_us - self._position_us < STALE_US else None
 
     @property
     def home_alt_m(self) -> float:
-        """Above mean sea level; NaN: not known."""
+        """Home's altitude above mean sea level; NaN: not known."""
         return math.nan if self.position is None else self.position.alt_m - self.relative_alt_m
 
     def unix_us(self, time_us: int) -> int:
-        """The calendar's time; 0: not known."""
+        """Unix time, microseconds; 0: not known."""
         return 0 if self._unix_minus_boot_us is None else time_us + self._unix_minus_boot_us
 
     def _note_position(self, message: Any, time_us: int) -> bool:
