@@ -50,11 +50,11 @@ from autopilot_bridge.telemetry.streams import PayloadCache
 from autopilot_bridge.telemetry.view import TelemetryView
 from flightsim.interface import SensorReadings
 
-if TYPE_CHECKING:  # its module brings scipy
+if TYPE_CHECKING:  # its module imports scipy
     from flightsim.flight_envelope import FlightEnvelope
 
 SLOW_RATE_HZ: Final = 50
-_TURNS: Final = 5  # of the slow loop, in which each unhurried microservice is asked once
+_TURNS: Final = 5  # iterations of the slow loop in which each microservice with `unhurried` is called once
 _COMPONENT: Final = 1
 _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
 
@@ -73,7 +73,7 @@ class _Progress:
 
     @property
     def active(self) -> bool:
-        """The mission mode is chosen."""
+        """The mission mode is selected."""
         return self._commander.mode is FlightMode.MISSION
 
 
@@ -86,12 +86,12 @@ class Autopilot:
         readings: the vehicle's sensors, written before each `step`.
         physics_rate_hz: calls of `step` per second.
         parameters: values that differ from the flavour's defaults.
-        envelope: what the aircraft can do; None for a multicopter.
+        envelope: the aircraft's flight envelope; None for a multicopter.
         unix_epoch_us: Unix time of boot.
-        inject_failure: takes MAV_CMD_INJECT_FAILURE; None: not supported.
+        inject_failure: executes MAV_CMD_INJECT_FAILURE; None: not supported.
         simulation: the simulated world; None: there is none.
         card: its memory card; None: an empty one in memory.
-        power: restarts the vehicle, or shuts it down; None: nobody can.
+        power: restarts the vehicle, or shuts it down; None: not possible.
 
     Attributes:
         actuators: motor commands of the newest step (flightsim.interface).
@@ -280,7 +280,7 @@ class Autopilot:
         )
         self.parameters.subscribe(self._on_parameter)
 
-    # the simulator's side
+    # interface to the simulator
 
     @property
     def actuators(self) -> NDArray[np.float64]:
@@ -301,7 +301,7 @@ class Autopilot:
                 self._view.advance(time_us)
                 table.tick(time_us)
 
-    # the link's side
+    # interface to the links
 
     def add_channel(self, channel: AutopilotChannel, *, role: str) -> None:
         """Start the default streams of a role ("onboard", "gcs" or "payload") on one more channel.
@@ -315,12 +315,12 @@ class Autopilot:
             self._parameter_service.list_on(channel)
 
     def close(self) -> None:
-        """Go down: close and store what is open."""
+        """Shut down: close open files and store pending data."""
         for more in self._more:
             more.close()
 
     def remove_channel(self, channel: AutopilotChannel) -> None:
-        """Stop everything on a channel."""
+        """Stop all streams and answers on a channel."""
         self._streams.remove(channel)
 
     def receive(self, frame: Frame, channel: AutopilotChannel) -> None:
@@ -337,7 +337,7 @@ class Autopilot:
             if service.handle(message, source, self._time_us):
                 return
 
-    # inside
+    # internal
 
     def _slow(self, time_us: int) -> None:
         context, navigation = self.context, self.navigation
@@ -358,7 +358,7 @@ class Autopilot:
             self._follow(event)
 
     def _follow(self, event: events.Event) -> None:
-        """What the rest of the autopilot makes of something that happened to the vehicle."""
+        """Pass an event of the vehicle to the other parts of the autopilot."""
         self._texts.tell(event)
         for more in self._more:
             more.follow(event)
@@ -426,5 +426,5 @@ class Autopilot:
 
 
 def merged(*tables: Mapping[int, EntryT]) -> dict[int, EntryT]:
-    """One table of several, by number; of the same number in two, the later one."""
+    """One table from several, by number; for a number in several tables, the last entry."""
     return {number: entry for table in tables for number, entry in table.items()}

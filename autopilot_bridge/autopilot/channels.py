@@ -1,4 +1,4 @@
-"""The channels of an autopilot: which streams run on each, and what a slow line takes of them."""
+"""The channels of an autopilot: the streams of each channel, reduced to fit a slow line."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -17,7 +17,7 @@ from autopilot_bridge.telemetry.throttle import StreamThrottle
 
 
 class AutopilotChannel(Channel, Protocol):
-    """A channel that takes packed payloads too.
+    """A channel that also sends packed payloads.
 
     Attributes:
         motion: makes the frames of the fastest messages; set when the channel is added.
@@ -27,7 +27,7 @@ class AutopilotChannel(Channel, Protocol):
 
     @property
     def line(self) -> LineBudget | None:
-        """What the channel's line can carry; None: whatever there is."""
+        """The capacity of the channel's line; None: unlimited."""
 
     def send_payload(self, message_id: int, payload: bytes) -> None:
         """Frame the payload and send it."""
@@ -40,16 +40,16 @@ class ChannelStreams:
     """The streams of all channels.
 
     Args:
-        channels: those that are open; kept up to date.
+        channels: the open channels; updated.
         firmware: default rates by role, and how streams follow a radio's buffer.
-        parameters: ArduPilot's SRn_*, where there are any.
+        parameters: ArduPilot's SRn_*, if there are any.
         cache: makes and packs messages.
-        motion: makes the fastest ones.
-        physics_step_us: no stream runs faster.
+        motion: makes the fastest messages.
+        physics_step_us: the shortest interval of a stream.
 
     Attributes:
         tables: streams by the channel's name.
-        running: the same tables, to step through.
+        running: the same tables, as a sequence to iterate over.
     """
 
     __slots__ = (
@@ -83,14 +83,14 @@ class ChannelStreams:
         self._step_us = physics_step_us
         self.tables: dict[str, StreamTable] = {}
         self.running: tuple[StreamTable, ...] = ()
-        self._ports: list[StreamTable] = []  # those for clients: SR0_* is the first
-        self._throttles: dict[str, StreamThrottle] = {}  # of channels on slow lines
+        self._ports: list[StreamTable] = []  # the tables of client channels: SR0_* is the first
+        self._throttles: dict[str, StreamThrottle] = {}  # the throttles of channels on slow lines
 
     def add(self, channel: AutopilotChannel, *, role: str, time_us: int, heartbeat_us: int) -> None:
         """Start the default streams of a role on one more channel.
 
         Args:
-            heartbeat_us: no heartbeat before.
+            heartbeat_us: time of the first heartbeat.
 
         Raises:
             ValueError: unknown role, or a channel of that name is there already.
@@ -121,7 +121,7 @@ class ChannelStreams:
             self.throttle(channel, time_us)
 
     def remove(self, channel: AutopilotChannel) -> None:
-        """Stop everything on a channel."""
+        """Stop all streams on a channel."""
         self._channels.remove(channel)
         table = self.tables.pop(channel.name)
         self._throttles.pop(channel.name, None)
@@ -129,7 +129,7 @@ class ChannelStreams:
         self._ports = [port for port in self._ports if port is not table]
 
     def throttle(self, channel: Channel, time_us: int) -> StreamThrottle | None:
-        """What thins the streams of a channel, from now on; None when it has no streams."""
+        """The throttle of a channel's streams, active from now on; None when it has no streams."""
         table = self.tables.get(channel.name)
         if table is None:
             return None
@@ -142,12 +142,12 @@ class ChannelStreams:
         return throttle
 
     def advance(self, time_us: int) -> None:
-        """Slow lines carry on. Called at 50 Hz."""
+        """Update the budgets of slow lines. Called at 50 Hz."""
         for throttle in self._throttles.values():
             throttle.advance(time_us)
 
     def push(self, message_id: int, time_us: int) -> None:
-        """Send a message on every channel at once, streams aside."""
+        """Send a message on every channel at once, independent of the streams."""
         self._cache.forget()
         payload = self._cache.payload(message_id, time_us)
         if payload is not None:
@@ -155,7 +155,7 @@ class ChannelStreams:
                 channel.send_payload(message_id, payload)
 
     def change(self, name: str, time_us: int) -> None:
-        """A parameter has changed; of those that set the rates of a channel's streams take it over."""
+        """A parameter has changed; if it sets the rates of a channel's streams, apply it."""
         if name.startswith("SR") and name[2:3].isdigit():
             self._apply_rates(int(name[2]), time_us, changed=name)
 

@@ -1,4 +1,4 @@
-"""What differs between the flavours in the autopilot's messages and services, gathered in one table."""
+"""The differences between the flavours in the autopilot's messages and services, in one table."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ PAYLOAD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
         mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
     }
 )
-"""What devices on the vehicle's own bus are told: whom they hang on, where it is, how it lies, the time."""
+"""Messages sent to devices on the vehicle's own bus: its identity, position, attitude and time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,8 +47,8 @@ class Firmware:
     """Services of one flavour.
 
     Attributes:
-        address: which targets are this autopilot, for everything but commands.
-        parameters, missions, intervals: habits of the services.
+        address: the target ids of this autopilot, for everything but commands.
+        parameters, missions, intervals: policies of the services.
         rates_hz: streams that run from the start, by role of the channel.
         answers_ping: PING requests are answered.
         flow_control: how streams follow a radio's transmit buffer.
@@ -66,7 +66,7 @@ class Firmware:
 
 
 def _log_rates_hz(groups: Mapping[int, tuple[int, ...]]) -> Mapping[int, float]:
-    """What an ArduPilot, which streams nothing unasked, writes into its log."""
+    """The log streams of an ArduPilot, which streams nothing to clients without a request."""
     rates_hz = {message_id: 10.0 for group in groups.values() for message_id in group}
     fast = (mavlink.MAVLINK_MSG_ID_ATTITUDE, mavlink.MAVLINK_MSG_ID_RAW_IMU)
     return MappingProxyType({mavlink.MAVLINK_MSG_ID_HEARTBEAT: 1.0, **rates_hz, **dict.fromkeys(fast, 25.0)})

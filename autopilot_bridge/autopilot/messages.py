@@ -1,4 +1,4 @@
-"""What each firmware for each class of vehicle streams."""
+"""The streamed messages of each firmware for each class of vehicle."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ def telemetry_messages(
     """The messages of one autopilot.
 
     Args:
-        sources: where values come from.
+        sources: the sources of the values.
         current_mode, orbit: see `Px4Messages`.
     """
     aircraft = flavour.kind is AirframeKind.FIXED_WING

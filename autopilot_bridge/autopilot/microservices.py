@@ -1,4 +1,4 @@
-"""Which microservices an autopilot has, beyond those that it is built around."""
+"""The additional microservices of an autopilot, besides those that are part of it."""
 
 from autopilot_bridge.services.incoming import incoming_services
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
@@ -9,7 +9,7 @@ from autopilot_bridge.services.vehicle_files import vehicle_files
 
 
 def microservices(parts: AutopilotParts) -> tuple[Microservice, ...]:
-    """Those of one autopilot, in the order in which they are asked."""
+    """The microservices of one autopilot, in the order in which they get messages."""
     return (
         *mission_services(parts),
         *incoming_services(parts),

@@ -1,4 +1,4 @@
-"""The autopilot's own state as each flavour tells it: HEARTBEAT, SYS_STATUS, AUTOPILOT_VERSION."""
+"""The autopilot's own state as each flavour reports it: HEARTBEAT, SYS_STATUS, AUTOPILOT_VERSION."""
 
 from typing import Final
 
@@ -18,7 +18,7 @@ RECEIVER: Final = mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 
 
 class NavigationJudgement:
-    """The filter's health in the four words the commander asks for."""
+    """The filter's health in the form that the commander reads."""
 
     __slots__ = ("_navigation",)
 
@@ -27,24 +27,24 @@ class NavigationJudgement:
 
     @property
     def attitude_valid(self) -> bool:
-        """Roll and pitch are good."""
+        """Roll and pitch are valid."""
         return self._navigation.health.attitude
 
     @property
     def altitude_valid(self) -> bool:
-        """The height is good."""
+        """The height is valid."""
         return self._navigation.health.position_vertical_absolute
 
     @property
     def velocity_valid(self) -> bool:
-        """The horizontal velocity is good."""
+        """The horizontal velocity is valid."""
         return self._navigation.health.velocity_horizontal
 
     @property
     def position_valid(self) -> bool:
-        """The horizontal position is good; dead-reckoned through the wind counts, and external odometry.
+        """The horizontal position is valid; dead reckoning with the wind counts, and external odometry.
 
-        Such a position may be local only: whoever needs a place on Earth needs the filter's origin too.
+        Such a position may be local only: a position on Earth needs the filter's origin too.
         """
         health = self._navigation.health
         return health.position_horizontal_absolute or (
@@ -53,7 +53,7 @@ class NavigationJudgement:
 
     @property
     def external(self) -> bool:
-        """External odometry aids the position: it needs no GPS."""
+        """External odometry aids the position, so no GPS is needed."""
         return self._navigation.health.external_in_use
 
     @property
@@ -63,7 +63,7 @@ class NavigationJudgement:
 
     @property
     def airspeed_rejected(self) -> bool:
-        """The filter doesn't believe the pitot tube any more."""
+        """The filter rejects the pitot tube's measurements."""
         return self._navigation.health.airspeed_synthetic
 
 
@@ -71,7 +71,7 @@ class StatusReport:
     """Fields of the status messages.
 
     Args:
-        flavour: whose habits.
+        flavour: the firmware's flavour.
         commander: mode, arming, failsafes.
     """
 
@@ -104,7 +104,7 @@ class StatusReport:
         )
 
     def current_mode(self) -> Values:
-        """CURRENT_MODE (436): what is flown and what was asked for."""
+        """CURRENT_MODE (436): the mode that is flown and the mode that was commanded."""
         modes = self._flavour.custom_modes
         flown = modes[self._commander.mode]
         return (self._standard_modes.get(flown, 0), flown, modes[self._commander.commanded_mode])
@@ -147,14 +147,14 @@ def _with(bits: int, bit: int, on: bool) -> int:
 
 
 def _sticks(commander: Commander) -> bool:
-    """A radio or somebody else's sticks are heard."""
+    """A radio or stick messages are received."""
     parameters = commander.parameters
     limit_s = parameters.manual_loss_s or parameters.stick_timeout_s
     return commander.situation.sticks_age_s <= limit_s
 
 
 def _sensors(commander: Commander) -> tuple[tuple[int, bool], ...]:
-    """Bits of what may break; both firmwares count a battery as broken from its first warning on."""
+    """Bits of the parts that may fail; both firmwares count a battery as failed from its first warning on."""
     health = commander.situation.health
     charged = health.battery and commander.battery_level < BatteryLevel.LOW
     return (

@@ -1,4 +1,4 @@
-"""Connection strings: the forms people know from pymavlink and MAVSDK, as typed values. Opens nothing.
+"""Connection strings in the forms of pymavlink and MAVSDK, as typed values. Opens nothing.
 
 udpin:127.0.0.1:14550          listen on UDP (also udp:, udpin://, udp://)
 udpout:192.168.1.2:14550       send to a UDP address (also udpout://)
@@ -23,7 +23,7 @@ VEHICLE_FORMS: Final = (
     "udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT (each also with ://), "
     "serial:DEVICE:BAUD or DEVICE,BAUD"
 )
-"""What leads to a vehicle, with any client."""
+"""A remote address, in the same form for every kind of client."""
 ACCEPTED_FORMS: Final = (
     "udpin:HOST:PORT, udpout:HOST:PORT, udppeer:HOST:PORT,HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT "
     "(each also with ://), serial:DEVICE:BAUD, DEVICE,BAUD, or a path ending in .tlog"
@@ -40,7 +40,7 @@ class _HostPort:
 
 
 class UdpServer(_HostPort):
-    """Listen on a UDP port; whoever sends becomes a peer. Port 0: any free one."""
+    """Listen on a UDP port; every sender becomes a peer. Port 0: any free one."""
 
     __slots__ = ()
 
@@ -49,7 +49,7 @@ class UdpServer(_HostPort):
 
 
 class UdpClient(_HostPort):
-    """Send to a UDP address and hear its answers."""
+    """Send to a UDP address and receive its answers."""
 
     __slots__ = ()
 
@@ -59,7 +59,7 @@ class UdpClient(_HostPort):
 
 @dataclass(frozen=True, slots=True)
 class UdpPeer:
-    """An own UDP port and a remote that is sent to from the start; the first sender heard takes its place."""
+    """An own UDP port and a remote that is sent to from the start; the first sender received replaces it."""
 
     host: str
     port: int
@@ -101,7 +101,7 @@ class SerialPort:
 
 @dataclass(frozen=True, slots=True)
 class ReplayLog:
-    """A telemetry log that is played as a read-only link."""
+    """A telemetry log that is replayed as a read-only link."""
 
     path: Path
 
@@ -126,15 +126,15 @@ _DEVICE: Final = re.compile(r"/dev/.+")
 
 
 def parse_address(text: str, accepted: str = ACCEPTED_FORMS) -> Address:
-    """The address a connection string means; `str()` of the result is its canonical form.
+    """The address in a connection string; `str()` of the result is its canonical form.
 
     Servers without a host listen on loopback only. `udp:` means `udpin:`, as in pymavlink and MAVSDK.
 
     Args:
-        accepted: what an error says of the forms that are; all are parsed.
+        accepted: text of the accepted forms in an error message; all forms are parsed.
 
     Raises:
-        AddressError: the text is none of the forms; the message says which are accepted.
+        AddressError: the text has none of the forms; the message names the accepted ones.
     """
     try:
         return _parsed(text)
@@ -143,7 +143,7 @@ def parse_address(text: str, accepted: str = ACCEPTED_FORMS) -> Address:
 
 
 class _Refused(ValueError):
-    """Why a text is no address."""
+    """Why a text is not an address."""
 
 
 def _parsed(text: str) -> Address:

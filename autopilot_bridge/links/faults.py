@@ -1,4 +1,4 @@
-"""What to tell a person when a link can't be opened."""
+"""Error messages for users when a link can't be opened."""
 
 import errno
 from typing import Final
@@ -9,7 +9,7 @@ _HUNG_UP: Final = "the other end hung up at once: check what listens there"
 
 
 def open_error(address: str, error: OSError) -> LinkError:
-    """A LinkError that says what was wrong with the address and what to do."""
+    """A LinkError with the problem of the address and its solution."""
     advice = {
         errno.EADDRINUSE: "the port is in use: stop the other program or choose another port",
         errno.EADDRNOTAVAIL: "no interface of this machine has that address: use 127.0.0.1 or 0.0.0.0",

@@ -1,4 +1,4 @@
-"""What every link is: bytes to and from peers, never blocking, never raising for what a peer does."""
+"""The interface of a link: bytes to and from peers; it never blocks, and never raises because of a peer."""
 
 from collections import deque
 from collections.abc import Callable
@@ -6,24 +6,25 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 PeerId = tuple[str, int]
-"""Who is at the other end: host and port; device or name and 0 where there are no ports."""
+"""The identity of a peer: host and port; device or name and 0 where there are no ports."""
 
 MAX_BACKLOG_BYTES: Final = 256 * 1024
-MAX_READS: Final = 256  # of one `receive`, so that a flood on one link can't starve the others
-MAX_READ_BYTES: Final = 1 << 18  # of one `receive`
+MAX_READS: Final = 256  # in one `receive`, so that a flood on one link can't block the others
+MAX_READ_BYTES: Final = 1 << 18  # in one `receive`
 READ_SIZE: Final = 65536
 
 
 @dataclass(slots=True)
 class LinkCounters:
-    """What passed over a link and what did not.
+    """The data that a link has transmitted and dropped.
 
     Attributes:
-        bytes_in, bytes_out: received, and handed to the operating system (or the other end in memory).
+        bytes_in, bytes_out: bytes received, and bytes passed to the operating system (or the other end in
+            memory).
         reads, writes: pieces received, and pieces sent (one piece to three peers counts three times).
-        dropped, bytes_dropped: pieces that were not sent, whole, because a peer reads too slowly or is gone.
-        errors: faults the operating system reported (refused, reset, unplugged).
-        connects, disconnects: peers that came and went.
+        dropped, bytes_dropped: whole pieces that were not sent, because a peer reads too slowly or is gone.
+        errors: faults reported by the operating system (refused, reset, unplugged).
+        connects, disconnects: number of peers that connected and disconnected.
     """
 
     bytes_in: int = 0
@@ -38,7 +39,7 @@ class LinkCounters:
 
 
 class Link(Protocol):
-    """Bytes to and from one or several peers. Each peer is a byte stream of its own: give it its own
+    """Bytes to and from one or several peers. Each peer is a separate byte stream and needs a separate
     parser.
     """
 
@@ -52,26 +53,28 @@ class Link(Protocol):
 
     @property
     def peers(self) -> tuple[PeerId, ...]:
-        """Who would get what is sent now."""
+        """The peers that get the data sent now."""
         ...
 
     @property
     def congested(self) -> bool:
-        """True while a slow reader holds back much of what was sent to it; long answers should wait."""
+        """True while much data waits for a slow reader; long answers should wait."""
         ...
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
-        """Send whole frames to one peer or to all of them. Never blocks; what can't be sent is dropped
-        whole.
+        """Send whole frames to one peer or to all of them. Never blocks; data that can't be sent are dropped
+        as a whole.
         """
         ...
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """Everything that has arrived, by sender, in order. Never blocks and never raises."""
+        """All received data, by sender, in order. Never blocks and never raises."""
         ...
 
     def filenos(self) -> tuple[int, ...]:
-        """File descriptors to watch for reading (they change as peers come and go); none in memory."""
+        """File descriptors to watch for reading (they change when peers connect and disconnect); none in
+        memory.
+        """
         ...
 
     def close(self) -> None:
@@ -80,11 +83,12 @@ class Link(Protocol):
 
 
 class SendQueue:
-    """What a slow byte stream has not taken yet: pieces go out whole and in order, or not at all.
+    """The data that a slow byte stream has not accepted yet: pieces are sent whole and in order, or not at
+    all.
 
     Attributes:
-        queued_bytes: waiting.
-        taken_bytes: what the stream took in all.
+        queued_bytes: bytes waiting.
+        taken_bytes: total bytes that the stream has accepted.
     """
 
     __slots__ = ("_counters", "_limit_bytes", "_pieces", "queued_bytes", "taken_bytes")
@@ -102,7 +106,9 @@ class SendQueue:
         return self.queued_bytes * 4 > self._limit_bytes
 
     def send(self, data: bytes, write: Callable[[bytes], int]) -> None:
-        """Send `data` behind what is queued; `write` returns how much it took and raises BlockingIOError."""
+        """Send `data` after the queued data; `write` returns the accepted bytes and raises
+        BlockingIOError.
+        """
         if self.queued_bytes + len(data) > self._limit_bytes:
             self.flush(write)
             if self.queued_bytes + len(data) > self._limit_bytes:
@@ -115,7 +121,7 @@ class SendQueue:
         self.flush(write)
 
     def flush(self, write: Callable[[bytes], int]) -> None:
-        """Send as much as the stream takes now."""
+        """Send as much as the stream accepts now."""
         pieces = self._pieces
         while pieces:
             try:
@@ -131,7 +137,7 @@ class SendQueue:
             pieces.popleft()
 
     def clear(self) -> None:
-        """The stream is gone: what was queued is dropped."""
+        """Drop the queued data of a stream that is closed."""
         self._counters.dropped += len(self._pieces)
         self._counters.bytes_dropped += self.queued_bytes
         self._pieces.clear()

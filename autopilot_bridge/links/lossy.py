@@ -1,4 +1,4 @@
-"""A link with faults: the standard fixture of tests that must bear a bad radio."""
+"""A link with faults: the standard fixture of tests over a bad radio."""
 
 import heapq
 from collections.abc import Callable
@@ -15,13 +15,13 @@ To = TypeVar("To")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Impairment:
-    """What a radio link does to what it carries. Probabilities are for each piece by itself.
+    """The faults of a radio link. Probabilities are independent for each piece.
 
     Attributes:
         loss: probability that a piece is lost.
         duplicate: probability that it arrives twice.
-        reorder: probability that it arrives behind the next one.
-        delay_s: time on the way.
+        reorder: probability that it arrives after the next one.
+        delay_s: transport delay.
         jitter_s: additional time, uniform from 0; keeps the order.
     """
 
@@ -44,10 +44,10 @@ class LossyLink:
     """A link with faults, in both directions. Pieces move when `send`, `receive` or `update` is called.
 
     Args:
-        link: the link to spoil.
-        impairment: how.
-        generator: source of chance, for this link alone.
-        time_us: the time that delays count in.
+        link: the link to impair.
+        impairment: the faults.
+        generator: random generator, for this link alone.
+        time_us: returns the time of the delays.
     """
 
     __slots__ = ("_incoming", "_link", "_outgoing", "counters")
@@ -82,14 +82,14 @@ class LossyLink:
         return self._link.congested
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
-        """Send, perhaps."""
+        """Send, unless the data are lost."""
         self.counters.writes += 1
         self.counters.bytes_out += len(data)
         self._outgoing.put(to, data)
         self.update()
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """What has made it so far."""
+        """The data that have arrived so far."""
         self.update()
         received = self._incoming.take_due()
         self.counters.reads += len(received)
@@ -97,7 +97,7 @@ class LossyLink:
         return received
 
     def update(self) -> None:
-        """Move along what is due."""
+        """Deliver the pieces that are due."""
         for peer, data in self._link.receive():
             self._incoming.put(peer, data)
         for to, data in self._outgoing.take_due():
@@ -109,12 +109,12 @@ class LossyLink:
         return self._link.filenos()
 
     def close(self) -> None:
-        """Close the link inside; what is on the way is lost."""
+        """Close the link inside; pieces in transit are lost."""
         self._link.close()
 
 
 class _Impaired(Generic[To]):
-    """Pieces on the way in one direction."""
+    """Pieces in transit in one direction."""
 
     __slots__ = ("_generator", "_held", "_impairment", "_last_due_us", "_order", "_queue", "_time_us", "lost")
 
@@ -131,7 +131,7 @@ class _Impaired(Generic[To]):
         self.lost = 0
 
     def put(self, to: To, data: bytes) -> None:
-        """Send one piece on its way. Every piece draws the same numbers, whatever becomes of it."""
+        """Start the transport of a piece. Every piece draws the same number of random values, lost or not."""
         impairment = self._impairment
         lost, twice, swapped, jitter = self._generator.random(4)
         if lost < impairment.loss:
@@ -150,7 +150,7 @@ class _Impaired(Generic[To]):
             self._held = None
 
     def take_due(self) -> list[tuple[To, bytes]]:
-        """What has arrived by now, in the order of arrival."""
+        """The pieces that have arrived by now, in the order of arrival."""
         now_us = self._time_us()
         due: list[tuple[To, bytes]] = []
         while self._queue and self._queue[0][0] <= now_us:

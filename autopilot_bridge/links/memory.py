@@ -13,11 +13,11 @@ class MemoryLink:
     """One end of a pair. What one end sends, the other receives, in order, at once.
 
     Args:
-        name: for descriptions; the other end is known by it.
+        name: for descriptions; the other end sees this name as its peer.
 
     Attributes:
         on_receive: when set, is called with the bytes at the moment the other end sends them; `receive` then
-            gives nothing.
+            returns nothing.
     """
 
     __slots__ = (
@@ -59,7 +59,7 @@ class MemoryLink:
 
     @property
     def counters(self) -> LinkCounters:
-        """What passed until now: what one end sent, the other has received."""
+        """Counters so far: the data that one end sent, the other has received."""
         other = self._other
         return LinkCounters(
             bytes_in=0 if other is None else other._bytes_out,
@@ -71,7 +71,7 @@ class MemoryLink:
         )
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
-        """Hand bytes to the other end."""
+        """Pass bytes to the other end."""
         other = self._other
         if self.closed or other is None or other.closed or len(other._inbox) >= MAX_INBOX:
             self._dropped += 1
@@ -86,7 +86,7 @@ class MemoryLink:
             other._inbox.append(data)
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """What the other end has sent since the last call."""
+        """The data that the other end has sent since the last call."""
         inbox = self._inbox
         if not inbox:
             return []
@@ -100,7 +100,7 @@ class MemoryLink:
         return ()
 
     def close(self) -> None:
-        """Close this end; what the other end sends is dropped from now on."""
+        """Close this end; data that the other end sends afterwards are dropped."""
         self.closed = True
         self._inbox.clear()
 
@@ -112,7 +112,7 @@ def memory_pair(
     on_receive_a: Callable[[bytes], None] | None = None,
     on_receive_b: Callable[[bytes], None] | None = None,
 ) -> tuple[MemoryLink, MemoryLink]:
-    """Two connected links; `on_receive_a` is called for what arrives at the first."""
+    """Two connected links; `on_receive_a` is called for the data that arrive at the first."""
     a, b = MemoryLink(name_a, on_receive_a), MemoryLink(name_b, on_receive_b)
     a._other, b._other = b, a
     a._peer, b._peer = (name_b, 0), (name_a, 0)

@@ -1,4 +1,4 @@
-"""Addresses to links."""
+"""Opening of links from addresses."""
 
 from collections.abc import Callable
 
@@ -24,7 +24,7 @@ def open_link(
     monotonic: Callable[[], float] = wall_time_s,
     time_us: Callable[[], int] | None = None,
 ) -> Link:
-    """Open the link an address (or connection string) names.
+    """Open the link of an address (or connection string).
 
     Args:
         address: what to open.
@@ -33,7 +33,7 @@ def open_link(
 
     Raises:
         AddressError: the connection string is none of the accepted forms.
-        LinkError: the link can't be opened; the message says what to do.
+        LinkError: the link can't be opened; the message contains the solution.
         TlogError: the log to replay can't be read.
     """
     if isinstance(address, str):

@@ -1,4 +1,4 @@
-"""A telemetry log as a link that can only be listened to."""
+"""A telemetry log as a read-only link."""
 
 from collections.abc import Callable
 from typing import Final
@@ -12,14 +12,14 @@ _MAX_PIECES: Final = 10_000  # of one `receive`
 
 
 class ReplayLink:
-    """Gives the frames of a log when their time has come, counted from the first `receive`.
+    """Delivers the frames of a log at their times, counted from the first `receive`.
 
     Args:
         address: the log.
         time_us: the clock that paces it, in microseconds; the wall clock when not given.
 
     Attributes:
-        finished: all frames were given.
+        finished: all frames were delivered.
 
     Raises:
         TlogError: the log can't be read.
@@ -48,7 +48,7 @@ class ReplayLink:
         return False
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
-        """A log hears nothing: counted as dropped."""
+        """Drop the data, and count them as dropped: a log is read-only."""
         self.counters.dropped += 1
         self.counters.bytes_dropped += len(data)
 

@@ -15,19 +15,19 @@ from autopilot_bridge.links.link import MAX_READS, LinkCounters, PeerId, SendQue
 REOPEN_INTERVAL_S: Final = 1.0
 _READ_SIZE: Final = 4096
 _BITS_PER_BYTE: Final = 10  # start bit, eight data bits, stop bit
-_BACKLOG_S: Final = 0.5  # what is older than that is not worth sending
-_LEAST_BACKLOG_BYTES: Final = 4096  # room for the answers of a slow line
+_BACKLOG_S: Final = 0.5  # older data are dropped
+_LEAST_BACKLOG_BYTES: Final = 4096  # enough for the answers on a slow line
 
 
 class SerialLink:
-    """A serial device. When it is unplugged, `receive` looks for it again, once a second at most.
+    """A serial device. When it is unplugged, `receive` tries to open it again, at most once a second.
 
     Args:
         address: device and baud rate.
         monotonic: wall clock in seconds, for the time between attempts.
 
     Raises:
-        LinkError: no such device, not permitted, in use, or the baud rate is not possible.
+        LinkError: no such device, no permission, in use, or an impossible baud rate.
     """
 
     def __init__(self, address: SerialPort, *, monotonic: Callable[[], float] = wall_time_s) -> None:
@@ -48,26 +48,26 @@ class SerialLink:
 
     @property
     def bytes_per_s(self) -> float:
-        """What the line carries in a second, one way."""
+        """The line's capacity in one direction, bytes per second."""
         return self._address.baud / _BITS_PER_BYTE
 
     @property
     def connected(self) -> bool:
-        """The device is there."""
+        """The device is present."""
         return self._port is not None
 
     @property
     def peers(self) -> tuple[PeerId, ...]:
-        """The device, while it is there."""
+        """The device, while it is present."""
         return (self._peer,) if self._port is not None else ()
 
     @property
     def congested(self) -> bool:
-        """True while the line is behind with what was sent."""
+        """True while much data waits for the line."""
         return self._queue.congested
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
-        """Send; dropped while the device is away."""
+        """Send; the data are dropped while the device is not present."""
         if self._port is None:
             self.counters.dropped += 1
             self.counters.bytes_dropped += len(data)
@@ -78,7 +78,7 @@ class SerialLink:
             self._unplugged()
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """All bytes that have arrived."""
+        """All received bytes."""
         received: list[tuple[PeerId, bytes]] = []
         if self._closed or (self._port is None and not self._reopen()):
             return received
@@ -100,11 +100,11 @@ class SerialLink:
         return received
 
     def filenos(self) -> tuple[int, ...]:
-        """The device, while it is there."""
+        """The device, while it is present."""
         return () if self._port is None else (self._port.fileno(),)
 
     def close(self) -> None:
-        """Close the device for good."""
+        """Close the device permanently."""
         self._closed = True
         if self._port is not None:
             self._queue.clear()
@@ -112,11 +112,11 @@ class SerialLink:
             self._port = None
 
     def _open(self) -> serial.Serial:
-        # `exclusive`: a second program on the same port would eat half of the bytes.
+        # `exclusive`: a second program on the same port would take part of the bytes.
         opened = serial.Serial(
             self._address.device, self._address.baud, timeout=0, write_timeout=0, exclusive=True
         )
-        # pyserial's VMIN = 0 makes "nothing there" and "hung up" look the same to read().
+        # With pyserial's VMIN = 0, read() returns the same for "no data" and "disconnected".
         attributes = termios.tcgetattr(opened.fileno())
         attributes[6][termios.VMIN] = 1
         termios.tcsetattr(opened.fileno(), termios.TCSANOW, attributes)
@@ -125,7 +125,7 @@ class SerialLink:
         return opened
 
     def _write(self, data: bytes) -> int:
-        # Not pyserial's write: it spins when the line takes nothing.
+        # Not pyserial's write: it loops without a pause while the line accepts nothing.
         assert self._port is not None
         return os.write(self._port.fileno(), data)
 

@@ -15,7 +15,7 @@ CONNECT_TIMEOUT_S: Final = 5.0
 RECONNECT_INTERVAL_S: Final = 1.0
 MAX_CLIENTS: Final = 32
 CLIENT_READ_SIZE: Final = 8192
-"""Bytes read from one client of a server at once; more waits where it comes from."""
+"""Bytes read from one client of a server at once; the rest waits in the operating system."""
 REPLACE_S: Final = 5.0
 STALLED_S: Final = 2.0
 DEAF_S: Final = 60.0
@@ -25,13 +25,13 @@ _BACKLOG: Final = 16
 class TcpServerLink:
     """A listening port; every client is a peer with its own byte stream.
 
-    There are at most `MAX_CLIENTS`. A newcomer takes the place of one that has said nothing for `REPLACE_S`;
-    while there is none, it is turned away. One that takes nothing of what it is sent for `STALLED_S` does not
-    hold back the others (`congested`), and is parted from after `DEAF_S`.
+    There are at most `MAX_CLIENTS`. A new client replaces one that has sent nothing for `REPLACE_S`; without
+    such a client, the new one is refused. A client that reads no data for `STALLED_S` no longer delays the
+    others (`congested`), and is disconnected after `DEAF_S`.
 
     Args:
         address: where to listen.
-        monotonic: wall clock in seconds, to find the silent and the deaf.
+        monotonic: wall clock in seconds, to detect clients that do not send or do not read.
 
     Raises:
         LinkError: the port is busy or the host unknown.
@@ -52,7 +52,7 @@ class TcpServerLink:
 
     @property
     def congested(self) -> bool:
-        """True while any client reads too slowly, unless it doesn't read at all."""
+        """True while any client reads too slowly, except clients that do not read at all."""
         return any(
             client.queue.congested and client.deaf_s(self._monotonic()) < STALLED_S
             for client in self._clients.values()
@@ -69,7 +69,7 @@ class TcpServerLink:
                 self._drop(peer)
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """Accept who is waiting; all bytes that have arrived, by client."""
+        """Accept waiting clients; returns all received bytes, by client."""
         self._accept()
         received: list[tuple[PeerId, bytes]] = []
         for peer, client in tuple(self._clients.items()):
@@ -88,7 +88,7 @@ class TcpServerLink:
         return (self._listener.fileno(), *(client.socket.fileno() for client in self._clients.values()))
 
     def close(self) -> None:
-        """Stop listening and part from every client."""
+        """Stop listening and disconnect every client."""
         if self._listener is not None:
             self._listener.close()
             self._listener = None
@@ -103,7 +103,7 @@ class TcpServerLink:
                 opened, peer = self._listener.accept()
             except (BlockingIOError, InterruptedError):
                 return
-            except OSError:  # the client went away again while waiting
+            except OSError:  # the client has disconnected while waiting
                 self.counters.errors += 1
                 return
             if len(self._clients) >= MAX_CLIENTS and not self._make_room():
@@ -127,7 +127,7 @@ class TcpServerLink:
 
 
 class TcpClientLink:
-    """A connection to a TCP server. When it breaks, `receive` tries to open it again, once a second at most.
+    """A connection to a TCP server. When it breaks, `receive` tries to open it again, at most once a second.
 
     Args:
         address: the server.
@@ -135,7 +135,7 @@ class TcpClientLink:
         connect_timeout_s: how long the first connection may take.
 
     Raises:
-        LinkError: nobody answers there.
+        LinkError: no server answers at the address.
     """
 
     def __init__(
@@ -159,7 +159,7 @@ class TcpClientLink:
         try:
             self._family, self._remote = opened.family, opened.getpeername()
             self._stream: _Stream | None = _Stream(opened, self.counters)
-        except OSError as error:  # the server has reset it at once
+        except OSError as error:  # the server has reset the connection at once
             opened.close()
             raise _refused(self.description, error) from error
         self.counters.connects += 1
@@ -180,7 +180,7 @@ class TcpClientLink:
         return self._stream is not None and self._stream.queue.congested
 
     def send(self, data: bytes, to: PeerId | None = None) -> None:
-        """Send to the server; dropped while not connected."""
+        """Send to the server; the data are dropped while not connected."""
         if self._stream is None:
             self.counters.dropped += 1
             self.counters.bytes_dropped += len(data)
@@ -188,7 +188,7 @@ class TcpClientLink:
             self._disconnect()
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """All bytes that have arrived."""
+        """All received bytes."""
         received: list[tuple[PeerId, bytes]] = []
         if self._closed:
             return received
@@ -203,7 +203,7 @@ class TcpClientLink:
         return () if self._stream is None else (self._stream.socket.fileno(),)
 
     def close(self) -> None:
-        """Close the connection for good."""
+        """Close the connection permanently."""
         self._closed = True
         if self._connecting is not None:
             self._connecting.close()
@@ -252,9 +252,9 @@ class _Stream:
 
     Attributes:
         socket: as opened.
-        queue: what was sent and not taken yet.
-        heard_s: when something came from it.
-        taken_s: when it last took something of what waited for it, as far as was looked.
+        queue: data not accepted yet.
+        heard_s: time of the last received data.
+        taken_s: time at which it last accepted queued data, as far as this was checked.
     """
 
     __slots__ = ("_counters", "_taken_bytes", "heard_s", "queue", "socket", "taken_s")
@@ -269,7 +269,7 @@ class _Stream:
         self._counters = counters
 
     def deaf_s(self, now_s: float) -> float:
-        """How long it has taken nothing of what waits for it."""
+        """The time for which it has accepted none of its queued data."""
         queue = self.queue
         if queue.taken_bytes != self._taken_bytes or not queue.queued_bytes:
             self.taken_s = now_s
@@ -292,7 +292,7 @@ class _Stream:
         reads: int = MAX_READS,
         size: int = READ_SIZE,
     ) -> bool:
-        """Append what has arrived; False when the connection is closed or broken."""
+        """Append the received data; False when the connection is closed or broken."""
         counters = self._counters
         try:
             self.queue.flush(self.socket.send)

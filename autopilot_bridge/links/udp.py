@@ -21,17 +21,17 @@ _RECEIVE_BUFFER_BYTES: Final = 1 << 20
 class UdpLink:
     """A UDP socket with any number of peers.
 
-    * `UdpServer`: everybody who sends is a peer until silent for `silence_s`, or forgotten. When there are
-      `MAX_PEERS`, one that was silent for `REPLACE_S` makes room; while there is none, newcomers are heard
-      but not sent to, so that a thousand strangers can't push out who was there before.
-    * `UdpClient`: the remote is the only peer; nobody else is heard.
-    * `UdpPeer`: the remote is the peer from the start; the first sender heard replaces it and stays, unless
-      it is forgotten. Others are heard but not sent to (PX4).
+    * `UdpServer`: every sender is a peer until it has sent nothing for `silence_s`, or is forgotten. When
+    there are `MAX_PEERS`, a new sender replaces a peer that has sent nothing for `REPLACE_S`; without such a
+    peer, data of new senders are received but nothing is sent to them, so that many new senders can't replace
+    active peers. * `UdpClient`: the remote is the only peer; data of other senders are dropped. * `UdpPeer`:
+    the remote is the peer from the start; the first sender received replaces it and stays, unless it is
+    forgotten. Data of others are received but nothing is sent to them (PX4).
 
     Args:
         address: what to open.
-        monotonic: wall clock in seconds, to find silent peers.
-        silence_s: after this long a server forgets a peer.
+        monotonic: wall clock in seconds, to detect silent peers.
+        silence_s: a server forgets a peer after this time without data.
 
     Raises:
         LinkError: the port is busy or the host unknown.
@@ -49,7 +49,7 @@ class UdpLink:
         self.counters = LinkCounters()
         self._last_heard_s: dict[PeerId, float] = {}
         self._partner: PeerId | None = None
-        self._remote: PeerId | None = None  # the partner until one is heard
+        self._remote: PeerId | None = None  # the peer until the first sender is received
         self._partner_heard = False
         self._learns = isinstance(address, UdpServer)
         self._is_client = isinstance(address, UdpClient)
@@ -72,7 +72,7 @@ class UdpLink:
 
     @property
     def peers(self) -> tuple[PeerId, ...]:
-        """Who is sent to."""
+        """The peers that data are sent to."""
         if self._partner is not None:
             return (self._partner,)
         return tuple(self._last_heard_s)
@@ -97,7 +97,7 @@ class UdpLink:
             self._send_to(data, self._partner)
 
     def receive(self) -> list[tuple[PeerId, bytes]]:
-        """All datagrams that have arrived (at most 128 of them, and a quarter of a megabyte, at once)."""
+        """All received datagrams (at most 128 of them, and a quarter of a megabyte, at once)."""
         received: list[tuple[PeerId, bytes]] = []
         if self._closed:
             return received
@@ -110,7 +110,7 @@ class UdpLink:
                 size, sender = self._socket.recvfrom_into(self._buffer)
             except (BlockingIOError, InterruptedError):
                 break
-            except OSError:  # a datagram of ours was refused; the socket lives on
+            except OSError:  # a datagram of ours was refused; the socket stays open
                 counters.errors += 1
                 continue
             counters.bytes_in += size
@@ -165,7 +165,7 @@ class UdpLink:
         self._last_heard_s[peer] = now_s
 
     def forget(self, peer: PeerId) -> None:
-        """Send nothing more to a peer, until it is heard again."""
+        """Send nothing more to a peer, until data of it are received again."""
         if peer in self._last_heard_s:
             del self._last_heard_s[peer]
             self.counters.disconnects += 1

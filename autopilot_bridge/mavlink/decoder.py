@@ -1,4 +1,4 @@
-"""Frames to pymavlink's message objects."""
+"""Conversion of frames to pymavlink's message objects."""
 
 from collections.abc import Callable
 from functools import cache
@@ -11,7 +11,7 @@ from autopilot_bridge.mavlink.frame import CHECKSUM_SIZE, HEADER_SIZE_V1, HEADER
 
 
 def decode(frame: Frame) -> MAVLinkMessage:
-    """The message in a frame, as pymavlink would give it: fields as attributes, header filled in.
+    """The message in a frame, as pymavlink would return it: fields as attributes, with its header.
 
     Strings end at their first zero; bytes that are not ASCII become U+FFFD. Never raises for a frame of
     the parser.

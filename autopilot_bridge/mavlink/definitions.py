@@ -1,4 +1,4 @@
-"""Message definitions: what the codec must know of each message of the dialect, taken from pymavlink's
+"""Message definitions: the codec's data for each message of the dialect, taken from pymavlink's
 classes.
 
 The dialect is `all`: every message of MAVLink's public definitions. Payloads are little-endian with

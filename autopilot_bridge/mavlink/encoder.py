@@ -24,7 +24,7 @@ _PACK_ERRORS: Final = (struct.error, OverflowError, TypeError, ValueError, Attri
 
 
 class FrameEncoder:
-    """Packs the messages of one component on one link: it owns the sequence counter.
+    """Packs the messages of one component on one link, and owns the sequence counter.
 
     Args:
         system_id, component_id: the sender, 1..255.
@@ -42,12 +42,12 @@ class FrameEncoder:
         self._messages: dict[int, tuple[bytes, bytes, Callable[[Any], bytes]]] = {}
 
     def encode(self, message: MAVLinkMessage) -> bytes:
-        """The frame of a message, payload truncated as MAVLink 2 has it. The message is left as it is.
+        """The frame of a message, with its payload truncated as in MAVLink 2. The message is not changed.
 
         Raises:
             MessageError: a field does not fit its type on the wire, or an array has the wrong length.
         """
-        message_id = type(message).id  # of the class: some messages have a field of that name
+        message_id = type(message).id  # from the class: some messages have a field of that name
         known = self._messages.get(message_id) or self._prepare(message_id)
         try:
             payload = known[2](message)
@@ -56,7 +56,7 @@ class FrameEncoder:
         return self._frame(known, payload)
 
     def encode_payload(self, message_id: int, payload: bytes) -> bytes:
-        """The frame of a payload that is packed already (wire order, zeros at the end kept or not).
+        """The frame of a packed payload (wire order, zeros at the end kept or not).
 
         Raises:
             MessageError: the dialect has no such message, or the payload is longer than 255 bytes.
@@ -70,8 +70,8 @@ class FrameEncoder:
     def encode_payloads(self, payloads: Iterable[tuple[int, bytes]]) -> list[bytes]:
         """The frames of several packed payloads (message id, bytes of at most 255), in order.
 
-        As `encode_payload` for each, without its check of the length: for streams, where the calls would cost
-        more.
+        As `encode_payload` for each, but without its check of the length: for streams, where separate calls
+        would cost more time.
         """
         messages, sequence, frames = self._messages, self.sequence, []
         for message_id, payload in payloads:
@@ -102,14 +102,15 @@ class FrameEncoder:
 def payload_packer(message_id: int) -> Callable[[MAVLinkMessage], bytes]:
     """A function that packs a message of this id into its full-size payload.
 
-    It raises `struct.error` and its like for values that do not fit; `FrameEncoder.encode` explains them.
+    It raises `struct.error` and similar errors for values that do not fit; `FrameEncoder.encode` explains
+    them.
     """
     found = definition(message_id)
     fields = found.wire_fields
     pack = struct.Struct("<" + "".join(_packed_format(field) for field in fields)).pack
     attributes = [_attribute(field) for field in fields]
     values_of: Callable[[MAVLinkMessage], tuple[Any, ...]] = attrgetter(*attributes)
-    if len(fields) == 1:  # an attrgetter of one name gives no tuple
+    if len(fields) == 1:  # an attrgetter of one name returns no tuple
         only = attrgetter(attributes[0])
         values_of = lambda message: (only(message),)  # noqa: E731
 
@@ -158,11 +159,11 @@ def _wrong_length(field: WireField, value: Any) -> int | None:
 
 
 def _attribute(field: WireField) -> str:
-    # pymavlink keeps the bytes of a string beside its decoded text.
+    # pymavlink keeps the bytes of a string besides its decoded text.
     return f"_{field.name}_raw" if field.type == "char" else field.name
 
 
 def _packed_format(field: WireField) -> str:
     if field.code == "s" or (field.length and field.code == "B"):
-        return f"{field.length or 1}s"  # bytes pack in one go
+        return f"{field.length or 1}s"  # bytes are packed as one value
     return f"{field.length}{field.code}" if field.length else field.code

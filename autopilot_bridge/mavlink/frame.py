@@ -1,4 +1,4 @@
-"""One checked MAVLink frame, as it was on the wire."""
+"""One verified MAVLink frame, as it was on the wire."""
 
 from typing import Final, NamedTuple
 
@@ -16,12 +16,12 @@ INCOMPAT_SIGNED: Final = 0x01
 
 
 class Frame(NamedTuple):
-    """A frame whose checksum is right and whose message the dialect knows (MAVLink guide, "Serialization").
+    """A frame with a correct checksum and a message of the dialect (MAVLink guide, "Serialization").
 
     Attributes:
         raw: all bytes of the frame, magic to checksum (or signature).
         message_id: id of the message.
-        system_id, component_id: who sent it.
+        system_id, component_id: the sender.
         sequence: the sender's frame counter, 0..255.
         version: 1 or 2.
         signed: the frame carries a signature (which the parser does not verify; `LinkSigning.admit` does).

@@ -1,7 +1,7 @@
-"""Frames from the peers of one link, with bounded work for each of them: nobody can starve the others.
+"""Frames from the peers of one link, with limited work for each peer: no peer can block the others.
 
-What has arrived waits in an inbox for each peer. Every call of `take` serves the peers in turn, each with a
-limited amount of work, so that a flood costs its sender, not the vehicle or its other clients.
+Received data wait in an inbox for each peer. Every call of `take` serves the peers in turn, each with a
+limited amount of work, so that a flood delays its sender only, not the vehicle or its other clients.
 """
 
 from collections import deque
@@ -14,16 +14,16 @@ from autopilot_bridge.mavlink.parser import FrameParser, ParserCounters
 
 MAX_PEERS: Final = 64
 INBOX_BYTES: Final = 256 * 1024
-"""What may wait for one peer."""
+"""Largest amount of data that may wait for one peer."""
 SHARE: Final = 400
 """Work for one peer in one `take`, in units of about a microsecond."""
 TOTAL: Final = 1000
 """Work for all peers in one `take`."""
-_FRAME_WORK: Final = 20  # to decode and handle a frame
-_HEAVY: Final = {23: 400}  # PARAM_SET: everything that depends on a parameter is worked out anew
-_SIGNATURE_WORK: Final = 6  # to check whether a frame may be believed
+_FRAME_WORK: Final = 20  # to decode and handle one frame
+_HEAVY: Final = {23: 400}  # PARAM_SET: all values that depend on a parameter are computed again
+_SIGNATURE_WORK: Final = 6  # to check whether a frame is accepted
 _PIECE_WORK: Final = 2
-_FAILURE_WORK: Final = 1  # to find that something is no frame
+_FAILURE_WORK: Final = 1  # to detect that bytes are no frame
 _BYTES_OF_WORK: Final = 64
 _SLICE_BYTES: Final = 256
 _SILENT_TAKES: Final = 5000  # 20 s of polls
@@ -33,13 +33,13 @@ Admit = Callable[[list[Frame]], list[Frame]]
 
 
 class _Inbox:
-    """What one peer has sent.
+    """The data that one peer has sent.
 
     Attributes:
         parser: finds the frames.
-        pieces: waiting; `size` bytes in all.
-        understood: a frame of it was taken once.
-        heard_at: number of the `take` that last brought something.
+        pieces: waiting data; `size` bytes in total.
+        understood: a frame of it was accepted at least once.
+        heard_at: number of the last `take` with data of it.
     """
 
     __slots__ = ("heard_at", "parser", "pieces", "size", "understood")
@@ -56,10 +56,10 @@ class Intake(Generic[PeerT]):
     """The inboxes of one link.
 
     Args:
-        admit: which frames are believed (`LinkSigning.admit`); None: all.
+        admit: selects the accepted frames (`LinkSigning.admit`); None: all.
 
     Attributes:
-        overrun_bytes: dropped unread, because a peer had too much waiting.
+        overrun_bytes: bytes dropped unread, because too many bytes of a peer were waiting.
     """
 
     __slots__ = ("_admit", "_inboxes", "_retired", "_takes", "_waiting", "overrun_bytes")
@@ -78,7 +78,7 @@ class Intake(Generic[PeerT]):
 
     @property
     def counters(self) -> ParserCounters:
-        """Where every byte that was looked at went, over all peers ever heard; `sources` is left out."""
+        """Counters of every parsed byte, over all peers so far; `sources` is left out."""
         total = ParserCounters()
         for counters in (self._retired, *(inbox.parser.counters for inbox in self._inboxes.values())):
             add_counters(total, counters)
@@ -91,16 +91,16 @@ class Intake(Generic[PeerT]):
 
     @property
     def waiting(self) -> bool:
-        """Something was not looked at yet."""
+        """There are unparsed data."""
         return bool(self._waiting)
 
     def understood(self, peer: PeerT) -> bool:
-        """A frame of this peer was taken once, and it is not forgotten."""
+        """A frame of this peer was accepted at least once, and the peer was not forgotten."""
         inbox = self._inboxes.get(peer)
         return inbox is not None and inbox.understood
 
     def parse(self, peer: PeerT, data: bytes) -> list[Frame]:
-        """The frames in bytes of one peer, at once and whatever they cost: for a link of one's own."""
+        """The frames in bytes of one peer, parsed at once without a limit: for a trusted link."""
         inbox = self._inbox(peer)
         frames = inbox.parser.feed(data)
         if self._admit is not None and frames:
@@ -110,7 +110,7 @@ class Intake(Generic[PeerT]):
         return frames
 
     def take(self, arrived: Iterable[tuple[PeerT, bytes]]) -> list[tuple[PeerT, list[Frame]]]:
-        """Put what has arrived into the inboxes, and give the frames there is time for, by peer."""
+        """Put received data into the inboxes, and return the frames within the work limit, by peer."""
         for peer, data in arrived:
             self._put(peer, data)
         self._takes += 1
@@ -148,7 +148,7 @@ class Intake(Generic[PeerT]):
             inbox.pieces += [data[at : at + _SLICE_BYTES] for at in range(0, len(data), _SLICE_BYTES)]
 
     def _serve(self, inbox: _Inbox, share: int) -> tuple[list[Frame], int]:
-        """Frames of one inbox, and the work they were."""
+        """Frames of one inbox, and the work that they needed."""
         frames: list[Frame] = []
         work = 0
         counters, pieces = inbox.parser.counters, inbox.pieces
@@ -178,9 +178,9 @@ class Intake(Generic[PeerT]):
         return inbox
 
     def _retire(self) -> None:
-        """Forget a peer: one that was never understood, else one that is silent, else the newest.
+        """Forget a peer: one without an accepted frame, else a silent one, else the newest.
 
-        So whoever has talked for a while is not pushed out by a thousand others.
+        So a large number of new peers can't replace an active peer.
         """
         inboxes = self._inboxes
         stranger = next((peer for peer, inbox in inboxes.items() if not inbox.understood), None)
@@ -198,7 +198,7 @@ class Intake(Generic[PeerT]):
 
 
 def add_counters(total: ParserCounters, more: ParserCounters) -> None:
-    """Add the numbers of `more`; `sources` are left as they are."""
+    """Add the numbers of `more`; `sources` are not changed."""
     for field in fields(ParserCounters):
         value = getattr(more, field.name)
         if isinstance(value, int):

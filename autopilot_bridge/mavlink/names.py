@@ -1,4 +1,4 @@
-"""Names of MAVLink's enumerations, for people."""
+"""Names of MAVLink's enumerations, for texts to users."""
 
 from typing import Final
 
@@ -8,17 +8,17 @@ _ENUMS: Final = dialect.enums
 
 
 def enum_name(enum: str, value: int, *, prefix: str = "") -> str | None:
-    """An entry's name without what all of them begin with; None: there is no such entry.
+    """An entry's name without the common prefix; None: there is no such entry.
 
     Args:
-        enum: as the definitions call it ("MAV_CMD").
+        enum: name in the definitions ("MAV_CMD").
         value: of the entry.
-        prefix: what the names begin with; "": the enumeration's own name and an underscore.
+        prefix: common prefix of the names; "": the enumeration's own name and an underscore.
     """
     entry = _ENUMS[enum].get(value)
     return None if entry is None else str(entry.name).removeprefix(prefix or f"{enum}_")
 
 
 def command_name(command: int) -> str:
-    """A MAV_CMD in words: "NAV_TAKEOFF"."""
+    """The name of a MAV_CMD: "NAV_TAKEOFF"."""
     return enum_name("MAV_CMD", command) or f"command {command}"

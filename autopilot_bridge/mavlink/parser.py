@@ -1,4 +1,4 @@
-"""Bytes in, frames out: finds MAVLink 1 and 2 frames in anything, never raises, accounts for every byte."""
+"""Bytes in, frames out: finds MAVLink 1 and 2 frames in any data, never raises, accounts for every byte."""
 
 import struct
 from dataclasses import dataclass, field
@@ -21,15 +21,15 @@ _CRC_EXTRA: Final = {key: bytes([item.crc_extra]) for key, item in DEFINITIONS.i
 _MAGIC_V1_BYTE: Final = bytes([MAGIC_V1])
 _MAGIC_V2_BYTE: Final = bytes([MAGIC_V2])
 _unpack_head: Final = struct.Struct("<BBBBBBBHB").unpack_from
-_MAX_LATE: Final = 16  # frames; a larger step back is a sender that started anew
+_MAX_LATE: Final = 16  # frames; a larger step back means that the sender has restarted
 
 
 @dataclass(slots=True)
 class SourceCounters:
-    """What was heard from one component.
+    """Counters of the frames received from one component.
 
     Attributes:
-        frames: good frames.
+        frames: valid frames.
         lost: frames missing from the sequence.
         late: frames that arrived after a later one (each was counted as lost first) or twice.
         last_sequence: newest sequence number.
@@ -41,7 +41,7 @@ class SourceCounters:
     last_sequence: int = -1
 
     def take(self, sequence: int) -> None:
-        """Count a good frame with this sequence number."""
+        """Count a valid frame with this sequence number."""
         self.frames += 1
         missed = (sequence - self.last_sequence - 1) & 0xFF
         if missed < 256 - _MAX_LATE:
@@ -53,19 +53,19 @@ class SourceCounters:
 
 @dataclass(slots=True)
 class ParserCounters:
-    """Where every byte went: `bytes_in == bytes_framed + bytes_dropped +` the parser's `pending_bytes`.
+    """Counters of all bytes: `bytes_in == bytes_framed + bytes_dropped +` the parser's `pending_bytes`.
 
     Attributes:
         bytes_in: bytes fed.
-        bytes_framed: bytes of good frames.
+        bytes_framed: bytes of valid frames.
         bytes_junk: bytes between frames, those left over from damaged frames included.
-        bytes_bad_crc: first bytes of what looked like a frame with a wrong checksum (the search goes on
-            behind it).
-        bytes_unsupported: first bytes of what looked like a MAVLink 2 frame with unknown incompatibility
+        bytes_bad_crc: first bytes of apparent frames with a wrong checksum (the search continues
+            after them).
+        bytes_unsupported: first bytes of apparent MAVLink 2 frames with unknown incompatibility
             flags.
-        bytes_unknown_message: whole frames of messages the dialect does not know; their checksum can't
+        bytes_unknown_message: whole frames of messages outside the dialect; their checksum can't
             be verified.
-        frames: good frames; `frames_v1` and `frames_signed` are those in MAVLink 1 and with a signature.
+        frames: valid frames; `frames_v1` and `frames_signed` are those in MAVLink 1 and with a signature.
         bad_crc, unsupported_flags, unknown_message: how often each happened.
         sources: counters by (system id, component id).
     """
@@ -86,23 +86,23 @@ class ParserCounters:
 
     @property
     def bytes_dropped(self) -> int:
-        """All bytes that are not in a good frame."""
+        """All bytes that are not in a valid frame."""
         return self.bytes_junk + self.bytes_bad_crc + self.bytes_unsupported + self.bytes_unknown_message
 
     @property
     def frames_lost(self) -> int:
-        """Frames missing from the sequences of all sources, those that came late taken off."""
+        """Frames missing from the sequences of all sources, without those that came late."""
         return sum(max(0, source.lost - source.late) for source in self.sources.values())
 
 
 class FrameParser:
     """Frames from one byte stream: one parser for each peer of a link.
 
-    A byte that can't begin a good frame is dropped and the search goes on behind it, so damage costs no
-    more than the damaged frame. A frame of an unknown message is skipped whole when another frame or the
-    end of the data follows it; otherwise it is taken for junk. Frames with incompatibility flags other
-    than "signed" are dropped, as the MAVLink guide demands ("Incompatibility Flags"). Signatures are
-    passed over unverified (`signing.LinkSigning` checks them).
+    A byte that can't begin a valid frame is dropped and the search continues after it, so damage costs at
+    most the damaged frame. A frame of an unknown message is skipped as a whole when another frame or the end
+    of the data follows it; otherwise it counts as junk. Frames with incompatibility flags other than "signed"
+    are dropped, as the MAVLink guide requires ("Incompatibility Flags"). Signatures are not verified here
+    (`signing.LinkSigning` checks them).
     """
 
     __slots__ = ("_pending", "counters")
@@ -123,7 +123,7 @@ class FrameParser:
         counters.bytes_in += size
         if self._pending:
             return self._search(self._pending + data)
-        # What most links deliver: whole unsigned MAVLink 2 frames, and nothing else.
+        # The usual data of most links: whole unsigned MAVLink 2 frames, and nothing else.
         frames: list[Frame] = []
         start = 0
         source: SourceCounters | None = None
@@ -151,7 +151,7 @@ class FrameParser:
         return frames
 
     def flush(self) -> None:
-        """The stream has ended or was interrupted: what is pending will not be completed and is counted
+        """The stream has ended or was interrupted: the pending bytes will not be completed and are counted
         as junk.
         """
         self.counters.bytes_junk += len(self._pending)
@@ -161,7 +161,7 @@ class FrameParser:
         counters = self.counters
         frames: list[Frame] = []
         size = len(buffer)
-        next_v1 = next_v2 = -1  # next magic bytes at or behind `start`
+        next_v1 = next_v2 = -1  # next magic bytes at or after `start`
         start = 0
         while start < size:
             if next_v2 < start:
@@ -240,7 +240,7 @@ class FrameParser:
         self._source(sender, frame.sequence).take(frame.sequence)
 
     def _source(self, sender: tuple[int, int], sequence: int) -> SourceCounters:
-        """Counters of a component; a new one begins with the sequence number it is first heard with."""
+        """Counters of a component; a new component begins with the sequence number of its first frame."""
         source = self.counters.sources.get(sender)
         if source is None:
             source = self.counters.sources[sender] = SourceCounters(last_sequence=(sequence - 1) & 0xFF)

@@ -1,10 +1,11 @@
 """MAVLink 2 message signing, without I/O (https://mavlink.io/en/guide/message_signing.html).
 
-A signed frame has the incompatibility flag 0x01 and 13 bytes more: link id, 48 bits of time in units of 10 us
-since 2015-01-01, and the first 48 bits of SHA-256 over the key and all that comes before.
+A signed frame has the incompatibility flag 0x01 and 13 additional bytes: link id, 48 bits of time in units of
+10 us since 2015-01-01, and the first 48 bits of SHA-256 over the key and all preceding bytes.
 
-One `SigningState` belongs to a device: key, newest timestamp and the streams heard are the same on all of its
-links, so that what was recorded on one can't be played on another. A `LinkSigning` is one link of it.
+One `SigningState` belongs to a device: key, newest timestamp and the received streams are the same on all of
+its links, so that frames recorded on one link can't be replayed on another. A `LinkSigning` belongs to one
+link.
 """
 
 import hmac
@@ -32,10 +33,10 @@ SIGNING_EPOCH_UNIX_US: Final = 1_420_070_400_000_000
 TIMESTAMP_UNIT_US: Final = 10
 MAX_TIMESTAMP: Final = (1 << 48) - 1
 MINUTE: Final = 6_000_000
-"""Timestamp units in a minute: how far behind a new stream may begin."""
+"""Timestamp units in a minute: the largest age of the first timestamp of a new stream."""
 MAX_STREAMS: Final = 256
 SETUP_SIGNING: Final = 256
-"""Id of the message that brings a key: never forwarded, never logged."""
+"""Id of the message that sets a key: never forwarded, never logged."""
 _SAVE_EVERY: Final = MINUTE // 2
 _TIMESTAMP_SIZE: Final = 6
 _DIGEST_SIZE: Final = 6
@@ -43,12 +44,12 @@ _RADIO_MESSAGES: Final = frozenset({109, 166})  # RADIO_STATUS, RADIO: a telemet
 
 
 def signing_time(unix_us: int) -> int:
-    """The timestamp of a moment of the Unix epoch (microseconds); 0 before 2015."""
+    """The timestamp of a time of the Unix epoch (microseconds); 0 before 2015."""
     return min(max(0, (unix_us - SIGNING_EPOCH_UNIX_US) // TIMESTAMP_UNIT_US), MAX_TIMESTAMP)
 
 
 class Refusal(StrEnum):
-    """Why a frame is not taken."""
+    """Why a frame is refused."""
 
     UNSIGNED = "unsigned"
     BAD_SIGNATURE = "bad signature"
@@ -63,8 +64,8 @@ class SigningState:
     Args:
         key: None: nothing is signed or checked.
         clock: the device's time as a timestamp (`signing_time`).
-        timestamp: no frame is signed with an earlier one, as after a restart.
-        on_save: called with the state when key or time ought to be stored: at a new key, and while frames are
+        timestamp: lowest timestamp of signed frames, as after a restart.
+        on_save: called with the state when key or time must be stored: at a new key, and while frames are
             signed each half minute of timestamps.
     """
 
@@ -98,11 +99,11 @@ class SigningState:
 
     @property
     def timestamp(self) -> int:
-        """The newest timestamp there was: sent, received, stored, or by the clock."""
+        """The newest timestamp of all: sent, received, stored, or from the clock."""
         return min(max(self._newest, self._clock()), MAX_TIMESTAMP)
 
     def set_key(self, key: SigningKey | None, timestamp: int = 0) -> None:
-        """Take another key, or none; time never goes back, whatever `timestamp` says."""
+        """Set another key, or none; time never goes back, whatever the value of `timestamp`."""
         self._key = key
         self._seed = sha256(b"" if key is None else key.secret)
         self._streams.clear()
@@ -110,7 +111,7 @@ class SigningState:
         self._save()
 
     def sign(self, frame: bytes, link_id: int) -> bytes:
-        """A MAVLink 2 frame that has no signature, with one."""
+        """Add a signature to a MAVLink 2 frame that has none."""
         self._newest = newest = min(max(self._newest + 1, self._clock()), MAX_TIMESTAMP)
         if newest >= self._save_at:
             self._save()
@@ -126,10 +127,10 @@ class SigningState:
         return signed + self._digest(signed)
 
     def verify(self, frame: Frame) -> Refusal | None:
-        """Check a signed frame against key and streams, and remember its time; None: it is good.
+        """Check a signed frame against key and streams, and store its time; None: it is valid.
 
-        Nothing is remembered of a frame whose signature is wrong: otherwise one forged frame with a late
-        timestamp would shut the true sender out.
+        Nothing is stored from a frame whose signature is wrong: otherwise one forged frame with a late
+        timestamp would block the true sender.
         """
         raw = frame.raw
         if not hmac.compare_digest(self._digest(raw[:-_DIGEST_SIZE]), raw[-_DIGEST_SIZE:]):
@@ -161,14 +162,14 @@ class SigningState:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSigningPolicy:
-    """What one link takes and sends while there is a key.
+    """The frames that one link accepts and sends while there is a key.
 
     Attributes:
         accept_unsigned: frames without signature, MAVLink 1 included.
         accept_bad_signature: frames whose signature is wrong or not new; they count as unsigned. For a link
-            that nobody else can reach, so that a device whose key was lost can be found again.
+            that only the owner can reach, so that a device whose key was lost stays reachable.
         sign: own frames are signed.
-        unsigned_messages: taken without signature anyway.
+        unsigned_messages: messages accepted without a signature anyway.
     """
 
     accept_unsigned: bool
@@ -180,27 +181,28 @@ class LinkSigningPolicy:
 REQUIRED: Final = LinkSigningPolicy(accept_unsigned=False)
 """Signatures are required."""
 RADIO: Final = LinkSigningPolicy(accept_unsigned=False, unsigned_messages=_RADIO_MESSAGES)
-"""Signatures are required, but of a telemetry radio on the line, which tells how full its buffer is.
-Elsewhere nobody may say that in its name: it slows streams down.
+"""Signatures are required, except from a telemetry radio on the line, which reports how full its buffer is.
+These messages slow streams down, so on other links they need a signature.
 """
 UNSIGNED_TOO: Final = LinkSigningPolicy(accept_unsigned=True)
-"""Unsigned frames are taken too, but no wrong signature."""
+"""Unsigned frames are accepted too, but no wrong signature."""
 TRUSTED: Final = LinkSigningPolicy(accept_unsigned=True, accept_bad_signature=True)
-"""A link that only its owner can reach, such as USB: everything is taken (MAVLink guide, "Accepting Unsigned
-Packets")."""
+"""A link that only its owner can reach, such as USB: all frames are accepted (MAVLink guide,
+"Accepting Unsigned Packets").
+"""
 INTERNAL: Final = LinkSigningPolicy(accept_unsigned=True, accept_bad_signature=True, sign=False)
 """Between parts of one device: nothing is signed or checked."""
 
 
 @dataclass(slots=True)
 class SigningCounters:
-    """What was signed, and what was refused, while there was a key.
+    """Frames signed and refused while there was a key.
 
     Attributes:
         sent: frames signed.
-        verified: frames with a good signature.
-        tolerated: frames taken without one, as the policy says.
-        refused: frames that were dropped, by reason.
+        verified: frames with a valid signature.
+        tolerated: frames accepted without one, by the policy.
+        refused: dropped frames, by reason.
     """
 
     sent: int = 0
@@ -210,7 +212,7 @@ class SigningCounters:
 
     @property
     def reasons(self) -> str:
-        """What was refused, in words: "3 unsigned, 1 replayed"; empty when nothing was."""
+        """The refused frames as a text: "3 unsigned, 1 replayed"; empty when there were none."""
         return ", ".join(f"{count} {reason}" for reason, count in self.refused.items() if count)
 
     @property
@@ -220,12 +222,12 @@ class SigningCounters:
 
 
 class LinkSigning:
-    """Signs what goes out on one link and checks what comes in.
+    """Signs the frames sent on one link and checks the received ones.
 
     Args:
         state: the device's.
         link_id: number of the link, 0..255; different for the links of one device.
-        policy: what the link takes.
+        policy: the link's policy.
     """
 
     __slots__ = ("counters", "link_id", "policy", "state")
@@ -240,7 +242,7 @@ class LinkSigning:
 
     @property
     def signs(self) -> bool:
-        """What goes out is to be signed."""
+        """Sent frames must be signed."""
         return self.state.active and self.policy.sign
 
     def sign(self, packet: bytes) -> bytes:
@@ -259,9 +261,9 @@ class LinkSigning:
         return b"".join(signed)
 
     def sign_again(self, raw: bytes) -> bytes:
-        """Somebody's frame under a signature of ours, instead of its own if it has one.
+        """A frame of another system with our signature, instead of its own if it has one.
 
-        A MAVLink 1 frame, and a message the dialect doesn't know, are given back as they are.
+        A MAVLink 1 frame, and a message outside the dialect, are returned unchanged.
         """
         message_id = raw[7] | raw[8] << 8 | raw[9] << 16 if raw[0] == MAGIC_V2 else -1
         if message_id not in DEFINITIONS:
@@ -271,7 +273,7 @@ class LinkSigning:
         return self.state.sign(bare, self.link_id)
 
     def admit(self, frames: list[Frame]) -> list[Frame]:
-        """Those of the frames that may be believed; after it, `Frame.signed` means verified."""
+        """The accepted frames; in them, `Frame.signed` means verified."""
         if not self.state.active or self.policy is INTERNAL:
             return frames
         policy, counters, state = self.policy, self.counters, self.state
@@ -296,5 +298,5 @@ class LinkSigning:
 
 
 def is_unsigned_v2(raw: bytes) -> bool:
-    """The frame could be given a signature."""
+    """The frame can be given a signature."""
     return raw[0] == MAGIC_V2 and not raw[2] & INCOMPAT_SIGNED

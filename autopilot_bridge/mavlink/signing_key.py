@@ -1,4 +1,4 @@
-"""The secret key of message signing, and the forms in which people keep it."""
+"""The secret key of message signing, and its forms in files."""
 
 import re
 from dataclasses import dataclass, field
@@ -15,10 +15,10 @@ _ACCEPTED: Final = "32 raw bytes, 64 hexadecimal digits, or a passphrase in one 
 
 @dataclass(frozen=True, slots=True)
 class SigningKey:
-    """32 secret bytes, not all zero (which means: no key). They don't show in reprs and messages.
+    """32 secret bytes, not all zero (which means: no key). They are not shown in reprs and messages.
 
     Raises:
-        SigningKeyError: the wrong number of bytes, or nothing but zeros.
+        SigningKeyError: the wrong number of bytes, or all bytes are zero.
     """
 
     secret: bytes = field(repr=False)
@@ -44,8 +44,8 @@ class SigningKey:
     def parse(cls, content: bytes) -> "SigningKey":
         """The key in the content of a file.
 
-        32 bytes that are not all printable are the key itself; 64 hexadecimal digits are the key in those;
-        one line of any other text is a passphrase.
+        32 bytes that are not all printable are the key itself; 64 hexadecimal digits are the key in that
+        form; one line of any other text is a passphrase.
 
         Raises:
             SigningKeyError: none of these; the content is not repeated in the message.

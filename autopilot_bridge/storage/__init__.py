@@ -1,4 +1,4 @@
-"""The vehicle's memory card: files that outlive a boot, behind one interface, and what lies on it."""
+"""The vehicle's memory card: files that persist over a boot, behind one interface."""
 
 from autopilot_bridge.storage.files import Entry, FileStore, Mode, OpenFile
 from autopilot_bridge.storage.memory import MemoryStore

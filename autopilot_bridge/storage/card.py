@@ -1,4 +1,4 @@
-"""The memory card of one vehicle, as its autopilot is given it: where it is kept and what it is for."""
+"""The memory card of one vehicle, as passed to its autopilot: its files and its use."""
 
 from dataclasses import dataclass, field
 
@@ -8,12 +8,12 @@ from autopilot_bridge.storage.memory import MemoryStore
 
 @dataclass(slots=True, kw_only=True)
 class MemoryCard:
-    """What stays when the autopilot boots again.
+    """The data that persist when the autopilot boots again.
 
     Attributes:
         files: the card's own file system; by default in memory, empty.
         logs: flights are logged on it.
-        boots: how often an autopilot was started with it, in this run.
+        boots: number of boots of an autopilot with it, in this run.
     """
 
     files: FileStore = field(default_factory=MemoryStore)

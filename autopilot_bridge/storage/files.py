@@ -1,4 +1,4 @@
-"""What a store of files can do. Errors are `OSError` with the errno that a file system would give."""
+"""The interface of a file store. Errors are `OSError` with the errno that a file system would give."""
 
 from enum import Enum, auto
 from typing import NamedTuple, Protocol
@@ -18,21 +18,21 @@ class Mode(Enum):
     """How a file is opened."""
 
     READ = auto()
-    WRITE = auto()  # made if there is none; what it holds stays
-    REPLACE = auto()  # made if there is none; emptied
-    NEW = auto()  # there must be none
+    WRITE = auto()  # created if it does not exist; its content is kept
+    REPLACE = auto()  # created if it does not exist; emptied
+    NEW = auto()  # must not exist
 
 
 class OpenFile(Protocol):
-    """An open file. Reads and writes say where; there is no position."""
+    """An open file. Reads and writes give the offset; there is no file position."""
 
     @property
     def size(self) -> int:
-        """Bytes at the moment."""
+        """Present size in bytes."""
         ...
 
     def read(self, offset: int, size: int) -> bytes:
-        """Up to `size` bytes from `offset`; fewer at the end, none behind it."""
+        """Up to `size` bytes from `offset`; fewer at the end, none after it."""
         ...
 
     def write(self, offset: int, data: bytes) -> None:
@@ -40,12 +40,12 @@ class OpenFile(Protocol):
         ...
 
     def close(self) -> None:
-        """Close; a second time does nothing. OSError when what was written is not accepted."""
+        """Close; a second call does nothing. OSError when the written data are not accepted."""
         ...
 
 
 class HeldBytes:
-    """What reading is for an open file whose bytes are in memory."""
+    """Reading of an open file whose bytes are in memory."""
 
     __slots__ = ("_data",)
 
@@ -54,23 +54,23 @@ class HeldBytes:
 
     @property
     def size(self) -> int:
-        """Bytes at the moment."""
+        """Present size in bytes."""
         return len(self._data)
 
     def read(self, offset: int, size: int) -> bytes:
-        """Up to `size` bytes from `offset`; fewer at the end, none behind it."""
+        """Up to `size` bytes from `offset`; fewer at the end, none after it."""
         return bytes(self._data[offset : offset + size])
 
 
 class FileStore(Protocol):
-    """A tree of files. Every method raises `OSError` and then has changed nothing."""
+    """A tree of files. A method that raises `OSError` has changed nothing."""
 
     def entry(self, path: VehiclePath) -> Entry:
-        """What is at a path."""
+        """The entry at a path."""
         ...
 
     def entries(self, path: VehiclePath) -> list[Entry]:
-        """What is in a directory, by name."""
+        """The entries of a directory, by name."""
         ...
 
     def open(self, path: VehiclePath, mode: Mode) -> OpenFile:
@@ -82,7 +82,7 @@ class FileStore(Protocol):
         ...
 
     def make_directory(self, path: VehiclePath) -> None:
-        """Make a directory in one that is there."""
+        """Make a directory in an existing one."""
         ...
 
     def remove_directory(self, path: VehiclePath) -> None:
@@ -90,16 +90,16 @@ class FileStore(Protocol):
         ...
 
     def rename(self, old: VehiclePath, new: VehiclePath) -> None:
-        """Give a file or directory another place; a file that is there is replaced."""
+        """Move a file or directory; an existing file at the new path is replaced."""
         ...
 
     def truncate(self, path: VehiclePath, size: int) -> None:
-        """Cut a file, or fill it up with zeros."""
+        """Shorten a file, or extend it with zeros."""
         ...
 
 
 def exists(store: FileStore, path: VehiclePath) -> bool:
-    """Whether there is something at a path."""
+    """Whether there is an entry at a path."""
     try:
         store.entry(path)
     except OSError:
@@ -108,10 +108,10 @@ def exists(store: FileStore, path: VehiclePath) -> bool:
 
 
 def make_directories(store: FileStore, path: VehiclePath) -> None:
-    """Make a directory and those it lies in, as far as they are missing.
+    """Make a directory and its missing parents.
 
     Raises:
-        OSError: there is a file in the way, or no room.
+        OSError: a file has the same path, or the store is full.
     """
     for depth in range(1, len(path) + 1):
         if not exists(store, path[:depth]):
@@ -119,7 +119,7 @@ def make_directories(store: FileStore, path: VehiclePath) -> None:
 
 
 def read_whole(store: FileStore, path: VehiclePath) -> bytes:
-    """All of a file.
+    """The whole content of a file.
 
     Raises:
         OSError: it can't be read.
@@ -132,10 +132,10 @@ def read_whole(store: FileStore, path: VehiclePath) -> bytes:
 
 
 def replace_whole(store: FileStore, path: VehiclePath, data: bytes) -> None:
-    """Write a file so that, whatever ends the process, it is either the old or the new one.
+    """Write a file so that it is either the old or the new one, even if the process is killed.
 
     Raises:
-        OSError: no room; the old file is as it was.
+        OSError: the store is full; the old file is unchanged.
     """
     beside = (*path[:-1], path[-1] + "~")
     file = store.open(beside, Mode.REPLACE)

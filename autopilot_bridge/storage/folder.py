@@ -1,8 +1,8 @@
-"""A store in a folder of the computer, which nobody gets out of.
+"""A store in a folder of the computer; clients can't access files outside the folder.
 
 Every name of a path is opened relative to the directory before it, without following links (`openat` with
-O_NOFOLLOW), so a symbolic link that somebody puts there, at whatever moment, leads nowhere. Only plain files
-and directories exist for a client; devices, pipes and links are not shown and can't be opened.
+O_NOFOLLOW), so a symbolic link in the folder, whenever it was made, gives no access. Only plain files
+and directories exist for a client; devices, pipes and links are not listed and can't be opened.
 """
 
 import contextlib
@@ -32,8 +32,8 @@ class FolderStore:
     """Files in a folder; see `FileStore`.
 
     Args:
-        folder: made if it is missing.
-        quota: how much it may hold, what lies there already included.
+        folder: created if it is missing.
+        quota: its largest content, existing files included.
 
     Raises:
         OSError: the folder can't be made or read, or another process uses it.
@@ -56,7 +56,7 @@ class FolderStore:
                 self.usage.size_bytes += status.st_size if stat.S_ISREG(status.st_mode) else 0
 
     def close(self) -> None:
-        """Give the folder back; a second time does nothing."""
+        """Release the folder; a second call does nothing."""
         if self._root >= 0:
             os.close(self._root)
             self._root = -1
@@ -133,7 +133,7 @@ class FolderStore:
 
     @contextlib.contextmanager
     def _directory(self, path: VehiclePath) -> Iterator[int]:
-        """A descriptor of a directory, reached name by name."""
+        """A descriptor of a directory, opened name by name."""
         descriptor = os.open(".", _DIRECTORY, dir_fd=self._root)
         try:
             for name in path:
@@ -146,7 +146,7 @@ class FolderStore:
 
     @contextlib.contextmanager
     def _parent(self, path: VehiclePath) -> Iterator[int]:
-        """A descriptor of the directory that a path lies in."""
+        """A descriptor of the directory that contains a path."""
         if not path:
             raise error(errno.EACCES)
         check_names(path)
@@ -186,12 +186,12 @@ class _FolderFile:
             while written < len(data):
                 written += os.pwrite(self._descriptor, data[written:], offset + written)
         except OSError:
-            os.ftruncate(self._descriptor, before)  # the disk is full: nothing, not half of it
+            os.ftruncate(self._descriptor, before)  # the disk is full: write nothing, not a part
             raise
         self._store.usage.size_bytes += max(0, end - before)
 
     def resize(self, size: int) -> None:
-        """Cut, or fill up with zeros."""
+        """Shorten, or extend with zeros."""
         before = self.size
         self._store.usage.check_growth(size - before)
         os.ftruncate(self._descriptor, size)
@@ -204,7 +204,7 @@ class _FolderFile:
 
 
 def _open(name: str, flags: int, parent: int) -> int:
-    """`openat`; a link in the way (ELOOP, or ENOTDIR for a directory) is nothing that exists."""
+    """`openat`; a link in the path (ELOOP, or ENOTDIR for a directory) counts as not existing."""
     try:
         return os.open(name, flags, 0o644, dir_fd=parent)
     except OSError as failure:
@@ -222,7 +222,7 @@ def _there(parent: int, name: str) -> bool:
 
 
 def _listed(item: os.DirEntry[str]) -> Entry | None:
-    """What a listing says of a name; None for what clients can't open."""
+    """The entry of a listing; None for entries that clients can't open."""
     try:
         item.name.encode("utf-8")
         return _entry(item.name, item.stat(follow_symlinks=False))

@@ -1,4 +1,4 @@
-"""Files that are made when they are opened: what the vehicle knows, in the shape of a file."""
+"""Files that are generated when they are opened, from the vehicle's data."""
 
 import errno
 from collections.abc import Callable, Mapping
@@ -8,9 +8,9 @@ from autopilot_bridge.storage.files import Entry, HeldBytes, Mode, OpenFile
 from autopilot_bridge.storage.paths import VehiclePath, error
 
 Content = Callable[[Mapping[str, str]], bytes]
-"""Makes a file's bytes; the argument holds what stands behind `?` in its name, ArduPilot's query."""
+"""Makes a file's bytes; the argument holds the query after `?` in its name (ArduPilot)."""
 Upload = Callable[[bytes], None]
-"""Takes a file that a client has written, when it is closed; ValueError refuses it."""
+"""Processes a file that a client has written, when it is closed; ValueError refuses it."""
 
 MAX_UPLOAD_BYTES: Final = 256 * 1024
 
@@ -78,7 +78,7 @@ class GeneratedStore:
 
 
 class _Snapshot(HeldBytes):
-    """The bytes of a generated file as they were when it was opened."""
+    """The bytes of a generated file at the time when it was opened."""
 
     __slots__ = ()
 
@@ -86,11 +86,11 @@ class _Snapshot(HeldBytes):
         raise error(errno.EBADF)
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""
 
 
 class _Upload(HeldBytes):
-    """A file being written, taken as a whole when it is closed."""
+    """A file being written, processed as a whole when it is closed."""
 
     __slots__ = ("_take",)
 

@@ -1,4 +1,4 @@
-"""A store in memory: empty at every start, gone at the end, equal for equal runs."""
+"""A store in memory: empty at every start, lost at the end, equal for equal runs."""
 
 import errno
 
@@ -13,7 +13,7 @@ class MemoryStore:
     """Files in memory; see `FileStore`.
 
     Args:
-        quota: how much it may hold.
+        quota: its largest content.
     """
 
     def __init__(self, quota: Quota = MEMORY_QUOTA) -> None:
@@ -93,7 +93,7 @@ class MemoryStore:
         self.resize(node, size)
 
     def resize(self, data: bytearray, size: int) -> None:
-        """Cut or fill up a file's bytes, on the account."""
+        """Shorten or extend a file's bytes, within the quota."""
         growth = size - len(data)
         self.usage.check_growth(growth)
         if growth > 0:
@@ -123,7 +123,7 @@ class MemoryStore:
         return node
 
     def _place(self, path: VehiclePath) -> tuple[_Directory, str]:
-        """The directory that a path lies in, and its name there."""
+        """The directory that contains a path, and its name there."""
         if not path:
             raise error(errno.EACCES)
         check_names(path)
@@ -131,7 +131,7 @@ class MemoryStore:
 
 
 class _MemoryFile(HeldBytes):
-    """An open file of a `MemoryStore`; removed meanwhile, it can still be read, as on a disk."""
+    """An open file of a `MemoryStore`; after its removal it can still be read, as on a disk."""
 
     __slots__ = ("_store", "_writable")
 
@@ -151,7 +151,7 @@ class _MemoryFile(HeldBytes):
         self._data[offset:end] = data
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""
 
 
 def _entry(name: str, node: "bytearray | _Directory") -> Entry:

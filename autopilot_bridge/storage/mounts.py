@@ -1,4 +1,4 @@
-"""One tree of several stores, each at its place, as the firmware shows its file systems."""
+"""One tree of several stores, each at its path, as the firmware shows its file systems."""
 
 import errno
 from collections.abc import Mapping
@@ -8,10 +8,10 @@ from autopilot_bridge.storage.paths import VehiclePath, error
 
 
 class MountTable:
-    """Stores at places; directories between the root and a place can only be looked at.
+    """Stores at paths; directories between the root and a store are read-only.
 
     Args:
-        places: where the stores are.
+        places: the stores, by path.
     """
 
     def __init__(self, places: Mapping[VehiclePath, FileStore]) -> None:
@@ -65,7 +65,7 @@ class MountTable:
         store.truncate(inside, size)
 
     def _find(self, path: VehiclePath) -> tuple[FileStore, VehiclePath] | None:
-        """The store that a path is in, and the path there; None for a directory above the stores."""
+        """The store that contains a path, and the path within it; None for a directory above the stores."""
         for place, store in self._places.items():
             if path[: len(place)] == place:
                 return store, path[len(place) :]
@@ -74,7 +74,7 @@ class MountTable:
         raise error(errno.ENOENT, path)
 
     def _store(self, path: VehiclePath) -> tuple[FileStore, VehiclePath]:
-        """The store that a path is in; EACCES for the directories above the stores."""
+        """The store that contains a path; EACCES for the directories above the stores."""
         found = self._find(path)
         if found is None:
             raise error(errno.EACCES, path)

@@ -1,7 +1,7 @@
-"""Paths as clients write them, taken apart into names that mean one thing only.
+"""Paths in requests of clients, split into unambiguous names.
 
-A path is bytes from a link: whatever it holds, what comes out has no `..`, no empty name, no control
-character and no byte that is not UTF-8, or `OSError` is raised. Nothing is looked up here.
+A path is untrusted bytes from a link: the result has no `..`, no empty name, no control
+character and no byte that is not UTF-8, or `OSError` is raised. No file is accessed here.
 """
 
 import errno
@@ -9,15 +9,15 @@ import os
 from typing import Final
 
 VehiclePath = tuple[str, ...]
-"""Names from the root down; the root is empty."""
+"""Names from the root on; the root is empty."""
 
 MAX_NAME_BYTES: Final = 127
 MAX_DEPTH: Final = 16
-_FORBIDDEN: Final = frozenset('\\:*?"<>|')  # as on the FAT of a real card; one of them parts names on Windows
+_FORBIDDEN: Final = frozenset('\\:*?"<>|')  # as on the FAT of a real card; one separates names on Windows
 
 
 def error(number: int, path: VehiclePath = ()) -> OSError:
-    """An `OSError` of the system's own kind for this errno (FileNotFoundError and so on)."""
+    """An `OSError` of the system's own class for this errno (FileNotFoundError and so on)."""
     return OSError(number, os.strerror(number), "/" + "/".join(path))
 
 
@@ -43,7 +43,7 @@ def parse_path(data: bytes) -> VehiclePath:
 
 
 def check_names(path: VehiclePath) -> VehiclePath:
-    """`path`, if a memory card could hold it: no characters that FAT forbids.
+    """`path`, if a memory card can store it: no characters that FAT forbids.
 
     Raises:
         OSError: EINVAL for such a character.

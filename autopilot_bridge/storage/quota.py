@@ -1,4 +1,4 @@
-"""How much a store may hold, and how much it holds."""
+"""The capacity of a store, and its present use."""
 
 import errno
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ FOLDER_QUOTA: Final = Quota(size_bytes=8 * 1024**3, files=20_000)
 
 
 class Usage:
-    """Counts what a store holds against its quota.
+    """Counts the content of a store against its quota.
 
     Attributes:
         size_bytes, files: in use.
@@ -45,11 +45,11 @@ class Usage:
         self.files = 0
 
     def check_file(self) -> None:
-        """ENOSPC when there is no room for one more file."""
+        """ENOSPC when there is no space for another file."""
         if self.files >= self._quota.files:
             raise error(errno.ENOSPC)
 
     def check_growth(self, size_bytes: int) -> None:
-        """ENOSPC when there is no room for so many bytes more."""
+        """ENOSPC when there is no space for so many additional bytes."""
         if size_bytes > 0 and self.size_bytes + size_bytes > self._quota.size_bytes:
             raise error(errno.ENOSPC)

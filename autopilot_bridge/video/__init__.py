@@ -1,7 +1,7 @@
-"""What cameras of a SITL see, for other people's eyes: RTSP streams, photos and recordings.
+"""The pictures of the cameras of a SITL for users: RTSP streams, photos and recordings.
 
-Pictures are made in a process of their own, and only while somebody watches or something is to be kept. The
-vehicles' process answers questions about where a camera is, and waits for nothing.
+Pictures are made in a separate process, and only while a player is connected or a file is to be written. The
+vehicles' process answers requests for a camera's view, and never waits.
 """
 
 from autopilot_bridge.video.service import CameraOnShow, VideoParameters, VideoService

@@ -1,6 +1,6 @@
 """`python -m autopilot_bridge.video CONTROL LISTEN`: the picture process, on sockets that it inherits.
 
-It ends when the process that started it does, however that ends.
+It ends when the process that started it ends, for whatever reason.
 """
 
 import asyncio
@@ -27,14 +27,14 @@ async def _main(control: int, listen: int) -> None:
     warming = asyncio.get_running_loop().create_task(studio.warm_up())
     await studio.serve()
     warming.cancel()
-    with contextlib.suppress(ConnectionError):  # the vehicles' process is gone
+    with contextlib.suppress(ConnectionError):  # the vehicles' process has ended
         await writer.drain()
     if server is not None:
         server.close()
 
 
 if __name__ == "__main__":
-    for ending in (signal.SIGINT, signal.SIGHUP):  # a terminal's: for the vehicles, whose end is ours
+    for ending in (signal.SIGINT, signal.SIGHUP):  # sent by a terminal; the vehicles' process handles them
         signal.signal(ending, signal.SIG_IGN)
     os.nice(5)
     cv2.setNumThreads(1)

@@ -1,4 +1,4 @@
-"""Pictures to H.264, by FFmpeg (PyAV): as RTP packets for streams, as MP4 for recordings."""
+"""Encoding of pictures to H.264 with FFmpeg (PyAV): as RTP packets for streams, as MP4 for recordings."""
 
 from collections.abc import Callable
 from fractions import Fraction
@@ -21,12 +21,12 @@ _OPTIONS: Final = {"preset": "ultrafast", "tune": "zerolatency", "crf": "22", "f
 
 
 class RtpEncoder:
-    """A running stream of RTP packets (RFC 6184), and RTCP sender reports between them.
+    """An RTP packet stream in progress (RFC 6184), with RTCP sender reports between the packets.
 
     Args:
         width_px, height_px: of the pictures; even numbers.
-        rate_hz: about how many there will be in a second.
-        send: takes (packet, whether it is RTCP).
+        rate_hz: approximate number of pictures per second.
+        send: called with (packet, whether it is RTCP).
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class RtpEncoder:
     ) -> None:
         self._send = send
         self._container: Any = av.open(
-            self,  # it asks for no more than `write`
+            self,  # FFmpeg needs only `write`
             "w",
             format="rtp",
             container_options={"packetsize": str(_PACKET_BYTES)},
@@ -43,14 +43,14 @@ class RtpEncoder:
         self._stream = _video_stream(self._container, width_px, height_px, rate_hz, _TICK)
 
     def write(self, packet: bytes) -> int:
-        """Taken by FFmpeg for a file: one call for each packet."""
+        """Called by FFmpeg, which uses this object as a file: one call for each packet."""
         data = bytes(packet)
-        # payload types 72..76 can't be told from RTCP (RFC 5761, section 4), and ours is 96
+        # payload types 72..76 are ambiguous with RTCP (RFC 5761, section 4); ours is 96
         self._send(data, 64 <= data[1] & 0x7F <= 95)
         return len(data)
 
     def encode(self, picture: Picture, *, ticks: int, key: bool) -> None:
-        """Send one picture; `ticks` of 90 kHz rise. A key picture is where a decoder can begin."""
+        """Send one picture; `ticks` of 90 kHz increase. A decoder can begin at a key picture."""
         for packet in self._stream.encode(_frame(picture, ticks, _TICK, key)):
             self._container.mux(packet)
 
@@ -60,13 +60,14 @@ class RtpEncoder:
 
 
 class Recording:
-    """An MP4 file that is readable up to its last fragment, however the process or the disk's room ends.
+    """An MP4 file that is readable up to its last fragment, even if the process is killed or the disk is
+    full.
 
     Attributes:
         path: the file.
 
     Raises:
-        OSError: the file can't be made, or exists.
+        OSError: the file can't be created, or exists.
     """
 
     def __init__(self, path: Path, *, width_px: int, height_px: int, rate_hz: float) -> None:
@@ -80,7 +81,7 @@ class Recording:
         self._start_us: int | None = None
 
     def write(self, picture: Picture, *, time_us: int) -> None:
-        """Add a picture of a vehicle time; times rise.
+        """Add a picture of a vehicle time; times increase.
 
         Raises:
             OSError: the file can't be written.
@@ -91,7 +92,7 @@ class Recording:
             self._container.mux(packet)
 
     def close(self) -> None:
-        """Finish the file, and let go of it in any case.
+        """Finish the file, and close it in any case.
 
         Raises:
             OSError: its end can't be written.

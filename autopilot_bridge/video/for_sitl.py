@@ -1,4 +1,6 @@
-"""Shows what the cameras of a SITL see: each camera component gets its stream, and a place for photos."""
+"""Serves the pictures of the cameras of a SITL: each camera component gets a stream and a folder for
+photos.
+"""
 
 import math
 from collections.abc import Callable
@@ -11,26 +13,26 @@ from flightsim.airframe import AirframeKind
 from flightsim.picture import Scenery
 
 _RUNWAY_M: Final = 600.0
-_BITS_PER_PIXEL: Final = 0.35  # of a moving landscape at our quality, about
+_BITS_PER_PIXEL: Final = 0.35  # approximate value for a moving landscape at our quality
 
 
 class CameraFolder:
-    """A camera component's way to files."""
+    """Makes the files of a camera component."""
 
     def __init__(self, service: VideoService, index: int) -> None:
         self._service = service
         self._index = index
 
     def photo(self, time_us: int, notes: dict[str, float]) -> str:
-        """Keep a photo; its name within the folder."""
+        """Store a photo; returns its name within the folder."""
         return self._service.photo(self._index, time_us, notes)
 
     def start_video(self, time_us: int) -> None:
-        """Begin to keep a video."""
+        """Begin to store a video."""
         self._service.start_recording(self._index, time_us)
 
     def stop_video(self, time_us: int) -> None:
-        """Finish it."""
+        """End the video."""
         self._service.stop_recording(self._index)
 
 
@@ -39,15 +41,15 @@ def show_cameras(
 ) -> VideoService | None:
     """Serve the pictures of all cameras of a world; None: there is no camera.
 
-    Cameras are called "camera" and the vehicle's system id. Aircraft have a runway of 600 m through home.
+    Cameras are named "camera" and the vehicle's system id. Aircraft have a runway of 600 m through home.
 
     Args:
         sitl: the world.
-        parameters: how its pictures are offered.
-        on_loss: told what could not be kept, and why.
+        parameters: how its pictures are served.
+        on_loss: called with what could not be stored, and why.
 
     Raises:
-        VideoError: the port is busy, or the folder holds something already.
+        VideoError: the port is busy, or the folder is not empty.
     """
     components = [
         (vehicle.specification.system_id, vehicle.payload.camera)

@@ -1,4 +1,4 @@
-"""What the vehicles' process and the picture process say to each other: one JSON object a line."""
+"""The messages between the vehicles' process and the picture process: one JSON object per line."""
 
 import json
 from dataclasses import asdict, dataclass, field
@@ -12,7 +12,7 @@ MAX_LINE = 1 << 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraSetup:
-    """One camera, as the picture process knows it.
+    """One camera, as described to the picture process.
 
     Attributes:
         name: last part of its address.
@@ -27,7 +27,7 @@ class CameraSetup:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudioSetup:
-    """All that the picture process has to know at its start.
+    """The start data of the picture process.
 
     Attributes:
         cameras: all.
@@ -43,7 +43,7 @@ class StudioSetup:
 
 
 def stream_size_px(model: PinholeModel, width_px: int) -> tuple[int, int]:
-    """Width and height of a stream that is to be so wide: even numbers, no more than the camera's own."""
+    """Width and height of a stream of a requested width: even numbers, at most the camera's own."""
     width_px = min(width_px, model.width_px)
     return width_px & ~1, max(2, round(model.height_px * width_px / model.width_px) & ~1)
 
@@ -54,10 +54,10 @@ def pack(message: dict[str, Any]) -> bytes:
 
 
 def unpack(line: bytes) -> dict[str, Any]:
-    """The object of a line; both ends are ours.
+    """The object in a line; both ends are ours.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the line is no JSON object.
     """
     message = json.loads(line)
     if not isinstance(message, dict):

@@ -1,4 +1,4 @@
-"""Photos as files: JPEG with what the camera knew of its place, as Exif 2.32 has it."""
+"""Photos as JPEG files, with the camera's position and settings in Exif 2.32."""
 
 import math
 from datetime import UTC, datetime
@@ -18,12 +18,12 @@ def save_photo(path: Path, picture: NDArray[np.uint8], notes: dict[str, Any]) ->
     Args:
         path: a new file.
         picture: the picture.
-        notes: what is known of: "lat_deg", "lon_deg", "alt_m" (above mean sea level), "yaw_deg" (of the
-            optical axis from true north), "unix_us", "focal_mm", "focal_35_mm"; and the "quality" to
-            save it with, 1 to 100.
+        notes: known values among "lat_deg", "lon_deg", "alt_m" (above mean sea level), "yaw_deg" (of the
+            optical axis from true north), "unix_us", "focal_mm", "focal_35_mm"; and the JPEG "quality",
+            1 to 100.
 
     Raises:
-        OSError: the file exists, or can't be written; nothing is left of it then.
+        OSError: the file exists, or can't be written; then no partial file is left.
     """
     encoded = BytesIO()
     Image.fromarray(picture[:, :, ::-1]).save(

@@ -1,4 +1,4 @@
-"""RTSP 1.0 on the wire (RFC 2326): requests in, responses out, media between them. Sans-IO."""
+"""RTSP 1.0 on the wire (RFC 2326): requests in, responses out, interleaved media. No I/O."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _REASONS: Final[Mapping[int, str]] = {
 
 
 class RtspError(ValueError):
-    """What came in is no RTSP; the connection is of no more use."""
+    """The received data are no RTSP; the connection can't be used any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Request:
 
 
 class RequestReader:
-    """Takes bytes in any pieces; gives whole requests. Media that players send (RTCP) is passed over."""
+    """Accepts bytes in any pieces; returns whole requests. Media data from players (RTCP) are skipped."""
 
     def __init__(self) -> None:
         self._buffer = b""
@@ -48,7 +48,7 @@ class RequestReader:
         """The requests that are complete now.
 
         Raises:
-            RtspError: it is no RTSP, or too long.
+            RtspError: the data are no RTSP, or too long.
         """
         self._buffer += data
         found = []
@@ -60,7 +60,7 @@ class RequestReader:
         return found
 
     def _take(self) -> tuple[Request | None, int] | None:
-        """The first thing in the buffer and its length; None: not complete."""
+        """The first element in the buffer and its length; None: not complete."""
         buffer = self._buffer
         if buffer[:1] == b"$":  # interleaved media (RFC 2326, section 10.12)
             length = 4 + int.from_bytes(buffer[2:4], "big")
@@ -104,7 +104,7 @@ def response(
 
 @dataclass(frozen=True, slots=True)
 class Transport:
-    """How a player wants its packets: in the connection (channels), or by UDP (its ports)."""
+    """The transport that a player requests: within the connection (channels), or by UDP (its ports)."""
 
     interleaved: bool
     first: int
@@ -112,14 +112,14 @@ class Transport:
 
     @property
     def header(self) -> str:
-        """As the response says it; UDP without the server's ports."""
+        """The header of the response; for UDP without the server's ports."""
         if self.interleaved:
             return f"RTP/AVP/TCP;unicast;interleaved={self.first}-{self.second}"
         return f"RTP/AVP;unicast;client_port={self.first}-{self.second}"
 
 
 def parse_transport(header: str) -> Transport | None:
-    """The first of a player's proposals that can be met; None: there is none (RFC 2326, section 12.39)."""
+    """The first supported proposal of a player; None: there is none (RFC 2326, section 12.39)."""
     for proposal in header.split(","):
         profile, *options = (part.strip() for part in proposal.split(";"))
         values = dict(option.partition("=")[::2] for option in options)

@@ -1,4 +1,4 @@
-"""RTSP server: hands the packets of camera streams to players, over UDP or within their connection."""
+"""RTSP server: sends the packets of camera streams to players, over UDP or within their connection."""
 
 import asyncio
 import secrets
@@ -19,18 +19,18 @@ from autopilot_bridge.video.rtsp import (
 from autopilot_bridge.video.studio import CameraStream
 
 MAX_PLAYERS: Final = 32
-_FULL_BYTES: Final = 512 * 1024  # of a connection's queue: from here on packets are left out
+_FULL_BYTES: Final = 512 * 1024  # of a connection's queue: above this size packets are dropped
 _METHODS: Final = "OPTIONS, DESCRIBE, SETUP, PLAY, PAUSE, TEARDOWN, GET_PARAMETER, SET_PARAMETER"
-_TIMEOUT_S: Final = 60  # as players are told, who ask for something or send RTCP twice in it
+_TIMEOUT_S: Final = 60  # sent to players, which send a request or RTCP twice within this time
 _LOOK_S: Final = 10.0
-_SILENT_LOOKS: Final = 9  # in a row: a player that is heard on no way is gone
+_SILENT_LOOKS: Final = 9  # in a row: a player that sends nothing on any channel is gone
 
 
 class RtspServer:
-    """Serves each stream at its name.
+    """Serves each stream under its name.
 
     Args:
-        streams: what there is to watch.
+        streams: all streams.
     """
 
     def __init__(self, streams: list[CameraStream]) -> None:
@@ -38,7 +38,7 @@ class RtspServer:
         self._players = 0
 
     async def accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """One connection, from its beginning to its end."""
+        """Serve one connection, from its beginning to its end."""
         full = self._players >= MAX_PLAYERS
         player = RtspPlayer(self._streams, writer)
         self._players += not full
@@ -53,7 +53,7 @@ class RtspServer:
                 if full:
                     break
         except (RtspError, OSError, TimeoutError, asyncio.CancelledError):
-            pass  # cancelled: the process ends, and the connection with it
+            pass  # cancelled: the process ends, and the connection ends with it
         finally:
             self._players -= not full
             player.close()
@@ -63,12 +63,13 @@ class RtspServer:
 
 
 async def _said(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
-    """What a player says next on its connection; nothing: it has ended it.
+    """The next data of a player on its connection; empty when the player has closed it.
 
-    Looks are counted, not seconds: when this process was stopped for a while, what was said meanwhile counts.
+    Timeouts are counted, not measured as a total time: after a pause of this process, data received meanwhile
+    count.
 
     Raises:
-        TimeoutError: it is gone.
+        TimeoutError: the player is gone.
     """
     silent = 0
     while player.held_by_connection or silent < _SILENT_LOOKS:
@@ -77,14 +78,14 @@ async def _said(reader: asyncio.StreamReader, player: "RtspPlayer") -> bytes:
             async with asyncio.timeout(_LOOK_S) as look:
                 return await reader.read(65536)
         except TimeoutError:
-            if not look.expired():  # the operating system has given it up
+            if not look.expired():  # a timeout of the operating system
                 raise
         silent = 0 if player.heard else silent + 1
     raise TimeoutError
 
 
 class _Ear(asyncio.DatagramProtocol):
-    """Hears a player's RTCP; the reports' contents are not used."""
+    """Receives a player's RTCP; the contents of the reports are not used."""
 
     def __init__(self, player: "RtspPlayer") -> None:
         self._player = player
@@ -97,9 +98,9 @@ class RtspPlayer:
     """One connection's session.
 
     Attributes:
-        playing: it is sent packets.
+        playing: packets are sent to it.
         lost: see `studio.Player`.
-        heard: set when something comes from it by UDP.
+        heard: set when data of it are received by UDP.
     """
 
     def __init__(self, streams: Mapping[str, CameraStream], writer: asyncio.StreamWriter) -> None:
@@ -115,11 +116,11 @@ class RtspPlayer:
 
     @property
     def held_by_connection(self) -> bool:
-        """Its packets go into the connection, which breaks when nobody takes them."""
+        """Its packets are sent within the connection, which breaks when the player does not read them."""
         return self.playing and self._transport is not None and self._transport.interleaved
 
     async def answer(self, request: Request) -> bytes:
-        """Do what is asked, and say so."""
+        """Execute a request; returns the response."""
         match request.method:
             case "OPTIONS":
                 return response(200, request, {"Public": _METHODS})
@@ -134,7 +135,7 @@ class RtspPlayer:
         return response(405, request, {"Allow": _METHODS})
 
     def send(self, packet: bytes, *, control: bool, key: bool) -> None:
-        """Hand a packet to the network; too slow a player misses some, until the next key picture."""
+        """Send a packet; a player that reads too slowly misses packets until the next key picture."""
         transport = self._transport
         if transport is None or not self.playing:
             return
@@ -154,7 +155,7 @@ class RtspPlayer:
         self._writer.write(b"$" + bytes((channel,)) + len(packet).to_bytes(2, "big") + packet)
 
     def close(self) -> None:
-        """Stop watching."""
+        """End the session."""
         self.playing = False
         if self._stream is not None:
             self._stream.remove(self)
@@ -215,6 +216,6 @@ class RtspPlayer:
         return {"Session": self._session} if self._session else {}
 
     def _address(self, own: int) -> str:
-        """Of the player's end of the connection, or of ours."""
+        """Address of the player's end of the connection, or of ours."""
         name: Any = self._writer.get_extra_info("sockname" if own else "peername")
         return str(name[0])

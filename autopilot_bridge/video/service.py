@@ -1,4 +1,4 @@
-"""The vehicles' side of pictures: listens, starts the picture process, tells it what is seen."""
+"""Pictures, in the vehicles' process: listens, starts the picture process, sends it the cameras' views."""
 
 import os
 import select
@@ -26,24 +26,24 @@ from flightsim.picture import Scenery
 DEFAULT_PORT: Final = 8554
 _PORTS_TRIED: Final = 50
 _BACKLOG: Final = 16
-_QUEUE_BYTES: Final = 4 << 20  # photos that the picture process has not taken yet
-_END_S: Final = 30.0  # to write what was told to be written, since the last word
+_QUEUE_BYTES: Final = 4 << 20  # photos that the picture process has not read yet
+_END_S: Final = 30.0  # time to write the pending files, since the last message
 _ENDED: Final = "the picture process has ended before photos or videos were written, which are lost"
 
 
 class VideoError(BridgeError):
-    """Pictures can't be offered as asked for."""
+    """Pictures can't be served as requested."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VideoParameters:
-    """How pictures are offered.
+    """How pictures are served.
 
     Attributes:
-        host: where players connect.
+        host: address that players connect to.
         port: for RTSP; 0: any; None: no streams.
-        any_port: when `port` is busy, the next free one will do.
-        folder: for photos and recordings; None: they are not kept. It is new or empty.
+        any_port: when `port` is busy, the next free one is used.
+        folder: for photos and recordings; None: they are not stored. It is new or empty.
         width_px: of streams and recordings.
         rate_hz: pictures per second of streams (wall clock) and recordings (vehicle time).
     """
@@ -67,10 +67,10 @@ class VideoParameters:
 
 
 class Watched(Protocol):
-    """A camera that pictures are made of (`flightsim.payload.Camera`)."""
+    """A camera whose pictures are made (`flightsim.payload.Camera`)."""
 
     def view(self, time_us: int) -> CameraView:
-        """What it sees now."""
+        """Its present view."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +82,7 @@ class CameraOnShow:
         camera: the device.
         model: its geometry.
         blur_px_m: of its lens.
-        streaming: whether its stream is running (VIDEO_STOP_STREAMING); asked for each picture.
+        streaming: returns whether its stream is running (VIDEO_STOP_STREAMING); called for each picture.
     """
 
     name: str
@@ -93,20 +93,20 @@ class CameraOnShow:
 
 
 class VideoService:
-    """Pictures of all cameras of a world. Call `poll` often; it costs next to nothing and never waits.
+    """Pictures of all cameras of a world. Call `poll` often; it takes little time and never waits.
 
     Args:
         cameras: all.
         scenery: of the world.
-        parameters: how their pictures are offered.
-        on_loss: told what could not be kept, and why, of photos and recordings. That comes later than the
-            camera has told its clients of a photo.
+        parameters: how their pictures are served.
+        on_loss: called with what could not be stored of photos and recordings, and why. This call comes after
+            the camera has reported a photo to its clients.
 
     Attributes:
         port: that players connect to; None: there are no streams.
 
     Raises:
-        VideoError: the port is busy, or the folder holds something already.
+        VideoError: the port is busy, or the folder is not empty.
     """
 
     def __init__(
@@ -139,20 +139,20 @@ class VideoService:
         self._photos_under_way = 0
         self._videos = [0] * len(self._cameras)
         self._next_frame_us: dict[int, int] = {}
-        self._untaken: set[int] = set()  # recordings with a picture under way
+        self._untaken: set[int] = set()  # recordings with a requested picture not yet received
         self._frame_us = round(1e6 / parameters.rate_hz)
 
-    # what others ask for
+    # interface to other parts
 
     def uri(self, index: int) -> str | None:
-        """Where a camera's stream is."""
+        """Address of a camera's stream."""
         if self.port is None:
             return None
         return f"rtsp://{self._parameters.host}:{self.port}/{self._cameras[index].name}"
 
     @property
     def uris(self) -> tuple[str, ...]:
-        """Where all streams are."""
+        """Addresses of all streams."""
         return tuple(uri for index in range(len(self._cameras)) if (uri := self.uri(index)) is not None)
 
     def size_px(self, index: int) -> tuple[int, int]:
@@ -165,7 +165,7 @@ class VideoService:
         return self._parameters.rate_hz
 
     def photo(self, index: int, time_us: int, notes: dict[str, Any]) -> str:
-        """Keep what a camera sees now; the file's name within the folder, "" when there is no folder."""
+        """Store the present view of a camera; returns the name within the folder, "" without a folder."""
         folder = self._parameters.folder
         if folder is None:
             return ""
@@ -180,7 +180,7 @@ class VideoService:
         return name
 
     def start_recording(self, index: int, time_us: int) -> None:
-        """Begin to keep a video, in a new file."""
+        """Begin to store a video, in a new file."""
         folder = self._parameters.folder
         if folder is None or index in self._next_frame_us:
             return
@@ -194,17 +194,17 @@ class VideoService:
         if self._next_frame_us.pop(index, None) is not None:
             self._tell("stop", index)
 
-    # the shell
+    # interface to the run loop
 
     def start(self) -> None:
-        """Start the picture process now: the first player would wait for its imports, and on a machine where
-        no picture was made before for the compiler.
+        """Start the picture process now: otherwise the first player would wait for its imports, and on a
+        machine without compiled kernels for the compiler.
         """
         if self._line is None:
             self._start()
 
     def poll(self, time_us: int) -> None:
-        """Answer the picture process, and start it when somebody wants to watch."""
+        """Answer the picture process, and start it when a player connects."""
         if self._line is None:
             if self._listener is not None and select.select((self._listener,), (), (), 0.0)[0]:
                 self._start()
@@ -212,7 +212,7 @@ class VideoService:
         for index, due_us in tuple(self._next_frame_us.items()):
             if time_us >= due_us:
                 self._next_frame_us[index] = max(due_us + self._frame_us, time_us)
-                if index not in self._untaken:  # else it is left out: the machine is too slow
+                if index not in self._untaken:  # else the picture is left out: the machine is too slow
                     self._untaken.add(index)
                     self._tell("frame", index, view=view_to_json(self._cameras[index].camera.view(time_us)))
         try:
@@ -231,7 +231,7 @@ class VideoService:
             self._flush()
 
     def close(self) -> None:
-        """End the picture process, where pictures are kept once it has written what it was told to write."""
+        """End the picture process; if files are stored, after it has written all pending ones."""
         if self._listener is not None:
             self._listener.close()
             self._listener = None
@@ -249,7 +249,7 @@ class VideoService:
         self._line = self._process = None
 
     def _heard_out(self, line: socket.socket, process: "subprocess.Popen[bytes]") -> bool:
-        """Let the picture process write what it was told to write; False: it did not get so far."""
+        """Wait until the picture process has written the pending files; False: it did not finish."""
         try:
             line.settimeout(_END_S)
             line.sendall(self._outgoing)
@@ -314,7 +314,7 @@ class VideoService:
             self._lost()
 
     def _lost(self) -> None:
-        """The picture process is gone; the next one who wants a picture starts another."""
+        """The picture process has ended; the next request for a picture starts another one."""
         if self._line is not None:
             self._line.close()
         if self._process is not None:

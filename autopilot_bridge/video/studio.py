@@ -1,4 +1,4 @@
-"""The picture process: renders what cameras see for players, photos and recordings."""
+"""The picture process: renders the cameras' views for players, photos and recordings."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -22,20 +22,20 @@ from autopilot_bridge.video.photo import save_photo
 from flightsim.payload import CameraView
 from flightsim.picture import Renderer
 
-_PAUSE_S: Final = 0.2  # between questions while a stream is stopped
+_PAUSE_S: Final = 0.2  # between requests while a stream is stopped
 
 Ask = Callable[[], Awaitable[CameraView | None]]
 
 
 class Player(Protocol):
-    """Somebody who watches a stream."""
+    """A client of a stream."""
 
     def send(self, packet: bytes, *, control: bool, key: bool) -> None:
-        """Take a packet (RTCP when `control`) of a picture; `key`: a decoder can begin with it."""
+        """Send a packet (RTCP when `control`) of a picture; `key`: a decoder can begin with it."""
 
     @property
     def lost(self) -> bool:
-        """It has missed packets, and needs a key picture to go on."""
+        """It has missed packets, and needs a key picture to continue."""
 
 
 class CameraStream:
@@ -61,14 +61,14 @@ class CameraStream:
         self._task: asyncio.Task[None] | None = None
 
     def add(self, player: Player) -> None:
-        """Somebody begins to watch."""
+        """Add a player."""
         self._players[player] = None
         self._newcomer = True
         if self._task is None or self._task.done():
             self._task = asyncio.get_running_loop().create_task(self._run())
 
     def remove(self, player: Player) -> None:
-        """Somebody stops watching; nobody left: so does the rendering."""
+        """Remove a player; rendering stops with the last one."""
         self._players.pop(player, None)
         if not self._players and self._task is not None:
             self._task.cancel()
@@ -95,7 +95,7 @@ class CameraStream:
                 self._newcomer = False
                 ticks = max(ticks + 1, round((loop.time() - start_s) * RTP_CLOCK_HZ))
                 encoder.encode(self.picture(view), ticks=ticks, key=self._key)
-                due_s = max(due_s + 1.0 / self.rate_hz, loop.time())  # a slow machine leaves pictures out
+                due_s = max(due_s + 1.0 / self.rate_hz, loop.time())  # a slow machine skips pictures
                 await asyncio.sleep(due_s - loop.time())
         finally:
             encoder.close()
@@ -106,11 +106,11 @@ class CameraStream:
 
 
 class Studio:
-    """All cameras, and the line to the vehicles' process.
+    """All cameras, and the connection to the vehicles' process.
 
     Args:
-        reader, writer: that line.
-        setup: what there is.
+        reader, writer: that connection.
+        setup: the start data.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class Studio:
         ]
 
     async def serve(self) -> None:
-        """Do what the vehicles' process says, until it is gone."""
+        """Execute the messages of the vehicles' process, until it ends."""
         try:
             while line := await self._reader.readline():
                 self._follow(unpack(line))
@@ -135,7 +135,9 @@ class Studio:
                 self._finish(stream)
 
     async def warm_up(self) -> None:
-        """Make a picture that nobody sees: kernels are loaded, or compiled, before the first player comes."""
+        """Render a picture that is not used: kernels are loaded, or compiled, before the first player
+        connects.
+        """
         view = await self._view(0)
         if view is not None:
             self.streams[0].picture(view)
@@ -180,7 +182,7 @@ class Studio:
             self._tell("video", path, error)
 
     def _film(self, stream: CameraStream, view: CameraView) -> None:
-        """Add to a recording, which ends where it can't be written."""
+        """Add to a recording, which ends when it can't be written."""
         recording = stream.recording
         if recording is None:
             return
@@ -189,7 +191,7 @@ class Studio:
         except OSError as error:
             self._tell("video", recording.path, error)
             stream.recording = None
-            with suppress(OSError):  # told already
+            with suppress(OSError):  # already reported
                 recording.close()
 
     def _finish(self, stream: CameraStream) -> None:
