@@ -1,4 +1,4 @@
-"""The bridge's errors. Bytes from a link or a log never raise; what a person or a program asks for may."""
+"""The bridge's errors. Bytes from a link or a log never raise; requests of a user or a program may."""
 
 
 class BridgeError(Exception):
@@ -10,8 +10,8 @@ class AddressError(BridgeError, ValueError):
 
 
 class LinkError(BridgeError, OSError):
-    """A link could not be opened (busy port, no such device); the message names the address and what to
-    do.
+    """A link could not be opened (busy port, no such device); the message contains the address and the
+    solution.
     """
 
 
@@ -20,11 +20,11 @@ class MessageError(BridgeError, ValueError):
 
 
 class ClockError(BridgeError, RuntimeError):
-    """A clock can't do what was asked of it (time limit of a virtual run reached, loop of the wrong kind)."""
+    """A clock can't execute a request (time limit of a virtual run reached, loop of the wrong kind)."""
 
 
 class TlogError(BridgeError, OSError):
-    """A telemetry log could not be created or read; the message names the path and what to do."""
+    """A telemetry log could not be created or read; the message contains the path and the solution."""
 
 
 class SigningKeyError(BridgeError, ValueError):

@@ -1,4 +1,4 @@
-"""The polygons and circles of a geofence plan, and whether places lie inside.
+"""The polygons and circles of a geofence plan, and whether positions are inside.
 
 Plan items as in the MAVLink mission protocol (MAV_MISSION_TYPE_FENCE): vertices of one polygon follow each
 other and carry their number in param1; circles carry the radius in param1.
@@ -31,7 +31,7 @@ class FencePolygon:
     inclusion: bool
 
     def allows(self, point: Point) -> bool:
-        """A point is where this shape wants it."""
+        """The shape allows a point."""
         return inside_polygon(point, self.vertices) == self.inclusion
 
 
@@ -44,7 +44,7 @@ class FenceCircle:
     inclusion: bool
 
     def allows(self, point: Point) -> bool:
-        """A point is where this shape wants it."""
+        """The shape allows a point."""
         return (math.dist(point, self.centre) < self.radius_m) == self.inclusion
 
 
@@ -52,7 +52,7 @@ FenceShape = FencePolygon | FenceCircle
 
 
 def fence_shapes(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[FenceShape, ...]:
-    """The shapes that fence items describe; what makes no sense is left out, shape by shape."""
+    """The shapes that fence items describe; invalid shapes are left out one by one."""
     shapes: list[FenceShape] = []
     pending: list[MissionItem] = []
     for item in items:
@@ -73,18 +73,18 @@ def fence_shapes(items: Iterable[MissionItem], frame: LocalFrame) -> tuple[Fence
 
 
 def fence_point(item: MissionItem, frame: LocalFrame) -> Point:
-    """Where a fence item is."""
+    """Position of a fence item."""
     north_m, east_m, _ = frame.ned_from_geodetic(item.x, item.y, frame.origin.alt_m)
     return north_m, east_m
 
 
 def outside_shapes(shapes: tuple[FenceShape, ...], point: Point, *, join: bool) -> bool:
-    """Whether a point is where the shapes don't want it.
+    """Whether the shapes forbid a point.
 
-    Every exclusion shape must be kept out of.
+    A point must be outside every exclusion shape.
 
     Args:
-        join: of several inclusion shapes one is enough (PX4); else all must be kept (ArduPilot).
+        join: being inside one inclusion shape is enough (PX4); else inside all (ArduPilot).
     """
     if not shapes:
         return False

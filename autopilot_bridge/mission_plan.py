@@ -1,4 +1,4 @@
-"""A mission as data: uploaded, stored, flown and written to files. Knows no protocol and no vehicle."""
+"""A mission as data: uploaded, stored, flown and written to files. Independent of protocol and vehicle."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -22,7 +22,7 @@ class MissionItem:
             MAV_FRAME_MISSION (2): plain numbers).
         param1..param4: as the command defines; NaN means "not set".
         x, y, z: as the frame defines.
-        autocontinue: go on to the next item when this one is done.
+        autocontinue: continue with the next item when this one is finished.
     """
 
     command: int

@@ -1,4 +1,4 @@
-"""Mission items as messages and back: MISSION_ITEM_INT and MISSION_ITEM, and what their frames mean.
+"""Conversion between mission items and messages: MISSION_ITEM_INT and MISSION_ITEM, and their frames.
 
 Source: MAVLink mission protocol, https://mavlink.io/en/services/mission.html.
 """
@@ -67,10 +67,10 @@ def item_message(
     """MISSION_ITEM_INT (degrees in 1e-7, local metres in 1e-4), or MISSION_ITEM, for one item.
 
     Args:
-        target: system and component it is for.
-        current: it is the one to be flown.
+        target: system and component of the receiver.
+        current: it is the item to be flown.
         as_int: MISSION_ITEM_INT.
-        unset: x and y that are not set (NaN), of MISSION_ITEM_INT.
+        unset: value in MISSION_ITEM_INT of an x or y that is not set (NaN).
     """
     x: float = item.x
     y: float = item.y

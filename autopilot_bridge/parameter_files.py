@@ -54,7 +54,7 @@ def read_untyped_parameter_file(path: Path) -> dict[str, float]:
     """The values in a parameter file; see `parse_untyped_parameters`.
 
     Raises:
-        ParameterError: the file can't be read, or what it says is not acceptable.
+        ParameterError: the file can't be read, or its content is not acceptable.
     """
     return parse_untyped_parameters(_read(path), source=f"parameter file {path}")
 
@@ -97,7 +97,7 @@ def _read(path: Path) -> str:
 
 
 def _entries(text: str, source: str) -> Iterator[tuple[str, str, str]]:
-    """Where it stands, name and value of each line that has one."""
+    """Location, name and value of each line that has one."""
     lines: dict[str, int] = {}
     for number, line in enumerate(text.splitlines(), start=1):
         where = f"{source}, line {number}"

@@ -1,4 +1,6 @@
-"""Parameters of an autopilot: definitions and the store of their values. Knows no protocol and no flavour."""
+"""Parameters of an autopilot: definitions and the store of their values. Independent of protocol and
+flavour.
+"""
 
 import math
 import struct
@@ -35,7 +37,9 @@ ChangeCallback = Callable[[str, float], None]
 
 
 class ParameterError(ValueError):
-    """A parameter was named or valued wrongly; the message names it, the value and what is accepted."""
+    """A parameter has an unknown name or an unacceptable value; the message names both and what is
+    accepted.
+    """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +49,7 @@ class ParameterDefinition:
     Attributes:
         name: up to 16 ASCII characters.
         type: storage type; float parameters are single precision.
-        default: value before anybody changed it, in `unit`.
+        default: initial value, in `unit`.
         minimum, maximum: documented range, in `unit`; None where the firmware documents none.
         unit: as the firmware documents it; empty for plain numbers.
         description: one line.
@@ -191,7 +195,7 @@ class ParameterStore:
         return self._values[self.index_of(name)]
 
     def set(self, name: str, value: float, *, check_range: bool = True) -> bool:
-        """Change a parameter and tell the subscribers; True when the value is new.
+        """Change a parameter and notify the subscribers; True when the value is new.
 
         `check_range=False` takes values outside the documented range, as the firmwares do over MAVLink; the
         storage type still limits them.
@@ -216,7 +220,7 @@ class ParameterStore:
         return True
 
     def fix(self, name: str, value: float) -> None:
-        """Give a parameter a value that nobody can change from now on.
+        """Set a parameter to a value that can't be changed from now on.
 
         Raises:
             ParameterError: unknown name or unacceptable value.
@@ -225,11 +229,11 @@ class ParameterStore:
         self._fixed.add(name)
 
     def is_fixed(self, name: str) -> bool:
-        """Whether a parameter's value is given by what it describes, and can't be changed."""
+        """Whether a parameter's value is fixed and can't be changed."""
         return name in self._fixed
 
     def subscribe(self, callback: ChangeCallback) -> Callable[[], None]:
-        """Call `callback(name, value)` after every change; returns what ends the subscription."""
+        """Call `callback(name, value)` after every change; returns a function that ends the subscription."""
         self._subscribers.append(callback)
 
         def unsubscribe() -> None:

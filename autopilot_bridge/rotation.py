@@ -1,4 +1,4 @@
-"""Rotations of single vectors, in plain numbers: for who turns a few vectors per image or message.
+"""Rotations of single vectors, in plain numbers: for a few vectors per image or message.
 
 Quaternions are Hamilton, (w, x, y, z), and named `q_a_from_b`.
 """

@@ -1,8 +1,8 @@
-"""Who gets a frame: the MAVLink routing guide ("Routing", https://mavlink.io/en/guide/routing.html).
+"""Destinations of a frame: the MAVLink routing guide ("Routing", https://mavlink.io/en/guide/routing.html).
 
-A frame goes to every other channel when it has no target or targets everybody (system 0); otherwise only
-to channels on which the target system (and the target component, unless it is 0) has been heard. It
-never goes back to where it came from. A key for signing (SETUP_SIGNING) goes nowhere.
+A frame goes to every other channel when it has no target or targets all systems (system 0); otherwise only to
+channels on which messages of the target system (and the target component, unless it is 0) were received. It
+never goes back to its own channel. A key for signing (SETUP_SIGNING) is not forwarded.
 """
 
 from collections.abc import Hashable
@@ -14,13 +14,13 @@ from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 ChannelT = TypeVar("ChannelT", bound=Hashable)
 
 MAX_COMPONENTS: Final = 256
-"""How many components are remembered for a channel; those that were silent longest are forgotten."""
+"""Number of components remembered for a channel; those that were silent longest are forgotten."""
 
 
 class Router(Generic[ChannelT]):
     """Routing table over channels of any kind (links, peers of a link, names).
 
-    A channel must be hashable. Frames are given by id alone, so nothing is packed again: forward `frame.raw`.
+    A channel must be hashable. Routing uses ids only, so no frame is packed again: forward `frame.raw`.
     """
 
     __slots__ = ("_heard",)
@@ -34,19 +34,19 @@ class Router(Generic[ChannelT]):
         return tuple(self._heard)
 
     def add(self, channel: ChannelT) -> None:
-        """Make a channel known; a second time does nothing."""
+        """Add a channel; a second call does nothing."""
         self._heard.setdefault(channel, {})
 
     def remove(self, channel: ChannelT) -> None:
-        """Forget a channel and what was heard on it."""
+        """Forget a channel and its components."""
         self._heard.pop(channel, None)
 
     def heard(self, channel: ChannelT) -> frozenset[tuple[int, int]]:
-        """(system id, component id) of everybody heard on a channel."""
+        """(system id, component id) of all components received on a channel."""
         return frozenset(self._heard.get(channel, ()))
 
     def learn(self, frame: Frame, source: ChannelT) -> None:
-        """Remember that the sender of a frame is on `source`."""
+        """Record that the sender of a frame is on `source`."""
         sender = (frame.system_id, frame.component_id)
         table = self._heard.get(source)
         if table is None:
@@ -57,7 +57,7 @@ class Router(Generic[ChannelT]):
             del table[next(iter(table))]
 
     def route(self, frame: Frame, source: ChannelT) -> list[ChannelT]:
-        """Learn from a frame that came in on `source` and tell which channels it is to be sent to."""
+        """Learn from a frame received on `source` and return the channels that it is to be sent to."""
         self.learn(frame, source)
         if frame.message_id == SETUP_SIGNING:
             return []
@@ -83,13 +83,13 @@ def _leads_to(heard: dict[tuple[int, int], None], system: int, component: int) -
 
 
 class LoopGuard:
-    """Finds frames that come round: the same bytes heard lately on another channel.
+    """Detects frames that return in a loop: the same bytes, received shortly before on another channel.
 
-    Two links joined by somebody's bridge would otherwise pass a frame around for ever. Sequence numbers and
+    Two links joined by a bridge would otherwise forward a frame for ever. Sequence numbers and
     time stamps make equal bytes from one sender rare; on the same channel they are a repetition, not a loop.
 
     Args:
-        memory: how many frames are remembered.
+        memory: number of frames that are remembered.
     """
 
     __slots__ = ("_heard", "_memory")
@@ -99,7 +99,7 @@ class LoopGuard:
         self._memory = memory
 
     def comes_round(self, raw: bytes, channel: object) -> bool:
-        """True when these bytes were heard first on another channel; remembers them otherwise."""
+        """True when these bytes were received first on another channel; remembers them otherwise."""
         first = self._heard.get(raw)
         if first is None:
             if len(self._heard) >= self._memory:

@@ -1,4 +1,4 @@
-"""Telemetry logs (.tlog): what pymavlink, MAVProxy and QGroundControl write and read.
+"""Telemetry logs (.tlog) in the format of pymavlink, MAVProxy and QGroundControl.
 
 A record is the time in microseconds of the Unix epoch, 8 bytes, big endian, and then one raw MAVLink frame.
 """
@@ -30,16 +30,16 @@ _CHUNK_BYTES: Final = 1 << 20
 
 
 class TlogWriter:
-    """Writes a new log; whole records only, so that the file is readable whatever ends the process.
+    """Writes a new log; whole records only, so that the file is readable even if the process is killed.
 
     Records are kept until there are 64 KiB of them or one second of log time has passed, then they are
-    handed to the operating system in one piece: a killed process loses at most that.
+    written to the operating system in one piece: a killed process loses at most these records.
 
     Args:
         path: the file; it must not exist.
 
     Attributes:
-        records: how many were written.
+        records: number of records written.
 
     Raises:
         TlogError: the file exists or can't be created.
@@ -80,7 +80,7 @@ class TlogWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Hand everything to the operating system.
+        """Write everything to the operating system.
 
         Raises:
             TlogError: the log is closed, or the disk is full.
@@ -96,7 +96,7 @@ class TlogWriter:
         self._kept = 0
 
     def close(self) -> None:
-        """Write what is left and close; a second time does nothing."""
+        """Write the remaining records and close; a second call does nothing."""
         if self._file is None:
             return
         try:
@@ -116,13 +116,13 @@ class TlogWriter:
 
 @dataclass(slots=True)
 class TlogCounters:
-    """Where every byte of a log went.
+    """Counters of every byte of a log.
 
     Attributes:
-        records: good records.
-        bytes_skipped: bytes that belong to no good record (damage, messages the dialect does not know,
+        records: valid records.
+        bytes_skipped: bytes outside valid records (damage, messages outside the dialect,
             and the torn record at the end of a log whose writer was killed).
-        frames: what the frames themselves showed; see `ParserCounters`.
+        frames: counters of the frames; see `ParserCounters`.
     """
 
     records: int = 0
@@ -133,8 +133,8 @@ class TlogCounters:
 class TlogReader:
     """Reads a log, one record after the other; damage is skipped and counted.
 
-    A whole record that is no good (a wrong checksum, an unknown message) is skipped as one where another
-    follows: what might begin inside it is not looked for. `estimators.logs` does that, and is much faster.
+    A whole invalid record (a wrong checksum, an unknown message) is skipped as one when another follows it; a
+    record that might begin inside it is not searched. `estimators.logs` does that, and is much faster.
 
     Args:
         path: the log.
@@ -178,7 +178,7 @@ class TlogReader:
                         continue
                     parser.flush()
                     if end == len(buffer) or _record_size(buffer, end) != 0:
-                        counters.bytes_skipped += size  # damaged, or a message the dialect does not know
+                        counters.bytes_skipped += size  # damaged, or a message outside the dialect
                         start = end
                         continue
                 following = _next_record(buffer, start + 1)
@@ -221,7 +221,7 @@ def _record_size(buffer: bytes, start: int) -> int | None:
 
 
 def _next_record(buffer: bytes, start: int) -> int:
-    """Where, at or behind `start`, a record may begin."""
+    """The first possible begin of a record at or after `start`."""
     at = start + _TIME.size
     found = [index for magic in (MAGIC_V1, MAGIC_V2) if (index := buffer.find(bytes([magic]), at)) >= 0]
     return min(found, default=max(start, len(buffer) - _TIME.size + 1)) - (_TIME.size if found else 0)

@@ -1,1 +1,1 @@
-"""The world: vehicles, air, sensors. Knows no MAVLink, no sockets and no wall clock."""
+"""The world: vehicles, air, sensors. Uses no MAVLink, no sockets and no wall clock."""

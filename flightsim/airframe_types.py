@@ -1,4 +1,4 @@
-"""What a vehicle's description says, checked and typed. `flightsim.airframe` reads it from files."""
+"""The content of a vehicle's description, checked and typed. `flightsim.airframe` reads it from files."""
 
 import itertools
 import math
@@ -31,7 +31,7 @@ __all__ = [
 
 
 class AirframeError(ValueError):
-    """A vehicle model cannot be used; the message says which file and why."""
+    """A vehicle model cannot be used; the message names the file and the reason."""
 
 
 class AirframeKind(StrEnum):
@@ -86,9 +86,9 @@ class ActuatorChannel:
         properties: JSBSim properties that take it.
         scale, offset: of the command. A negative scale turns the sign round.
         minimum, maximum: of the property.
-        effectiveness: property of the actuator's effectiveness in the model (1 sound, 0 failed); None: a
-            failing actuator is one whose command goes to neutral.
-        optional: properties that the model has not are left out.
+        effectiveness: property of the actuator's effectiveness in the model (1 sound, 0 failed); None: the
+            command of a failing actuator is set to neutral.
+        optional: properties that the model does not have are left out.
     """
 
     role: Role
@@ -155,8 +155,8 @@ class LaunchParameters:
             off by itself, the rest means nothing.
         pitch_rad: of the rail or the throw, and of the vehicle on it.
         acceleration_m_s2: along the rail.
-        speed_m_s: over ground at which the vehicle is let go, or at which it goes on until `length_m`.
-        length_m: shortest way along the rail; 0: let go as soon as the speed is reached.
+        speed_m_s: ground speed at which the vehicle is released, or which it keeps until `length_m`.
+        length_m: shortest way along the rail; 0: released as soon as the speed is reached.
         height_m: of the centre of gravity over the ground before the launch.
     """
 
@@ -209,7 +209,7 @@ class Airframe:
         start: (property, value) set once after the initial conditions: engine running, gear down.
         start_optional: whether properties of `start` that the model has not are left out.
         limits: for the autopilot.
-        launch_kind: how it is launched unless told otherwise.
+        launch_kind: its default launch.
         launches: how a catapult or a hand does it.
     """
 

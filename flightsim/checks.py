@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 Check = Callable[..., None]
-"""Looks at the numbers it is given by name, and raises a ValueError for the first that isn't accepted."""
+"""Checks numbers by name, and raises a ValueError for the first one that is not accepted."""
 
 _NO_OTHERS: Final[Mapping[str, Check]] = MappingProxyType({})
 
@@ -58,11 +58,11 @@ def check_fields(
     """Check every number among the fields of a dataclass, and in its tuples.
 
     Args:
-        record: an instance; fields that hold anything else than numbers are passed over.
+        record: an instance; fields other than numbers are skipped.
         usually: what the numbers must be.
         but: what some must be instead, by name.
         unlimited: names of those that may be infinite as well.
-        unchecked: names of those that somebody else looks at.
+        unchecked: names of those that are checked elsewhere.
     """
     for field in fields(record):
         name = field.name

@@ -53,8 +53,9 @@ def speed_m_s(truth: Array) -> float:
 class Touches:
     """How a vehicle met the ground when it came from the air.
 
-    After the blow the velocity is that of a bounce, or of a wreck that JSBSim throws about: what a gear has
-    to stand, and what is told of a crash, is the velocity just before. Of bounces the hardest counts.
+    After the impact the velocity is that of a bounce, or of a wreck that JSBSim moves unpredictably. The load
+    on the gear and the report of a crash therefore use the velocity just before the impact. Of several
+    bounces, the hardest one counts.
 
     Args:
         within_steps: touches no farther apart are bounces of one landing.
@@ -70,7 +71,7 @@ class Touches:
         self._step = -within_steps
 
     def observe(self, step: int, touching: bool, truth: Array) -> float:
-        """Look at a vehicle; gives the rate of sink (m/s) of a touch that is new, else 0.
+        """Check a vehicle; returns the sink rate (m/s) of a new touch, else 0.
 
         Args:
             step: of the physics; it rises from call to call.
@@ -92,7 +93,7 @@ class Touches:
         return step - self._step < self._within_steps
 
     def words(self, step: int, truth: Array) -> str:
-        """What a crash now is told as."""
+        """The text that describes a crash at this step."""
         velocity = self._touch_ned_m_s if self.recent(step) else truth[t.VEL_NED_M_S]
         speed, sink = float(np.linalg.norm(velocity)), max(0.0, float(velocity[2]))
         return f"hit the ground at {speed:.0f} m/s, sinking at {sink:.1f} m/s"

@@ -1,7 +1,7 @@
-"""What a fixed-wing aircraft can do, in numbers: what an autopilot's airframe file is made from.
+"""The flight envelope of a fixed-wing aircraft, in numbers: the source of an autopilot's airframe file.
 
-Working it out is also the check of an aircraft at load: one that cannot fly its cruise, or whose controls do
-nothing or the opposite, is refused in plain words.
+Its computation is also the check of an aircraft when it is loaded: one that cannot fly its cruise, or whose
+controls have no effect or the opposite effect, is refused with a clear message.
 """
 
 import math
@@ -29,7 +29,7 @@ _SEA_LEVEL_KG_M3: Final = 1.225
 _HEIGHT_M: Final = 100.0
 _STALL_STEP: Final = 0.93
 _STALL_RESOLUTION: Final = 0.01
-# Cruise of an aircraft whose description says nothing, over its stall speed.
+# Default speeds of an aircraft, as multiples of its stall speed.
 _SLOWEST, _CRUISE, _FASTEST = 1.2, 1.6, 2.2
 _LEAST_ROLL_RATE_RAD_S: Final = 0.05
 _LEAST_ACCELERATION_RAD_S2: Final = 0.02
@@ -38,18 +38,18 @@ _LEAST_ACCELERATION_RAD_S2: Final = 0.02
 def flight_envelope(
     model: str | Path | Airframe, *, home: Home | None = None, environment: Environment | None = None
 ) -> FlightEnvelope:
-    """Work out what an aircraft can do; asked again for the same in this process, remembered.
+    """Compute the flight envelope of an aircraft; a repeated call in this process returns the stored result.
 
-    The same is: an equal description (its limits included) and files of equal content, engines, propellers
-    and systems among them, in air of equal density.
+    A call is repeated if the description is equal (its limits included), with files of equal content,
+    engines, propellers and systems among them, in air of equal density.
 
     Args:
         model: as for `Vehicle`.
         home: its altitude makes the density.
-        environment: only its temperature counts.
+        environment: only its temperature is used.
 
     Raises:
-        AirframeError: no usable fixed-wing model, or it cannot fly; the message says why.
+        AirframeError: no usable fixed-wing model, or it cannot fly; the message gives the reason.
     """
     airframe = model if isinstance(model, Airframe) else load_airframe(model)
     air = environment or Environment()

@@ -28,11 +28,11 @@ class InitialState:
         roll_rad, pitch_rad: attitude (only in the air).
         yaw_rad: heading; None is the home's.
         rates_frd_rad_s: body rates against the Earth (only in the air).
-        rotor_rad_s: speed of every rotor; of a fixed-wing vehicle, 0 leaves it as its [start] has it.
+        rotor_rad_s: speed of every rotor; of a fixed-wing vehicle, 0 keeps the value of its [start].
         battery_remaining: charge left, 0..1.
         actuators: commands that the actuators have followed already (only in the air); None: at rest.
-        launch: how a fixed-wing vehicle gets into the air: "runway", "catapult" or "hand"; None is what its
-            description says. With the last two it is held on the launcher until `Vehicle.launch()`.
+        launch: how a fixed-wing vehicle is launched: "runway", "catapult" or "hand"; None: as in its
+            description. With the last two it is held on the launcher until `Vehicle.launch()`.
     """
 
     height_m: float | None = None
@@ -93,7 +93,7 @@ def initialise(
         environment: the air.
         start: how it starts.
         launch: it starts on this launcher.
-        prepare: set what the description's [start] says: engines running and the like.
+        prepare: set the values of the description's [start], such as running engines.
     """
     if launch is not None:
         start = replace(start, height_m=launch.height_m, pitch_rad=launch.pitch_rad, launch=None)
@@ -145,7 +145,8 @@ def initialise(
 def standing_height_m(fdm: jsbsim.FGFDMExec, airframe: Airframe) -> float:
     """Height of the centre of gravity over the ground from which a level vehicle comes to stand.
 
-    Where the description does not say: that at which its lowest contact point touches the ground.
+    If the description does not give it, it is the height at which the lowest contact point touches the
+    ground.
     """
     if airframe.cg_height_at_rest_m is None:
         fdm.run_ic()  # the centre of gravity is known after that, fuel included

@@ -96,7 +96,7 @@ def load_fdm(
     _add_rotary_gusts(tree.getroot())
     for output in tree.getroot().findall(
         "output"
-    ):  # files that some aircraft of the jsbsim package would write beside themselves
+    ):  # files that some aircraft of the jsbsim package would write to their folders
         tree.getroot().remove(output)
     if launcher:
         _add_launcher(tree.getroot())
@@ -161,7 +161,7 @@ def _add_launcher(root: ElementTree.Element) -> None:
 def _add_rotary_gusts(root: ElementTree.Element) -> None:
     """Let the aerodynamics use the rates against the air: those of the body less `ROTARY_GUSTS`.
 
-    Aerodynamics in a file of their own, and those without rates, are left as they are.
+    Aerodynamics in a separate file, and those without rates, are not changed.
     """
     aerodynamics = root.find("aerodynamics")
     if aerodynamics is None or "file" in aerodynamics.attrib:
@@ -194,7 +194,7 @@ def _add_rotary_gusts(root: ElementTree.Element) -> None:
 
 
 def hold_motion(fdm: jsbsim.FGFDMExec, held: bool) -> None:
-    """Hold position, attitude, velocity and rates as they are while all else goes on, or let go."""
+    """Hold position, attitude, velocity and rates while everything else is simulated, or release them."""
     for name, method in _INTEGRATORS:
         fdm.set_property_value(f"simulation/integrator/{name}", _NONE if held else method)
 

@@ -40,8 +40,8 @@ _STAMP_DIGITS: Final = 16
 def kernel(function: Function) -> Function:
     """Compile a function with `numba.njit` on first use and keep the machine code from run to run.
 
-    The code lies beside the module, or in the user's cache folder where that is not writable; where neither
-    is, every process compiles anew. Any number of processes may compile at the same time.
+    The code is stored beside the module, or in the user's cache folder if that place is not writable; if
+    neither is writable, every process compiles again. Any number of processes may compile at the same time.
     """
     try:
         dispatcher = numba.njit(cache=True)(function)
@@ -58,10 +58,10 @@ def kernel(function: Function) -> Function:
 def compiled_for(function: Function, *arguments: object) -> Function:
     """The machine code of a kernel for arguments of the same types as these.
 
-    A kernel looks at the type of every argument of every call, which costs as much as a small kernel's own
-    work. This is for calls at the physics rate whose arguments are always the same arrays: what it returns
-    takes the caller's word for it that an array has the element type, dimensions and layout of the example.
-    A function that is no kernel is returned as it is.
+    A kernel checks the type of every argument at every call, which takes as long as a small kernel's own
+    work. This function is for calls at the physics rate whose arguments are always the same arrays: the
+    returned function does not check that an array has the element type, dimensions and layout of the example.
+    A function that is no kernel is returned unchanged.
     """
     if not is_jitted(function):
         return function
@@ -77,9 +77,10 @@ def bound(function: Callable[..., Any], *arguments: object, then: tuple[object, 
 
     Args:
         function: a kernel.
-        arguments: its first arguments: arrays, whose elements may change later on, and numbers, which don't.
-        then: examples of the others, three at most, which the caller gives; as for `compiled_for`, it is
-            taken at its word.
+        arguments: its first arguments: arrays, whose elements may change later, and numbers, which do not
+            change.
+        then: examples of the other arguments, at most three, which the caller passes; as in `compiled_for`,
+            their types are not checked.
     """
     typed = tuple(map(numba.typeof, arguments))
     entry = _entry(function, typed, len(then)) if is_jitted(function) else None
@@ -241,10 +242,11 @@ def _value_parts(value: object, name: str, function: Callable[..., Any], seen: s
 
 
 class _CacheFile:
-    """What Numba's cache asks of its files, with one file for each kernel, stamp, signature and processor.
+    """The file interface of Numba's cache, with one file for each kernel, stamp, signature and processor.
 
-    A file is written whole, under another name, and then renamed: whoever reads finds all of it or none. Its
-    name says what it holds, so processes that run different versions of the sources do not read each other's.
+    A file is written whole, under another name, and then renamed: a reader finds the complete file or none.
+    Its name identifies its content, so processes that run different versions of the sources do not read each
+    other's.
     """
 
     def __init__(self, folder: Path, base: str, function: Callable[..., Any], variant: str = "") -> None:
@@ -254,18 +256,18 @@ class _CacheFile:
         self._variant = variant
 
     def beside(self, name: str, function: Callable[..., Any], variant: str) -> "_CacheFile":
-        """Of a function that calls the kernel, in one of several variants that don't replace each other."""
+        """The file of a function that calls the kernel, in one of several variants with separate files."""
         return _CacheFile(self._folder, f"{self._base}-{name}", function, variant)
 
     def load(self, key: object) -> Any:
-        """What was saved under the key, or None."""
+        """The data saved under the key, or None."""
         try:
             return pickle.loads(self._path(key).read_bytes())
         except (OSError, EOFError, pickle.UnpicklingError):
             return None
 
     def save(self, key: object, data: object) -> None:
-        """Keep the data and drop what older sources left behind; a full disk is no obstacle to flying."""
+        """Store the data and delete the files of older sources; an error such as a full disk is ignored."""
         path = self._path(key)
         part = path.with_name(f"{path.name}.tmp.{uuid.uuid4().hex[:16]}")
         with suppress(OSError):

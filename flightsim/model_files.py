@@ -14,10 +14,10 @@ _OWN_FOLDERS: Final = ("", "Engines", "engine", "Systems", "systems")
 
 
 def model_files(airframe: Airframe) -> tuple[Path, ...]:
-    """The model's XML and every file it names (engines, propellers, systems, tables of its own), in turn.
+    """The model's XML and every file it names (engines, propellers, systems, tables), recursively.
 
-    A file of one name is looked for where JSBSim looks: beside the model, in its folders for engines and
-    systems, and in those of the `jsbsim` package; all that are found count.
+    A file is searched in the same places as in JSBSim: beside the model, in its folders for engines and
+    systems, and in those of the `jsbsim` package; all matches are included.
     """
     package = Path(jsbsim.get_default_root_dir())
     folders = (*(airframe.folder / name for name in _OWN_FOLDERS), package / "engine", package / "systems")

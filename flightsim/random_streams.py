@@ -1,6 +1,6 @@
 """Named random streams: one root seed, one independent child per thing that is random.
 
-A child is found by its key, not by the order in which children are asked for, so adding a sensor or a vehicle
+A child is found by its key, not by the order in which children are requested, so adding a sensor or a vehicle
 changes no other stream. The key is hashed into the `spawn_key` of a `numpy.random.SeedSequence`, which numpy
 mixes into the entropy pool like any child made by `SeedSequence.spawn`.
 """

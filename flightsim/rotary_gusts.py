@@ -74,7 +74,7 @@ def _advance(
 
 
 class RotaryGusts:
-    """Rotation of the air around one aircraft with wings, beside its `DrydenTurbulence`.
+    """Rotation of the air around one aircraft with wings, in addition to its `DrydenTurbulence`.
 
     Attributes:
         rates_frd_rad_s: (3,) present rotation of the air over ground, body axes, written in place by `step`.
@@ -88,7 +88,7 @@ class RotaryGusts:
         Args:
             span_m: wing span.
             dt_s: step.
-            seed_sequence: the vehicle's stream for turbulence; p_g draws from a stream of its own below it.
+            seed_sequence: the vehicle's stream for turbulence; p_g draws from a separate child stream of it.
         """
         self._span_m = span_m
         self._dt_s = dt_s

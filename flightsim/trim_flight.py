@@ -57,7 +57,7 @@ def trim_flight(
 
     Raises:
         AirframeError: no fixed wing, or no usable model.
-        TrimError: no such flight; the message says what stands against it.
+        TrimError: no such flight exists; the message gives the reason.
         ValueError: arguments that contradict each other.
     """
     tunnel = WindTunnel(model, home=home, environment=environment, height_m=height_m)
@@ -105,7 +105,7 @@ def trim_in_tunnel(
 
 
 class _Problem:
-    """Unknowns of one trim and what the tunnel says to them.
+    """Unknowns of one trim and the accelerations that the wind tunnel gives for them.
 
     Unknowns: angle of attack, bank (or rate of turn, where the bank is given), aileron, elevator, rudder (or
     sideslip, for an aircraft without), throttle (or climb angle, where the throttle is given).

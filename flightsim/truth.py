@@ -1,4 +1,4 @@
-"""Layout of the truth vector: what the world knows of one vehicle after a physics step.
+"""Layout of the truth vector: the true state of one vehicle after a physics step.
 
 One preallocated float64 array per vehicle, written in place by the vehicle model and read by the sensor
 kernels and the log. It never reaches an autopilot, a mission or an estimator.

@@ -78,7 +78,7 @@ _TOUCHED_S: Final = 10  # after touching the ground: what goes wrong then began 
 
 
 class Motion(IntEnum):
-    """What `write_truth` makes of JSBSim's values."""
+    """The result of `write_truth` for JSBSim's values."""
 
     SOUND = 0
     IMPOSSIBLE = 1  # not finite, or no motion of any vehicle

@@ -1,6 +1,6 @@
 """Dryden turbulence at low altitude (MIL-F-8785C, paragraphs 3.7.3 and 3.7.5), one seeded stream per vehicle.
 
-JSBSim has a turbulence of its own; it scales with height above sea level where the standard takes height
+JSBSim has its own turbulence model; it scales with height above sea level where the standard takes height
 above ground, replaces the second-order lateral and vertical filters by first-order ones, and stops in still
 air. So the three velocities are made here and handed to JSBSim as its gust.
 

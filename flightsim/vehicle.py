@@ -56,10 +56,10 @@ class Vehicle:
         airframe: the model's description.
         home: origin of the world.
         environment: the air.
-        launcher: what holds it and launches it; None for a vehicle without.
-        crash: what it broke on, for people; None: whole. A wreck lies where it is for good.
+        launcher: holds and launches it; None for a vehicle without a launcher.
+        crash: text about its crash, for users; None: not crashed. A crashed vehicle does not move again.
         physics_rate_hz: steps per second.
-        load_warnings: what JSBSim had to say about the model; empty for a clean one.
+        load_warnings: JSBSim's warnings about the model; empty if there are none.
     """
 
     __slots__ = (
@@ -215,11 +215,12 @@ class Vehicle:
         self._refresh_magnetic_field()
 
     def step(self, actuators: Array) -> None:
-        """Advance one physics step and write `truth`. Of a wreck only the time goes on.
+        """Advance one physics step and write `truth`. For a crashed vehicle only the time advances.
 
         Args:
-            actuators: (MAX_ACTUATORS,) commands, motors 0..1, surfaces -1..1; those the vehicle has not are
-                ignored. They act from this step on: rotors follow in this step, the motion from the next one.
+            actuators: (MAX_ACTUATORS,) commands, motors 0..1, surfaces -1..1; those that the vehicle does not
+                have are ignored. They act from this step on: rotors follow in this step, the motion from the
+                next one.
 
         Raises:
             VehicleDivergedError: the motion is no longer possible, and nothing was hit.

@@ -1,8 +1,8 @@
 """A JSBSim aircraft held in a state of motion while actuators and engines settle: forces and moments of it.
 
 JSBSim's integrators are switched off, so position, attitude, velocity and rates stay as they were set, while
-everything that has a time of its own (servos, rotors, engines) goes on. What is read then are the
-accelerations the aircraft would have.
+everything with its own dynamics (servos, rotors, engines) continues. The readings are then the accelerations
+that the aircraft would have.
 """
 
 import math

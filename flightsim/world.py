@@ -72,9 +72,9 @@ class World:
         offset_ne_m: tuple[float, float] = (0.0, 0.0),
         initial: InitialState | None = None,
     ) -> Vehicle:
-        """Add a vehicle standing at an offset from home, or starting as `initial` says.
+        """Add a vehicle standing at an offset from home, or with the initial state `initial`.
 
-        Its random streams are named by its index, so the vehicles added before it do not notice.
+        Its random streams are named by its index, so it does not change the vehicles added before it.
 
         Raises:
             ValueError: both an offset and an initial state, or the clock is already running.

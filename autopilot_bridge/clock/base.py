@@ -1,4 +1,4 @@
-"""What tasks wait on."""
+"""The clock interface for tasks."""
 
 import asyncio
 from contextlib import AbstractAsyncContextManager
@@ -15,9 +15,9 @@ class Clock(Protocol):
 
     @property
     def stamp_us(self) -> int:
-        """What the vehicle would stamp a message with now, microseconds: to be compared with time stamps.
+        """The vehicle's time stamp for a message sent now, microseconds: to be compared with time stamps.
 
-        The same as `time_us`, but for vehicles that booted after the clock began, boot anew or stand still.
+        The same as `time_us`, except for vehicles that booted after the clock began, reboot or pause.
         """
         ...
 

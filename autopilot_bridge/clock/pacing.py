@@ -14,19 +14,19 @@ def unix_time_us() -> int:
 
 
 MAX_LAG_S: Final = 0.25
-"""Wall seconds of lag that are caught up; a longer stop (SIGSTOP, suspended laptop) is forgotten."""
+"""Wall seconds of lag that are caught up; a longer stop (SIGSTOP, suspended laptop) is not caught up."""
 
 
 class Pacer:
-    """Says how long to wait before simulated time may go on.
+    """Computes how long to wait before simulated time may advance.
 
     Args:
         speedup: simulated seconds per wall second, above 0.
         monotonic: wall clock in seconds.
-        max_lag_s: lag that is caught up by running faster; beyond it the simulation goes on where it is.
+        max_lag_s: lag that is caught up by running faster; a longer lag is not caught up.
 
     Attributes:
-        slipped_s: wall seconds given up in all, because the simulation could not keep pace.
+        slipped_s: total wall time lost because the simulation could not keep pace, s.
     """
 
     __slots__ = ("_anchor_s", "_anchor_us", "_monotonic", "_speedup", "max_lag_s", "slipped_s")
@@ -73,7 +73,7 @@ class RealTimeClock:
     Args:
         speed: simulated seconds per wall second.
         monotonic: wall clock in seconds.
-        wait: waits for so many wall seconds; a function that also serves sockets may stand here.
+        wait: waits for so many wall seconds; a function that also serves sockets may be used here.
         max_lag_s: lag that is caught up (see `Pacer`).
     """
 
@@ -94,13 +94,13 @@ class RealTimeClock:
 
     @property
     def slipped_s(self) -> float:
-        """Wall seconds given up in all; 0 when the simulation kept pace."""
+        """Total wall time lost, s; 0 when the simulation kept pace."""
         return self._pacer.slipped_s
 
     def wait_until(self, time_us: int) -> None:
         """Return when simulated time `time_us` is due on the wall clock, at once when it is overdue.
 
-        Afterwards `lag_s` tells by how many wall seconds the simulation was late (0 when early).
+        Afterwards `lag_s` is the number of wall seconds by which the simulation was late (0 when early).
         """
         slipped_s = self._pacer.slipped_s
         ahead_s = self._pacer.ahead_s(time_us)

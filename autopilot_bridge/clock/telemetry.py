@@ -1,4 +1,4 @@
-"""The time of a vehicle somewhere else, from the timestamps in its messages."""
+"""The time of a remote vehicle, from the timestamps in its messages."""
 
 import asyncio
 import math
@@ -10,34 +10,34 @@ from typing import Any, Final
 from autopilot_bridge.clock.pacing import wall_time_s
 
 _WINDOW_S: Final = 4.0  # wall seconds over which the rate is measured
-_MIN_WINDOW_S: Final = 0.25  # a shorter base says nothing about the rate
+_MIN_WINDOW_S: Final = 0.25  # a shorter base is too short to measure the rate
 _MIN_SPACING_S: Final = 0.02  # observations kept for the rate are no closer than this
 _MAX_STEP_BACK_US: Final = 1_000_000  # messages overtake each other by less; more is a new time base
-_BACKLOG_S: Final = 0.25  # wall seconds in which messages that waited for us are read
+_BACKLOG_S: Final = 0.25  # wall seconds in which messages that waited in the queue are read
 _RATE_LIMITS: Final = (0.01, 1000.0)
 _PACED_US: Final = (
     2_000_000.0  # vehicle time assumed between two messages; autopilots tell theirs every second
 )
-_SILENT_RATE: Final = 1.0  # at most so fast where nothing is received
-_MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are looked at again: rates change
+_SILENT_RATE: Final = 1.0  # greatest rate while nothing is received
+_MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are checked again: rates change
 
 
 class TelemetryClock:
-    """Vehicle time, carried on between messages at the rate (speed factor) seen lately.
+    """Vehicle time, extrapolated between messages at the rate (speed factor) measured recently.
 
     `time_us` follows the vehicle's own time since boot. The first observation sets it, and waits begun before
-    keep what they had left. From then on it never runs backwards: when the vehicle reboots, or comes back
-    from a pause during which deadlines went on, time continues from where it was, and differs from what
-    messages are stamped with (`stamp_us`). Messages that waited while this process was busy are no pause:
-    time stands until they have been read. Where nothing is received, time goes on at the last rate for two
-    seconds of the vehicle's time, then at no more than real time: deadlines expire on a dead link too, and a
-    simulator that is stopped for a moment costs them no more than that moment, however fast it was.
+    keep their remaining time. From then on it never runs backwards: when the vehicle reboots, or continues
+    after a pause during which deadlines advanced, time continues from its value, and differs from the time
+    stamps of messages (`stamp_us`). Messages that waited while this process was busy are no pause: time
+    stands still until they have been read. While nothing is received, time advances at the last rate for two
+    seconds of the vehicle's time, then at most at real time: deadlines expire on a dead link too, and a
+    simulator that is stopped for a moment delays them by that moment only, however fast it was.
 
     Args:
         monotonic: wall clock in seconds.
 
     Attributes:
-        reboots: how often the vehicle's own time jumped back.
+        reboots: number of backward jumps of the vehicle's own time.
     """
 
     def __init__(self, monotonic: Callable[[], float] = wall_time_s) -> None:
@@ -61,7 +61,7 @@ class TelemetryClock:
 
     @property
     def vehicle_time_us(self) -> int | None:
-        """Newest time the vehicle has told; None before the first."""
+        """Newest time in a message of the vehicle; None before the first."""
         return self._vehicle_us
 
     @property
@@ -77,7 +77,7 @@ class TelemetryClock:
 
     @property
     def stamp_us(self) -> int:
-        """The vehicle's own time now; runs backwards when it boots anew, or stands still and goes on."""
+        """The vehicle's own time now; runs backwards when it reboots, or continues after a pause."""
         return math.floor(self._base_us - self._offset_us + self._since_us)
 
     @property
@@ -88,17 +88,17 @@ class TelemetryClock:
 
     @property
     def _slower_in_silence(self) -> float:
-        """The rate of silence as a share of the vehicle's."""
+        """The rate while nothing is received, as a fraction of the vehicle's rate."""
         return min(1.0, _SILENT_RATE / self._rate)
 
     def wall_s_until(self, time_us: int) -> float:
-        """Wall seconds until a time comes, if nothing is received before; 0 when it has come."""
+        """Wall seconds until a time, if nothing is received before; 0 when it has passed."""
         due_us = time_us - self._base_us
         paced_us = min(due_us, _PACED_US) + max(0.0, due_us - _PACED_US) / self._slower_in_silence
         return max(0.0, paced_us * 1e-6 / self._rate - self.silence_s)
 
     def observe(self, vehicle_time_us: int) -> None:
-        """Take the timestamp of a message that arrived just now."""
+        """Process the timestamp of a message that has just arrived."""
         now_us = self.time_us
         wall_s = self._monotonic()
         previous_us = self._vehicle_us
@@ -106,7 +106,7 @@ class TelemetryClock:
             self._set_first(vehicle_time_us, now_us)
         elif vehicle_time_us < previous_us:
             if previous_us - vehicle_time_us <= _MAX_STEP_BACK_US:
-                return  # overtaken on the way
+                return  # overtaken by a later message
             self.reboots += 1
             self._history.clear()
             self._offset_us = now_us - vehicle_time_us
@@ -114,11 +114,11 @@ class TelemetryClock:
             if self._behind is None:
                 self._behind = (wall_s, now_us - vehicle_time_us)
             if wall_s - self._behind[0] >= _BACKLOG_S:
-                # The vehicle stood still (paused simulator, suspended machine) while deadlines went on.
+                # The vehicle was paused (paused simulator, suspended machine) while deadlines advanced.
                 self._history.clear()
                 self._offset_us = self._behind[1]
                 self._behind = None
-            # Otherwise it may be us who were busy, and these are the messages that waited meanwhile.
+            # Otherwise this process may have been busy, and these messages have waited in the queue.
         else:
             self._behind = None
         self._vehicle_us = vehicle_time_us
@@ -215,7 +215,7 @@ class TelemetryClock:
 
 
 class _Deadline:
-    """A moment of vehicle time and what is to happen then."""
+    """A time of the vehicle, and the action at that time."""
 
     __slots__ = ("callback", "time_us")
 

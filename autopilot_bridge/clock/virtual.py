@@ -1,10 +1,9 @@
-"""An asyncio event loop whose time is a simulated world's.
+"""An asyncio event loop on the time of a simulated world.
 
-`asyncio.sleep(1)` in a mission means one second of vehicle time. Whenever no task can run, the loop lets the
-world make physics steps until a timer is due or a step has woken a task (trio's autojump clock, with a world
-that must be stepped through instead of jumped over). Without real file descriptors in play the order of
-events depends on the world alone: neither on the machine, nor on the speed factor, nor on how often the
-process was stopped.
+`asyncio.sleep(1)` in a mission means one second of vehicle time. Whenever no task can run, the loop makes the
+world advance by physics steps until a timer is due or a step has woken a task (as trio's autojump clock, with
+a world that must be stepped through instead of jumped over). Without real file descriptors the order of
+events depends on the world alone: not on the machine, the speed factor, or how often the process was stopped.
 """
 
 import asyncio
@@ -20,10 +19,10 @@ from autopilot_bridge.errors import ClockError
 T = TypeVar("T")
 
 _NEVER_US: Final = 1 << 62
-_STEPS_PER_POLL: Final = 64  # file descriptors and signal wake-ups are looked after this often
+_STEPS_PER_POLL: Final = 64  # file descriptors and signal wake-ups are checked this often
 _MAX_ROUNDS_WITHOUT_STEP: Final = 1000  # tasks that only yield to each other must not stop the world
-_MIN_SLEEP_S: Final = 1e-3  # what epoll can time; being ahead by less is left to the next step
-_LIMIT_GRACE_US: Final = 10_000_000  # for tasks to clean up in after the time limit
+_MIN_SLEEP_S: Final = 1e-3  # resolution of epoll; a smaller lead is left to the next step
+_LIMIT_GRACE_US: Final = 10_000_000  # time for tasks to clean up after the time limit
 
 
 class VirtualTimeLoop(asyncio.SelectorEventLoop):
@@ -32,8 +31,9 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     Args:
         advance: makes one physics step. It may wake tasks (set results of futures, put into queues).
         time_us: the world's time, microseconds since boot.
-        speedup: simulated seconds per wall second at most; None: as fast as possible. Pacing only sleeps.
-        max_time_us: the run fails with a ClockError when the world gets that old; None: no limit.
+        speedup: greatest number of simulated seconds per wall second; None: as fast as possible. Pacing only
+            sleeps.
+        max_time_us: the run fails with a ClockError when the world reaches this time; None: no limit.
         monotonic: wall clock in seconds, for pacing.
 
     An exception in `advance` ends the run with that exception.
@@ -72,13 +72,13 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
 
     @property
     def slipped_s(self) -> float:
-        """Wall seconds given up because the world could not keep the pace; 0 when not paced."""
+        """Wall seconds lost because the world could not keep pace; 0 when not paced."""
         pacer = self._world_selector.pacer
         return 0.0 if pacer is None else pacer.slipped_s
 
 
 class _WorldSelector(selectors.DefaultSelector):
-    """Where the loop would wait for file descriptors, the world goes on instead."""
+    """Steps the world where the loop would wait for file descriptors."""
 
     def __init__(
         self, advance: Callable[[], object], time_us: Callable[[], int], max_time_us: int | None
@@ -151,8 +151,8 @@ def _due_us(when_s: float) -> int:
 def run(main: Coroutine[Any, Any, T], loop: asyncio.AbstractEventLoop) -> T:
     """Run a coroutine on a loop as `asyncio.run` does, and close the loop.
 
-    Tasks left over are cancelled and get their time to clean up. The first Ctrl-C cancels `main`, so
-    that it can leave the vehicle safe; KeyboardInterrupt is raised when it is done. A second one stops
+    Remaining tasks are cancelled and get time to clean up. The first Ctrl-C cancels `main`, so
+    that it can leave the vehicle safe; KeyboardInterrupt is raised when it has finished. A second one stops
     at once.
     """
     with asyncio.Runner(loop_factory=lambda: loop) as runner:

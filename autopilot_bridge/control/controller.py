@@ -234,7 +234,7 @@ class MulticopterController:
         self.set_parameters(replace(self._parameters, **values))  # type: ignore[arg-type]
 
     def set_ground_contact(self, contact: bool) -> None:
-        """Tell whether the ground may carry part of the weight; hover thrust is not learnt meanwhile."""
+        """Set whether the ground may carry part of the weight; hover thrust is not learnt then."""
         self._state[c.GROUND_CONTACT] = 1.0 if contact else 0.0
 
     @property

@@ -1,4 +1,4 @@
-"""Layout of the fixed-wing control setpoint: what a flight task asks of the fixed-wing control laws.
+"""Layout of the fixed-wing control setpoint: the command of a flight task to the fixed-wing control laws.
 
 One preallocated float64 array, written by the active flight task at 50 Hz, read by the control kernels. At
 level `FLY` the lateral and the longitudinal part stand for themselves, as PX4 1.16's FixedWingLateralSetpoint

@@ -61,7 +61,7 @@ def _desaturate(motor: Array, axis: int, upper: float, only_reduce: bool) -> Non
 
 @kernel
 def allocate(roll: float, pitch: float, yaw: float, thrust: float, motor: Array, unallocated: Array) -> None:
-    """motor (4,) = normalised motor thrusts 0..1; unallocated (3,) = torque asked for but not given."""
+    """motor (4,) = normalised motor thrusts 0..1; unallocated (3,) = commanded torque not produced."""
     for i in range(MOTORS):
         motor[i] = roll * ALLOCATION[i, ROLL] + pitch * ALLOCATION[i, PITCH] + thrust
     _desaturate(motor, COLLECTIVE, 1.0, True)

@@ -1,4 +1,4 @@
-"""Gains and limits of the multicopter control laws; PX4's parameter stands beside each field."""
+"""Gains and limits of the multicopter control laws; PX4's parameter is given beside each field."""
 
 import math
 from dataclasses import dataclass

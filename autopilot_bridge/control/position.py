@@ -138,7 +138,7 @@ def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
         px = p[c.POS_XY_P] * ex
         vx = vx if math.isfinite(vx) else 0.0
     elif math.isnan(vx) and math.isnan(sp[_ACC]):
-        vx = 0.0  # nothing asked for: stand still
+        vx = 0.0  # not commanded: stand still
     if math.isfinite(ey):
         py = p[c.POS_XY_P] * ey
         vy = vy if math.isfinite(vy) else 0.0

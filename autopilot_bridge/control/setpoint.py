@@ -1,4 +1,4 @@
-"""Layout of the control setpoint: what a flight task asks of the control laws.
+"""Layout of the control setpoint: the command of a flight task to the control laws.
 
 One preallocated float64 array, written by the active flight task, read by the control kernels. At level
 `TRAJECTORY` NaN means "not controlled here" as in PX4's TrajectorySetpoint: position feeds velocity,

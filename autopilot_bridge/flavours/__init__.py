@@ -16,7 +16,7 @@ def get_flavour(name: str, kind: AirframeKind = AirframeKind.MULTICOPTER) -> "Fl
     Raises:
         ValueError: there is none; the message lists the names.
     """
-    # imported on demand: a program flies one flavour, and each brings a parameter table of its own
+    # imported on demand: a program uses one flavour, and each loads its own parameter table
     fixed_wing = kind is AirframeKind.FIXED_WING
     if name == "px4" and fixed_wing:
         from autopilot_bridge.flavours.px4_plane import PX4_PLANE

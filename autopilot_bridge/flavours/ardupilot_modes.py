@@ -34,7 +34,7 @@ CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
         FlightMode.FOLLOW: 23,
         FlightMode.ZIGZAG: 24,
         FlightMode.AUTO_RETURN: 27,
-        FlightMode.TERMINATION: 0,  # no mode of its own
+        FlightMode.TERMINATION: 0,  # not a separate mode
     }
 )
 
@@ -73,7 +73,7 @@ REFUSED_NAMES: Final[Mapping[int, str]] = MappingProxyType(
         28: "TURTLE",
     }
 )
-"""Numbers the firmware knows and refuses on this vehicle: "Mode change to X failed", not "No such mode N"."""
+"""Known numbers that the firmware refuses on a copter: "Mode change to X failed", not "No such mode N"."""
 
 _MANUAL_MODES: Final = frozenset(
     {FlightMode.STABILIZED, FlightMode.ACRO, FlightMode.ALTITUDE, FlightMode.DRIFT, FlightMode.TERMINATION}

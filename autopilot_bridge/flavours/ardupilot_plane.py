@@ -45,7 +45,7 @@ _NOT_ARMABLE: Final = frozenset({FlightMode.RETURN, FlightMode.HOLD, FlightMode.
 MODE_NEEDS_BY_DEAD_RECKONING: Final[Mapping[FlightMode, Need]] = MappingProxyType(
     {mode: needs & ~(Need.POSITION | Need.MISSION) for mode, needs in MODE_NEEDS.items()}
 )
-"""ArduPlane refuses no mode in flight for want of a position: without one it goes on by dead reckoning."""
+"""ArduPlane refuses no mode in flight without a position: it then continues by dead reckoning."""
 
 POLICY: Final = CommanderPolicy(
     boot_mode=FlightMode.MANUAL,

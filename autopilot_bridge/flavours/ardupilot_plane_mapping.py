@@ -210,7 +210,7 @@ _USE_AGAIN: Final = 2
 
 
 def airframe_overrides(envelope: FlightEnvelope) -> dict[str, float]:
-    """Parameters that a user who tuned this aircraft has set, with their values."""
+    """Parameters that a user sets to tune this aircraft, with their values."""
     values = {
         **mapping.airframe_overrides(
             tuned_controller(envelope), only_in(CONTROLLER, AIRFRAME_FLIGHT), ARDUPILOT_PLANE_PARAMETERS

@@ -31,7 +31,7 @@ CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
         FlightMode.AVOID: 14,
         FlightMode.GUIDED: 15,
         FlightMode.INITIALISING: 16,
-        FlightMode.TERMINATION: 0,  # no mode of its own: shown as the one it ends in
+        FlightMode.TERMINATION: 0,  # not a separate mode: shown as the mode in which it ends
     }
 )
 
@@ -77,7 +77,7 @@ REFUSED_TEXTS: Final[Mapping[int, str]] = MappingProxyType(
         **{number: "Q_ENABLE 0" for number in (17, 18, 19, 20, 21, 22, 23, 25)},
     }
 )
-"""Numbers the firmware knows and refuses on this vehicle, and what it says; others are "No such mode N"."""
+"""Known numbers that the firmware refuses on this vehicle, and its texts; others are "No such mode N"."""
 
 
 def commanded_mode(number: int) -> FlightMode | None:

@@ -1,4 +1,4 @@
-"""What ArduCopter says about events (4.6.3, reference sections 1, 3, 5 and 6)."""
+"""ArduCopter's texts of events (4.6.3, reference sections 1, 3, 5 and 6)."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -124,7 +124,7 @@ def notices(event: events.Event) -> tuple[Notice, ...]:
 
 
 def arming_denied(event: events.ArmingDenied, mode_names: Mapping[FlightMode, str]) -> tuple[Notice, ...]:
-    """A text for each reason, as both of ArduPilot's vehicles say them."""
+    """A text for each reason, the same for both of ArduPilot's vehicles."""
     prefix = "PreArm" if event.check_only else "Arm"
     return tuple(
         Notice(Severity.CRITICAL, f"{prefix}: {describe(reason, event.mode, mode_names)}")
@@ -141,7 +141,7 @@ def fence_names(walls: int) -> str:
 
 
 def battery_warning(event: events.BatteryWarning) -> tuple[Notice, ...]:
-    """What both vehicles say of a battery."""
+    """Both vehicles' texts about a battery."""
     word = "low" if event.level <= BatteryLevel.LOW else "critical"
     text = f"Battery 1 is {word} {event.voltage_v:.2f}V used {event.used_ah * 1000.0:.0f} mAh"
     return (Notice(Severity.WARNING, text),)

@@ -1,4 +1,4 @@
-"""Where each firmware keeps what on its memory card, and how it looks after it."""
+"""The files of each firmware on its memory card, and when they are written."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class LogTimes:
 
     Attributes:
         from_boot: from the start on, else from arming.
-        after_disarming: goes on after disarming.
+        after_disarming: logging continues after disarming.
         new_at_disarming: a new log begins at disarming.
     """
 
@@ -37,9 +37,9 @@ class CardLayout:
         first_log_id: of LOG_ENTRY.
         parameters: file of the stored parameters, on the card.
         plans: folder of the stored plans, on the card.
-        save_after_s: so long after a change the parameters are stored.
+        save_after_s: time from a change until the parameters are stored.
         log_times: when to log, by the parameters; None: not at all.
-        armed_refusal: what is said to who asks for logs of an armed vehicle; empty: it is sent them.
+        armed_refusal: text sent to a client that requests logs of an armed vehicle; empty: logs are sent.
     """
 
     mount: VehiclePath

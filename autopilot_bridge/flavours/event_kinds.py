@@ -72,7 +72,7 @@ class EventKind:
     Attributes:
         name: unique; its hash is the number.
         message: one line; `{1}` stands for the first argument.
-        level: severity for whoever flies; 8 is for programs only.
+        level: severity for the pilot; 8 is for programs only.
         group: "default", "arming_check" or "health".
         type: "summary" for the frame of a report, else empty.
         arguments: in order.
@@ -120,7 +120,7 @@ def definitions(
     Args:
         namespace: of the kinds.
         kinds: all that there are.
-        mode_groups: HEARTBEAT.custom_mode of each group of modes that a report of checks tells of.
+        mode_groups: HEARTBEAT.custom_mode of each group of modes in a report of checks.
     """
     enums: dict[str, object] = {}
     groups: dict[str, dict[str, dict[str, object]]] = {}

@@ -35,8 +35,8 @@ class ModeDisplay(NamedTuple):
         armed: motors may turn.
         booted: the boot phase is over.
         landed: standing on the ground.
-        attitude_setpoints: the setpoint stream asks for positions, velocities or attitudes (no body rates).
-        thrust_setpoints: the setpoint stream asks for attitudes or body rates, with thrust.
+        attitude_setpoints: the setpoint stream commands positions, velocities or attitudes (no body rates).
+        thrust_setpoints: the setpoint stream commands attitudes or body rates, with thrust.
     """
 
     mode: FlightMode
@@ -121,7 +121,7 @@ class ControllerFactory(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """What AUTOPILOT_VERSION, PROTOCOL_VERSION and the banner say.
+    """The content of AUTOPILOT_VERSION, PROTOCOL_VERSION and the banner.
 
     Attributes:
         product: name in texts, "ArduCopter V4.6.3 (3fc7011a)".
@@ -160,7 +160,7 @@ class Flavour:
         kind: the vehicle class.
         autopilot: MAV_AUTOPILOT.
         vehicle_type: MAV_TYPE.
-        custom_modes: HEARTBEAT.custom_mode of every mode this firmware knows.
+        custom_modes: HEARTBEAT.custom_mode of every mode of this firmware.
         mode_names: what the firmware calls its modes in texts.
         base_mode: HEARTBEAT.base_mode.
         listed_modes: what AVAILABLE_MODES lists, in its order; empty: the firmware has no such message.
@@ -185,7 +185,7 @@ class Flavour:
             take its `envelope` too.
         text_needs_heartbeat: no STATUSTEXT on a channel before a heartbeat was received there.
         heartbeat_on_mode_change: an extra heartbeat is sent at once.
-        sends_events: what happens is told in EVENT messages, texts repeat them.
+        sends_events: events are sent as EVENT messages, and texts repeat them.
         bytewise_parameters: integer parameters travel as bit patterns, not as floats.
         reboot_starts_again: a reboot starts the simulated vehicle again too, at its first place and level
             (ArduPilot's SITL); else only the autopilot boots, as on a vehicle.

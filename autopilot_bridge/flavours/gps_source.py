@@ -1,4 +1,4 @@
-"""Which receiver the first GPS is: the vehicle's own, one whose fixes come by messages, or none."""
+"""The source of the first GPS: the vehicle's own receiver, fixes received by messages, or none."""
 
 from enum import Enum, auto
 from typing import Final

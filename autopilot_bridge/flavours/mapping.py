@@ -8,7 +8,7 @@ from autopilot_bridge.parameters import ParameterDefinition, ParameterStore
 
 T = TypeVar("T")
 
-_LEAST_RATIO: Final = 0.05  # a filter that believes its sensors to the millimetre diverges
+_LEAST_RATIO: Final = 0.05  # a filter with too small sensor noise diverges
 _GREATEST_RATIO: Final = 100.0
 
 
@@ -76,9 +76,8 @@ def airframe_overrides(
 ) -> dict[str, float]:
     """Parameters whose defaults differ from the `tuned` values of a parameter class, with those values.
 
-    What an airframe file of the firmware does: under these settings the mapping gives the tuned values, as
-        far
-    as the firmware's ranges allow.
+    As an airframe file of the firmware: with these settings the mapping gives the tuned values, within the
+    firmware's ranges.
     """
     known = {definition.name: definition for definition in definitions}
     overrides = {}

@@ -1,7 +1,7 @@
-"""What keeps an aircraft flyable whatever a ground station sets: limits around the values its envelope gives.
+"""Limits that keep an aircraft flyable with any parameter values, relative to the values of its envelope.
 
-A multicopter's gains differ little from one to the next, and fixed limits do. The gains of aircraft differ by
-orders of magnitude, so that they are limited to multiples of what fits this one.
+The gains of multicopters differ little, so fixed limits are enough. The gains of aircraft differ by orders of
+magnitude, so they are limited to multiples of this aircraft's values.
 """
 
 import math

@@ -1,7 +1,7 @@
-"""What ground stations are told of a PX4's outputs: which function each has, and where its actuator sits.
+"""PX4's outputs as reported to ground stations: the function of each, and the place of its actuator.
 
-The JSON of COMP_METADATA_TYPE_ACTUATORS, made of the parameters that the vehicle has: QGroundControl's page
-of actuators shows and tests what is in it.
+The JSON of COMP_METADATA_TYPE_ACTUATORS, made from the vehicle's parameters. QGroundControl's actuator page
+shows and tests these outputs.
 
 Source: MAVLink's schema `actuators.schema.json` (version 1); PX4 1.16, `output_functions.yaml` and the
 control allocator's `module.yaml`.

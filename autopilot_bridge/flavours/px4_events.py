@@ -38,7 +38,7 @@ MODE_BITS: Final[Mapping[FlightMode, int]] = MappingProxyType(
         FlightMode.ORBIT: 1 << 21,
     }
 )
-"""Groups of modes in the report, by PX4's navigation states; modes without one are not told of."""
+"""Groups of modes in the report, by PX4's navigation states; modes without one are not reported."""
 
 MODE_GROUPS: Final[Mapping[int, int]] = MappingProxyType(
     {bit.bit_length() - 1: CUSTOM_MODES[mode] for mode, bit in MODE_BITS.items()}
@@ -231,7 +231,7 @@ KINDS: Final = (
 
 
 def occurrences(event: events.Event, notices: tuple[Notice, ...]) -> tuple[Occurrence, ...]:
-    """The events that PX4 sends when something happens, besides the report of checks.
+    """PX4's events of the vehicle, besides the report of checks.
 
     Args:
         event: what happened.

@@ -283,7 +283,7 @@ def navigation_parameters(store: ParameterStore) -> NavigationParameters:
 
 
 def gps_is_fused(store: ParameterStore) -> bool:
-    """EKF2_GPS_CTRL asks for position or velocity."""
+    """EKF2_GPS_CTRL enables position or velocity."""
     return bool(integer(store, "EKF2_GPS_CTRL", 7) & _GPS_POSITION_OR_VELOCITY)
 
 

@@ -133,7 +133,7 @@ _MAIN_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
 
 
 def commanded_mode(main: int, sub: int) -> FlightMode | None:
-    """The mode DO_SET_MODE or SET_MODE asks for, or None when there is none of these numbers.
+    """The mode that DO_SET_MODE or SET_MODE requests; None when no mode has these numbers.
 
     Orbit is entered by DO_ORBIT only: its sub mode selects plain Position. Termination can't be commanded.
     """

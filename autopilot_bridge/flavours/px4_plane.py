@@ -41,7 +41,7 @@ POLICY: Final = replace(
     MULTICOPTER_POLICY,
     armable_modes=_SELECTABLE - _PREVENT_ARMING,
     ground_modes=_SELECTABLE,
-    flown_modes=_SELECTABLE - {FlightMode.FOLLOW},  # nobody to follow
+    flown_modes=_SELECTABLE - {FlightMode.FOLLOW},  # an aircraft follows no target
     kept_after_disarm=_SELECTABLE - _PREVENT_ARMING,
     preflight_disarm_extra_s=0.0,
     orbit_mode=FlightMode.HOLD,  # Orbit is a multicopter's mode; an aircraft circles in Hold

@@ -225,7 +225,7 @@ def airframe_overrides(envelope: FlightEnvelope) -> dict[str, float]:
 
 
 def commander_parameters(store: ParameterStore) -> CommanderParameters:
-    """Those of the multicopter, and what PX4 looks at on an aircraft: COM_POS_*, FD_FAIL_*."""
+    """The parameters of the multicopter, and those that PX4 uses on an aircraft: COM_POS_*, FD_FAIL_*."""
     accuracy_m = number(store, "COM_POS_FS_EPH", 50.0)
     terminates = integer(store, "CBRK_FLIGHTTERM", _TERMINATION_OFF) != _TERMINATION_OFF
     return replace(

@@ -1,6 +1,6 @@
-"""What PX4 says about events on a fixed wing (v1.16.1): as on a multicopter, and what only aircraft do.
+"""PX4's texts of events on a fixed wing (v1.16.1): those of a multicopter, and those of aircraft only.
 
-As in `px4_texts`, what PX4 tells in EVENT messages follows as texts.
+As in `px4_texts`, PX4's EVENT messages are repeated as texts.
 """
 
 from typing import Final
@@ -23,7 +23,7 @@ _FLARING: Final = Notice(Severity.INFO, "Landing, flaring")
 _ABORTED: Final = Notice(Severity.CRITICAL, "Landing aborted")
 
 FIXED: Final = (_EXECUTING, _LANDED, _AIRSPEED_FAILED, _AIRSPEED_HEALTHY, _RUNWAY, _FLARING, _ABORTED)
-"""Texts without numbers in them that have an event of their own."""
+"""Texts without numbers that have a separate event."""
 
 
 def notices(event: events.Event) -> tuple[Notice, ...]:

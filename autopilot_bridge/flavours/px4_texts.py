@@ -1,9 +1,9 @@
-"""What PX4 says about events (v1.16.1, reference sections 7 to 9).
+"""PX4's texts of events (v1.16.1, reference sections 7 to 9).
 
 PX4 gives the reasons of a refused arming in EVENT messages (`px4_events`), which need its metadata to be
-read. Here they follow as texts too, worded as PX4 words the events, for clients that know texts only. The
-status text service ends texts that events repeat with a tab, so that those who read events don't show them
-twice.
+read. Here they are sent as texts too, in the words of the events, for clients without support for events. The
+status text service ends texts that events repeat with a tab, so that clients that read events do not show
+them twice.
 """
 
 from collections.abc import Mapping
@@ -88,7 +88,7 @@ FIXED: Final = (
     *(Notice(Severity.CRITICAL, text) for text in _BATTERY.values()),
     *dict.fromkeys(_COMMANDS.values()),
 )
-"""Texts without numbers in them that have an event of their own."""
+"""Texts without numbers that have a separate event."""
 
 
 def notices(event: events.Event) -> tuple[Notice, ...]:

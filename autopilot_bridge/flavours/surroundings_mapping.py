@@ -25,7 +25,7 @@ _STRICT: Final = {0: TargetLost.LAND, 1: TargetLost.SEARCH, 2: TargetLost.HOVER}
 
 
 def px4_follow(store: ParameterStore) -> FollowParameters:
-    """FLW_TGT_*. The angle is clockwise from the target's course: 0 ahead of it, 180 behind."""
+    """FLW_TGT_*. The angle is clockwise from the target's course: 0 in front of it, 180 behind it."""
     distance_m = clamp(number(store, "FLW_TGT_DST", 8.0), 1.0, 1000.0)
     angle_rad = math.radians(number(store, "FLW_TGT_FA", 180.0))
     height_m = clamp(number(store, "FLW_TGT_HT", 8.0), 1.0, 1000.0)

@@ -12,7 +12,7 @@ def combined(
 
     Args:
         base: the table of the class that has the shared rows.
-        own: what the other class has besides, or has differently; new rows come last.
+        own: the additional and different rows of the other class; additional rows come last.
         without: names, or beginnings of names that end in `_`, that the other class does not have.
     """
     replaced = {definition.name: definition for definition in own}

@@ -18,7 +18,7 @@ class Severity(IntEnum):
 
 
 class Notice(NamedTuple):
-    """A text for the pilot: severity and what STATUSTEXT says."""
+    """A text for the pilot: severity and text of STATUSTEXT."""
 
     severity: Severity
     text: str

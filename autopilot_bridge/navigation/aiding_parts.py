@@ -17,7 +17,7 @@ class AidingParts:
     Attributes:
         readings: newest samples of the sensors.
         solution: estimate and covariance.
-        health: what the filter says of itself.
+        health: the filter's own state.
         clocks: when each sensor last aided.
         contradictions: how often the filter's belief had to give way.
         standby: what is held while nothing aids.

@@ -41,7 +41,7 @@ class Alignment:
         self._mag_samples = 0
 
     def step(self, readings: SensorReadings) -> None:
-        """Add this step's fresh samples; start anew on motion or on samples that make no sense."""
+        """Add this step's fresh samples; restart on motion or on invalid samples."""
         imu = readings.imu
         if imu.fresh:
             accel = imu.values[IMU_ACCEL_FRD_M_S2]

@@ -1,4 +1,4 @@
-"""The Earth as the filter knows it: gravity, rotation, pressure altitude and density."""
+"""The filter's model of the Earth: gravity, rotation, pressure altitude and density."""
 
 import math
 from typing import Final

@@ -1,6 +1,7 @@
-"""Pose and velocity that somebody else has measured: visual odometry, motion capture.
+"""Pose and velocity measured by an external system: visual odometry, motion capture.
 
-The navigation filter takes them as `ExternalSample`s. They come by messages, so nothing in them is trusted.
+The navigation filter receives them as `ExternalSample`s. They come from messages, so their values are
+untrusted.
 """
 
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ class ExternalFrame(IntEnum):
     """Axes that a sample's vectors are in."""
 
     NED = 0  # north, east, down
-    LOCAL_FRD = 1  # level and down, but with a heading of its own
+    LOCAL_FRD = 1  # level, but with a separate heading reference
     BODY_FRD = 2  # the vehicle's; velocities only
 
 
@@ -65,7 +66,7 @@ class ExternalCounts:
         frozen: the same to the last digit, in flight.
         incoherent: moves in another way than the vehicle, so that nothing is begun with it.
         flooded: more than are looked at between two updates.
-        resets: jumps of the estimate to what the sender says.
+        resets: jumps of the estimate to the sender's values.
     """
 
     __slots__ = (
@@ -87,12 +88,12 @@ class ExternalCounts:
 
 
 def variance_of(said: float, noise: float, *, own: bool) -> float:
-    """What is believed of a variance that a sender states.
+    """The variance that the filter uses for a variance in a message.
 
     Args:
-        said: the sender's; NaN or nonsense: not known.
-        noise: 1-sigma: the least that is believed.
-        own: only `noise` counts.
+        said: the sender's; NaN or an invalid value: not known.
+        noise: 1-sigma: the smallest value used.
+        own: only `noise` is used.
     """
     least = noise * noise
     return least if own or not 0.0 < said < 1e6 else max(said, least)

@@ -1,9 +1,9 @@
-"""External odometry in the filter: when it is begun with, fused, refused, followed in jumps, and given up.
+"""External odometry in the filter: start of its use, fusion, refusal, jumps, and end of its use.
 
 The rules follow PX4's EKF2. Without GPS the position is the sender's. While GPS is fused the sender's origin
-is followed, and its positions count from it once GPS is lost. Beyond EKF2's rules nothing is begun with, or
-gone over to, that doesn't move as the vehicle does, and what repeats itself to the last digit in flight isn't
-believed.
+is followed, and its positions count from it once GPS is lost. In addition to EKF2's rules, odometry whose
+motion contradicts the vehicle's motion is not taken into use, and values that repeat exactly in flight are
+refused.
 """
 
 import math
@@ -130,7 +130,7 @@ class ExternalAiding:
         return sound
 
     def report(self, health: NavigationHealth, *, on_earth: bool) -> None:
-        """What it changes in what the filter says of itself.
+        """Write its part of the filter's health.
 
         Args:
             on_earth: the filter's origin is known.
@@ -167,7 +167,7 @@ class ExternalAiding:
             counts.late += 1
             return True
         jumped = has_position and self._reset_counter not in (-1, sample.reset_counter)
-        if has_position:  # a sender of speeds alone has a counter of its own
+        if has_position:  # a sender of speeds only has a separate counter
             self._reset_counter = sample.reset_counter
         has, turned = 0, False
         if p.use_yaw and math.isfinite(yaw_rad):

@@ -1,6 +1,6 @@
 """The heading of external odometry: fused in place of the compass, or compared with the filter's own.
 
-A sender in LOCAL_FRD has a heading of its own that doesn't refer to north. Where it is fused the filter takes
+A sender in LOCAL_FRD has a separate heading reference, which is not north. Where it is fused the filter takes
 it over. Else the angle between the two frames is found by comparing headings.
 """
 

@@ -14,8 +14,8 @@ class ExternalParameters:
             _YAW of 6).
         height_reference: heights are the sender's (EKF2_HGT_REF 3, EK3_SRC1_POSZ 6); else its heights count
             from where the vehicle was when they began.
-        own_noise: the noise below counts instead of the messages' (EKF2_EV_NOISE_MD 1); else it is the least
-            that is believed.
+        own_noise: the noise below counts instead of the messages' (EKF2_EV_NOISE_MD 1); else it is the lower
+            limit.
         position_noise_m, velocity_noise_m_s, yaw_noise_rad: 1-sigma (EKF2_EVP_NOISE, _EVV_, _EVA_;
             VISO_POS_M_NSE, VISO_VEL_M_NSE, VISO_YAW_M_NSE).
         position_gate, velocity_gate, yaw_gate: standard deviations of the innovation (EKF2_EVP_GATE,

@@ -156,7 +156,7 @@ class NavigationFilter:
         return self._parameters
 
     def take_external(self, sample: ExternalSample) -> None:
-        """Pose and velocity that somebody else has measured; fused at the next update, if they fit.
+        """Pose and velocity measured by an external system; fused at the next update if they pass the checks.
 
         They may hold anything: what can't be used is counted (`external_counts`).
         """

@@ -155,7 +155,7 @@ class GpsAiding:
         scale = max(1.0, float(values[GPS_SPEED_ACCURACY_M_S]) / horizontal) ** 2
         for i, noise in enumerate((horizontal, horizontal, vertical)):
             obs[f.GPS_VEL_VAR + i] = scale * noise * noise
-            if obs[f.GPS_VEL + i] != obs[f.GPS_VEL + i]:  # not told: nothing is learnt of it
+            if obs[f.GPS_VEL + i] != obs[f.GPS_VEL + i]:  # not measured: it adds no information
                 obs[f.GPS_VEL + i] = solution.past_velocity(row)[i]
                 obs[f.GPS_VEL_VAR + i] = _UNTOLD_VARIANCE_M2_S2
         solution.set_gps_accuracy(float(values[GPS_EPH_M]), float(values[GPS_EPV_M]))

@@ -1,9 +1,9 @@
-"""Is the receiver's fix good enough to use? PX4's EKF2_REQ_* checks, with a time they must hold.
+"""Quality checks of the receiver's fix: PX4's EKF2_REQ_* checks, with a time they must hold.
 
-Two checks more. Over two seconds the position must move about as the velocity says, or a receiver that talks
-nonsense in good form would be believed once the filter has nothing else left. And a receiver that repeats
-itself to the last digit doesn't measure any more: believed, its constant velocity would have the vehicle
-chase it faster and faster, unseen.
+Two additional checks. Over two seconds the change of position must agree approximately with the velocity;
+otherwise a receiver with wrong but plausible values would be used once the filter has no other source. And a
+receiver whose values repeat exactly no longer measures: with its constant velocity the filter would make the
+vehicle fly faster and faster without detecting it.
 
 A velocity, or its vertical part, may be NaN: not known.
 """

@@ -72,7 +72,7 @@ class HeadingAiding:
         return heading + math.atan2(field[1], field[0])
 
     def align_with_course(self, north_m_s: float, east_m_s: float) -> bool:
-        """A wing that has no heading, for want of a magnetometer, flies about where it points; True if so."""
+        """Without a magnetometer, set the heading of a wing to its course; True if it was set."""
         if math.hypot(north_m_s, east_m_s) < self._parameters.airspeed_threshold_m_s:
             return False
         self._turn(math.atan2(east_m_s, north_m_s) - self._yaw_rad())

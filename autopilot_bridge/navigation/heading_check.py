@@ -1,9 +1,9 @@
-"""Was the heading right that a wing was launched with?
+"""Check of the heading with which a fixed wing was launched.
 
-On the ground only the magnetometer tells, and iron nearby can turn it. Right after the launch, GPS velocities
-that are refused while course and nose differ widely say that it did: the course is then the better heading
-(PX4's EKF2 resets its yaw in the same case, from an estimator of its own). Once GPS has agreed with the
-heading in flight, a disagreement is the receiver's.
+On the ground only the magnetometer measures the heading, and iron nearby can deflect it. If GPS velocities
+are refused right after the launch while course and nose differ widely, it was deflected: the course is then
+the better heading (PX4's EKF2 resets its yaw in the same case, from a separate estimator). Once GPS has
+agreed with the heading in flight, a disagreement is an error of the receiver.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What the navigation filter says about itself, as ESTIMATOR_STATUS and EKF_STATUS_REPORT carry it."""
+"""The navigation filter's own state, as reported in ESTIMATOR_STATUS and EKF_STATUS_REPORT."""
 
 import math
 
@@ -13,7 +13,7 @@ class NavigationHealth:
     Attributes:
         uninitialised: not aligned yet; nothing else means anything.
         attitude: roll and pitch are good (MAVLink ESTIMATOR_ATTITUDE).
-        yaw_aligned: the heading refers to true north as far as the magnetometer knows.
+        yaw_aligned: the heading refers to true north, to the accuracy of the magnetometer.
         velocity_horizontal, velocity_vertical: the velocity is good.
         position_horizontal_relative, position_horizontal_absolute: good relative to the origin, and on Earth.
         position_vertical_absolute: the height is good.
@@ -25,15 +25,15 @@ class NavigationHealth:
         gps_quality: the receiver's fix passes the quality checks.
         accel_error: the accelerometer contradicts the height sensors, or the IMU delivers nothing usable.
         gps_in_use, barometer_in_use, magnetometer_in_use, rangefinder_in_use: fused lately.
-        dead_reckoning: horizontal position is valid but nothing that knows the ground has aided it for a
-            second.
+        dead_reckoning: horizontal position is valid but no measurement relative to the ground has aided it
+            for a second.
         wind_dead_reckoning: airspeed and sideslip aid the velocity in its place, through the wind (PX4's
             filter status of this name; ArduPilot's EKF then has a relative, but no absolute position). The
             accuracies grow.
         external_in_use: position or velocity of external odometry aid the horizontal position.
         external_yaw_in_use: the heading is that of external odometry.
         airspeed_in_use, sideslip_in_use: fused lately.
-        airspeed_valid: the navigation state's airspeed is the pitot tube's, and believed.
+        airspeed_valid: the navigation state's airspeed is the pitot tube's, and passes its checks.
         airspeed_synthetic: it is the ground velocity's less the wind instead.
         wind_valid: the wind in the navigation state is known to some use.
         wind_variance_m2_s2: of the wind to the north and to the east; NaN where none is estimated.

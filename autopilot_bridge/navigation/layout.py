@@ -1,4 +1,4 @@
-"""Layout of the navigation state: what the filter tells the rest of the autopilot, every physics step.
+"""Layout of the navigation state: the output of the filter to the autopilot, at every physics step.
 
 One preallocated float64 array, written in place by the navigation filter. Positions are in the local NED
 frame at the filter's origin, metres; body is FRD.

@@ -26,14 +26,14 @@ _MAY_BE_ZERO = frozenset(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NavigationParameters:
-    """What the filter believes about its sensors, and when it trusts them.
+    """The filter's assumptions about its sensors, and the limits of their use.
 
     The noise figures are the defaults of PX4 1.16's EKF2, converted to continuous time; a flavour sets them
     by its parameters (`flavours/navigation_noise.py`). They are not the simulated sensors' figures: the
     firmwares' defaults cover vibration, timing errors and cheap sensors on all frames, so they are larger.
-    Airspeed, sideslip and wind are different: the firmwares' noise stands for gusts, too, which this filter
-    measures apart from it.
-    Gates are in standard deviations of the innovation. Times and checks follow EKF2 where not said otherwise.
+    Airspeed, sideslip and wind are different: the firmwares' noise includes gusts, which this filter measures
+    separately. Gates are in standard deviations of the innovation. Times and checks follow EKF2 unless noted
+    otherwise.
 
     Attributes:
         covariance_rate_hz: rate of covariance prediction and measurement updates; divides the physics rate.
@@ -113,10 +113,10 @@ class NavigationParameters:
         wind_walk_m_s_sqrt_s: random walk of the wind (EKF2_WIND_NSD, EK3_WIND_P_NSE).
         wind_height_scale: by this times the vertical speed (in m/s) the walk is faster (EK3_WIND_PSCALE).
         wind_prior_m_s: 1-sigma of the wind before anything is known of it, each way.
-        turbulence_length_m: over which turbulence is correlated (MIL-F-8785C: 250 m at 100 m). An airspeed
-            innovation says as little about the steady wind as one in this distance would, however often the
-            sensor is read.
-        airspeed_checks: an airspeed that contradicts ground velocity and wind is not believed any more
+        turbulence_length_m: over which turbulence is correlated (MIL-F-8785C: 250 m at 100 m). Airspeed
+            innovations carry as much information about the steady wind as one per this distance, however
+            often the sensor is read.
+        airspeed_checks: an airspeed that contradicts ground velocity and wind is no longer used
             (ASPD_DO_CHECKS; ARSPD_OPTIONS bit 0).
         airspeed_check_innovation_m_s, airspeed_check_integral_m: the innovation beyond the first, added up
             over time, may reach the second (ASPD_FS_INNOV, ASPD_FS_INTEG).

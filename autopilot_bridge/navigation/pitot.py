@@ -1,4 +1,4 @@
-"""Airspeed from a pitot tube: conversion, smoothing, and whether it is to be believed."""
+"""Airspeed from a pitot tube: conversion, smoothing, and checks."""
 
 import math
 from typing import Final
@@ -90,7 +90,7 @@ class Pitot:
         )
 
     def update_density(self, *, believed: bool) -> None:
-        """Air density from the barometer, and from the sensor's own temperature if it is believed."""
+        """Air density from the barometer, and from the sensor's own temperature if that is valid."""
         static_pa = float(self._readings.barometer.values[BARO_PRESSURE_PA])
         if not _PRESSURE_PA[0] <= static_pa <= _PRESSURE_PA[1]:
             return
@@ -104,14 +104,14 @@ class Pitot:
 
 
 class AirspeedCheck:
-    """Decides over time whether the sensor is believed: PX4's airspeed selector (AirspeedValidator).
+    """Decides over time whether the sensor is used: PX4's airspeed selector (AirspeedValidator).
 
     The part of the innovation beyond a limit is added up; beyond an integral, or when the sensor is dead,
     the check fails. Failing for `airspeed_stop_delay_s` takes the sensor out, passing for
     `airspeed_start_delay_s` brings it back.
 
     Attributes:
-        passed: the sensor is believed.
+        passed: the sensor is used.
     """
 
     __slots__ = ("_bad_since_us", "_good_since_us", "_integral_m", "_updated_us", "passed")
@@ -120,7 +120,7 @@ class AirspeedCheck:
         self.restart()
 
     def restart(self) -> None:
-        """Believe the sensor until it proves wrong."""
+        """Use the sensor until its checks fail."""
         self.passed = True
         self._integral_m = 0.0
         self._bad_since_us = -1
@@ -170,7 +170,7 @@ class GustVariance:
     _LIGHT: Final = 1.0  # (m/s)^2, light turbulence of MIL-F-8785C at 100 m
     _LIGHT_FOR_S: Final = 15.0  # weight of that first guess
     _LONGEST_S: Final = 60.0
-    _MOST: Final = 100.0  # (m/s)^2 that one innovation may say
+    _MOST: Final = 100.0  # (m/s)^2, limit for one innovation
     _SETTLED: Final = 1.0  # (m/s)^2 of the estimate, below which the innovation is turbulence
 
     def __init__(self) -> None:

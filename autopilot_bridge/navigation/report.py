@@ -26,7 +26,7 @@ def report(
     held: bool,
     at_rest: bool,
 ) -> None:
-    """Write `health` (what GPS quality and the rangefinder say excepted)."""
+    """Write `health` (except the fields of GPS quality and rangefinder)."""
     variance, obs = solution.p.diagonal().tolist(), solution.obs
     horizontal_var = variance[POS] + variance[POS + 1]
     tilt_var = variance[ATT] + variance[ATT + 1]

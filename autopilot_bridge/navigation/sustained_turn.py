@@ -1,9 +1,9 @@
-"""What a lasting turn does to the gyro of a wing.
+"""The effect of a sustained turn on the gyro biases of a fixed wing.
 
 An aircraft can turn for minutes, and its gyro's scale and cross-axis errors then act as a bias: the filter
-rightly learns it, and it is wrong as soon as the turn ends. So when the turn rate, averaged over some
-seconds, has changed, the gyro biases become uncertain by what the change makes of those errors. Short rolls
-are counted by their angle in the covariance prediction, as everywhere.
+correctly learns this bias, and it is wrong as soon as the turn ends. When the turn rate, averaged over some
+seconds, has changed, the variance of the gyro biases is therefore increased by the change multiplied by those
+errors. Short rolls are covered by their angle in the covariance prediction.
 """
 
 from typing import Final

@@ -1,1 +1,1 @@
-"""What the autopilot says of itself: message builders per flavour and the streams that send them."""
+"""The autopilot's telemetry: message builders per flavour and the streams that send them."""

@@ -1,4 +1,4 @@
-"""What the messages of both firmwares' aircraft are made from: airspeed, wind and the path being flown."""
+"""The common sources of the messages of both firmwares' aircraft: airspeed, wind and the path being flown."""
 
 import math
 from typing import NamedTuple
@@ -59,7 +59,7 @@ class AircraftState:
 
     @property
     def path(self) -> FlightPath | None:
-        """What is being flown along; looked for once per step, since several messages tell of it."""
+        """The path being flown; determined once per step, since several messages need it."""
         sources = self._sources
         if not sources.context.armed:
             return None
@@ -72,7 +72,7 @@ class AircraftState:
 
     @property
     def surfaces(self) -> Surfaces:
-        """What the actuators are told."""
+        """The commands of the actuators."""
         values = self._sources.controller.actuators.tolist()
         return Surfaces(
             values[interface.AILERON],
@@ -83,13 +83,13 @@ class AircraftState:
 
     @property
     def powered(self) -> bool:
-        """The motor may turn: armed, and what is flown is more than resting."""
+        """The motor may turn: the vehicle is armed, and the task is not idle."""
         context = self._sources.context
         return context.armed and bool(context.setpoint[sp.LEVEL] > sp.IDLE)
 
     @property
     def controller(self) -> FixedWingController:
-        """The control laws, as an aircraft has them."""
+        """The control laws of an aircraft."""
         controller = self._sources.controller
         assert isinstance(controller, FixedWingController)
         return controller

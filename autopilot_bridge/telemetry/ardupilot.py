@@ -228,7 +228,7 @@ class ArdupilotMessages(CommonMessages):
         return (NAN, NAN, NAN, NAN)
 
     def extended_sys_state(self) -> Values:
-        """EXTENDED_SYS_STATE (245): a copter calls itself VTOL in multicopter state."""
+        """EXTENDED_SYS_STATE (245): a copter reports VTOL in multicopter state."""
         return (mavlink.MAV_VTOL_STATE_MC, int(self.sources.context.landed_state))
 
     def battery_status(self) -> Values | None:

@@ -116,7 +116,7 @@ class ArduPlaneMessages(ArdupilotMessages):
         return (math.degrees(math.atan2(-east, -north)), math.hypot(north, east, down), down)
 
     def nav_controller_output(self) -> Values | None:
-        """NAV_CONTROLLER_OUTPUT (62), in the modes the autopilot navigates in; airspeed error in cm/s."""
+        """NAV_CONTROLLER_OUTPUT (62), in modes with navigation by the autopilot; airspeed error in cm/s."""
         if self.sources.heartbeat()[_CUSTOM_MODE_FIELD] not in _NAVIGATING:
             return None
         controller, v = self._aircraft.controller, self.view.refreshed()
@@ -172,7 +172,7 @@ class ArduPlaneMessages(ArdupilotMessages):
         )
 
     def extended_sys_state(self) -> Values:
-        """EXTENDED_SYS_STATE (245): no VTOL; taking off is flying already."""
+        """EXTENDED_SYS_STATE (245): no VTOL; a take-off is reported as flight."""
         landed = int(self.sources.context.landed_state)
         if landed == mavlink.MAV_LANDED_STATE_TAKEOFF:
             landed = int(mavlink.MAV_LANDED_STATE_IN_AIR)

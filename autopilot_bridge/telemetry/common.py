@@ -1,4 +1,4 @@
-"""Messages that both firmwares send alike (MAVLink common message set)."""
+"""Messages that are the same in both firmwares (MAVLink common message set)."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -23,7 +23,7 @@ _NO_GPS: Final = 0  # GPS_FIX_TYPE
 
 @dataclass(slots=True, kw_only=True)
 class TelemetrySources:
-    """Where the messages take their contents from.
+    """The sources of the messages' values.
 
     Attributes:
         controller: `MulticopterController` or `FixedWingController`.
@@ -32,7 +32,8 @@ class TelemetrySources:
         mission_current: packed payload of MISSION_CURRENT.
         autopilot_version: field values of AUTOPILOT_VERSION.
         battery_level: MAV_BATTERY_CHARGE_STATE.
-        position_ready: the position may be flown on (the boot timeline is over and the filter has one).
+        position_ready: the position can be used for flight (the boot timeline is over and the filter has
+            one).
         unix_epoch_us: Unix time of boot, microseconds.
         task: the flight task being flown, None while there is none (aircraft).
         missions: the plan a mission task flies (aircraft).
@@ -110,7 +111,7 @@ class CommonMessages:
     def gps_raw_int(self) -> Values | None:
         """GPS_RAW_INT (24); eph and epv are the dilutions of precision x 100, as both firmwares send.
 
-        A receiver that has fallen silent is shown as none at all.
+        A receiver that has stopped sending is shown as not present.
         """
         gps = self.sources.readings.gps
         if gps.time_us < 0:
@@ -122,7 +123,7 @@ class CommonMessages:
         fix_type = _NO_GPS if silent else int(v[interface.GPS_FIX_TYPE])
         vn, ve, _ = v[interface.GPS_VEL_NED_M_S]
         speed_cm_s = course_cdeg = UINT16_UNKNOWN
-        if vn == vn:  # else it was not told
+        if vn == vn:  # else it was not sent
             speed_cm_s = round(math.hypot(vn, ve) * 100.0)
             course_cdeg = round(math.degrees(math.atan2(ve, vn)) % 360.0 * 100.0) % 36000
         if fix_type < 2 or not math.isfinite(v[interface.GPS_LAT_DEG]):
@@ -165,7 +166,7 @@ class CommonMessages:
         )
 
     def differential_pressure_hpa(self) -> float:
-        """What the pitot tube measures; 0 without one."""
+        """Pressure of the pitot tube; 0 without one."""
         return 0.0
 
     def servo_output_raw(self) -> Values:
@@ -203,7 +204,7 @@ class CommonMessages:
         )
 
     def airspeed_m_s(self) -> float:
-        """What VFR_HUD shows as airspeed without an airspeed sensor."""
+        """The value for VFR_HUD's airspeed without an airspeed sensor."""
         return 0.0
 
     def throttle(self) -> float:
@@ -211,7 +212,7 @@ class CommonMessages:
         return self.sources.controller.thrust if self.sources.context.armed else 0.0
 
     def attitude_target(self) -> Values | None:
-        """ATTITUDE_TARGET (83): what the attitude loop is following."""
+        """ATTITUDE_TARGET (83): the setpoint of the attitude loop."""
         context = self.sources.context
         if not context.armed or context.setpoint[sp.LEVEL] < sp.RATES:
             return None
@@ -226,7 +227,7 @@ class CommonMessages:
         )
 
     def trajectory_setpoint(self) -> list[float] | None:
-        """Position 3, velocity 3, acceleration 3, yaw, yaw rate asked for; None when not flying so."""
+        """Commanded position 3, velocity 3, acceleration 3, yaw, yaw rate; None in other kinds of flight."""
         context = self.sources.context
         if not context.armed or context.setpoint[sp.LEVEL] != sp.TRAJECTORY:
             return None

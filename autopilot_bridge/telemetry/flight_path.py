@@ -1,4 +1,4 @@
-"""What an aircraft is flying along, for telemetry: the place ahead, a circle, the line to the place."""
+"""The path of an aircraft, for telemetry: the target position, a circle, the line to the position."""
 
 import math
 from typing import NamedTuple
@@ -20,9 +20,9 @@ class FlightPath(NamedTuple):
     """The present leg, local NED metres.
 
     Attributes:
-        north_m, east_m, down_m: the place flown to, or the centre of the circle.
-        radius_m: of the circle, negative counter-clockwise; NaN: a place to fly to or past.
-        from_north_m, from_east_m: where the line to the place begins; NaN: not known.
+        north_m, east_m, down_m: the target position, or the centre of the circle.
+        radius_m: of the circle, negative counter-clockwise; NaN: a position to fly to or past.
+        from_north_m, from_east_m: where the line to the position begins; NaN: not known.
     """
 
     north_m: float
@@ -38,15 +38,17 @@ class FlightPath(NamedTuple):
         return math.isfinite(self.radius_m)
 
     def distance_m(self, north_m: float, east_m: float) -> float:
-        """From a position to the place, horizontally."""
+        """Horizontal distance from a position to the target position."""
         return math.hypot(self.north_m - north_m, self.east_m - east_m)
 
     def bearing_rad(self, north_m: float, east_m: float) -> float:
-        """From a position to the place, clockwise from north."""
+        """Bearing from a position to the target position, clockwise from north."""
         return math.atan2(self.east_m - east_m, self.north_m - north_m)
 
     def direction_rad(self, north_m: float, east_m: float) -> float:
-        """Direction of the path: of the tangent of a circle, else the bearing of the place; -pi..pi."""
+        """Direction of the path: the tangent of a circle, else the bearing of the target position;
+        -pi..pi.
+        """
         bearing = self.bearing_rad(north_m, east_m)
         if not self.circles:
             return bearing
@@ -64,7 +66,9 @@ class FlightPath(NamedTuple):
         return (along_north * off_east - along_east * off_north) / length_m
 
     def nearest_point(self, north_m: float, east_m: float) -> tuple[float, float]:
-        """(north, east) of the path's point nearest to a position; the place where the line isn't known."""
+        """(north, east) of the path's point nearest to a position; the target position if the line is not
+        known.
+        """
         if self.circles:
             away_m = self.distance_m(north_m, east_m)
             if away_m == 0.0:
@@ -84,7 +88,7 @@ class FlightPath(NamedTuple):
 
 
 def flight_path(task: object, context: FlightContext, missions: MissionStore | None) -> FlightPath | None:
-    """What a flight task is flying along; None for one that flies no place (sticks, attitudes, headings)."""
+    """The path of a flight task; None for one without positions (sticks, attitudes, headings)."""
     while isinstance(task, (MissionTask, ReturnTask)) and task.sub_task is not None:
         task = task.sub_task
     if isinstance(task, MissionTask):
@@ -109,7 +113,7 @@ def flight_path(task: object, context: FlightContext, missions: MissionStore | N
 
 
 def _leg(context: FlightContext, missions: MissionStore) -> FlightPath | None:
-    """The leg of a plan to its current item, from the item with a place before it."""
+    """The leg of a plan to its current item, from the last item with a position before it."""
     items, current = missions.items, missions.current
     if not 0 <= current < len(items):
         return None

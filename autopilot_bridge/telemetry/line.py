@@ -1,12 +1,12 @@
-"""Lines that carry less than is to be said: how much of it streams may take, on vehicle time.
+"""Lines with less capacity than the messages need: the share of it for streams, on vehicle time.
 
-Answers (acknowledgements, parameters, mission items, files) go out at once; streams get what they leave, and
-at least a quarter of the line, so that no list of parameters silences the vehicle. What waits for the line is
-always less than a fraction of a second's worth.
+Answers (acknowledgements, parameters, mission items, files) are sent at once; streams get the rest, and at
+least a quarter of the line, so that a list of parameters does not stop the telemetry. The data that wait for
+the line are always less than a fraction of a second's worth.
 
-PX4 scales the rates of its streams by what the link carries (`Mavlink::update_rate_mult`), ArduPilot waits
+PX4 scales the rates of its streams by the link's capacity (`Mavlink::update_rate_mult`), ArduPilot waits
 for space in the transmit buffer (`GCS_MAVLINK::update_send`); both slow down when a radio's RADIO_STATUS
-tells that its buffer fills.
+reports that its buffer fills.
 """
 
 from collections.abc import Collection
@@ -15,30 +15,30 @@ from typing import Final
 
 MICROSECONDS: Final = 1_000_000
 USED_SHARE: Final = 0.85
-"""Of the line's capacity, what thinned streams take together; the rest is for answers."""
+"""Share of the line's capacity for all thinned streams together; the rest is for answers."""
 LEAST_SHARE: Final = 0.25
-"""Of the line's capacity, what is kept for streams whatever answers there are."""
+"""Share of the line's capacity that is reserved for streams in any case."""
 STREAMS_WAIT_S: Final = 0.1
-"""Streams wait while the line is behind by so much."""
+"""Streams wait while the line has this backlog."""
 LISTS_WAIT_S: Final = 0.2
-"""Long answers pause while the line is behind by so much."""
+"""Long answers pause while the line has this backlog."""
 LATEST_S: Final = 0.3
-"""However small their share, streams wait while the line is behind by so much."""
+"""Streams with the smallest share too wait while the line has this backlog."""
 SLOW_US: Final = MICROSECONDS
-"""Streams of 1 Hz and less are not thinned, nor others to less, as long as all these fit."""
+"""Streams of 1 Hz and less are not thinned, and others not below 1 Hz, as long as all of them fit."""
 _PASSES: Final = 4
 
 
 class LineBudget:
-    """What a line has been given and not carried yet.
+    """The data passed to a line and not transmitted yet.
 
     Args:
-        bytes_per_s: what the line carries, bytes per second of vehicle time.
+        bytes_per_s: the line's capacity, bytes per second of vehicle time.
 
     Attributes:
         bytes_per_s: as given.
-        backlog_bytes: on their way.
-        forwarded_bytes: of other components, so far: sent at once, as they come.
+        backlog_bytes: data not transmitted yet.
+        forwarded_bytes: total of other components' data, which are sent at once.
 
     Raises:
         ValueError: the capacity is not above 0.
@@ -56,7 +56,7 @@ class LineBudget:
         self._time_us = 0
 
     def advance(self, time_us: int) -> None:
-        """The line has carried on until `time_us`."""
+        """Update the backlog to `time_us`."""
         carried = (time_us - self._time_us) * self.bytes_per_s / MICROSECONDS
         self._time_us = time_us
         self.backlog_bytes = max(0.0, self.backlog_bytes - carried)
@@ -64,16 +64,16 @@ class LineBudget:
         self._share_bytes = min(most, self._share_bytes + LEAST_SHARE * carried)
 
     def add(self, size: int) -> None:
-        """Bytes were given to the line."""
+        """Bytes were passed to the line."""
         self.backlog_bytes += size
 
     def forward(self, size: int) -> None:
-        """Bytes of another component were given to the line."""
+        """Bytes of another component were passed to the line."""
         self.backlog_bytes += size
         self.forwarded_bytes += size
 
     def spend_share(self, size: int) -> None:
-        """So many bytes of streams were sent."""
+        """Bytes of streams were sent."""
         self._share_bytes -= size
 
     @property
@@ -83,7 +83,7 @@ class LineBudget:
 
     @property
     def stream_room_bytes(self) -> float:
-        """What streams may send now; more than nothing: one message, however long it is."""
+        """Bytes that streams may send now; if positive, one message may be sent, whatever its length."""
         free = STREAMS_WAIT_S * self.bytes_per_s - self.backlog_bytes
         if self.backlog_bytes > LATEST_S * self.bytes_per_s:
             return 0.0
@@ -94,9 +94,9 @@ def thinned_us(interval_us: int, multiplier: float, stretch: float, slowdown_us:
     """Interval of a stream that is thinned.
 
     Args:
-        interval_us: as asked for.
-        multiplier: share of its rate that a fast stream keeps.
-        stretch: factor on all intervals, when not even 1 Hz of everything fits.
+        interval_us: requested interval.
+        multiplier: fraction of its rate that a fast stream keeps.
+        stretch: factor on all intervals, when not even 1 Hz of all streams fits.
         slowdown_us: added for a radio whose buffer is short (ArduPilot).
     """
     kept = interval_us if interval_us >= SLOW_US else min(interval_us / multiplier, float(SLOW_US))
@@ -108,7 +108,7 @@ def fit(streams: Collection[tuple[int, float]], bytes_per_s: float) -> tuple[flo
 
     Args:
         streams: interval (us) and size (bytes) of each.
-        bytes_per_s: what they may take together.
+        bytes_per_s: capacity for all streams together.
     """
     slow = sum(size * MICROSECONDS / interval for interval, size in streams if interval >= SLOW_US)
     fast = [(interval, size) for interval, size in streams if interval < SLOW_US]
@@ -116,7 +116,7 @@ def fit(streams: Collection[tuple[int, float]], bytes_per_s: float) -> tuple[flo
     if least >= bytes_per_s:
         return 1e-6, least / bytes_per_s
     multiplier = 1.0
-    for _ in range(_PASSES):  # streams that come down to 1 Hz stay there, the others make up for it
+    for _ in range(_PASSES):  # streams that reach 1 Hz stay there, and the others are reduced further
         floored = sum(size for interval, size in fast if interval >= SLOW_US * multiplier)
         scaled = sum(
             size * MICROSECONDS / interval for interval, size in fast if interval < SLOW_US * multiplier
@@ -137,11 +137,11 @@ class FlowControl:
     Attributes:
         factors: (below, factor): the rate of all streams is multiplied by the first factor that applies.
         recovery: (above, factor) of spare room.
-        least: the smallest share of the rates.
-        timeout_us: without RADIO_STATUS for so long there is no radio; 0: kept.
+        least: the smallest fraction of the rates.
+        timeout_us: after this time without RADIO_STATUS the radio counts as gone; 0: never.
         slowdowns_ms: (below, milliseconds) added to all intervals.
         speedups_ms: (above, milliseconds taken off, only while more than) of spare room.
-        most_ms: slowed down to no more than about this.
+        most_ms: approximate limit of the slowdown.
     """
 
     factors: tuple[tuple[int, float], ...] = ()
@@ -164,10 +164,10 @@ ARDUPILOT_FLOW_CONTROL: Final = FlowControl(
 
 
 class RadioFlow:
-    """What a radio at the end of a channel has told about its buffer.
+    """The transmit buffer of a radio at the end of a channel, from its messages.
 
     Attributes:
-        multiplier: share of their rates that streams keep.
+        multiplier: fraction of their rates that streams keep.
         slowdown_us: added to all intervals.
     """
 
@@ -180,7 +180,7 @@ class RadioFlow:
         self.slowdown_us = 0
 
     def heard(self, free_percent: int, time_us: int) -> None:
-        """A RADIO_STATUS came: percent of the transmit buffer that are free."""
+        """A RADIO_STATUS was received: free part of the transmit buffer in percent."""
         control, slowdown_ms = self._control, self.slowdown_us // 1000
         self._heard_us = time_us
         for below, factor in control.factors:

@@ -1,6 +1,6 @@
 """The fastest messages, packed and framed by compiled kernels straight from the navigation state.
 
-Six messages make up three quarters of PX4's onboard traffic. Their payloads lie one behind the other in a
+Six messages make up three quarters of PX4's onboard traffic. Their payloads are stored consecutively in a
 record with exactly the layout of the wire. One call fills all of them, another makes frames of those that are
 due on a channel.
 """
@@ -134,7 +134,7 @@ _PARTS: Final = _parts()
 
 @kernel
 def _frames(record: NDArray[np.uint8], out: NDArray[np.uint8], due: int, sender: int, sequence: int) -> int:
-    """MAVLink 2 frames of the parts whose bit is set in `due`, one behind the other; returns their length.
+    """MAVLink 2 frames of the parts whose bit is set in `due`, in sequence; returns their length.
 
     Args:
         sender: system id x 256 + component id.
@@ -177,9 +177,9 @@ class MotionMessages:
         bits: message id -> its bit in `frames`.
 
     Args:
-        view: gives the time of the step.
+        view: provides the time of the step.
         context: local frame and home.
-        navigation: the filter; without an attitude there is none of the messages that carry one.
+        navigation: the filter; without an attitude, messages with an attitude are not made.
         readings: the IMU, magnetometer and barometer behind HIGHRES_IMU.
     """
 
@@ -229,11 +229,11 @@ class MotionMessages:
         }
 
     def frames(self, due: int, encoder: FrameEncoder) -> bytes:
-        """Frames of the messages whose `bits` are set, those that there is something to say for.
+        """Frames of the messages whose `bits` are set and whose values are available.
 
         Args:
             due: sum of `bits`.
-            encoder: the channel's; gives sender and sequence numbers.
+            encoder: the channel's; provides sender and sequence numbers.
         """
         if not self._navigation.health.attitude:
             due &= ~_NEED_ATTITUDE

@@ -1,4 +1,4 @@
-"""Packets of our own channels as records of a log (.tlog): many are taken apart at once, by compiled code."""
+"""Packets of our own channels as records of a log (.tlog): compiled code splits many at once."""
 
 from typing import Final
 
@@ -24,7 +24,7 @@ _WHOLE: Final = -1
 
 @kernel
 def _frame_size(data: Bytes, start: int, end: int) -> int:
-    """Size of the frame that begins at `start`; 0 where none does, or where it does not end by `end`."""
+    """Size of the frame that begins at `start`; 0 if there is none, or if it does not end by `end`."""
     size = 0
     if end - start >= OVERHEAD_V1:
         if data[start] == MAGIC_V2:
@@ -41,13 +41,13 @@ def _split(data: Bytes, times_us: Integers, sizes: Integers, out: Bytes) -> tupl
     """Write the frames of packets as records.
 
     Args:
-        data: the packets, one behind the other.
+        data: the packets, in sequence.
         times_us, sizes: (packets,) of each.
-        out: where to, large enough for a time before every shortest frame.
+        out: output, large enough for a time before every shortest frame.
 
     Returns:
-        Bytes written, records, the first packet that does not end with a frame (-1: all do), and where in
-        it no whole frame begins.
+        Bytes written, records, the first packet that does not end with a frame (-1: all do), and the offset
+        in it where no whole frame begins.
     """
     written, records, torn, torn_at = 0, 0, _WHOLE, 0
     end = 0
@@ -74,16 +74,16 @@ def _split(data: Bytes, times_us: Integers, sizes: Integers, out: Bytes) -> tupl
 def packet_records(times_us: list[int], packets: list[bytes]) -> tuple[bytes, int, str]:
     """Records of the frames in packets that channels of ours have sent.
 
-    Frames are told apart by their lengths only; what comes from elsewhere goes through a parser first. Among
-    them may be somebody else's that were forwarded as they came: MAVLink 1, or signed.
+    Frames are split by their lengths only; data from other sources must go through a parser first. The
+    packets may contain forwarded frames of other systems, unchanged: MAVLink 1, or signed.
 
     Args:
         times_us: of each packet, microseconds of the Unix epoch.
-        packets: each of one or more whole frames, one behind the other.
+        packets: each of one or more whole frames, in sequence.
 
     Returns:
-        The records, how many there are, and what is wrong with the first packet that does not end with a
-        frame (empty: all do); of such a packet the whole frames before are there.
+        The records, their number, and the error of the first packet that does not end with a
+        frame (empty: all do); the whole frames of such a packet are included.
     """
     data = np.frombuffer(b"".join(packets), dtype=np.uint8)
     out = np.empty(data.size + TIME_SIZE * (data.size // OVERHEAD_V1), dtype=np.uint8)

@@ -1,7 +1,7 @@
-"""Packing field values straight into payload bytes, without a message object in between.
+"""Packing of field values directly into payload bytes, without a message object.
 
-Streams run at hundreds of messages a second; a tuple of values in definition order is all they make. Integer
-fields saturate at their range instead of failing, as firmware does.
+Streams run at hundreds of messages a second; each produces only a tuple of values in definition order.
+Integer fields saturate at their range instead of failing, as in the firmware.
 """
 
 import math
@@ -31,7 +31,7 @@ _FLOAT_MAX = 3.4028234663852886e38
 def values_packer(message: MessageDefinition) -> Pack:
     """A function that packs values in the order of `message.field_names` into the payload on the wire.
 
-    Array fields take a sequence of their full length, strings bytes.
+    Array fields need a sequence of their full length, strings bytes.
     """
     order = [message.field_names.index(field.name) for field in message.wire_fields]
     fields = message.wire_fields

@@ -88,14 +88,14 @@ _TARGET_BITS: Final = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)
 """POSITION_TARGET_TYPEMASK of position, velocity, acceleration (north, east, down), yaw and yaw rate."""
 
 _FREE_FALL_M_S2: Final = 100.0
-"""Downward acceleration that PX4 asks for while the motors are off."""
+"""Downward acceleration that PX4 commands while the motors are off."""
 
 ODID_EPOCH_UNIX_S: Final = 1546300800
 """2019-01-01, the epoch of Open Drone ID's system time stamp."""
 
 
 class Px4Messages(CommonMessages):
-    """Builders of what PX4 sends.
+    """Builders of PX4's messages.
 
     Args:
         current_mode: (standard_mode, custom_mode, intended_custom_mode).
@@ -136,7 +136,7 @@ class Px4Messages(CommonMessages):
         }
 
     def ping(self) -> Values:
-        """PING (4), to everybody."""
+        """PING (4), to all systems."""
         self._ping_sequence += 1
         return (self.view.time_us, self._ping_sequence, 0, 0)
 
@@ -150,7 +150,7 @@ class Px4Messages(CommonMessages):
         return (0, self.view.time_us * 1000, 0, 0)
 
     def altitude(self) -> Values | None:
-        """ALTITUDE (141): monotonic is the barometer's, terrain counts from the local origin."""
+        """ALTITUDE (141): monotonic is the barometer's, terrain is relative to the local origin."""
         v = self.view.refreshed()
         if not v.has_global:
             return None
@@ -168,7 +168,7 @@ class Px4Messages(CommonMessages):
         )
 
     def attitude_target(self) -> Values | None:
-        """ATTITUDE_TARGET (83), at rest too: level, as it stands, motors off."""
+        """ATTITUDE_TARGET (83), at rest too: level, with the present heading, motors off."""
         target = super().attitude_target()
         if target is not None or not self.sources.navigation.health.attitude:
             return target
@@ -177,13 +177,15 @@ class Px4Messages(CommonMessages):
         return (self.view.time_ms, 0, level, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0))
 
     def position_target_local_ned(self) -> Values | None:
-        """POSITION_TARGET_LOCAL_NED (85), at rest too; what nobody asks for is NaN, and masked."""
+        """POSITION_TARGET_LOCAL_NED (85), at rest too; a quantity that is not commanded is NaN, and
+        masked.
+        """
         target = self.trajectory_setpoint()
         if target is None:
             if self.sources.context.armed or not self.sources.navigation.health.attitude:
                 return None
             target = [NAN] * 6 + [0.0, 0.0, _FREE_FALL_M_S2, self.view.refreshed().yaw, 0.0]
-        else:  # PX4 shows what its position controller makes of a position
+        else:  # PX4 shows the output of its position controller
             computed = self.sources.controller.velocity_setpoint_ned_m_s.tolist()
             target[3:6] = [
                 made if math.isnan(asked) else asked
@@ -193,7 +195,7 @@ class Px4Messages(CommonMessages):
         return (self.view.time_ms, mavlink.MAV_FRAME_LOCAL_NED, mask, *target)
 
     def estimator_status(self) -> Values:
-        """ESTIMATOR_STATUS (230). PX4's ratios are squares: of the innovation over that of its gate."""
+        """ESTIMATOR_STATUS (230). PX4's ratios are squared: (innovation / gate)^2."""
         health = self.sources.navigation.health
         return (
             self.view.time_us,
@@ -256,7 +258,7 @@ class Px4Messages(CommonMessages):
         )
 
     def open_drone_id_system(self) -> Values | None:
-        """OPEN_DRONE_ID_SYSTEM (12904): the operator is taken to stand at home."""
+        """OPEN_DRONE_ID_SYSTEM (12904): the operator is assumed at home."""
         home = self.home_place()
         if home is None:
             return None

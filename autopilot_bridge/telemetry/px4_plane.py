@@ -39,7 +39,7 @@ GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
 _NEUTRAL_US: Final = 1500
 _TRAVEL_US: Final = 500.0
 _STOPPED_US: Final = 900
-_PLACE_MASK: Final = 0xDF8  # velocity, acceleration, yaw and yaw rate aren't given
+_PLACE_MASK: Final = 0xDF8  # velocity, acceleration, yaw and yaw rate are not given
 _NOTHING: Final = (NAN,) * 8
 
 
@@ -75,7 +75,7 @@ class Px4PlaneMessages(Px4Messages):
         return 0.0 if pressure_pa is None else pressure_pa * 0.01
 
     def servo_output_raw(self) -> Values:
-        """SERVO_OUTPUT_RAW (36): aileron, elevator, rudder, motor; 900 us where nothing is driven."""
+        """SERVO_OUTPUT_RAW (36): aileron, elevator, rudder, motor; 900 us for outputs without an actuator."""
         aileron = elevator = rudder = motor = _STOPPED_US
         if self.sources.context.armed:
             surfaces = self._aircraft.surfaces
@@ -90,8 +90,8 @@ class Px4PlaneMessages(Px4Messages):
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62): nav_roll and nav_pitch stay 0, bearings are signed, as in PX4.
 
-        In a circle the target bearing is the direction of the path. The height error is wanted less flown,
-        the airspeed error flown less wanted.
+        In a circle the target bearing is the direction of the path. The height error is the wanted minus the
+        actual height, the airspeed error the actual minus the wanted airspeed.
         """
         v = self.view.refreshed()
         if not v.has_global:
@@ -132,7 +132,7 @@ class Px4PlaneMessages(Px4Messages):
         return (v.time_us, wind[0], wind[1], 0.0, north + east, 0.0, v.alt_amsl_m, 0.0, 0.0)
 
     def position_target_global_int(self) -> Values | None:
-        """POSITION_TARGET_GLOBAL_INT (87): the place flown to, or the centre of the circle."""
+        """POSITION_TARGET_GLOBAL_INT (87): the target position, or the centre of the circle."""
         path, frame = self._aircraft.path, self.sources.context.frame
         if path is None or frame is None:
             return None
@@ -148,7 +148,9 @@ class Px4PlaneMessages(Px4Messages):
         )
 
     def position_target_local_ned(self) -> Values | None:
-        """POSITION_TARGET_LOCAL_NED (85): the nearest point of the path; at rest here, at sea level."""
+        """POSITION_TARGET_LOCAL_NED (85): the nearest point of the path; at rest the own position, at sea
+        level.
+        """
         v = self.view.refreshed()
         frame, path = self.sources.context.frame, self._aircraft.path
         if frame is None:

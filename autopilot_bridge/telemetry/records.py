@@ -21,11 +21,11 @@ _NUMPY_CODES: Final = {
 
 
 def record_type(*messages: MessageDefinition, prefixed: bool = False) -> np.dtype[np.void]:
-    """A packed record of one message, or of several one behind the other.
+    """A packed record of one message, or of several messages in sequence.
 
     Args:
-        messages: whose fields, in the order of the wire; messages with strings are not meant.
-        prefixed: field names carry the message's name before them: `attitude__roll`.
+        messages: the messages of the fields, in wire order; messages with strings are not supported.
+        prefixed: field names have the message's name as a prefix: `attitude__roll`.
     """
     fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
     for message in messages:

@@ -1,9 +1,9 @@
-"""Which messages go out on a channel, and when.
+"""The periodic messages of a channel, and when they are sent.
 
 A `StreamTable` belongs to one channel. Every stream keeps its own due time, so any rate is exact on average
 on the physics grid; the payload of a message that several channels send in the same step is built once
 (`PayloadCache`). On a line of limited capacity streams are thinned (`thin`), and one that is due waits for
-room: only its number waits, the message is built when it goes out.
+capacity: only its number waits, and the message is built when it is sent.
 """
 
 from bisect import insort
@@ -19,7 +19,9 @@ from autopilot_bridge.telemetry.packing import values_packer
 
 Values = tuple[object, ...]
 Builder = Callable[[], Values | bytes | None]
-"""Field values of a message in the order of its definition, or its packed payload; None: nothing to say."""
+"""Field values of a message in the order of its definition, or its packed payload; None: no values
+available.
+"""
 
 GRID_US: Final = 10_000
 """Streams of 50 Hz and slower are sent on this grid of vehicle time; their rate stays exact on average."""
@@ -29,14 +31,14 @@ HEARTBEAT: Final = 0
 
 
 class PayloadSink(Protocol):
-    """Where a stream's packed payloads go: one MAVLink channel."""
+    """The destination of a stream's packed payloads: one MAVLink channel."""
 
     def send_streams(self, motion: int, payloads: Sequence[tuple[int, bytes]]) -> None:
         """Send the due motion messages (bits of `motion_bits`) and frames of payloads (message id, bytes)."""
 
 
 class PayloadCache:
-    """Builds and packs messages, once per physics step however many channels send them."""
+    """Builds and packs messages, once per physics step for all channels."""
 
     __slots__ = ("_builders", "_packers", "_payloads", "time_us")
 
@@ -50,7 +52,7 @@ class PayloadCache:
         return message_id in self._builders
 
     def forget(self) -> None:
-        """Build anew even within this step: something has changed."""
+        """Build again, even within this step: something has changed."""
         self._payloads.clear()
 
     def at(self, time_us: int) -> dict[int, bytes | None]:
@@ -61,14 +63,14 @@ class PayloadCache:
         return self._payloads
 
     def build(self, message_id: int) -> bytes | None:
-        """Build and keep a payload of this step; None when there is nothing to say."""
+        """Build and keep a payload of this step; None when no values are available."""
         values = self._builders[message_id]()
         payload = values if values is None or isinstance(values, bytes) else self._packers[message_id](values)
         self._payloads[message_id] = payload
         return payload
 
     def payload(self, message_id: int, time_us: int) -> bytes | None:
-        """Packed payload of a message at this step, or None when there is nothing to say."""
+        """Packed payload of a message at this step, or None when no values are available."""
         payloads = self.at(time_us)
         return payloads[message_id] if message_id in payloads else self.build(message_id)
 
@@ -77,7 +79,7 @@ class _Group:
     """Streams that are always due together: one interval, one phase.
 
     Attributes:
-        interval_us, due_us: time between two messages as asked for, and when the next ones are due.
+        interval_us, due_us: requested time between two messages, and time at which the next ones are due.
         step_us: time between two messages as sent: longer where streams are thinned.
         message_ids: the streams, in rising order, without those of `motion`.
         motion: bits of the motion messages among them.
@@ -94,7 +96,7 @@ class _Group:
 
     @property
     def wake_us(self) -> int:
-        """When they are sent: the slower ones wait for the grid, to share a packet with others."""
+        """Time at which they are sent: the slower ones wait for the grid, to share a packet with others."""
         return self.due_us if self.step_us < SLOW_US else -(-self.due_us // GRID_US) * GRID_US
 
 
@@ -102,12 +104,12 @@ class StreamTable:
     """The periodic messages of one channel.
 
     Args:
-        cache: where payloads come from.
+        cache: provides the payloads.
         sink: the channel.
         rates_hz: message id -> rate of the streams that run from the start.
         physics_step_us: no stream runs faster than the physics.
         motion_bits: messages that the sink frames by itself, and their bits.
-        line: what the channel's line can carry; None: whatever there is.
+        line: capacity of the channel's line; None: unlimited.
     """
 
     __slots__ = (
@@ -147,7 +149,7 @@ class StreamTable:
         self._motion_bits = motion_bits or {}
         self._sink = sink
         self._step_us = physics_step_us
-        self._serials = count()  # tell groups apart that wake together
+        self._serials = count()  # distinguish groups with the same wake time
         self._heap: list[tuple[int, int, _Group]] = []
         self._groups: dict[int, _Group] = {}
         self._intervals_us: dict[int, int] = {}
@@ -177,7 +179,7 @@ class StreamTable:
             self._start(message_id, interval_us, time_us + interval_us)
 
     def delay(self, message_id: int, due_us: int) -> None:
-        """Have the next message of a running stream sent at `due_us`."""
+        """Send the next message of a running stream at `due_us`."""
         interval_us = self._intervals_us.get(message_id)
         if interval_us is not None:
             self._stop(message_id)
@@ -192,7 +194,7 @@ class StreamTable:
         self.set_interval(message_id, interval_us, time_us)
 
     def loads(self) -> list[tuple[int, float]]:
-        """Interval as asked for (us) and size (bytes of a frame) of the streams that may be thinned."""
+        """Requested interval (us) and size (bytes of a frame) of the streams that may be thinned."""
         sizes = self._sizes
         return [
             (interval_us, sizes.get(number, OVERHEAD_V2 + definition(number).size))
@@ -201,7 +203,7 @@ class StreamTable:
         ]
 
     def thin(self, multiplier: float, stretch: float, slowdown_us: int) -> None:
-        """Send all streams but the heartbeat more slowly than asked for (`line.thinned_us`)."""
+        """Send all streams but the heartbeat at a lower rate than requested (`line.thinned_us`)."""
         thinning = (multiplier, stretch, slowdown_us)
         if thinning != self._thinning:
             self._thinning = thinning
@@ -209,7 +211,7 @@ class StreamTable:
                 self._pace(group)
 
     def tick(self, time_us: int) -> None:
-        """Send what is due."""
+        """Send the messages that are due."""
         heap, cache = self._heap, self._cache
         motion = 0
         woken: list[tuple[int, list[int]]] = []
@@ -218,10 +220,10 @@ class StreamTable:
             wake_us, serial, group = heap[0]
             step_us = group.step_us
             due_us = group.due_us + step_us
-            if due_us <= time_us:  # a stream never bursts to catch up
+            if due_us <= time_us:  # a stream never sends several messages at once to catch up
                 due_us = time_us + step_us
             group.due_us = due_us
-            if step_us >= SLOW_US:  # as `wake_us`
+            if step_us >= SLOW_US:  # as in `wake_us`
                 due_us = -(-due_us // GRID_US) * GRID_US
             heapreplace(heap, (due_us, serial, group))
             next_us = heap[0][0]
@@ -245,7 +247,7 @@ class StreamTable:
     def _send_within(
         self, line: LineBudget, motion: int, woken: list[tuple[int, list[int]]], time_us: int
     ) -> None:
-        """Send what the line has room for; what is due beside it waits, each stream once."""
+        """Send the messages that the line has capacity for; the other due ones wait, each stream once."""
         waiting = self._waiting
         for message_id, bit in self._motion_bits.items():
             if motion & bit:
@@ -273,7 +275,7 @@ class StreamTable:
             self._sink.send_streams(bits, due)
 
     def _take(self, message_id: int, due: list[tuple[int, bytes]], time_us: int) -> int:
-        """Build a message that waited; gives its size as a frame, 0 when there was nothing to say."""
+        """Build a message that waited; returns the size of its frame, 0 when no values are available."""
         del self._waiting[message_id]
         payload = self._cache.payload(message_id, time_us)
         size = 0
@@ -324,7 +326,7 @@ class StreamTable:
 
 
 def _in_order(woken: list[tuple[int, list[int]]]) -> list[int]:
-    """Message ids of several groups: those that woke earlier first, then by their numbers."""
+    """Message ids of several groups: those with an earlier wake time first, then by their numbers."""
     return [
         message_id
         for _, message_id in sorted((wake_us, number) for wake_us, numbers in woken for number in numbers)

@@ -1,4 +1,4 @@
-"""One channel's streams, fitted to what its line and its radio take."""
+"""The streams of one channel, reduced to fit the capacity of its line and its radio."""
 
 from typing import Final
 
@@ -15,20 +15,22 @@ from autopilot_bridge.telemetry.streams import StreamTable
 
 _EVERY_US: Final = MICROSECONDS
 _LEAST_MULTIPLIER: Final = 0.05
-"""To this share of their rates a radio slows down the fast streams; below, all streams (PX4's least)."""
+"""A radio slows the fast streams down to this fraction of their rates; below it, all streams (PX4's
+minimum).
+"""
 
 
 class StreamThrottle:
-    """Thins the streams of a table. What the line carries for other components of the vehicle (a camera, a
-    gimbal) is not thinned: the table gets the rest.
+    """Thins the streams of a table. Data of other components of the vehicle (a camera, a
+    gimbal) are not thinned: the table gets the remaining capacity.
 
     Args:
         table: the channel's streams.
-        line: what its line can carry; None: only a radio limits it.
+        line: its line's capacity; None: only a radio limits it.
         control: how the firmware follows a radio's buffer.
 
     Attributes:
-        radio: what a radio on the channel has told.
+        radio: the state that a radio on the channel has reported.
     """
 
     __slots__ = ("_due_us", "_forwarded_bytes", "_line", "_others_bytes_per_s", "_table", "radio")
@@ -42,7 +44,7 @@ class StreamThrottle:
         self._others_bytes_per_s = 0.0
 
     def advance(self, time_us: int) -> None:
-        """Let the line carry on, and now and then look anew at what fits. Called at 50 Hz."""
+        """Update the line, and regularly fit the rates again. Called at 50 Hz."""
         if self._line is not None:
             self._line.advance(time_us)
         if time_us < self._due_us:

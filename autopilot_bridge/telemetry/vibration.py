@@ -1,4 +1,4 @@
-"""Vibration metrics as VIBRATION reports them: the level of what the accelerometers feel faster than 5 Hz."""
+"""Vibration metrics as in VIBRATION: the level of the accelerations above 5 Hz."""
 
 import math
 from collections.abc import Callable
@@ -25,8 +25,8 @@ class VibrationMeter:
     """High-passed accelerometer RMS per body axis (ArduPilot: 5 Hz high pass, 2 Hz smoothing).
 
     Args:
-        accel_frd_m_s2: newest accelerometer sample, shape (3,), written in place by the sensor; what is not a
-            finite number is passed over.
+        accel_frd_m_s2: newest accelerometer sample, shape (3,), written in place by the sensor; values that
+            are not finite are ignored.
         rate_hz: calls of `update` per second.
 
     Attributes:

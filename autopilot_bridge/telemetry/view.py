@@ -1,4 +1,4 @@
-"""What telemetry is made of, converted once per physics step to plain numbers in the wire's units."""
+"""The input of telemetry, converted once per physics step to plain numbers in the wire's units."""
 
 import math
 from typing import Final
@@ -17,7 +17,7 @@ VIBRATION_RATE_HZ: Final = 50.0  # of the slow loop
 
 
 class TelemetryView:
-    """Snapshot of one autopilot's state for the message builders, made once per step and only when asked for.
+    """Snapshot of one autopilot's state for the message builders, made at most once per step, on demand.
 
     Attributes (of `refreshed()`): attitude `q` (w, x, y, z), `rates` rad/s, `roll`, `pitch`, `yaw` rad; `pos`
     and `vel` NED m, m/s; `acc` NED m/s^2; and, when the filter has an origin, `lat_e7`,
@@ -62,7 +62,7 @@ class TelemetryView:
         self.advance(0)
 
     def advance(self, time_us: int) -> None:
-        """The step is now `time_us`; everything else follows when somebody asks for it."""
+        """The step is now `time_us`; all other attributes are updated on demand."""
         self.time_us = time_us
         self.time_ms = time_us // 1000
 

@@ -1,7 +1,7 @@
 """Simulated mission payload: what a vehicle carries for its mission, and what there is to be found with it.
 
-A camera on a gimbal with a detector behind it, over ground targets; a survey magnetometer over a magnetic
-map with targets' signatures in it. All read the vehicle's truth and give measurements.
+A camera on a gimbal with a detector, over ground targets; a survey magnetometer over a magnetic map with
+targets' signatures in it. All read the vehicle's truth and give measurements.
 """
 
 from flightsim.payload.camera import Camera, CameraParameters

@@ -1,4 +1,4 @@
-"""Camera with a detector behind it: what it finds of the ground targets, frame by frame."""
+"""Camera with a detector: its detections of the ground targets, frame by frame."""
 
 import math
 from collections import deque
@@ -46,8 +46,9 @@ class CameraParameters:
         quantum_px: step of a detection's place; the middle of four corners in whole pixels has steps of a
             quarter.
         size_noise: one sigma of a detection's size, as a share of it.
-        tag_range: tell the distance of tagged targets from their apparent size, as AprilTag detectors do. The
-            size is then as good as the pixels: `pixel_noise_px` / sqrt(2) for the mean side of four corners.
+        tag_range: measure the distance of tagged targets by their apparent size, as AprilTag detectors do.
+            The size is then as good as the pixels: `pixel_noise_px` / sqrt(2) for the mean side of four
+            corners.
         detection: how likely a target in the image is detected.
         max_range_m: haze and resolution end there.
         min_depression_rad: targets seen flatter than this below the horizon are lost in the background.
@@ -117,7 +118,7 @@ class Camera:
     Attributes:
         parameters: as given.
         frame: newest delivered frame; None before the first.
-        focus_distance_m: what is sharp in a picture; None: whatever lies in its middle (autofocus).
+        focus_distance_m: distance in focus; None: that of the centre of the picture (autofocus).
     """
 
     __slots__ = (
@@ -169,11 +170,11 @@ class Camera:
             parameters: the camera.
             truth: the vehicle's truth vector, read when a frame is exposed.
             home: origin of the targets' frame.
-            targets: what there is to see; moved to the time of each exposure.
-            gimbal: what it hangs on, stepped before it; None: fixed as the parameters say.
+            targets: the ground targets; moved to the time of each exposure.
+            gimbal: the gimbal that carries it, stepped before it; None: fixed by the parameters.
             physics_rate_hz: calls of `step` per second.
-            seeds: a seed sequence of its own for each name: "camera" for false detections, "camera_target_0",
-                ... for each target, so that one target more changes nothing of the others.
+            seeds: a separate seed sequence for each name: "camera" for false detections, "camera_target_0",
+                ... for each target, so that an additional target does not change the others.
 
         Raises:
             ValueError: the rate doesn't divide the physics rate.

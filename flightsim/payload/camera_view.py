@@ -1,4 +1,4 @@
-"""Where a camera is and looks at one moment, and what stands before it: all that a picture is made from."""
+"""Position and attitude of a camera at one time, and the targets before it: the input of a picture."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What a detector makes of a picture: the answer of one frame, and how likely it sees a target."""
+"""The result of a detector for one frame, and its probability to detect a target."""
 
 import math
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ class CameraFrame:
     Attributes:
         time_us: when it was exposed.
         number: counts from 0.
-        detections: from left to right, so that their order tells nothing.
+        detections: from left to right, so that their order carries no information.
     """
 
     time_us: int
@@ -93,11 +93,11 @@ class PictureDetection:
     size.
 
     Tags of the family 36h11 by `cv2.aruco`, balls by their colour. A tag on the ground is foreshortened, so
-    the size that counts is size_px * sine^foreshortening; blur b asks for a size of sqrt(half_size_px^2 +
-    (blur_factor b)^2) where half of the tags are read. A target that the edge of the picture cuts off, or
-    that another one covers, is not detected. A tag is not read below min_depression_rad: `cv2.aruco` drops
-    quadrilaterals with two corners closer than a twentieth of the outline. The defaults are fits to rendered
-    pictures, by `python benchmarks/camera_detection.py`.
+    the effective size is size_px * sine^foreshortening; with blur b, a size of sqrt(half_size_px^2 +
+    (blur_factor b)^2) is needed for half of the tags to be read. A target that the edge of the picture cuts
+    off, or that another one covers, is not detected. A tag is not read below min_depression_rad: `cv2.aruco`
+    drops quadrilaterals with two corners closer than a twentieth of the outline. The defaults are fits to
+    rendered pictures, by `python benchmarks/camera_detection.py`.
 
     Attributes:
         max_probability: of a target that fills many pixels.

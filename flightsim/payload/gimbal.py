@@ -26,7 +26,7 @@ _NOISE_ROWS: Final = 256
 
 
 class GimbalFlags(IntFlag):
-    """MAVLink's GIMBAL_DEVICE_FLAGS, those that this gimbal knows.
+    """The flags of MAVLink's GIMBAL_DEVICE_FLAGS that this gimbal supports.
 
     Roll and pitch are steadied together, by PITCH_LOCK; ROLL_LOCK alone does nothing.
     """
@@ -250,14 +250,14 @@ class Gimbal:
 
         With PITCH_LOCK roll and pitch are held against the horizon, else against the vehicle. With YAW_LOCK
         yaw is held against north, else against the vehicle's nose. YAW_IN_VEHICLE_FRAME and
-        YAW_IN_EARTH_FRAME say which `yaw_rad` is given in; without them YAW_LOCK says it. NEUTRAL goes to
-        the middle of all joints, RETRACT puts the camera away; the rest is then left alone.
+        YAW_IN_EARTH_FRAME select the frame of `yaw_rad`; without them YAW_LOCK selects it. NEUTRAL moves to
+        the middle of all joints, RETRACT retracts the camera; the other arguments are then ignored.
 
         Args:
             flags: `GimbalFlags`.
             roll_rad: of the horizon in the picture.
-            pitch_rad, yaw_rad: where to look; NaN: from where the command in force points.
-            pitch_rate_rad_s, yaw_rate_rad_s: go on turning at this rate; NaN: not.
+            pitch_rad, yaw_rad: direction; NaN: that of the active command.
+            pitch_rate_rad_s, yaw_rate_rad_s: keep turning at this rate; NaN: no rate.
 
         Raises:
             ValueError: unknown or contradictory flags, or numbers out of range.

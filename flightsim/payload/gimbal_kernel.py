@@ -114,8 +114,8 @@ def quaternion_from_joints(roll: float, pitch: float, yaw: float, out: Array) ->
 def joints_from_quaternion(q: Array, axes: float, yaw_now: float, out: Array) -> None:
     """out = joint angles roll, pitch, yaw that give the attitude `q` (frd from gimbal).
 
-    Of two axes only the direction of the optical axis is met. Where yaw has no say (two axes: straight up or
-    down; three: rolled by 90 degrees) it stays as it is.
+    A gimbal of two axes matches only the direction of the optical axis. Where yaw has no effect (two axes:
+    straight up or down; three: rolled by 90 degrees) it is not changed.
     """
     w, x, y, z = q[0], q[1], q[2], q[3]
     if axes < 3.0:
@@ -138,7 +138,7 @@ def joints_from_quaternion(q: Array, axes: float, yaw_now: float, out: Array) ->
 
 @kernel
 def _demand(body: Array, constants: Array, state: Array, out: Array) -> None:
-    """out = joint angles that the command asks for on a vehicle of attitude `body`; without limits."""
+    """out = joint angles of the command on a vehicle of attitude `body`; without limits."""
     if state[PARKED] > 0.0:
         out[:] = 0.0
         return
@@ -182,7 +182,7 @@ def advance(truth: Array, constants: Array, state: Array, normals: Array, row: i
         state[BODY] = body
         state[STARTED] = 1.0
 
-    # The demand that the old command makes of the old attitude, then what is new about it.
+    # The joint angles for the old command and the old attitude, then the change since.
     _demand(state[BODY], constants, state, before)
     _limited(before, constants, held[_YAW], at_limit)
     steer = np.zeros(3)
@@ -224,7 +224,7 @@ def advance(truth: Array, constants: Array, state: Array, normals: Array, row: i
     turning[1] += rates[_PITCH] + sr * rates[_YAW]
     turning[2] += sp * rates[_ROLL] + cp * cr * rates[_YAW]
 
-    # What it says of itself.
+    # The reported attitude.
     for axis in range(3):
         out[MEASURED_JOINTS.start + axis] = joints[axis] + constants[ENCODER] * normals[row, 6 + axis]
         out[MEASURED_RATES.start + axis] = turning[axis] + constants[GYRO_NOISE] * normals[row, 12 + axis]

@@ -42,7 +42,7 @@ class HomeFrame:
         )
 
     def position_ned_m(self, truth: Array) -> tuple[float, float, float]:
-        """(north, east, down) in metres of the vehicle whose truth vector it is."""
+        """(north, east, down) in metres of the vehicle with this truth vector."""
         north_m, east_m = self.north_east_m(
             math.degrees(float(truth[t.LAT_RAD])), math.degrees(float(truth[t.LON_RAD]))
         )

@@ -15,9 +15,9 @@ Array = NDArray[np.float64]
 class MagneticField:
     """Total field at any place: the true background and signatures.
 
-    What a mission knows is a published map, `survey.surveyed` of the background, so reading - map is what the
-    targets add, noise, and the error of the survey. Beyond the grid's edges and in its holes the field goes
-    on as at the nearest data, so that a magnetometer reads something everywhere.
+    A mission has a published map, `survey.surveyed` of the background, so reading - map is the sum of the
+    targets' fields, noise, and the error of the survey. Beyond the grid's edges and in its holes the field is
+    that of the nearest data, so that a magnetometer has a reading everywhere.
 
     Attributes:
         home: origin of the frame.

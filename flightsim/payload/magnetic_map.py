@@ -43,7 +43,7 @@ _CSV_HEADER: Final = "north_m,east_m,total_field_nt"
 
 
 class MagneticMapError(ValueError):
-    """A map that can't be used; the message says what is wrong with it."""
+    """A map that can't be used; the message gives the reason."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -114,7 +114,7 @@ class MagneticMap:
         return math.isfinite(self.total_at_nt(north_m, east_m))
 
     def require_inside(self, what: str, north_m: float, east_m: float) -> None:
-        """Refuse a place that the map says nothing about.
+        """Refuse a position without data in the map.
 
         Raises:
             MagneticMapError: it names `what`, the place and what the map covers.

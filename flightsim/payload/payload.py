@@ -57,7 +57,7 @@ class Payload:
             truth: the vehicle's truth vector.
             home: origin of the world.
             physics_rate_hz: calls of `step` per second.
-            seeds: a seed sequence of its own for each name ("gimbal", "camera", "camera_target_0", ...,
+            seeds: a separate seed sequence for each name ("gimbal", "camera", "camera_target_0", ...,
                 "survey_magnetometer"): `lambda name: streams.child("vehicle", i, "sensor", name)`.
             targets: what a camera sees; None: nothing.
             magnetic_field: what a magnetometer measures.

@@ -70,7 +70,7 @@ class GaussianSignature:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DipoleSignature:
-    """A magnetic dipole: what any compact body looks like from some of its lengths away.
+    """A magnetic dipole: the field of any compact body at some of its lengths away.
 
     B = mu_0 / 4 pi (3 (m r) r / |r|^5 - m / |r|^3) adds as a vector to the Earth's field; a scalar
     magnetometer reads what that does to the magnitude (Blakely, Potential theory in gravity and magnetic
@@ -99,7 +99,7 @@ class DipoleSignature:
         north, east = np.broadcast_arrays(north_m - self.north_m, east_m - self.east_m)
         down = np.full_like(north, self.height_m - height_m)
         offset = np.stack([north, east, down], axis=-1)
-        # Nobody measures inside the body: a metre is the least distance.
+        # The model is not valid inside the body: a metre is the least distance.
         distance = np.maximum(1.0, np.sqrt(np.sum(offset * offset, axis=-1, keepdims=True)))
         moment = np.array(self.moment_ned_a_m2)
         along = np.sum(offset * moment, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""A survey of the true field: what a published magnetic map knows, and what it has wrong.
+"""A survey of the true field: the content and the errors of a published magnetic map.
 
 An aircraft flies parallel lines north and south and reads the total field along them; a few tie lines cross
 them. Processing takes the daily variation out by a base station and levels the lines by their crossings,
@@ -78,7 +78,7 @@ def surveyed(
         seed: the survey's random stream.
 
     Returns:
-        The published map; `error_nt` and `line_spacing_m` are what the survey says of itself.
+        The published map; `error_nt` and `line_spacing_m` are the survey's own figures.
     """
     p = parameters
     whole = truth.without_holes()
@@ -116,7 +116,7 @@ def truth_behind(
 
     Args:
         published: the map.
-        parameters: of the survey that has made it, as far as the map doesn't say.
+        parameters: of its survey, for values that the map does not contain.
         seed: the survey's random stream.
     """
     p = parameters
@@ -156,7 +156,7 @@ def _flown(
     step_m = float(along_m[1] - along_m[0])
     track_m = p.track_error_m * _gauss_markov(rng, shape, step_m / p.wander_m)
     height_m = p.height_error_m * _gauss_markov(rng, shape, step_m / p.wander_m)
-    # One line after the other, up and down: the daily variation goes on through the turns.
+    # One line after the other, up and down: the daily variation continues during the turns.
     running = _gauss_markov(
         rng, (along_m.size * lines_m.size, 1), step_m / _SPEED_M_S / p.diurnal_time_constant_s
     )

@@ -1,6 +1,6 @@
 """How ground targets move: parameters, and the trajectories they start.
 
-A trajectory is a function of vehicle time alone: how often it is asked changes nothing.
+A trajectory is a function of vehicle time alone: the number of calls has no effect.
 """
 
 import math

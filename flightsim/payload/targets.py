@@ -12,7 +12,7 @@ from flightsim.payload.target_motion import TargetMotion
 Array = NDArray[np.float64]
 
 NO_TAG = -1
-"""Stands for the identity of what has no tag to be told by."""
+"""The tag id of a target without a tag."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,7 +22,7 @@ class GroundTargetParameters:
     Attributes:
         motion: `Static`, `ConstantVelocity`, `Circle`, `RandomWalk`, or one's own.
         size_m: extent, as a camera sees it from any side.
-        tag_id: what a camera reads off it (AprilTag); `NO_TAG`: it looks like any other.
+        tag_id: id that a camera reads (AprilTag); `NO_TAG`: it looks like any other.
     """
 
     motion: TargetMotion
@@ -69,7 +69,7 @@ class GroundTarget:
 
 
 class GroundTargets:
-    """All targets of a world, in arrays. Every vehicle's camera looks at the same ones.
+    """All targets of a world, in arrays. The cameras of all vehicles see the same targets.
 
     Attributes:
         targets: one by one; views of the arrays.
@@ -100,7 +100,7 @@ class GroundTargets:
 
         Args:
             parameters: the targets.
-            seeds: a seed sequence of its own for each, by index: `lambda i: streams.child("target", i)`.
+            seeds: a separate seed sequence for each, by index: `lambda i: streams.child("target", i)`.
         """
         count = len(parameters)
         self.positions_ned_m: Array = np.zeros((count, 3))

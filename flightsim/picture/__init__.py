@@ -1,7 +1,7 @@
 """Pictures of what a camera sees: ground, sky, marks and targets, by the geometry of the detections.
 
-Nothing of the simulation needs this package; whoever shows or keeps pictures imports it, in a process of its
-own where the vehicle must not wait.
+The simulation does not need this package. A program that shows or stores pictures imports it, in a separate
+process if the vehicle must not wait.
 """
 
 from flightsim.picture.renderer import Renderer, Scenery

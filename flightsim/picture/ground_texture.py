@@ -11,7 +11,7 @@ def ground_texture(seed: int = 1) -> NDArray[np.float32]:
     """Levels (LEVELS, TEXELS, TEXELS); level n fills its first TEXELS >> n.
 
     The noise has mean 0, at the finest level a deviation of 1, a falling spectrum as grass and soil have, and
-    no seam: the patch may be laid beside itself.
+    no seam: the patch can be repeated.
     """
     rng = np.random.Generator(np.random.PCG64(seed))
     frequency = np.fft.fftfreq(TEXELS) * TEXELS

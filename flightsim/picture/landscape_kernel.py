@@ -88,7 +88,7 @@ def _band(distance: float, half_width: float, footprint: float) -> float:
 
 @kernel
 def _home_mark(north: float, east: float, footprint: float) -> float:
-    """How much of a pixel is painted: a ring with an H, whose legs point north."""
+    """The painted fraction of a pixel: a ring with an H whose legs point north."""
     radius = math.hypot(north, east)
     ring = _band(radius - (_PAD_M - 0.25), 0.25, footprint)
     legs = _band(abs(east) - 0.9, 0.2, footprint) * _band(north, 1.5, footprint)

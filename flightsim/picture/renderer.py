@@ -23,10 +23,10 @@ _COVERED: Final = 12  # grey of a camera that is put away
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenery:
-    """What there is to see besides the targets: fields of 100 m with tracks between them, a mark at home.
+    """The scenery besides the targets: fields of 100 m with tracks between them, a mark at home.
 
     Attributes:
-        runway_length_m: of a runway whose middle is at home; 0: there is none.
+        runway_length_m: length of a runway with its middle at home; 0: no runway.
         runway_width_m, runway_heading_rad: of it.
         visibility_m: over which haze takes 63 % of the contrast.
         sun_azimuth_rad, sun_elevation_rad: where light comes from.

@@ -1,8 +1,8 @@
 """Ground targets in a picture: tags as plates that lie on the ground, others as red balls.
 
 A tag is of the family 36h11 (Olson 2011, AprilTag), so that any detector reads its number; its black square
-is the target's size, within a yellow margin of one cell. What has no number, or one beyond the family, is a
-ball of the target's size: it looks the same from every side, as the detector takes it to be.
+is the target's size, within a yellow margin of one cell. A target without a number, or with one outside the
+family, is a ball of the target's size: it looks the same from every side, as the detector model assumes.
 """
 
 import functools

@@ -1,7 +1,7 @@
 """How a sensor can fail: MAVLink's FAILURE_TYPE, plus drift.
 
 A failure acts on one unit's channels, sample by sample. It sees the samples that would have been delivered,
-after the sensor's latency; it may change the values in place, and says whether the unit delivers them.
+after the sensor's latency; it may change the values in place, and returns whether the unit delivers them.
 """
 
 from collections import deque
@@ -53,7 +53,7 @@ def add(values: Array, bias: Array) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultTarget:
-    """One unit's channels in a sensor's sample, and what its failures look like by default.
+    """One unit's channels in a sensor's sample, and the default form of its failures.
 
     Attributes:
         unit: which unit.
@@ -136,7 +136,7 @@ class Wrong:
 
 
 class NoFix:
-    """WRONG with `no_fix`: a receiver that goes on reporting, but without a fix, as when jammed."""
+    """WRONG with `no_fix`: a receiver that continues to report, but without a fix, as when jammed."""
 
     def __init__(self, values: Array) -> None:
         self._values = values

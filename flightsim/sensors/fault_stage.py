@@ -1,4 +1,4 @@
-"""Where a failure sits in a sensor, and how one is made from what the caller asks."""
+"""The place of a failure in a sensor, and the construction of failures from requests."""
 
 import math
 from collections.abc import Sequence

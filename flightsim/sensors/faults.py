@@ -14,12 +14,13 @@ class FaultPanel:
     """Failures of one vehicle's sensors, numbered as MAV_CMD_INJECT_FAILURE numbers them.
 
     Gyro and accelerometer fail apart although they share a reading. A unit that delivers nothing leaves its
-    reading stale (`fresh` never True). A gyro or accelerometer that alone delivers nothing leaves its last
-    values standing in the IMU reading, which stays fresh for the other's sake, as a driver does that reads
-    registers nobody updates; only when both are silent does the IMU reading go stale.
+    reading stale (`fresh` never True). If only one of gyro and accelerometer delivers nothing, its last
+    values stay in the IMU reading, which stays fresh because of the other sensor, as in a driver that reads
+    registers that are not updated. The IMU reading becomes stale only when both deliver nothing.
 
-    A unit has one failure at a time: a new one replaces the old. Failures draw from streams of their own, and
-    the healthy noise goes on underneath, so after `clear` a sensor reads what it would have read anyway.
+    A unit has one failure at a time: a new one replaces the old. Failures draw from separate streams, and the
+    normal noise continues during a failure, so after `clear` a sensor gives the same readings as without the
+    failure.
     """
 
     __slots__ = ("_points",)
@@ -71,7 +72,8 @@ class FaultPanel:
             slow_factor: SLOW: one sample in so many arrives.
             delay_s: DELAYED: extra delay, rounded to samples.
             mean_up_s, mean_down_s: INTERMITTENT: mean durations of delivering and silence.
-            no_fix: WRONG on GPS: the receiver goes on reporting, but without a fix (OFF stops its messages).
+            no_fix: WRONG on GPS: the receiver continues to report, but without a fix (OFF stops its
+                messages).
             blocked: WRONG on AIRSPEED: the opening of the pitot tube is closed and its drain open, so that it
                 reads no airspeed (STUCK: closed drain and all, the pressure stays in).
 

@@ -91,7 +91,7 @@ FIX_AFTER_10_S: Final = (
 """The same for a receiver without corrections."""
 
 RECEIVERS: Final = ("differential", "standalone")
-"""Names of the receivers that `GpsParameters.of` knows."""
+"""Names of the receivers for `GpsParameters.of`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -53,7 +53,7 @@ _NORMALS: Final = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuParameters:
-    """A calibrated Bosch BMI088, the IMU of Pixhawk 5X and 6X boards, unless a line says otherwise.
+    """A calibrated Bosch BMI088, the IMU of Pixhawk 5X and 6X boards, unless noted otherwise.
 
     Numbers are one-sigma where they describe a spread. Datasheet: BST-BMI088-DS001, section 1.2.
 

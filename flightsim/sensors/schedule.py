@@ -1,4 +1,4 @@
-"""When each sensor is due: a table over one common period, so that a physics step looks nothing up."""
+"""When each sensor is due: a table over one common period, so that a physics step needs no search."""
 
 import math
 from collections.abc import Callable, Iterable

@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 Kernel = Callable[[Array, Array, Array, Array, int, Array], bool]
 """kernel(truth, constants, state, normals, row, out) -> a sample was taken.
 
-Writes one sample to `out`; takes its standard normals from `normals[row]`; keeps what lasts in `state`.
-When it returns False (the device says nothing) it leaves `out` alone.
+Writes one sample to `out`; takes its standard normals from `normals[row]`; keeps its state in `state`. When
+it returns False (the device delivers no sample) it does not change `out`.
 """
 
 NOISE_ROWS: Final = 256  # samples served by one call of the generator

@@ -85,8 +85,8 @@ class SensorSuite:
             parameters: the sensors.
             physics_rate_hz: calls of `step` per second of vehicle time.
             truth: the vehicle's truth vector (`flightsim.truth`), read on each step.
-            seeds: a seed sequence of its own for each name: sensors draw from "imu", "gps", ..., their
-                failures from "fault_gyro", "fault_gps", ....
+            seeds: a separate seed sequence for each name: sensors draw from "imu", "gps", ..., their failures
+                from "fault_gyro", "fault_gps", ....
 
         Raises:
             ValueError: a rate that doesn't divide the physics rate, or a truth vector of another shape.
