@@ -1,8 +1,8 @@
 """Parameter files: QGroundControl's `.params` and the `.parm` of MAVProxy, ArduPilot and Mission Planner.
 
 `.params`: vehicle id, component id, name, value, MAV_PARAM_TYPE, separated by tabs. `.parm` (also `.param`):
-name and value, separated by spaces, a comma or `=`. In both, `#` starts a comment. The form of a line tells
-which of the two it is.
+name and value, separated by spaces, a comma or `=`. In both, `#` starts a comment. The form of a line
+identifies the format.
 """
 
 import math

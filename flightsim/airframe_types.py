@@ -192,7 +192,7 @@ DEFAULT_LAUNCHES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Airframe:
-    """What the simulator must know of a JSBSim model.
+    """The simulator's data of a JSBSim model.
 
     Attributes:
         name: short name.

@@ -1,8 +1,8 @@
-"""When the motion of a vehicle has ended in a crash, and how the wreck lies.
+"""Detection of a crash, and the position of the crashed vehicle.
 
-Contact points of a model carry wheels and tips at the loads of landings. A body that hits the ground beyond
-what an airframe stands is not theirs to compute: JSBSim then throws it kilometres high, drives it into the
-ground, or ends at numbers that are none. Here it breaks, and stays where it is.
+Contact points of a model carry wheels and tips at the loads of landings. They are not valid for impacts
+beyond the strength of the airframe: JSBSim then throws the vehicle kilometres high, moves it into the ground,
+or computes values that are not finite. Here the vehicle crashes, and stays at its position.
 """
 
 import math

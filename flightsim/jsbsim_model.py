@@ -1,4 +1,4 @@
-"""JSBSim behind a quiet, typed edge: load a model, find its properties. Its messages go to `logging`."""
+"""A typed interface to JSBSim: load a model, find its properties. Its messages go to `logging`."""
 
 import logging
 import shutil

@@ -174,7 +174,7 @@ def source_stamp(function: Callable[..., Any]) -> str:
     the kernels it calls; also the version of Numba.
 
     Raises:
-        TypeError: a global that the function names is of a kind that cannot be told apart by its value.
+        TypeError: a global that the function names is of a kind that cannot be distinguished by its value.
     """
     digest = hashlib.sha256(numba.__version__.encode())
     for part in _parts(function, set()):

@@ -1,6 +1,6 @@
-"""Bringing a fixed-wing vehicle into the air: catapult (a straight rail, also a winch's long one) and hand.
+"""Launch of a fixed-wing vehicle: catapult (a straight rail, also a winch's long one) and hand.
 
-Until `launch()` the vehicle is held; then it is accelerated along the rail and let go. Both are done by a
+Until `launch()` the vehicle is held; then it is accelerated along the rail and released. Both are done by a
 force and a moment on the JSBSim model, those of a stiff carriage: the force that the carriage's motion needs,
 less the forces of air, propeller, gear and gravity, and a critically damped spring to the place and attitude
 on the rail. So the motion is continuous, and an accelerometer measures the same as on a real launcher.

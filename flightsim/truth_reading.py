@@ -157,8 +157,8 @@ class TruthReader:
         truth: (TRUTH_SIZE,), written.
         ground_alt_m: of the level ground, above mean sea level.
         physics_rate_hz: calls of `read` per second.
-        slow_steps: every so many steps what is not motion (air, power, ground contact) is read, from the
-            first step on.
+        slow_steps: interval in steps at which values other than motion (air, power, ground contact) are read,
+            from the first step on.
 
     Attributes:
         touches: how it met the ground.

@@ -1,4 +1,4 @@
-"""Time: the one place that sleeps or asks what time it is.
+"""Time: the only package that sleeps or reads a clock.
 
 * `Clock`: what missions and other tasks wait on: vehicle time.
 * `VirtualTimeLoop`, `LoopClock`, `run`: an embedded world's time, as fast as it goes or paced.

@@ -16,7 +16,7 @@ _MAX_STEP_BACK_US: Final = 1_000_000  # messages overtake each other by less; mo
 _BACKLOG_S: Final = 0.25  # wall seconds in which messages that waited in the queue are read
 _RATE_LIMITS: Final = (0.01, 1000.0)
 _PACED_US: Final = (
-    2_000_000.0  # vehicle time assumed between two messages; autopilots tell theirs every second
+    2_000_000.0  # vehicle time assumed between two messages; autopilots send theirs every second
 )
 _SILENT_RATE: Final = 1.0  # greatest rate while nothing is received
 _MAX_TIMER_S: Final = 1.0  # wall seconds after which deadlines are checked again: rates change

@@ -149,7 +149,7 @@ class FailsafeMonitor:
         return action
 
     def active(self, time_us: int, parameters: CommanderParameters) -> bool:
-        """A failsafe takes action (or, where the flavour says so, only warns)."""
+        """A failsafe takes action (or only warns, where the flavour counts warnings)."""
         if self._policy.critical_on_warning:
             return bool(self._active)
         return self.action(time_us, parameters) > FailsafeAction.WARN

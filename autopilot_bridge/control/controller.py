@@ -171,12 +171,12 @@ def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: 
 class MulticopterController:
     """Cascaded control of a quad-X: position, velocity, attitude, body rates, mixing.
 
-    The setpoint's level chooses where the cascade starts. What a setpoint leaves open (NaN) is filled as
+    The setpoint's level chooses where the cascade starts. Fields that are not set (NaN) are filled as
     follows, so that no NaN reaches a motor: an axis with neither position, velocity nor acceleration stands
-    still; NaN yaw holds by yaw rate; a NaN or zero attitude is level flight at the present heading; NaN
-    rates are zero; NaN thrust at levels RATES and ATTITUDE means that the vertical part of the trajectory
-    fields is flown. Position and velocity loops leave out what the navigation state doesn't know; without
-    attitude or rates the motors idle.
+    still; NaN yaw holds by yaw rate; a NaN or zero attitude is level flight at the present heading; NaN rates
+    are zero; NaN thrust at levels RATES and ATTITUDE means that the vertical part of the trajectory fields is
+    flown. Position and velocity loops do not use unknown parts of the navigation state; without attitude or
+    rates the motors idle.
 
     Args:
         parameters: gains and limits.

@@ -57,8 +57,8 @@ def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
     """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
 
     The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
-    Not so on the ground: the thrust that winds down after a touchdown would be taken for hover thrust, and
-    the landing would never be seen.
+    On the ground this is not valid: the decreasing thrust after a touchdown would be learnt as hover thrust,
+    and the landing would not be detected.
     """
     s[c.THRUST_LAGGED] += (s[c.THRUST_GIVEN] - s[c.THRUST_LAGGED]) * min(
         1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT])
@@ -115,7 +115,7 @@ def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
     north = (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy
     east = 2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy
     if s[c.GROUND_CONTACT] != 0.0:
-        # what the ground pushes sideways is no drag: leaning against it would tip the vehicle over
+        # a sideways force of the ground is no drag: tilting against it would overturn the vehicle
         north, east = 0.0, 0.0
     size = math.sqrt(north * north + east * east)
     if not math.isfinite(size):

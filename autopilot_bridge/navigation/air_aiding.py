@@ -1,9 +1,9 @@
 """When a fixed wing's airspeed and sideslip are fused, with how much trust, and which airspeed is shown.
 
 The rules follow PX4: airspeed above a threshold, sideslip in flight, wind alone corrected while GPS gives the
-velocity, wind dead reckoning without it. Without GPS and pitot tube the airspeed is assumed to have stayed
-what it was (ArduPilot's EK3 does so with its cruise airspeed): not good enough for a position, but in a turn
-it keeps centripetal acceleration from being taken for tilt.
+velocity, wind dead reckoning without it. Without GPS and pitot tube the airspeed is assumed to be unchanged
+(as ArduPilot's EK3 does with its cruise airspeed). This is not good enough for a position, but in a turn it
+prevents the filter from interpreting centripetal acceleration as tilt.
 """
 
 import math
@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 _WIND_NE: Final = slice(WIND_NED_M_S.start, WIND_NED_M_S.start + 2)
 _AIRBORNE_M: Final = 3.0  # this far from the height of the last rest, and fast: in flight
-_LONGEST_ROLL_US: Final = 30_000_000  # so long so fast: not on a runway
+_LONGEST_ROLL_US: Final = 30_000_000  # at this speed for this time: not on a runway
 _KNOWN_WIND_M_S: Final = 3.0  # 1-sigma up to which the wind is of use
 _GROUND_AID_US: Final = 1_000_000  # GPS fused within this time: only the wind needs correcting
 _AIR_AID_US: Final = 1_000_000
@@ -34,7 +34,7 @@ _LONGEST_INTERVAL_S: Final = 2.0
 _USUAL_TIME_S: Final = 10.0  # average of the airspeed that is assumed when it can't be measured
 _STILL_SPEED_M_S: Final = 1.5  # what stands on the ground and is not being launched
 _STILL_FORCE_M_S2: Final = 2.0
-_QUIET_US: Final = 3_000_000  # so long without acceleration: what speed there seems to be is an error
+_QUIET_US: Final = 3_000_000  # without acceleration for this time: an estimated speed is an error
 
 
 class AirAiding:

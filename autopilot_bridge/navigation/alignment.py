@@ -34,7 +34,7 @@ class Alignment:
         self.restart()
 
     def restart(self) -> None:
-        """Begin anew."""
+        """Restart."""
         self._elapsed_s = 0.0
         self._accel[:] = 0.0
         self._mag[:] = 0.0

@@ -1,13 +1,13 @@
-"""How often the filter's belief had to give way."""
+"""Counts measurements that were fused although they failed the innovation gate."""
 
 from typing import Final
 
 _MEMORY_US: Final = 10_000_000
-_TOO_MANY: Final = 4  # within that time of each other: the estimate is worth nothing
+_TOO_MANY: Final = 4  # within that time of each other: the estimate is unusable
 
 
 class Contradictions:
-    """Counts sensors that seem good and had to be obeyed against the filter's belief."""
+    """Counts the times at which a healthy sensor was used although it contradicted the estimate."""
 
     __slots__ = ("_count", "_newest_us")
 

@@ -60,7 +60,7 @@ class ExternalCounts:
         taken: came in.
         fused: moved the estimate.
         refused: all that was to be fused was beyond its gate.
-        not_finite: nothing usable in it, or beyond any sense.
+        not_finite: no usable value, or values beyond the limits.
         late: older than the filter's history.
         poor: of too little quality.
         frozen: the same to the last digit, in flight.

@@ -91,7 +91,7 @@ class ExternalAiding:
         self.restart()
 
     def restart(self) -> None:
-        """The filter aligns anew: nothing of the sender is known."""
+        """The filter aligns again: forget the sender's state."""
         self._queue.clear()
         self._last = b""
         self._equal = self._coherent = 0
@@ -211,7 +211,7 @@ class ExternalAiding:
             self._mapped -= self._rotation(row) @ np.array(p.offset_frd_m)
 
     def _judge_coherence(self, measured_us: int, row: int, *, restart: bool) -> None:
-        """Count samples that have moved since the one before as the filter has."""
+        """Count samples whose motion since the sample before agrees with the filter's."""
         gap = self._solution.past_position(row) - self._mapped
         allowed = _COHERENT_M + 4.0 * self._parameters.position_noise_m
         steady = self._gap_us >= 0 and abs(measured_us - self._gap_us) <= _COHERENT_GAP_US

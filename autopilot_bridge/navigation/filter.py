@@ -209,7 +209,7 @@ class NavigationFilter:
         self._aiding.set_origin(origin)
 
     def reset(self) -> None:
-        """Forget the estimate and align anew. The origin and the reset counters stay."""
+        """Forget the estimate and align again. The origin and the reset counters stay."""
         self._aligned = False
         self._take_pending()  # and forget them
         self._countdown = self._divisor

@@ -116,7 +116,7 @@ class GpsAiding:
         return row
 
     def note(self, time_us: int, row: int, accepted: int, *, at_rest: bool) -> None:
-        """What was accepted (bits of `fusion`) of the fix that was prepared."""
+        """Record the accepted parts (bits of `fusion`) of the prepared fix."""
         clocks, health, obs = self._clocks, self._health, self._solution.obs
         velocity, position = bool(accepted & f.ACCEPTED_GPS_VEL), bool(accepted & f.ACCEPTED_GPS_POS)
         if velocity:

@@ -1,4 +1,4 @@
-"""The heading: by the magnetometer, and turned where the field or the flight says that it was wrong."""
+"""The heading: from the magnetometer, and corrected when the field or the flight shows that it was wrong."""
 
 import math
 
@@ -111,8 +111,9 @@ class HeadingAiding:
         return row
 
     def note(self, time_us: int, *, accepted: bool) -> None:
-        """The sample was fused or refused. Refused for long while it speaks, perhaps the magnetometer's bias
-        has changed, and is learnt anew."""
+        """The sample was fused or refused. If samples arrive but are refused for a long time, the
+        magnetometer's bias may have changed, and is learnt again.
+        """
         clocks = self._clocks
         if accepted:
             clocks.mag_us = clocks.mag_refused_us = time_us

@@ -113,7 +113,7 @@ class HeightAiding:
         self._has_jumped(down)
 
     def _refused(self, time_us: int) -> None:
-        """Refused for too long: with GPS heights the offset is learnt anew, without them the height jumps."""
+        """Refused for too long: with GPS heights learn the offset again; without them the height jumps."""
         clocks, solution = self._clocks, self._solution
         since_us = max(clocks.baro_us, clocks.aligned_us)
         if time_us - since_us <= self._parameters.height_timeout_s * 1e6:

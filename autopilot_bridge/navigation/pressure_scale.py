@@ -1,15 +1,15 @@
-"""How far pressure altitude and height part in a climb: no day is the standard atmosphere's.
+"""The difference of pressure altitude and height in a climb, outside the standard atmosphere.
 
 On a day warmer or colder than the standard one, a metre of pressure altitude is some per cent more or less of
-height (15 K: five per cent). The error is the same on the way up and down, so it is counted by the way
-between turning points; what lies within a band is turbulence and costs nothing.
+height (15 K: five per cent). The error is the same on the way up and down, so it is computed from the height
+differences between turning points; differences within a band are turbulence and are ignored.
 """
 
 import math
 from typing import Final
 
 _BAND_M: Final = 4.0
-_COHERENCE_M: Final = 30.0  # way over which the error is taken to add up evenly
+_COHERENCE_M: Final = 30.0  # height difference over which the error is assumed to add up evenly
 
 
 class PressureScale:

@@ -1,7 +1,7 @@
-"""What is fused when little else is: standing still, and position or height held where they were.
+"""Pseudo-measurements without other aiding: standing still, and position or height held.
 
-A wing in flight without any aiding is adrift: it is certainly not where it was, and holding it there would
-take its centripetal acceleration for tilt.
+A fixed wing in flight without any aiding has moved, so its position is not held: holding it would make the
+filter interpret centripetal acceleration as tilt.
 """
 
 import math
@@ -107,10 +107,10 @@ class Standby:
         return has
 
     def _is_turned(self, parameters: NavigationParameters, time_us: int) -> bool:
-        """The vehicle stands, and yet it turns: a gust rocks an aircraft and swings it round on its wheels.
+        """The vehicle stands but turns: a gust rocks an aircraft and turns it on its wheels.
 
-        Taken for the gyro's bias, the turn would be lost to the heading, and go on in the flight; nor does
-        the vehicle's middle stand still in it.
+        If the turn were interpreted as the gyro's bias, the heading would not follow it, and the wrong bias
+        would turn the heading in flight. The vehicle's centre does not stand still in such a turn either.
         """
         core, p = self._solution.core, self._solution.p
         span_s = core[SUM_GYRO_TIME]
@@ -130,7 +130,7 @@ class Standby:
         return time_us - self._turning_since_us < _STEADY_US
 
     def _hold(self, *, flying: bool) -> None:
-        """From now on the position is held where it is, and the velocity taken as about zero."""
+        """Hold the present position from now on, and assume a velocity near zero."""
         solution, core = self._solution, self._solution.core
         solution.obs[f.HOLD : f.HOLD + 2] = core[X_POS : X_POS + 2]
         self.held = True

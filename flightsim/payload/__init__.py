@@ -1,4 +1,4 @@
-"""Simulated mission payload: what a vehicle carries for its mission, and what there is to be found with it.
+"""Simulated mission payload: the devices that a vehicle carries for its mission, and their targets.
 
 A camera on a gimbal with a detector, over ground targets; a survey magnetometer over a magnetic map with
 targets' signatures in it. All read the vehicle's truth and give measurements.

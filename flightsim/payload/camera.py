@@ -58,7 +58,7 @@ class CameraParameters:
         position_frd_m: place on the vehicle, from its centre of gravity.
         max_zoom: longest focal length, in focal lengths of the model.
         blur_px_m: of the lens at zoom 1: diameter of the circle of confusion in pixels, for each 1/m between
-            what is in focus and what is looked at. Pictures show it; the detector is not bothered.
+            the focus and the object. Pictures show it; the detector is not affected.
         min_focus_m: nearest distance that can be focused on.
     """
 

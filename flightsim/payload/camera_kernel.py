@@ -73,8 +73,8 @@ def look(
 ) -> int:
     """Rows (n, VIEW) of `out` for targets (n, 3), tags where `tagged`; returns how many are visible.
 
-    Visible is what lies before the camera, in the image as it is and as it is measured, near enough, and far
-    enough below the horizon. `normals` is (n, 3): noise of u, v and size.
+    A target is visible if it is before the camera, within the image both truly and as measured, near enough,
+    and far enough below the horizon. `normals` is (n, 3): noise of u, v and size.
     """
     arm, eye, sight, body, gimbal = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
     rotate(q_ned_from_frd, constants[POSITION_FRD_M], arm)

@@ -44,7 +44,7 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class CameraFrame:
-    """What the detector found in one frame; perhaps nothing.
+    """The detections in one frame; may be empty.
 
     Attributes:
         time_us: when it was exposed.

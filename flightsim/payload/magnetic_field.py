@@ -1,4 +1,4 @@
-"""The magnetic field as it is: geology and main field on a grid, and the targets."""
+"""The true magnetic field: geology and main field on a grid, and the targets."""
 
 from collections.abc import Sequence
 

@@ -5,7 +5,7 @@ them. Processing takes the daily variation out by a base station and levels the 
 which leaves an error of each line, and a grid is interpolated between the lines (Akima's splines, the usual
 choice of bi-directional gridding). See Reeves, "Aeromagnetic Surveys" (2005), chapters 3 to 5.
 
-So the published map differs from the truth by what lies between the lines, by stripes along them, and by
+So the published map differs from the truth by the field between the lines, by stripes along them, and by
 noise. The survey states this difference as the standard deviation of its tie lines about its map.
 """
 

@@ -1,4 +1,4 @@
-"""Ground targets: what there is to be found, on level ground at home's altitude."""
+"""Ground targets, on level ground at home's altitude."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Pictures of what a camera sees: ground, sky, marks and targets, by the geometry of the detections.
+"""Pictures of a camera's view: ground, sky, marks and targets, by the geometry of the detections.
 
 The simulation does not need this package. A program that shows or stores pictures imports it, in a separate
 process if the vehicle must not wait.

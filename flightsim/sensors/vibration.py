@@ -1,4 +1,4 @@
-"""Vibration of the airframe by its rotors, as an IMU in it reads it.
+"""Vibration of the airframe caused by its rotors, as an IMU measures it.
 
 A rotor whose centre of mass lies off its axis pulls once in a turn, with a force that turns in the rotor's
 plane and grows with the square of its speed. Its blades pass the arms or the wing twice in a turn and pull
