@@ -1,4 +1,4 @@
-"""Waypoint missions in wind and turbulence, measured by the truth, as issue 3 asks for them.
+"""Waypoint missions in wind and turbulence, measured by the truth, against required figures.
 
 The settled part of a leg begins 200 m behind its first waypoint, or where the quickest turn possible in that
 wind is over (`turn_geometry`: up to 280 m), and ends 100 m before its second one. The airspeed is the true
@@ -67,7 +67,7 @@ def fly_case(case: Case, turbulence: Turbulence = Turbulence.MODERATE) -> Missio
 
 
 def shortfalls(figures: MissionFigures) -> list[str]:
-    """What of issue 3's figures a mission misses before its flare."""
+    """What of the required figures a mission misses before its flare."""
     kept = {
         "across": rms(figures.across_m) < 5.0,
         "height": rms(figures.height_m) < 2.0,
