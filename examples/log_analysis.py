@@ -3,7 +3,7 @@
     flightstack fly lissajous --out flown
     python examples/log_analysis.py flown/flight.tlog
 
-It reads logs of flight controllers (.bin, .ulg), too. Only logs of an embedded SITL have the truth.
+It also reads the logs of flight controllers (.bin, .ulg). Logs of simulated flights hold the truth, too.
 """
 
 import sys
