@@ -54,7 +54,7 @@ def fly_case(case: Case, turbulence: Turbulence = Turbulence.MODERATE) -> Missio
         speed_m_s=6.0,
         from_deg=heading_deg + case.wind_from_deg,
         turbulence=turbulence,
-        profile=WindProfile(),  # 6 m/s at all heights; of the profile see README, Limits
+        profile=WindProfile(),  # 6 m/s at all heights; of the profile see docs/limits.md
     )
     flight = AircraftFlight(
         case.flavour,
