@@ -1,8 +1,10 @@
 """An own estimator: altitude and climb from the static pressure.
 
-flightstack fly lissajous --estimator examples/own_estimator.py --out climb
-flightstack replay climb/flight.tlog --estimator examples/own_estimator.py --set time_constant_s=1
-flightstack estimate examples/own_estimator.py --connect udpin:127.0.0.1:14540
+    flightstack fly lissajous --estimator examples/own_estimator.py --out climb
+    flightstack replay climb/flight.tlog --estimator examples/own_estimator.py --set time_constant_s=1
+    flightstack estimate examples/own_estimator.py --connect udpin:127.0.0.1:14540
+
+The three commands run it in a flight, over a log and on a live link. It needs no registration.
 """
 
 from dataclasses import dataclass

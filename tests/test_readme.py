@@ -74,7 +74,9 @@ def test_the_mission_flies_and_the_estimator_with_it(tmp_path: Path) -> None:
     (tmp_path / "receiver.py").write_text(RECEIVER, encoding="utf-8")
     printed = fly(SQUARE, tmp_path, "--altitude", "15", "--estimator", str(tmp_path / "receiver.py"))
     assert printed.count("battery") == 4
-    assert re.search(r"receiver, vehicle 1: \d+ estimates: north 0\.\d+ m/s", printed), printed
+    assert re.search(r"receiver, vehicle 1: \d+ estimates: alt [01]\.\d+ m RMS off autopilot", printed), (
+        printed
+    )
 
 
 @pytest.mark.parametrize("autopilot", [pytest.param("px4", marks=pytest.mark.slow), "ardupilot"])
