@@ -168,7 +168,7 @@ class Runner:
         if unknown:
             raise EstimatorError(f"{estimator.NAME} needs {', '.join(unknown)}: no such message in MAVLink")
         if estimator.TEAM and system_id is not None:
-            raise EstimatorError(f"{estimator.NAME} hears all vehicles; system id {system_id} has no effect")
+            raise EstimatorError(f"{estimator.NAME} takes all vehicles; system id {system_id} has no effect")
         self.system_id = system_id
         self.outcomes: Counter[Outcome] = Counter()
         self.left_out: Counter[str] = Counter()

@@ -50,8 +50,8 @@ def confirmation(
         return None
     if not yes and not somebody_is_there():
         raise click.UsageError(
-            f"{', '.join(connections)}: may be a real vehicle, and nobody can be asked; give --yes "
-            "to fly it when nothing is found against it"
+            f"{', '.join(connections)}: may be a real vehicle, and there is no terminal to confirm the "
+            "flight; give --yes to fly it when the checks find no problem"
         )
 
     async def confirm(looks: "Sequence[Look]") -> bool:

@@ -50,17 +50,17 @@ class _Teller:
 @click.option("--connect", required=True, metavar="URL", help="The vehicle: udpin:0.0.0.0:14550, serial:...")
 @click.option("--duration", type=_SECONDS, metavar="S", help="Vehicle time. [default: until Ctrl-C]")
 @click.option(
-    "--system-id", type=click.IntRange(1, 255), metavar="N", help="Vehicle. [default: the first heard]"
+    "--system-id", type=click.IntRange(1, 255), metavar="N", help="Vehicle. [default: the first one received]"
 )
 @click.option(
     "--component-id", type=click.IntRange(191, 194), default=191, show_default=True, help="Its own."
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator.")
-@click.option("--publish/--no-publish", default=True, show_default=True, help="Tell estimates on the link.")
+@click.option("--publish/--no-publish", default=True, show_default=True, help="Send estimates on the link.")
 @click.option("--no-request", is_flag=True, help="Don't ask the autopilot for the rates that are needed.")
 @click.option(
     "--silence", type=_SECONDS, default=10.0, show_default=True, metavar="S",
-    help="End when the vehicle was not heard for so long, wall seconds.",
+    help="End when nothing was received from the vehicle for so long, wall seconds.",
 )  # fmt: skip
 @click.option(
     "--against", type=click.Choice(["autopilot", "truth", "both"]), default="both", show_default=True,

@@ -38,7 +38,7 @@ _FORECAST_HEIGHT_M: Final = 100.0  # at least; the wind of a profile grows littl
     multiple=True,
     type=click.IntRange(1, 255),
     metavar="ID",
-    help="Of the vehicle, where several are on its link; one for each --connect. [default: the first heard]",
+    help="Of the vehicle, where several are on its link; one for each --connect. [default: the first]",
 )
 @_world(
     "--autopilot",

@@ -289,7 +289,7 @@ def play(
         connection = open_link(address)
         warn_if_open((link,), key)
         if not connection.peers:
-            click.echo(f"waiting for somebody on {connection.description}", err=True)
+            click.echo(f"waiting for a client on {connection.description}", err=True)
         try:
             played = send(
                 opened,
@@ -305,7 +305,7 @@ def play(
             if terminal:
                 click.echo(err=True)
         lost = connection.counters.dropped
-        but = f" ({lost} dropped: nobody there, or too slow)" if lost else ""
+        but = f" ({lost} dropped: no receiver, or a slow one)" if lost else ""
         click.echo(f"played: {played.frames} frames{but}, {played.log_s:.1f} s of the log, to {address}")
 
     _run(work)

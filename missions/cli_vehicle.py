@@ -46,7 +46,7 @@ def info(**given: Any) -> int:
 
 def _shown(value: Any) -> str:
     if value is None:
-        return "not told"
+        return "not reported"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, Mapping):

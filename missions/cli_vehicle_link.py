@@ -27,7 +27,11 @@ _OPTIONS = (
     ),
     click.option("--system-id", type=click.IntRange(1, 255), help="Where several are on the link."),
     click.option(
-        "--timeout", type=FiniteRange(0.5, 600.0), default=10.0, show_default=True, help="To hear it, s."
+        "--timeout",
+        type=FiniteRange(0.5, 600.0),
+        default=10.0,
+        show_default=True,
+        help="For its heartbeat, s.",
     ),
     click.option("--json", "as_json", is_flag=True, help="Print JSON, for scripts."),
 )
@@ -114,6 +118,6 @@ async def confirm(question: str, yes: bool) -> None:
     if yes:
         return
     if not somebody_is_there():
-        raise click.UsageError(f"{question}: not confirmed; give --yes where nobody can be asked")
+        raise click.UsageError(f"{question}: not confirmed; there is no terminal to ask on: give --yes")
     if not is_yes(await ask(f"{question}? Type {YES_WORDS}")):
         raise click.ClickException("not confirmed, nothing was done")

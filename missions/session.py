@@ -251,14 +251,14 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
         where = f" on {', '.join(request.connect)}" if request.connect else ""
         which = "" if wanted is None else f" with system id {wanted}"
         others = ", ".join(map(str, vehicle.connection.autopilots_heard))
-        heard = f" (heard: vehicle {others})" if others else ""
+        heard = f" (received: vehicle {others})" if others else ""
         signing = vehicle.connection.signing
         if signing is not None and signing.counters.refused_frames:
             heard += f" (refused by the signing key: {signing.counters.reasons})"
         asked = "is it on, and sending there?"
         if request.connect and request.signing_key is None and not others:
             asked += " Does it ask for signatures (--signing-key)?"
-        raise MissionError(f"no vehicle{which} was heard{where}{heard}: {error}; {asked}") from error
+        raise MissionError(f"no vehicle{which} was received{where}{heard}: {error}; {asked}") from error
     vehicle.notes.system_id = vehicle.system_id
     vehicle.regain_s = request.regain_s if request.connect else 0.0
     vehicle.notes.autopilot = vehicle.autopilot
@@ -307,7 +307,7 @@ async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request:
         await flying
         if vehicle.armed:
             raise MissionError(
-                f"the mission ended with the vehicle armed; it was told to {request.on_failure}. "
+                f"the mission ended with the vehicle armed; it was commanded to {request.on_failure}. "
                 "End a mission with return_to_launch() or land()"
             )
         vehicle.notes.progress = 1.0

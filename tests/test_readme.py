@@ -21,7 +21,7 @@ PAGES: Final = (
 )
 README_BYTES: Final = 10_000
 # Their pages may come with another branch; when they are there, the links are checked.
-PENDING: Final = ("mavlink/", "papers.md", "firmware/")
+PENDING: Final = ("mavlink/",)
 
 
 def code_blocks(text: str) -> list[str]:

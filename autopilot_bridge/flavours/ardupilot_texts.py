@@ -1,4 +1,4 @@
-"""What ArduCopter says about events (4.6.3, reference sections 1, 3, 5 and 6)."""
+"""What ArduCopter says about events (docs/firmware/ardupilot.md, sections 1, 3, 5 and 6)."""
 
 from collections.abc import Mapping
 from typing import Final

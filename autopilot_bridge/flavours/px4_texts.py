@@ -1,4 +1,4 @@
-"""What PX4 says about events (v1.16.1, reference sections 7 to 9).
+"""What PX4 says about events (docs/firmware/px4.md, sections 7 to 9).
 
 PX4 gives the reasons of a refused arming in EVENT messages (`px4_events`), which need its metadata to be
 read. Here they follow as texts too, worded as PX4 words the events, for clients that know texts only. The

@@ -1,8 +1,9 @@
 """The camera as a MAVLink component: camera protocol v2, and LANDING_TARGET for what its detector finds.
 
 Source: MAVLink camera protocol v2 (mavlink.io/en/services/camera.html) and the LANDING_TARGET message.
-Detections carry angles off the optical axis; their tangents are the normalized image coordinates (seed 004,
-equation 36). The camera has no receiver of its own: where photos were taken is what the autopilot told.
+Detections carry angles off the optical axis; their tangents are the normalized image coordinates (Tolman et
+al. 2021, equation 36). The camera has no receiver of its own: where photos were taken is what the autopilot
+reported.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Streamed setpoints as ArduPlane takes them (reference: ArduPilot 4.6.3, section 7).
+"""Streamed setpoints as ArduPlane takes them (docs/firmware/ardupilot.md, section 7).
 
 Only GUIDED listens. Roll, pitch and throttle of SET_ATTITUDE_TARGET are taken or left to the autopilot one by
 one; of the position setpoints only a height is used.

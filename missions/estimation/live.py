@@ -236,9 +236,9 @@ class _Process:
             return f"{request.connect} has been silent for {request.silence_s:g} s; what came before is kept"
         which = "vehicle" if request.system_id is None else f"vehicle {request.system_id}"
         others = ", ".join(map(str, sorted(self._tap.autopilots)))
-        also = f" (heard: vehicle {others})" if others else ""
+        also = f" (received: vehicle {others})" if others else ""
         return (
-            f"no {which} was heard on {request.connect} within {request.silence_s:g} s{also}; "
+            f"no {which} was received on {request.connect} within {request.silence_s:g} s{also}; "
             "is it on, and sending there?"
         )
 

@@ -165,7 +165,7 @@ def _opened(logs: Sequence[Log] | Path) -> tuple[Sequence[Log], str]:
     try:
         return [open_log(logs)], ""
     except LogError:
-        return [], "nothing was heard"
+        return [], "nothing was received"
 
 
 def _told(lacking: Mapping[int, Sequence[str]], vehicles: int) -> str:

@@ -244,7 +244,7 @@ class SearchTeam:
     def _motion(self, vehicle: "Vehicle") -> Motion:
         place, attitude = vehicle.latest(Position), vehicle.latest(Attitude)
         if place is None or attitude is None:
-            raise MissionError(f"the vehicle tells no position or attitude; {vehicle.heard()}")
+            raise MissionError(f"the vehicle reports no position or attitude; {vehicle.heard()}")
         wings = vehicle.kind is VehicleKind.FIXED_WING
         wind = vehicle.wind_ne_m_s() if wings else None
         airspeed_m_s = vehicle.pilot.airspeed_true_m_s if vehicle.pilot is not None else math.nan

@@ -74,7 +74,7 @@ COMMAND: Final = MissionCommand(
             "--target",
             default="500,300",
             metavar="NORTH,EAST",
-            help="Where the target is at the beginning, m from home, as somebody has reported it.",
+            help="Where the target is at the beginning, m from home, as reported before the flight.",
         ),
         option("--target-speed", type=float, default=0.0, help="Of the target, m/s."),
         option("--target-heading", type=float, default=0.0, help="It moves there, degrees."),

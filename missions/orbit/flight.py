@@ -157,7 +157,7 @@ class OrbitFlight:
     def _told_attitude(self) -> telemetry.Attitude:
         attitude = self._vehicle.latest(telemetry.Attitude)
         if attitude is None:
-            raise MissionError(f"the vehicle tells no attitude (ATTITUDE); {self._vehicle.heard()}")
+            raise MissionError(f"the vehicle reports no attitude (ATTITUDE); {self._vehicle.heard()}")
         return attitude
 
     def _require_flying(self) -> None:

@@ -15,7 +15,7 @@ from missions.vehicle.vehicle import Vehicle
 
 
 class OrbitMission(Mission[OrbitOptions]):
-    """`flightstack fly orbit`: paper 004, section IV."""
+    """`flightstack fly orbit`: Tolman et al. 2021, section IV."""
 
     name = "orbit"
     kinds = (VehicleKind.FIXED_WING,)
@@ -75,7 +75,7 @@ class OrbitMission(Mission[OrbitOptions]):
             f"standard deviation {summary['radius_estimate_std_m']:.1f} m, altitude by pressure within "
             f"{summary['altitude_estimate_error_m']:.1f} m; target lost {summary['target_losses']} times, "
             f"{summary['detections_used']} detections used",
-            "where aircraft and target truly were, a vehicle elsewhere does not tell",
+            "a vehicle outside the simulation does not report where aircraft and target truly were",
         )
 
     def title(self, options: OrbitOptions) -> str:

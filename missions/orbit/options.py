@@ -187,7 +187,7 @@ class OrbitOptions(MissionOptions):
             raise PlanError(
                 f"from {self.height_over_target_m:g} m above it, at {self.radius_m:g} m, the target "
                 "would be seen "
-                f"only {math.degrees(depression):.1f} degrees below the horizon, too flat to tell its "
+                f"only {math.degrees(depression):.1f} degrees below the horizon, too flat to measure its "
                 "distance; "
                 f"{math.degrees(LEAST_DEPRESSION_RAD):g} are needed: ask for a higher --altitude or a "
                 "smaller --radius"

@@ -31,7 +31,7 @@ COMMAND: Final = MissionCommand(
         option(
             "--then",
             type=click.Choice(["return", "land"]),
-            help="After a mission that does not land by itself. [default: return; an aircraft must be told]",
+            help="After a mission that does not land by itself. [default: return; required for aircraft]",
         ),
         option("--time-limit", type=float, help="End the mission after so many seconds, with --then."),
     ),

@@ -159,7 +159,7 @@ def _way(
 ) -> list[Finding]:
     """Where the mission leads: near home, and inside the fence."""
     if outline is None or not outline.points_ned_m:
-        return [warning("way", "the mission does not tell where it flies", "know it yourself")]
+        return [warning("way", "the mission does not state where it flies", "check it yourself")]
     points = outline.points_ned_m
     farthest_m = max(math.hypot(n, e) for n, e, _ in points)
     highest_m = max(-d for _, _, d in points)
@@ -217,11 +217,11 @@ def _endurance(snapshot: Snapshot, outline: Outline | None) -> Finding:
     """Whether the battery lasts, as far as both are known."""
     duration_s = None if outline is None else outline.duration_s
     if duration_s is None:
-        return warning("duration", "the mission does not tell how long it flies", "know it yourself")
+        return warning("duration", "the mission does not state how long it flies", "check it yourself")
     text = f"about {duration_s / 60.0:.1f} min of mission"
     left_s = snapshot.whole("BATTERY_STATUS", "time_remaining")
     if not left_s:
-        return ok("duration", f"{text}; the autopilot does not tell how long the battery lasts")
+        return ok("duration", f"{text}; the autopilot does not report how long the battery lasts")
     text += f", {left_s / 60.0:.1f} min of battery"
     if left_s < _RESERVE * duration_s:
         return problem("duration", text, "charge it, or fly less")
@@ -232,5 +232,5 @@ def _lost_link(vehicle: Vehicle, parameters: Mapping[str, float]) -> Finding:
     words = lost_link_words(vehicle.autopilot, vehicle.kind, parameters)
     vehicle.notes.lost_link = "; ".join(words)
     if not words:
-        return warning("lost link", "the autopilot does not tell what it would do", "look at its parameters")
+        return warning("lost link", "the autopilot's reaction is not known", "look at its parameters")
     return ok("lost link", "; ".join(words))

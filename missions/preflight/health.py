@@ -55,7 +55,9 @@ def sensors(snapshot: Snapshot) -> list[Finding]:
     if enabled is None or health is None or present is None:
         return [
             problem(
-                "sensors", "the autopilot has not told how they are (SYS_STATUS)", "wait, or look at the link"
+                "sensors",
+                "their health was not reported (SYS_STATUS)",
+                "wait, or look at the link",
             )
         ]
     sick = enabled & present & ~health & ~_SAID_ELSEWHERE
@@ -129,7 +131,7 @@ def gps(snapshot: Snapshot) -> Finding:
     """Fix, satellites and dilution."""
     fix = snapshot.whole("GPS_RAW_INT", "fix_type")
     if fix is None:
-        return warning("GPS", "nothing was told of a receiver", "a flight to places needs one")
+        return warning("GPS", "no receiver was reported", "a flight to places needs one")
     satellites = snapshot.whole("GPS_RAW_INT", "satellites_visible") or 0
     eph = snapshot.whole("GPS_RAW_INT", "eph")
     hdop = None if eph is None or eph == _UNKNOWN_EPH else eph / 100.0
@@ -150,7 +152,7 @@ def navigation(snapshot: Snapshot) -> Finding:
         return _ekf_status_report(snapshot)
     flags = snapshot.whole("ESTIMATOR_STATUS", "flags")
     if flags is None:
-        return warning("navigation", "the filter's state is not told", "ask for it, or look at the link")
+        return warning("navigation", "the filter's state is not reported", "ask for it, or look at the link")
     if not flags & dialect.ESTIMATOR_POS_HORIZ_ABS or not flags & dialect.ESTIMATOR_ATTITUDE:
         return problem(
             "navigation", "the filter has no position or no attitude", "wait for GPS, keep it still"
@@ -236,7 +238,9 @@ def remote_control(snapshot: Snapshot) -> Finding:
     if channels > 0 or present & health & _RC_BIT:
         rssi = snapshot.whole("RC_CHANNELS", "rssi")
         strength = "" if rssi in (None, 255, 0) else f", signal {100 * (rssi or 0) // 254} %"
-        return ok("remote control", f"heard{strength}")
+        return ok("remote control", f"received{strength}")
     return warning(
-        "remote control", "none is heard", "nobody could take over but by this link: fly so on purpose only"
+        "remote control",
+        "none is received",
+        "a pilot can take over by this link only; make sure that you want that",
     )

@@ -51,7 +51,7 @@ class AttitudePilot:
         """Ask for the streams it needs, and take the pressure on the ground.
 
         Raises:
-            MissionError: the vehicle tells no pressure, or is in the air.
+            MissionError: the vehicle reports no pressure, or is in the air.
         """
         for name, rate_hz in _RATES_HZ.items():
             await vehicle.set_message_rate(name, rate_hz)
@@ -67,7 +67,7 @@ class AttitudePilot:
                     total, count = total + 100.0 * message.press_abs, count + 1
         if not count:
             raise VehicleTimeout(
-                f"the vehicle tells no static pressure (SCALED_PRESSURE) within {_GROUND_S:g} s; "
+                f"the vehicle reports no static pressure (SCALED_PRESSURE) within {_GROUND_S:g} s; "
                 f"{vehicle.heard()}"
             )
         return cls(vehicle, total / count)
@@ -138,7 +138,7 @@ class AttitudePilot:
         height_m = self.height_m
         if air is None or attitude is None or not math.isfinite(height_m):
             raise MissionError(
-                "the vehicle tells no airspeed, attitude or pressure (VFR_HUD, ATTITUDE, "
+                "the vehicle reports no airspeed, attitude or pressure (VFR_HUD, ATTITUDE, "
                 "SCALED_PRESSURE), so "
                 f"altitude can't be held; {self._vehicle.heard()}"
             )

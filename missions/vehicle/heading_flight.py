@@ -92,7 +92,7 @@ class HeadingFlight:
             return None
         attitude = self._vehicle.latest(telemetry.Attitude)
         if attitude is None:
-            raise MissionError(f"the vehicle tells no attitude (ATTITUDE); {self._vehicle.heard()}")
+            raise MissionError(f"the vehicle reports no attitude (ATTITUDE); {self._vehicle.heard()}")
         airspeed = self._pilot.airspeed_true_m_s
         roll = self._controller.roll_rad(
             heading_rad=attitude.yaw_rad,

@@ -110,7 +110,7 @@ class VehicleView:
     @staticmethod
     def _known(value: T | None) -> T:
         if value is None:
-            raise VehicleTimeout("no heartbeat was heard yet: call wait_heartbeat first")
+            raise VehicleTimeout("no heartbeat was received yet: call wait_heartbeat first")
         return value
 
     def _on_heartbeat(self, frame: Any) -> None:
@@ -228,7 +228,7 @@ class VehicleView:
         """Home as the vehicle reports it."""
         place = self.home_or_none()
         if place is None:
-            raise VehicleTimeout("the vehicle has not told its home position: call wait_ready first")
+            raise VehicleTimeout("the vehicle has not reported its home position: call wait_ready first")
         return place
 
     async def position(self, timeout_s: float = 5.0) -> Position:
@@ -286,8 +286,8 @@ class VehicleView:
     def heard(self, *, silence: bool = True) -> str:
         """What was heard last, for error messages; with `silence`, also how long ago when that is long."""
         if self._adapter is None or self._heard_us is None:
-            return "nothing was heard from an autopilot"
-        parts = [f"last heard: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
+            return "nothing was received from an autopilot"
+        parts = [f"last received: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
         position = self.message("GLOBAL_POSITION_INT")
         if position is not None:
             parts.append(f"{position.relative_alt * 1e-3:.1f} m above home")

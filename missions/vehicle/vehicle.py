@@ -426,13 +426,13 @@ class Vehicle(FixedWingFlight):
                 await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
         # a disarmed vehicle too: in the mission's mode it would fly off when it is armed again
         for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
-            self.notes.left = f"was told to {mode}, and did not answer"
+            self.notes.left = f"was commanded to {mode} and did not answer"
             try:
                 await self.set_mode(mode, 5.0)
             except LinkClosed:  # the vehicle may still hear us: what it was told first shall stand
                 return
             except MissionError:
                 continue
-            self.notes.left = f"was told to {mode}"
+            self.notes.left = f"was commanded to {mode}"
             return
         self.notes.left = "refused to return, to land and to hold"

@@ -175,7 +175,7 @@ class VehicleClient:
         if not self._answers:
             self._answers = await self.command(dialect.MAV_CMD_REQUEST_MESSAGE, version) is not None
         if not self._answers:
-            raise VehicleTimeout(f"vehicle {self.system_id} is heard, but does not answer")
+            raise VehicleTimeout(f"vehicle {self.system_id} sends heartbeats, but does not answer")
 
     async def ask_for(self, names: Sequence[str], rate_hz: float = 2.0) -> None:
         """Have messages streamed that are not (ArduPilot sends only what it was asked for)."""
@@ -244,7 +244,7 @@ async def open_client(
     if client is None:
         which = "autopilot" if system_id is None else f"autopilot with system id {system_id}"
         raise VehicleTimeout(
-            f"no {which} was heard on {address} within {timeout_s:g} s; {await _heard(address)}"
+            f"no {which} was received on {address} within {timeout_s:g} s; {await _heard(address)}"
         )
 
 

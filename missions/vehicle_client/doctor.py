@@ -128,7 +128,7 @@ def _clock(snapshot: Snapshot, unix_time_us: int, begun_s: float) -> Finding:
     told_us = snapshot.whole("SYSTEM_TIME", "time_unix_usec")
     if not told_us:
         return warning(
-            "clock", "the vehicle doesn't tell the date", "its logs are undated until it has GPS time"
+            "clock", "the vehicle doesn't report the date", "its logs are undated until it has GPS time"
         )
     now_us = unix_time_us + (asyncio.get_running_loop().time() - begun_s) * 1e6
     off_s = (told_us - now_us) * 1e-6

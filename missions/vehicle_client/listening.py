@@ -17,8 +17,8 @@ _GCS_HEARTBEAT_S = 1.0
 
 
 SIGNED = (
-    "it signs what it says, and may believe nobody without its key; this command can't sign: use a link that "
-    "takes unsigned frames (serial, USB), or clear the key"
+    "it signs its messages, and may accept no message without its key; this command can't sign: use a link "
+    "that takes unsigned frames (serial, USB), or clear the key"
 )
 """Why a vehicle that is heard does not answer."""
 
@@ -61,11 +61,9 @@ class LinkQuality:
             )
         if "HEARTBEAT" in self.rates_hz:
             ids = ", ".join(str(system) for system, component in self.components if component == 1)
-            return (
-                f"heard there now: autopilot with system id {ids}; try again, or choose it with --system-id"
-            )
+            return f"received now: autopilot with system id {ids}; try again, or choose it with --system-id"
         names = ", ".join(f"{system}/{component}" for system, component in self.components)
-        return f"heard were components {names} (system/component), none of them an autopilot's heartbeat"
+        return f"received were components {names} (system/component), none of them an autopilot's heartbeat"
 
 
 async def listen(address: Address, seconds: float, system_id: int | None = None) -> LinkQuality:

@@ -47,7 +47,7 @@ class PlaceOnPath:
         vehicle = self._vehicle
         p = vehicle.latest(telemetry.Position)
         if p is None:
-            raise MissionError(f"the vehicle tells no position in flight; {vehicle.heard()}")
+            raise MissionError(f"the vehicle reports no position in flight; {vehicle.heard()}")
         if not vehicle.armed:
             raise MissionError(f"the vehicle disarmed before the pattern was flown; {vehicle.heard()}")
         north, east, _ = self._frame.ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)

@@ -165,7 +165,7 @@ class _Stream:
             return None
         attitude = vehicle.latest(telemetry.Attitude)
         if attitude is None:
-            raise MissionError(f"the vehicle tells no attitude (ATTITUDE); {vehicle.heard()}")
+            raise MissionError(f"the vehicle reports no attitude (ATTITUDE); {vehicle.heard()}")
         _measure(vehicle, self._effect)
         return AttitudeSetpoint(
             roll_rad=self._law.roll_rad(self._place, attitude.yaw_rad, vehicle.clock.time_us)

@@ -155,7 +155,7 @@ def test_nobody_there_is_one_line() -> None:
     assert done.returncode == 1
     assert done.stdout == ""
     (line,) = done.stderr.splitlines()
-    assert "no autopilot was heard on udpin:127.0.0.1" in line
+    assert "no autopilot was received on udpin:127.0.0.1" in line
     assert "nothing was received in 2 s" in line
     wrong = {"serial:/dev/none:57600": "can't be opened", "nonsense": "accepted:", "a.tlog": "accepted:"}
     for url, words in wrong.items():

@@ -41,7 +41,7 @@ def test_nothing_is_asked_on_links_of_this_machine() -> None:
 def test_where_nobody_can_be_asked_nothing_flies(connection: str) -> None:
     result = CliRunner().invoke(fly, ["lissajous", "--connect", connection])
     assert result.exit_code == 2
-    assert "nobody can be asked; give --yes" in " ".join(result.output.split())
+    assert "there is no terminal to confirm the flight; give --yes" in " ".join(result.output.split())
 
 
 @pytest.mark.parametrize("option", [["--yes"], ["--check"], ["--regain", "5"]])

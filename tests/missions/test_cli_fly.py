@@ -222,7 +222,7 @@ def test_a_mission_that_ends_in_the_air_has_failed(tmp_path: Path) -> None:
     assert result.return_value == 1
     summary = json.loads((out / "summary.json").read_text())
     assert summary["outcome"] == "failed"
-    assert "told to return" in summary["reason"]
+    assert "commanded to return" in summary["reason"]
 
 
 def test_an_error_in_a_mission_names_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

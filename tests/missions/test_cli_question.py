@@ -175,9 +175,12 @@ def test_ctrl_c_at_a_question_about_a_vehicle_is_no_answer_and_the_end() -> None
     [
         (
             "fly lissajous --connect serial:/dev/ttyNONE:57600",
-            "may be a real vehicle, and nobody can be asked; give --yes",
+            "may be a real vehicle, and there is no terminal to confirm the flight; give --yes",
         ),
-        ("fly lissajous --connect udpin:127.0.0.1:1 --check", "nobody can be asked; give --yes"),
+        (
+            "fly lissajous --connect udpin:127.0.0.1:1 --check",
+            "no terminal to confirm the flight; give --yes",
+        ),
     ],
 )
 def test_where_the_input_is_closed_nobody_can_be_asked(words: str, told: str) -> None:

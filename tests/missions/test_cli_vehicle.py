@@ -37,7 +37,9 @@ def test_half_a_parameter_file_does_not_stay_on_a_full_disk(
 
 def test_where_the_input_is_closed_nobody_can_be_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", None)
-    with pytest.raises(click.UsageError, match="delete all: not confirmed; give --yes"):
+    with pytest.raises(
+        click.UsageError, match="delete all: not confirmed; there is no terminal to ask on: give --yes"
+    ):
         asyncio.run(confirm("delete all", False))
     asyncio.run(confirm("delete all", True))
 

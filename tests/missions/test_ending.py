@@ -58,7 +58,7 @@ def test_who_asks_a_flight_to_end_leaves_the_vehicle_safe(
     assert elsewhere.kind == "return"
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert (summary["outcome"], summary["reason"]) == ("interrupted", result.reason)
-    assert "the vehicle was told to return" in result.reason
+    assert "was commanded to return" in result.reason
 
 
 @pytest.mark.parametrize("number", ENDING)
@@ -88,7 +88,7 @@ def test_what_is_sent_twice_at_once_is_asked_once(
     result = flown(tmp_path / "run", send)
     assert (result.outcome, result.signal) == ("interrupted", signal.SIGTERM)
     assert elsewhere.kind == "land"
-    assert "the vehicle was told to land" in result.reason
+    assert "was commanded to land" in result.reason
 
 
 @pytest.mark.parametrize("second", [*ENDING, signal.SIGINT])

@@ -365,7 +365,7 @@ def test_a_failed_flight_exits_1_with_one_line(embedded, tmp_path, capsys, monke
     code, _out, err = command_line(capsys, "fly", "sector", "--out", str(tmp_path / "run"))
     assert code == 1
     assert len(err.splitlines()) == 1
-    assert "no heartbeat of a PX4 or ArduPilot autopilot within 15 s; nothing was heard" in err
+    assert "no heartbeat of a PX4 or ArduPilot autopilot within 15 s; nothing was received" in err
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["outcome"] == "failed"
 
 

@@ -71,7 +71,7 @@ def test_ready_waits_for_the_checks(flown, flavour):
 @both
 def test_not_ready_says_what_is_missing(flown, flavour):
     async def script(vehicle, autopilot):
-        with pytest.raises(VehicleTimeout, match=r"missing: pre-arm checks.*last heard: mode"):
+        with pytest.raises(VehicleTimeout, match=r"missing: pre-arm checks.*last received: mode"):
             await vehicle.wait_ready(timeout_s=5.0)
 
     def never(autopilot):
@@ -83,7 +83,7 @@ def test_not_ready_says_what_is_missing(flown, flavour):
 def test_no_heartbeat_says_that_nothing_was_heard(flown):
     async def script(vehicle, autopilot):
         autopilot.streams.clear()
-        with pytest.raises(VehicleTimeout, match=r"no heartbeat .* within 4 s; nothing was heard"):
+        with pytest.raises(VehicleTimeout, match=r"no heartbeat .* within 4 s; nothing was received"):
             await vehicle.wait_heartbeat(timeout_s=4.0)
 
     flown(script, ready=False, setup=lambda a: a.streams.clear())

@@ -51,7 +51,7 @@ def test_a_lost_link_ends_every_wait(flown, flavour, awaited):
             autopilot.mute_commands.add(dialect.MAV_CMD_DO_SET_MODE)
         lost_us = autopilot.time_us + 3_000_000
         later(3.0, lambda: silent(autopilot))
-        expected = rf"^link lost: no heartbeat for 1\d s while waiting for {awaited}.*; last heard: mode"
+        expected = rf"^link lost: no heartbeat for 1\d s while waiting for {awaited}.*; last received: mode"
         with pytest.raises(LinkClosed, match=expected) as lost:
             await WAITS[awaited](vehicle)
         assert str(lost.value).count("no heartbeat") == 1
@@ -77,7 +77,7 @@ def test_a_lost_link_is_not_waited_for_when_making_safe(flown):
 
 def test_before_the_first_heartbeat_the_wait_has_its_own_deadline(flown):
     async def script(vehicle, autopilot):
-        with pytest.raises(VehicleTimeout, match="within 30 s; nothing was heard"):
+        with pytest.raises(VehicleTimeout, match="within 30 s; nothing was received"):
             await vehicle.wait_heartbeat(timeout_s=30.0)
 
     flown(script, ready=False, setup=lambda autopilot: autopilot.streams.clear())
@@ -331,7 +331,7 @@ def test_what_keeps_a_vehicle_from_arming_is_told(flown, flavour):
     said, time_us = flown(script, flavour=flavour, ready=False, setup=unready)
     why = "PreArm: Battery 1 below minimum" if flavour == "ardupilot" else "Preflight Fail: low battery"
     assert "missing: pre-arm checks" in said and "within 20 s" in said
-    assert f"; the autopilot says: {why}; last heard" in said
+    assert f"; the autopilot says: {why}; last received" in said
     assert time_us < 24_000_000
 
 

@@ -243,9 +243,9 @@ def test_a_parameter_out_of_range_is_refused(tmp_path: Path) -> None:
 def test_no_heartbeat(nobody_there: Run) -> None:
     """Fails with a line that says where nobody was heard, leaves a whole run folder, exit code 1."""
     text = nobody_there.finish(exit_code=FAILED)
-    assert "no vehicle was heard on udpin:127.0.0.1" in text
+    assert "no vehicle was received on udpin:127.0.0.1" in text
     assert len([line for line in text.splitlines() if line.startswith("flightstack: ")]) == 1
     summary = nobody_there.summary
     assert summary["outcome"] == "failed"
-    assert "no vehicle was heard" in summary["reason"]
+    assert "no vehicle was received" in summary["reason"]
     assert set(summary["message_counts"]) <= {"HEARTBEAT"}

@@ -31,9 +31,9 @@ def test_a_signal_leaves_the_vehicle_safe_and_the_run_whole(
         run.process.send_signal(number)
         said = run.finish(code)
         assert said.count("\n") == 1
-        assert "interrupted; the vehicle was told to return; the log is in" in said
+        assert "interrupted; was commanded to return; the log is in" in said
         assert run.summary["outcome"] == "interrupted"
-        assert run.summary["vehicles"][0]["left"] == "was told to return"
+        assert run.summary["vehicles"][0]["left"] == "was commanded to return"
 
 
 def test_a_terminal_that_is_closed_does_so_too(tmp_path: Path) -> None:
@@ -45,4 +45,4 @@ def test_a_terminal_that_is_closed_does_so_too(tmp_path: Path) -> None:
         assert terminal.wait_for_end() == 128 + signal.SIGHUP
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["outcome"] == "interrupted"
-    assert summary["vehicles"][0]["left"] == "was told to return"
+    assert summary["vehicles"][0]["left"] == "was commanded to return"

@@ -26,7 +26,7 @@ def fly_into(run: Run, mode: str) -> None:
 def check_interrupted(run: Run, text: str, on_failure: str = "return") -> None:
     lines = [line for line in text.splitlines() if line]
     summary = run.summary
-    told = f"was told to {on_failure}"
+    told = f"was commanded to {on_failure}"
     assert [block["left"] for block in summary["vehicles"]] == [told] * len(summary["vehicles"])
     ids = [block["system_id"] for block in summary["vehicles"]]
     who = ", ".join(f"vehicle {system_id} {told}" for system_id in ids)

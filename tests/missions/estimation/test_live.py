@@ -319,7 +319,7 @@ def test_a_vehicle_that_is_not_there(tmp_path, port, vehicle, capfd):
     vehicle(system=7)
     assert estimate(tmp_path, port, "--system-id", "3", "--silence", "0.7") == 1
     error = capfd.readouterr().err
-    assert f"no vehicle 3 was heard on udpin:127.0.0.1:{port} within 0.7 s (heard: vehicle 7)" in error
+    assert f"no vehicle 3 was received on udpin:127.0.0.1:{port} within 0.7 s (received: vehicle 7)" in error
 
 
 @pytest.mark.parametrize(
@@ -396,5 +396,5 @@ def test_a_process_that_stood_still_counts_that_as_nobodys_silence(tmp_path, por
     monkeypatch.setattr("missions.estimation.live.wall_time_s", lambda: now_s)
     monkeypatch.setattr("missions.estimation.live.asyncio.wait_for", wait_for)
     assert estimate(tmp_path, port, "--silence", "1") == 1
-    assert "no vehicle was heard" in capfd.readouterr().err
+    assert "no vehicle was received" in capfd.readouterr().err
     assert sum(waits) == pytest.approx(1.25)

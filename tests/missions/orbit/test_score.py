@@ -42,7 +42,7 @@ def test_a_vehicle_elsewhere_is_told_as_the_mission_believed():
     assert circle.startswith("orbit of 150 m for 600 s, as the mission believes: mean radius 150.4 m")
     for words in ("standard deviation 1.9 m", "within 3.2 m", "target lost 1 times", "5900 detections"):
         assert words in circle
-    assert "does not tell" in unknown
+    assert "does not report" in unknown
 
 
 def test_of_an_orbit_that_was_never_reached_nothing_is_said():

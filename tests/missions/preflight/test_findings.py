@@ -91,14 +91,14 @@ def test_why_it_is_not_ready(texts: tuple[str, ...], unhealthy: int, words: str)
 @pytest.mark.parametrize(
     ("changes", "subject", "level", "words"),
     [
-        ({"SYS_STATUS": None}, "sensors", Level.PROBLEM, "has not told"),
+        ({"SYS_STATUS": None}, "sensors", Level.PROBLEM, "not reported"),
         ({"SYS_STATUS": {HEALTH: 0x1320C83B}}, "sensors", Level.PROBLEM, "3d mag"),
         ({"SYS_STATUS": {HEALTH: 0x0320C83F}}, "arming", Level.PROBLEM, "not passed"),
         ({"HEARTBEAT": {"base_mode": 0x9D}}, "arming", Level.WARNING, "is armed"),
         ({"GPS_RAW_INT": {"fix_type": 2}}, "GPS", Level.PROBLEM, "2D_FIX, 10 satellites"),
         ({"GPS_RAW_INT": {"satellites_visible": 5}}, "GPS", Level.WARNING, "5 satellites"),
         ({"GPS_RAW_INT": {"eph": 300}}, "GPS", Level.WARNING, "HDOP 3.0"),
-        ({"GPS_RAW_INT": None}, "GPS", Level.WARNING, "nothing was told"),
+        ({"GPS_RAW_INT": None}, "GPS", Level.WARNING, "no receiver was reported"),
         ({"ESTIMATOR_STATUS": {"flags": 1}}, "navigation", Level.PROBLEM, "no position"),
         ({"ESTIMATOR_STATUS": {"mag_ratio": 1.5}}, "navigation", Level.PROBLEM, "1.50 (mag)"),
         ({"ESTIMATOR_STATUS": {"vel_ratio": 0.6}}, "navigation", Level.WARNING, "0.60 (vel)"),
