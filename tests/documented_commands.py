@@ -12,8 +12,8 @@ _COMMAND: Final = re.compile(r"^(?:#)? {4,}(flightstack .*?)(?:  +#.*)?$", re.MU
 
 
 def commands_in(text: str) -> list[str]:
-    """The indented lines of a page, a docstring or a comment that begin with `flightstack`."""
-    return _COMMAND.findall(text)
+    """The indented lines of a page, a docstring or a comment that begin with `flightstack`, synopses aside."""
+    return [line for line in _COMMAND.findall(text) if "[" not in line]
 
 
 def parse(line: str) -> None:
