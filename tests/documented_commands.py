@@ -12,7 +12,7 @@ _COMMAND: Final = re.compile(r"^(?:#)? {4,}(flightstack .*?)(?:  +#.*)?$", re.MU
 
 
 def commands_in(text: str) -> list[str]:
-    """The indented lines of a page, a docstring or a comment that begin with `flightstack`, synopses aside."""
+    """The indented command lines of a page, a docstring or a comment; synopses are left out."""
     return [line for line in _COMMAND.findall(text) if "[" not in line]
 
 
