@@ -1,9 +1,9 @@
 """Does `flightstack sitl` keep real time, and every default stream its rate?
 
 Starts the SITL as a process of its own for each flavour, listens as clients do (PX4: its onboard and its
-ground-station link; ArduPilot: TCP, after REQUEST_DATA_STREAM at 4 Hz) and compares with the rates of the
-reference pages: pace within 1 %, every stream within 5 % (or one message) of its rate, by wall time and by
-vehicle time.
+ground-station link; ArduPilot: TCP, after REQUEST_DATA_STREAM at 4 Hz) and compares with the rates of
+docs/firmware/px4.md (section 6) and docs/firmware/ardupilot.md (section 2): pace within 1 %, every stream
+within 5 % (or one message) of its rate, by wall time and by vehicle time.
 
     python benchmarks/realtime_streams.py [--seconds 60] [--flavour px4|ardupilot]
 """

@@ -38,7 +38,8 @@ def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
 def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
     """Parameters that give clients, who live in wall time, as long to answer as at speedup 1.
 
-    PX4's own SITL stretches these when it runs faster (reference page, section 2); ArduPilot's does not.
+    PX4's own SITL stretches these when it runs faster (docs/firmware/px4.md, section 2); ArduPilot's does
+    not.
     """
     if autopilot != "px4" or speedup <= 1.0:
         return {}

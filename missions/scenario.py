@@ -78,7 +78,7 @@ class SurveyScenario:
         sigma_along_m, sigma_across_m: its standard deviations.
         orientation_rad: of its long axis.
         moment_a_m2, depth_m: the target is a dipole along the Earth's field, this far below home; None: a
-            two-dimensional Gaussian (seed 003).
+            two-dimensional Gaussian (Lum et al. 2005).
     """
 
     map_path: Path | None = None

@@ -1,4 +1,4 @@
-"""Imports point one way (DESIGN.md, section 2). Read from the sources, so that nothing need be imported."""
+"""Imports point one way (docs/architecture.md). Read from the sources, so that nothing need be imported."""
 
 import ast
 from functools import cache

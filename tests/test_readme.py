@@ -1,37 +1,45 @@
-"""What the README shows works as it stands: its commands parse, its mission flies, its files are there."""
+"""What README and pages show works as it stands: commands parse, missions fly, linked files are there."""
 
 import re
-import shlex
 from pathlib import Path
+from typing import Final
 
 import click
 import pytest
 
-from missions.cli import command_line
 from tests.clients.forked_process import flightstack_done
+from tests.documented_commands import commands_in, parse
 
-ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-COMMANDS = re.findall(r"^    (flightstack .*?)(?:  +#.*)?$", README, re.MULTILINE)
-SQUARE, HEADINGS, CLIMB = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-
-
-def parse(line: str) -> None:
-    """Parse a command line with the program's own parser, without running it."""
-    words = shlex.split(line)[1:]
-    with click.Context(command_line, info_name="flightstack") as parent:
-        command = command_line.get_command(parent, words[0])
-        assert command is not None, f"no command {words[0]}"
-        command.make_context(words[0], words[1:], parent=parent)
+ROOT: Final = Path(__file__).parents[1]
+DOCS: Final = ROOT / "docs"
+README: Final = (ROOT / "README.md").read_text(encoding="utf-8")
+EXTENDING: Final = (DOCS / "extending.md").read_text(encoding="utf-8")
+PAGES: Final = (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted(DOCS.rglob("*.md")))
+README_BYTES: Final = 10_000
 
 
-@pytest.mark.parametrize("line", COMMANDS)
+def code_blocks(text: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+SQUARE, RECEIVER = code_blocks(README)
+(HEADINGS,) = code_blocks(EXTENDING)
+COMMANDS = [line for page in PAGES for line in commands_in(page.read_text(encoding="utf-8"))]
+LINKS = [
+    (page.relative_to(ROOT).as_posix(), link)
+    for page in PAGES
+    for link in re.findall(r"\]\(([^)h][^)]*)\)", page.read_text(encoding="utf-8"))
+]
+
+
+@pytest.mark.parametrize("line", sorted(set(COMMANDS)))
 def test_commands_parse(line: str) -> None:
     parse(line)
 
 
 def test_there_are_commands() -> None:
-    assert len(COMMANDS) > 8
+    assert len(commands_in(README)) > 8
+    assert len(commands_in((DOCS / "cli.md").read_text(encoding="utf-8"))) > 30
     with pytest.raises(click.UsageError):
         parse("flightstack fly lissajous --no-such-option")
 
@@ -43,8 +51,12 @@ def test_the_two_lines_set_up_what_they_use() -> None:
     assert tests.endswith("-m pytest")
 
 
+def test_the_readme_is_short() -> None:
+    assert len(README.encode()) <= README_BYTES
+
+
 def fly(mission: str, folder: Path, *arguments: str) -> str:
-    """Fly a mission of the README from a file; what it printed."""
+    """Fly a mission of a page from a file; what it printed."""
     (folder / "mission.py").write_text(mission, encoding="utf-8")
     done = flightstack_done("fly", str(folder / "mission.py"), *arguments, "--out", str(folder / "run"))
     assert done.returncode == 0, done.stderr
@@ -53,10 +65,12 @@ def fly(mission: str, folder: Path, *arguments: str) -> str:
 
 
 def test_the_mission_flies_and_the_estimator_with_it(tmp_path: Path) -> None:
-    (tmp_path / "climb.py").write_text(CLIMB, encoding="utf-8")
-    said = fly(SQUARE, tmp_path, "--altitude", "15", "--estimator", str(tmp_path / "climb.py"))
-    assert said.count("battery") == 4
-    assert re.search(r"climb, vehicle 1: \d+ estimates: alt [01]\.\d+ m RMS off autopilot", said)
+    (tmp_path / "receiver.py").write_text(RECEIVER, encoding="utf-8")
+    printed = fly(SQUARE, tmp_path, "--altitude", "15", "--estimator", str(tmp_path / "receiver.py"))
+    assert printed.count("battery") == 4
+    assert re.search(r"receiver, vehicle 1: \d+ estimates: alt [01]\.\d+ m RMS off autopilot", printed), (
+        printed
+    )
 
 
 @pytest.mark.parametrize("autopilot", [pytest.param("px4", marks=pytest.mark.slow), "ardupilot"])
@@ -64,10 +78,20 @@ def test_the_mission_of_aircraft_flies(tmp_path: Path, autopilot: str) -> None:
     fly(HEADINGS, tmp_path, "--model", "aerosonde", "--autopilot", autopilot)
 
 
-@pytest.mark.parametrize("link", re.findall(r"\]\(([^)h][^)]*)\)", README))
-def test_linked_files_and_sections_exist(link: str) -> None:
-    file, _, section = link.partition("#")
-    assert (ROOT / file).exists(), link
+@pytest.mark.parametrize(("page", "link"), LINKS, ids=lambda text: text)
+def test_linked_files_and_sections_exist(page: str, link: str) -> None:
+    name, _, section = link.partition("#")
+    file = (ROOT / page).parent / name if name else ROOT / page
+    assert file.exists(), link
     if section:
-        headings = re.findall(r"^#+ (.+)$", (ROOT / file).read_text(encoding="utf-8"), re.MULTILINE)
+        headings = re.findall(r"^#+ (.+)$", file.read_text(encoding="utf-8"), re.MULTILINE)
         assert section in {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
+
+
+def test_the_index_names_every_page() -> None:
+    """The pages of MAVLink services have an index of their own."""
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    pages = [page.relative_to(DOCS).as_posix() for page in sorted(DOCS.rglob("*.md"))]
+    expected = [page for page in pages if page != "index.md" and not page.startswith("mavlink")]
+    assert len(expected) > 10
+    assert [page for page in expected if f"]({page})" not in index] == []

@@ -1,4 +1,4 @@
-"""ArduCopter 4.6.3 (reference: ArduPilot 4.6.3, sections 1, 3 and 6)."""
+"""ArduCopter 4.6.3 (docs/firmware/ardupilot.md, sections 1, 3 and 6)."""
 
 from types import MappingProxyType
 from typing import Final

@@ -1,4 +1,4 @@
-"""ArduPlane 4.6.3 (reference: ArduPilot 4.6.3, sections 1, 3 and 7)."""
+"""ArduPlane 4.6.3 (docs/firmware/ardupilot.md, sections 1, 3 and 7)."""
 
 from collections.abc import Mapping
 from dataclasses import replace

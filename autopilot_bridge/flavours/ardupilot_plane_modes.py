@@ -1,4 +1,4 @@
-"""ArduPlane modes: custom_mode numbers, names and base_mode (reference: ArduPilot 4.6.3, section 1)."""
+"""ArduPlane modes: custom_mode numbers, names and base_mode (docs/firmware/ardupilot.md, section 1)."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""ArduPlane's texts of events (4.6.3, reference sections 1, 3, 5 and 7)."""
+"""ArduPlane's texts of events (docs/firmware/ardupilot.md, sections 1, 3, 5 and 7)."""
 
 import math
 from collections.abc import Mapping

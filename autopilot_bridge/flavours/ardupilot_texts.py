@@ -1,4 +1,4 @@
-"""ArduCopter's texts of events (4.6.3, reference sections 1, 3, 5 and 6)."""
+"""ArduCopter's texts of events (docs/firmware/ardupilot.md, sections 1, 3, 5 and 6)."""
 
 from collections.abc import Mapping
 from typing import Final

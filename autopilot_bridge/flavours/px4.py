@@ -1,4 +1,4 @@
-"""PX4 v1.16.1 for a multicopter (reference: PX4 v1.16.1, sections 3 to 9)."""
+"""PX4 v1.16.1 for a multicopter (docs/firmware/px4.md, sections 3 to 9)."""
 
 from types import MappingProxyType
 from typing import Final

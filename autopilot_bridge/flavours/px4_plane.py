@@ -1,4 +1,4 @@
-"""PX4 v1.16.1 for a fixed wing (reference: PX4 v1.16.1, sections 3 to 9)."""
+"""PX4 v1.16.1 for a fixed wing (docs/firmware/px4.md, sections 3 to 9)."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""PX4 fixed-wing modes: custom_mode numbers, names and base_mode (reference: PX4 v1.16.1, section 4)."""
+"""PX4 fixed-wing modes: custom_mode numbers, names and base_mode (docs/firmware/px4.md, section 4)."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

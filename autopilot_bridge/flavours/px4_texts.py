@@ -1,4 +1,4 @@
-"""PX4's texts of events (v1.16.1, reference sections 7 to 9).
+"""PX4's texts of events (docs/firmware/px4.md, sections 7 to 9).
 
 PX4 gives the reasons of a refused arming in EVENT messages (`px4_events`), which need its metadata to be
 read. Here they are sent as texts too, in the words of the events, for clients without support for events. The

@@ -1,9 +1,9 @@
 """The camera as a MAVLink component: camera protocol v2, and LANDING_TARGET for the targets it detects.
 
 Source: MAVLink camera protocol v2 (mavlink.io/en/services/camera.html) and the LANDING_TARGET message.
-Detections carry angles off the optical axis; their tangents are the normalized image coordinates (seed 004,
-equation 36). The camera has no GPS receiver: the place of a photo is the position that the autopilot has
-sent.
+Detections carry angles off the optical axis; their tangents are the normalized image coordinates (Tolman et
+al. 2021, equation 36). The camera has no GPS receiver: the place of a photo is the position that the
+autopilot has sent.
 """
 
 from collections.abc import Callable

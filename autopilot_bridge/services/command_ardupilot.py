@@ -1,4 +1,4 @@
-"""Commands as every ArduPilot vehicle takes them (reference: ArduPilot 4.6.3, section 3)."""
+"""Commands as every ArduPilot vehicle takes them (docs/firmware/ardupilot.md, section 3)."""
 
 import math
 from abc import abstractmethod

@@ -1,4 +1,4 @@
-"""Commands as ArduPlane takes them (reference: ArduPilot 4.6.3, sections 3, 5 and 7)."""
+"""Commands as ArduPlane takes them (docs/firmware/ardupilot.md, sections 3, 5 and 7)."""
 
 import math
 from typing import Final

@@ -1,4 +1,4 @@
-"""Commands as PX4 takes them (reference: PX4 v1.16.1, section 7)."""
+"""Commands as PX4 takes them (docs/firmware/px4.md, section 7)."""
 
 import math
 

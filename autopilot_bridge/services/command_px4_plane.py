@@ -1,4 +1,4 @@
-"""Commands as PX4 takes them on a fixed wing (reference: PX4 v1.16.1, sections 4 and 7)."""
+"""Commands as PX4 takes them on a fixed wing (docs/firmware/px4.md, sections 4 and 7)."""
 
 import math
 

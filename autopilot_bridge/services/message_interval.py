@@ -1,7 +1,7 @@
 """SET_MESSAGE_INTERVAL, GET_MESSAGE_INTERVAL, REQUEST_MESSAGE and ArduPilot's REQUEST_DATA_STREAM.
 
-The results are those of reference sections 6 and 7 (PX4) and 2 (ArduPilot); `IntervalPolicy` holds the
-differences.
+The results are those of docs/firmware/px4.md, sections 6 and 7, and docs/firmware/ardupilot.md, section 2;
+`IntervalPolicy` holds the differences.
 """
 
 import math

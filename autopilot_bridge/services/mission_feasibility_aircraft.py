@@ -1,7 +1,7 @@
 """PX4's rules for a fixed wing's mission: take-off and landing items, and a flyable approach.
 
 Source: PX4 1.16 navigator, FeasibilityChecker (checkTakeoffLandAvailable, the fixed-wing landing checks); the
-slope as it was seen (reference: PX4 v1.16.1, section 10).
+slope as it was seen (docs/firmware/px4.md, section 10).
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Streamed setpoints as ArduPlane takes them (reference: ArduPilot 4.6.3, section 7).
+"""Streamed setpoints as ArduPlane takes them (docs/firmware/ardupilot.md, section 7).
 
 Setpoints are used in GUIDED only. Roll, pitch and throttle of SET_ATTITUDE_TARGET are each either used or
 left to the autopilot; of the position setpoints only a height is used.

@@ -1,7 +1,8 @@
 """Streamed setpoints: SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET.
 
-PX4 flies them in OFFBOARD as they come and counts the good ones as a sign of life (reference: PX4, section
-9). ArduPilot flies them smoothly in GUIDED (reference: ArduPilot, section 6). Neither acknowledges them.
+PX4 flies them in OFFBOARD as they come and counts the good ones as a sign of life (docs/firmware/px4.md,
+section 9). ArduPilot flies them smoothly in GUIDED (docs/firmware/ardupilot.md, sections 6 and 7). Neither
+acknowledges them.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Where clients of each firmware look for its SITL (reference pages, section 1)."""
+"""Where clients of each firmware look for its SITL (docs/firmware/px4.md and ardupilot.md, section 1)."""
 
 from dataclasses import dataclass
 from typing import Final

@@ -16,7 +16,7 @@ _M = mavlink
 START_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
     {_M.MAVLINK_MSG_ID_HEARTBEAT: 1, _M.MAVLINK_MSG_ID_TIMESYNC: 0.1}
 )
-"""What a copter sends before anything is requested: SRn_* are 0, reference section 1."""
+"""What a copter sends before anything is requested: SRn_* are 0 (docs/firmware/ardupilot.md, section 1)."""
 
 STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
     {
@@ -58,7 +58,7 @@ STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
         ),
     }
 )
-"""REQUEST_DATA_STREAM groups, reference section 2."""
+"""REQUEST_DATA_STREAM groups (docs/firmware/ardupilot.md, section 2)."""
 
 STREAM_RATE_PARAMETERS: Final[Mapping[int, str]] = MappingProxyType(
     {
@@ -84,7 +84,7 @@ NOT_REQUESTABLE: Final = frozenset(
         _M.MAVLINK_MSG_ID_TIMESYNC,
     }
 )
-"""Messages that 4.6 refuses to send on request, reference section 1."""
+"""Messages that 4.6 refuses to send on request (docs/firmware/ardupilot.md, section 1)."""
 
 _RC_NEUTRAL_US: Final = (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800)
 _POSITION_ONLY_MASK: Final = 0xFDF8

@@ -30,7 +30,7 @@ STREAM_GROUPS: Final[Mapping[int, tuple[int, ...]]] = MappingProxyType(
         ),
     }
 )
-"""REQUEST_DATA_STREAM groups, reference section 2."""
+"""REQUEST_DATA_STREAM groups (docs/firmware/ardupilot.md, section 2)."""
 
 _NEUTRAL_US: Final = 1500
 _TRAVEL_US: Final = 400.0  # SERVOn_MIN 1100 to SERVOn_MAX 1900

@@ -52,7 +52,7 @@ ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
         CURRENT_EVENT_SEQUENCE: 1 / 3,
     }
 )
-"""PX4's ONBOARD mode (UDP 14540), reference section 6."""
+"""PX4's ONBOARD mode (UDP 14540; docs/firmware/px4.md, section 6)."""
 
 GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
     {
@@ -82,7 +82,7 @@ GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
         _M.MAVLINK_MSG_ID_PING: 0.1,
     }
 )
-"""PX4's NORMAL mode with raised rates (UDP 14550), reference section 6."""
+"""PX4's NORMAL mode with raised rates (UDP 14550; docs/firmware/px4.md, section 6)."""
 
 _TARGET_BITS: Final = (1, 2, 4, 8, 16, 32, 64, 128, 256, 1024, 2048)
 """POSITION_TARGET_TYPEMASK of position, velocity, acceleration (north, east, down), yaw and yaw rate."""

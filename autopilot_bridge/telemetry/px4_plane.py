@@ -23,7 +23,7 @@ ONBOARD_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
         _M.MAVLINK_MSG_ID_WIND_COV: 10,
     }
 )
-"""PX4's ONBOARD mode (UDP 14540), reference section 6."""
+"""PX4's ONBOARD mode (UDP 14540; docs/firmware/px4.md, section 6)."""
 
 GCS_RATES_HZ: Final[Mapping[int, float]] = MappingProxyType(
     {

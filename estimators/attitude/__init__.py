@@ -1,4 +1,4 @@
-"""Roll and pitch by a complementary filter on SO(3), for fixed wings and multirotors (seed 004)."""
+"""Roll and pitch by a complementary filter on SO(3), for fixed wings and multirotors (docs/attitude.md)."""
 
 from estimators.attitude.estimate import AttitudeEstimate
 from estimators.attitude.estimator import AttitudeEstimator

@@ -1,4 +1,4 @@
-"""Roll and pitch from inertial messages and airspeed (seed 004, section II)."""
+"""Roll and pitch from inertial messages and airspeed (Tolman et al. 2021, section II)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import asin, atan2, nan, sqrt

@@ -65,7 +65,8 @@ class AttitudeParameters:
         gap_max_s: longer silence of the inertial sensor starts the filter anew.
         airspeed_age_max_s: an older airspeed is not used.
         airspeed_min_m_s: below, there is no lift to speak of: angle of attack and sideslip are zero.
-        longitudinal: whether the change of airspeed is taken into account (the paper: unaccelerated flight).
+        longitudinal: whether the change of airspeed is taken into account; Tolman et al. 2021
+            assume unaccelerated flight.
         speed_gain_1_s: of the airspeed on its filter, which makes that change.
         attack: whether the angle of attack is estimated; otherwise it is zero.
         lift_1_m: k_L / m; None: learned in flight.

@@ -1,8 +1,8 @@
 """Roll and pitch as the direction down in the body: its motion, its correction, and the gyro bias (compiled).
 
-The direction down, `d = R^T e_3`, is the paper's (seed 004) rotation R from body to level without anything of
-yaw: with the projector of (3) and (11), `R' = R [(I - d d^T) w]x` moves d by `d' = -w x d`, for d x d = 0. So
-R is rebuilt from roll and pitch where it is needed, and no yaw creeps in.
+The direction down, `d = R^T e_3`, is the rotation R from body to level of Tolman et al. 2021 without anything
+of yaw: with the projector of (3) and (11), `R' = R [(I - d d^T) w]x` moves d by `d' = -w x d`, for d x d = 0.
+So R is rebuilt from roll and pitch where it is needed, and no yaw creeps in.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Fixed wing: where down is, from specific force, airspeed, angle of attack and sideslip (compiled).
 
-Seed 004, (9)-(19), as corrected and extended in docs/attitude.md.
+Tolman et al. 2021, (9)-(19), as corrected and extended in docs/attitude.md.
 """
 
 import math

@@ -1,4 +1,7 @@
-"""Motion of a vehicle along a Lissajous pattern whose frequencies are not quite known (seed 000)."""
+"""Motion of a vehicle along a Lissajous pattern whose frequencies are not quite known.
+
+Source: Steckenrider, Leamy and Furukawa 2020, section III; docs/papers.md.
+"""
 
 from estimators.lissajous.estimate import LissajousEstimate
 from estimators.lissajous.estimator import LissajousEstimator

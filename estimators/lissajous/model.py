@@ -2,7 +2,8 @@
 
 Source: Steckenrider, Leamy, Furukawa 2020 (SSRR), section III. The state is (x, x', y, y') relative to the
 pattern's centre; with the frequencies in it, (x, x', y, y', w_x, w_y). Where the paper's equations have slips
-(17, 25a, 28, 29) the corrected form is the default, and the printed one is kept for the study to compare.
+(17, 25a, 28, 29; docs/papers.md) the corrected form is the default, and the printed one is kept for the study
+to compare.
 """
 
 import math

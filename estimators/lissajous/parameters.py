@@ -9,7 +9,7 @@ __all__ = ["Form", "LissajousParameters", "Source"]
 
 
 class Form(StrEnum):
-    """The three estimators of the paper's Table IV."""
+    """The three estimators of Steckenrider et al. 2020, Table IV."""
 
     MEASUREMENT = "measurement"
     """What was measured, as it came (N)."""

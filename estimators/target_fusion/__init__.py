@@ -1,4 +1,7 @@
-"""A target's place, fused from what a team of drones sees of it (seed 000)."""
+"""A target's place, fused from what a team of drones sees of it.
+
+Source: Steckenrider, Leamy and Furukawa 2020, section III-C; docs/papers.md.
+"""
 
 from estimators.target_fusion.estimate import TargetEstimate
 from estimators.target_fusion.estimator import TargetFusionEstimator

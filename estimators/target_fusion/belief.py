@@ -1,7 +1,8 @@
 """What is believed of one target: a Gaussian that fades, a gate, and a rival that may take its place.
 
-The paper fuses what all drones see at one step (equation 35) and leaves open a target that is not always in
-view. Here detections come one by one, at times of their own; between them the target may have walked.
+Steckenrider et al. 2020 fuse what all drones see at one step (equation 35) and leave open a target that is
+not always in view. Here detections come one by one, at times of their own; between them the target may have
+walked.
 """
 
 from typing import Final

@@ -13,7 +13,8 @@ class Heading(StrEnum):
     """Which way a drone's nose points."""
 
     COURSE = "course"
-    """Along its estimated velocity, with that velocity's uncertainty (the paper): the nose leads the way."""
+    """Along its estimated velocity, with that velocity's uncertainty (Steckenrider et al. 2020): the nose
+    leads the way."""
     YAW = "yaw"
     """As the autopilot's ATTITUDE says."""
 

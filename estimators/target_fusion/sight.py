@@ -1,7 +1,8 @@
 """A detection as a place beside the drone: direction, range, and how good both are.
 
-The paper takes the target's place in the drone's frame as measured (equation 30). A camera gives a direction;
-its length comes from the tag's apparent size (AprilTags, as in the paper), the message, or the height.
+Steckenrider et al. 2020 take the target's place in the drone's frame as measured (equation 30). A camera
+gives a direction; its length comes from the tag's apparent size (AprilTags, as in the paper), the message, or
+the height.
 """
 
 import math

@@ -33,7 +33,7 @@ class Signature(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GaussianSignature:
-    """A two-dimensional Gaussian, the same at every height (Lum, Rysdyk and Pongpunwattana, figure 3).
+    """A two-dimensional Gaussian, the same at every height (Lum et al. 2005, figure 3).
 
     Attributes:
         north_m, east_m: centre, local NED of home.

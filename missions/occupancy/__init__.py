@@ -1,1 +1,4 @@
-"""Search with a shared occupancy map (seed 003, section IV): cells, decisions, detections, the mission."""
+"""Search with a shared occupancy map: cells, decisions, detections, the mission.
+
+Source: Lum, Rysdyk and Pongpunwattana 2005, section IV; docs/papers.md.
+"""

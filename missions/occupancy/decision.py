@@ -1,4 +1,4 @@
-"""Which neighbouring cell a searcher flies to next: the utility of seed 003, equation 9."""
+"""Which neighbouring cell a searcher flies to next: the utility of Lum et al. 2005, equation 9."""
 
 import math
 from collections.abc import Collection

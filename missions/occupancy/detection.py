@@ -1,6 +1,7 @@
 """When a magnetometer reading is an anomaly, and how likely a passing searcher is to see one.
 
-Source: seed 003, sections III.C (an anomaly is what exceeds the noise) and IV.B (detection model).
+Source: Lum, Rysdyk and Pongpunwattana 2005, sections III-C (an anomaly is what exceeds the noise) and IV-B
+(detection model); docs/papers.md.
 """
 
 import math

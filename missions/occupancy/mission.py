@@ -1,4 +1,4 @@
-"""The mission `occupancy`: a team searches a magnetic map for a target (seed 003, section IV)."""
+"""The mission `occupancy`: a team searches a magnetic map for a target (Lum et al. 2005, section IV)."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,7 @@
 """The occupancy map of a search: scores of cells, lowered by searching, raised around what was identified.
 
-Source: seed 003 (Lum, Rysdyk, Pongpunwattana), section IV.B, equations 10 and 11. North and east are metres
-from home; arrays have rows to the north and columns to the east.
+Source: Lum, Rysdyk and Pongpunwattana 2005, section IV-B, equations 10 and 11; docs/papers.md. North and east
+are metres from home; arrays have rows to the north and columns to the east.
 """
 
 import math

@@ -1,6 +1,6 @@
 """Attitude by a filter of ours: roll and pitch from inertial messages and airspeed, yaw from the autopilot.
 
-The filter is seed 004's self-pose estimation (docs/attitude.md); it knows no yaw.
+The filter is the self-pose estimation of Tolman et al. 2021 (docs/attitude.md); it knows no yaw.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Roll commands that lead into a circle around a moving point and keep it there (paper 004, section IV-A).
+"""Roll commands that lead into a circle around a moving point and keep it there (Tolman et al. 2021, IV-A).
 
 Everything is relative: p is the horizontal offset to the target, v = -dp/dt the velocity of the aircraft
 against it. The angle from v to p, chi = atan2((v x p)_3, v . p), is +90 deg with the target abeam to the
@@ -15,7 +15,7 @@ whose feed-forward is that of the circle on the circle, and right elsewhere too,
 everywhere; the derivative terms come from the estimated velocity, not from differences of noisy angles.
 Bank makes the turn: v omega = g tan(phi) cos(crab), with the angle between heading and v, since lift pulls
 across the heading and not across v. In wind v changes along the circle, and the bank with it: v^2 / (g rho)
-where the paper prints v / (g rho).
+where the paper prints v / (g rho). docs/papers.md lists these corrections.
 """
 
 import math

@@ -1,4 +1,6 @@
-"""From a place in the image to a direction over ground and back (paper 004, equations 36 to 40).
+"""From a place in the image to a direction over ground and back.
+
+Source: Tolman et al. 2021, equations 36 to 40.
 
 Frames: camera (x to the right of the image, y down, z along the optical axis), gimbal (x along the optical
 axis, y right, z down), body (FRD), NED. The paper's level frame is NED turned by the heading; here NED itself

@@ -15,7 +15,7 @@ from missions.vehicle.vehicle import Vehicle
 
 
 class OrbitMission(Mission[OrbitOptions]):
-    """`flightstack fly orbit`: paper 004, section IV."""
+    """`flightstack fly orbit`: Tolman et al. 2021, section IV."""
 
     name = "orbit"
     kinds = (VehicleKind.FIXED_WING,)

@@ -6,8 +6,8 @@ offset p from the aircraft to the target and the velocity u of the target agains
     dp/dt = u - v_air,    u = v_target - v_wind
 
 Wind and target motion enter the relative motion as one: u. So a still target in wind, and a moving one in
-still air, are the same to the filter, and neither GPS nor the wind's own value is needed. (The paper takes
-the relative velocity to be that of the aircraft, equation 34, and flies in still air.)
+still air, are the same to the filter, and neither GPS nor the wind's own value is needed. (Tolman
+et al. 2021 take the relative velocity to be that of the aircraft, equation 34, and fly in still air.)
 
 Measured are bearing and depression of the line of sight; equation 40, offset = height / tan(depression), is
 in the measurement model, so that a flat line of sight from far away weighs as little as it should.

@@ -1,4 +1,7 @@
-"""A Lissajous curve in its own time law: harmonic motion on both axes (paper 000, equation 11)."""
+"""A Lissajous curve in its own time law: harmonic motion on both axes.
+
+Source: Steckenrider et al. 2020, equation 11.
+"""
 
 import math
 from typing import Final

@@ -1,1 +1,1 @@
-"""Monte Carlo studies: the papers' experiments that need no vehicle."""
+"""Monte Carlo studies: experiments of the papers (docs/papers.md) that need no vehicle."""

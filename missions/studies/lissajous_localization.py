@@ -149,7 +149,7 @@ class SampleRun:
 
 
 def sample_run(seed: int = 0, run: int = 0) -> SampleRun:
-    """One run of the cell that the paper's figures show, with the corrected equations."""
+    """One run of the cell that figures 6 and 7 of the paper show, with the corrected equations."""
     block = block_of(Equations.CORRECTED)
     trace: Array = np.zeros((STEPS, _DRONES + len(block.columns), 4))
     errors = simulate(block, CELLS.index(setting.SAMPLE_CELL), seed, run, trace=trace)

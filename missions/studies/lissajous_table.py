@@ -1,4 +1,7 @@
-"""The study's figures: medians, wins, the table beside the paper's, and what `summary.json` holds."""
+"""The study's figures: medians, wins, the table, and what `summary.json` holds.
+
+"The paper" is Steckenrider et al. 2020; its Table IV stands beside ours.
+"""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Arming checks and mode changes, as the reference pages list them."""
+"""Arming checks and mode changes, as docs/firmware/px4.md and ardupilot.md list them."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Modes, arming and failsafes of aircraft, as the reference pages and the firmwares' documents list them."""
+"""Modes, arming and failsafes of aircraft, as docs/firmware and the firmwares' documents list them."""
 
 import math
 

@@ -1,4 +1,7 @@
-"""Failsafes of the whole stack, commanded and observed over MAVLink alone, timed as the references say."""
+"""Failsafes of the whole stack, commanded and observed over MAVLink alone.
+
+Their times are those of docs/firmware.
+"""
 
 import math
 

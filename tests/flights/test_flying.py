@@ -1,6 +1,7 @@
 """Manual flight, attitude targets, orbit, brake, reposition and return, on the whole stack.
 
-The figures of the reference pages (PX4 section 13, ArduPilot section 6) are what a flight is compared with.
+A flight is compared with the figures of docs/firmware/px4.md, section 13, and docs/firmware/ardupilot.md,
+section 6.
 """
 
 import math

@@ -93,7 +93,7 @@ def test_the_shutter_is_released_through_the_autopilot(talk):
     assert digicam == [m.MAV_RESULT_ACCEPTED]
     assert len(talk.of(m.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, CAMERA_COMPONENT)) == 1
     started = talk.command(m.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
-    # PX4 leaves cameras with an id of their own to their clients (reference page, section 7)
+    # PX4 leaves cameras with an id of their own to their clients (docs/firmware/px4.md, section 7)
     px4 = talk.sitl.vehicles[0].specification.flavour == "px4"
     assert started == [m.MAV_RESULT_UNSUPPORTED if px4 else m.MAV_RESULT_ACCEPTED]
 

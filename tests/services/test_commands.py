@@ -1,4 +1,4 @@
-"""COMMAND_LONG, COMMAND_INT and SET_MODE: the results of the reference tables, state by state."""
+"""COMMAND_LONG, COMMAND_INT and SET_MODE: the results that docs/firmware lists, by state."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Flavours: mode numbers, base_mode, identity and parameter mappings against the reference pages."""
+"""Flavours: mode numbers, base_mode, identity and parameter mappings against docs/firmware."""
 
 import math
 

@@ -1,4 +1,7 @@
-"""Fences, downloads and progress of the mission protocol (reference: PX4 section 10, ArduPilot section 5)."""
+"""Fences, downloads and progress of the mission protocol.
+
+Expected: docs/firmware/px4.md, section 10, and docs/firmware/ardupilot.md, section 5.
+"""
 
 import math
 from typing import Any

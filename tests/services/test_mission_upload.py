@@ -1,4 +1,4 @@
-"""Uploads in the mission protocol, against the references (PX4 section 10, ArduPilot section 5)."""
+"""Uploads in the mission protocol, against docs/firmware (px4.md, section 10; ardupilot.md, section 5)."""
 
 import math
 from typing import Any

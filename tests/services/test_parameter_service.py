@@ -1,4 +1,7 @@
-"""The parameter protocol of both flavours, against their references (PX4 section 11, ArduPilot section 4)."""
+"""The parameter protocol of both flavours.
+
+Expected: docs/firmware/px4.md, section 11, and docs/firmware/ardupilot.md, section 4.
+"""
 
 import math
 import struct

@@ -1,4 +1,4 @@
-"""Commands of aircraft: the plane's column of the reference tables, and where they send the aircraft."""
+"""Commands of aircraft: the plane's column of docs/firmware, and where they send the aircraft."""
 
 import math
 from dataclasses import replace

@@ -24,7 +24,7 @@ PX4_ONBOARD_HZ = {
     **dict.fromkeys(("BATTERY_STATUS", "CURRENT_MODE", "HOME_POSITION", "VIBRATION"), 0.5),
     "CURRENT_EVENT_SEQUENCE": 1 / 3,
 }
-"""Reference page, section 6, without two messages pymavlink does not know; disarmed."""
+"""docs/firmware/px4.md, section 6, without two messages pymavlink does not know; disarmed."""
 
 PX4_GCS_HZ = {
     **dict.fromkeys(("ATTITUDE", "ATTITUDE_QUATERNION", "GLOBAL_POSITION_INT"), 50),
@@ -52,7 +52,7 @@ ARDUPILOT_AT_4_HZ = {
     *("SCALED_PRESSURE", "SCALED_PRESSURE2", "SERVO_OUTPUT_RAW", "SIMSTATE", "SYSTEM_TIME", "SYS_STATUS"),
     *("TERRAIN_REPORT", "VFR_HUD", "VIBRATION", "WIND"),
 }
-"""Reference page, section 2: everything that REQUEST_DATA_STREAM(ALL, 4 Hz) gives, disarmed."""
+"""docs/firmware/ardupilot.md, section 2: everything that REQUEST_DATA_STREAM(ALL, 4 Hz) gives, disarmed."""
 
 NOT_ON_OUR_VEHICLE = {"SCALED_IMU3", "SCALED_PRESSURE2", "SIMSTATE"}
 """It has no third IMU and no second barometer, and truth is not the autopilot's to tell."""

@@ -257,7 +257,7 @@ def test_every_message_has_the_fields_of_its_definition() -> None:
 
 @pytest.mark.parametrize(("rate_hz", "result"), [(40.0, Result.ACCEPTED), (45.0, 2), (50.0, 2), (4.0, 0)])
 def test_arduplane_refuses_rates_beyond_its_loop(rate_hz: float, result: int) -> None:
-    """Reference section 2: a loop of 50 Hz sends 40 Hz, and says what to increase for more."""
+    """A loop of 50 Hz sends 40 Hz, and says what to increase for more (docs/firmware/ardupilot.md, 2)."""
     aircraft = Aircraft()
     cache = PayloadCache(aircraft.ardupilot.builders())
     channel = SimpleNamespace(name="one", send=lambda message: None)

@@ -4,7 +4,8 @@ The flare is a path in height over the distance to go: from the slope's sink to 
 linearly with the height. Height errors are flown out along it, so that turbulence moves the touch little;
 without a position the sink follows the height alone. The pitch has nothing to do with the airspeed here
 (`control.fixed_wing.vertical_speed`), so the throttle holds it until the wheels touch: with the throttle
-closed a head wind that dies at the last moment would let the aircraft fall.
+closed a head wind that dies at the last moment would let the aircraft fall. Which airspeed counts, in a wind
+that fades towards the ground, is in `surface_wind`.
 """
 
 import math
@@ -14,6 +15,7 @@ from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from autopilot_bridge.flight.fixed_wing.surface_wind import SurfaceWind
 
 _ALIGN_M: Final = 1.0  # over the ground the crab angle is taken out
 _TOUCH_M: Final = 0.12
@@ -33,7 +35,8 @@ _FIRMER_1_S: Final = 0.5
 _LATE_1_S: Final = 0.06  # added to the sink of the touch for every metre flown beyond the place, ...
 _LATE_M_S: Final = 0.8  # ... at most this (ArduPilot: TECS_LAND_SRC)
 _SOFTEST: Final = 0.5  # of the sink of the touch: so low over the path
-_AIRSPEED_SHARE: Final = 0.9  # of the approach's airspeed, held in the flare
+_AIRSPEED_SHARE: Final = 0.94  # of the approach's airspeed, held in the flare; head wind adds to it:
+_HEAD_WIND_SHARE: Final = 0.25  # of what there is of it at the touch (ArduPlane: LAND_WIND_COMP, half of it)
 _POWER_SHARE: Final = 0.6  # of the trim throttle flies the glide slope about
 _POWER_GAIN: Final = 3.0  # throttle per share of the airspeed that is missing
 
@@ -55,19 +58,25 @@ def flare_height(time_s: float, start_m: float, before_m_s: float, after_m_s: fl
     return start_m * after_m_s / change * math.expm1(change * time_s / start_m)
 
 
-def power(state: AircraftState, airspeed_m_s: float, parameters: FixedWingFlightParameters) -> float:
-    """Throttle that holds an airspeed close to the ground; idle without an engine or an airspeed.
+def power(known_m_s: float, airspeed_m_s: float, parameters: FixedWingFlightParameters) -> float:
+    """Throttle that holds an airspeed close to the ground; idle without an engine or a known airspeed.
 
-    The lower of the airspeed and of what will be left of it when the gust has passed: an engine that idles
-    in a gust from ahead lets the aircraft fall when it ends.
+    Args:
+        known_m_s: what can be counted on (`SurfaceWind.airspeed_m_s`): an engine that idles in a gust from
+            ahead lets the aircraft fall when it ends.
+        airspeed_m_s: to hold.
     """
     p = parameters
-    if not (p.trim_throttle > 0.0 and state.airspeed_m_s == state.airspeed_m_s):
+    if not (p.trim_throttle > 0.0 and known_m_s == known_m_s):
         return p.throttle_idle
-    lasting = state.lasting_airspeed_m_s
-    known = min(state.airspeed_m_s, lasting) if lasting == lasting else state.airspeed_m_s
-    missing = (airspeed_m_s - known) / airspeed_m_s
+    missing = (airspeed_m_s - known_m_s) / airspeed_m_s
     return min(1.0, max(p.throttle_idle, _POWER_SHARE * p.trim_throttle + _POWER_GAIN * missing))
+
+
+def flare_airspeed(head_wind_m_s: float, parameters: FixedWingFlightParameters) -> float:
+    """Airspeed to hold in the flare: less than the approach's, by a share of the head wind less so."""
+    approach = parameters.landing_airspeed_m_s
+    return min(approach, _AIRSPEED_SHARE * approach + _HEAD_WIND_SHARE * max(0.0, head_wind_m_s))
 
 
 class Flare:
@@ -138,6 +147,7 @@ class Flare:
         height_m: float,
         to_go_m: float,
         slope: tuple[float, float],
+        wind: SurfaceWind,
         parameters: FixedWingFlightParameters,
         command: FlightCommand,
     ) -> None:
@@ -147,12 +157,13 @@ class Flare:
             height_m: over the ground.
             to_go_m: along the runway to the place of the touch.
             slope: height of the flare that follows, m; sink of the glide slope, m/s.
+            wind: close to the ground, of this update.
         """
         p = parameters
         self._plan(*slope, p)
         command.down_m = math.nan
         command.height_rate_m_s = -self._sink(state, height_m, to_go_m, p)
-        command.throttle = power(state, p.landing_airspeed_m_s, p)
+        command.throttle = power(wind.airspeed_m_s, p.landing_airspeed_m_s, p)
 
     def fly(
         self,
@@ -160,6 +171,7 @@ class Flare:
         state: AircraftState,
         height_m: float,
         to_go_m: float,
+        wind: SurfaceWind,
         parameters: FixedWingFlightParameters,
         command: FlightCommand,
     ) -> bool:
@@ -168,12 +180,13 @@ class Flare:
         Args:
             height_m: over the ground.
             to_go_m: along the runway to the place of the touch; NaN: not known.
+            wind: close to the ground, of this update.
         """
         p = parameters
         self._time_s += ctx.dt_s
         sink = self._sink(state, height_m, to_go_m, p)
         command.height_rate_m_s = -sink
-        command.throttle = power(state, _AIRSPEED_SHARE * p.landing_airspeed_m_s, p)
+        command.throttle = power(wind.airspeed_m_s, flare_airspeed(wind.head_wind_m_s, p), p)
         # the limits of the pitch close in gradually: no jerk of the elevator
         part = min(1.0, self._time_s / _PITCH_BLEND_S)
         ahead = height_m - _LEAD * p.pitch_time_constant_s * state.vel_down_m_s

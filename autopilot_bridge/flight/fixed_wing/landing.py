@@ -16,6 +16,7 @@ from autopilot_bridge.flight.fixed_wing.flare import Flare
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.power_check import PowerCheck
+from autopilot_bridge.flight.fixed_wing.surface_wind import SurfaceWind
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 
 _ENTRY_HEIGHT_M: Final = 4.0  # the circle is left this close to its height
@@ -85,6 +86,7 @@ class LandTask(AircraftTask):
         "_start",
         "_touch_pitch_rad",
         "_wanted",
+        "_wind",
         "approach",
         "phase",
     )
@@ -101,6 +103,7 @@ class LandTask(AircraftTask):
         self._line = Line()
         self._circle: Circle | None = None
         self._flare = Flare()
+        self._wind = SurfaceWind()
         self._blind: DescendTask | None = None
         self._power = PowerCheck()
         self._rolled_s = 0.0
@@ -125,7 +128,7 @@ class LandTask(AircraftTask):
         self.approach = approach_into_wind(ctx, state, place) if leg is None else leg
         self._line.set(self.approach.north_m, self.approach.east_m, self.approach.course_rad)
         if leg is not None and self._on_leg(ctx, leg):
-            self.phase = LandPhase.APPROACH
+            self._enter_approach(leg)
         else:
             self._enter_circle(ctx)
 
@@ -250,7 +253,11 @@ class LandTask(AircraftTask):
             and abs(past_entry) < _ENTRY_WITHIN * circle.radius_m
             and abs(wrap_pi(state.course_rad - approach.course_rad)) < _ENTRY_COURSE_RAD
         ):
-            self.phase = LandPhase.APPROACH
+            self._enter_approach(approach)
+
+    def _enter_approach(self, approach: Approach) -> None:
+        self.phase = LandPhase.APPROACH
+        self._wind.reset(approach.down_m - approach.entry_down_m)
 
     def _height(self, p: FixedWingFlightParameters, down_m: float) -> float:
         """Over the ground, as far as it is known."""
@@ -267,9 +274,16 @@ class LandTask(AircraftTask):
                 p.ground_bank_max_rad + (p.bank_max_rad - p.ground_bank_max_rad) * share
             )
 
+    def _follow_wind(self, ctx: FlightContext, height_m: float) -> None:
+        """Follow the wind over the height."""
+        made_up = ctx.health is not None and ctx.health.airspeed_synthetic
+        standing_m = ctx.fixed_wing.standing_height_m
+        self._wind.update(self._state, height_m, standing_m, ctx.dt_s, measured=not made_up)
+
     def _fly_approach(self, ctx: FlightContext, p: FixedWingFlightParameters, approach: Approach) -> None:
         state, command = self._state, self._command
         height = self._height(p, approach.down_m)
+        self._follow_wind(ctx, height)
         self._limit_bank(p, height)
         share = (height - _LOW_M) / (_DIVE_FREE_M - _LOW_M)
         if share < 1.0:
@@ -288,7 +302,9 @@ class LandTask(AircraftTask):
                 command.down_m += _SLOPE_GAIN * (slope_down - state.down_m)
                 command.height_rate_m_s = -sink
             if height < _SHORT_FINAL_M and p.trim_throttle > 0.0 and state.airspeed_m_s == state.airspeed_m_s:
-                self._flare.fly_slope(state, height, -past_place, (flare_height, sink), p, command)
+                self._flare.fly_slope(
+                    state, height, -past_place, (flare_height, sink), self._wind, p, command
+                )
         else:
             command.heading_rad = approach.course_rad
             command.height_rate_m_s = -sink
@@ -310,6 +326,7 @@ class LandTask(AircraftTask):
         else:
             command.heading_rad = approach.course_rad
         height = self._height(p, approach.down_m)
+        self._follow_wind(ctx, height)
         self._limit_bank(p, height)
         to_go = math.nan
         if ctx.position_valid:
@@ -320,7 +337,7 @@ class LandTask(AircraftTask):
                 self._begin_go_around()
                 self._fly_go_around(ctx, p, approach)
                 return
-        touched = self._flare.fly(ctx, state, height, to_go, p, command)
+        touched = self._flare.fly(ctx, state, height, to_go, self._wind, p, command)
         if self._flare.aligning:
             command.steering_heading_rad = approach.course_rad
         if touched:

@@ -7,7 +7,7 @@ from tests.estimators.attitude.wing_flight import PAPER_DEG2, fly_turns
 
 
 def test_one_flight():
-    """A calm one, by the truth: better than the paper."""
+    """A calm one, by the truth: better than Table I of Tolman et al. 2021."""
     found = fly_turns(1)
     assert found.bank_deg > 44.0
     assert found.mean_square_deg2[0] < PAPER_DEG2[0]

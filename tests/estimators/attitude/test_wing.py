@@ -57,7 +57,7 @@ def test_turn_of_long_duration_brings_no_yaw_into_roll_and_pitch():
 
 @pytest.mark.parametrize("longitudinal", [True, False])
 def test_acceleration_along_the_path(longitudinal):
-    """2 m/s^2 for 10 s, level: the change of airspeed explains the force. The paper leaves it out."""
+    """2 m/s^2 for 10 s, level: the change of airspeed explains the force. Tolman et al. 2021 leave it out."""
     found = Filter(at.WING, attack=False, longitudinal=longitudinal)
     fly(found, coordinated(12.0, 0.0), 12.0, 5.0)
     worst = 0.0

@@ -15,7 +15,7 @@ from flightsim.environment import Environment, Turbulence
 from tests.flights.aircraft import AircraftFlight
 
 PAPER_DEG2: Final = (3.067, 1.476)
-"""Mean squared errors of roll and pitch in the paper's Table I: two minutes, banks of -10 to 25 degrees."""
+"""Mean squared errors of roll and pitch (Tolman et al. 2021, Table I): two minutes, banks -10 to 25 deg."""
 _RADIUS_M: Final = 70.0  # 45 degrees of bank at the Aerosonde's 26 m/s
 _BANKS_DEG: Final = (45.0, -45.0, 0.0, 30.0, -30.0, 45.0, 0.0)
 

@@ -12,12 +12,13 @@ from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.flight.context import FlightPhase, LandedState, TouchedDown
 from autopilot_bridge.flight.fixed_wing import DescendTask, FixedWingFlightParameters, LandPhase, LandTask
 from autopilot_bridge.flight.fixed_wing.approach import approach_along_leg
-from autopilot_bridge.flight.fixed_wing.flare import flare_height, flare_time, power
+from autopilot_bridge.flight.fixed_wing.flare import flare_airspeed, flare_height, flare_time, power
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.task import TaskStatus
 from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.navigation import layout as n
 from flightsim.environment import Environment
+from flightsim.wind_profile import SURFACE_LAYER
 from tests.control.fixed_wing.aerosonde import AEROSONDE
 from tests.flight.fixed_wing.aircraft import Aircraft
 
@@ -148,20 +149,49 @@ def test_beside_the_runway_on_short_final_it_goes_around() -> None:
     assert abs(along) < 15.0 and abs(right) < 3.0
 
 
-def _in_the_flare(airspeed_m_s: float, lasting_m_s: float) -> float:
-    state = AircraftState()
-    state.airspeed_m_s, state.lasting_airspeed_m_s = airspeed_m_s, lasting_m_s
-    return power(state, 20.0, FixedWingFlightParameters())
+def _in_the_flare(known_m_s: float) -> float:
+    return power(known_m_s, 20.0, FixedWingFlightParameters())
 
 
-def test_a_gust_from_ahead_does_not_close_the_throttle_and_a_lull_opens_it() -> None:
-    steady = _in_the_flare(20.0, 20.0)
-    assert 0.0 < steady < 1.0
-    assert _in_the_flare(25.0, 20.0) == steady
-    assert _in_the_flare(18.0, 20.0) == _in_the_flare(20.0, 18.0) > steady
-    assert _in_the_flare(25.0, 25.0) == 0.0
-    assert _in_the_flare(20.0, math.nan) == steady  # no wind is known
-    assert _in_the_flare(math.nan, 20.0) == 0.0
+def test_throttle_holds_the_airspeed_that_can_be_counted_on() -> None:
+    steady = _in_the_flare(20.0)
+    assert 0.0 < steady < _in_the_flare(18.0) <= 1.0
+    assert _in_the_flare(25.0) == 0.0
+    assert _in_the_flare(math.nan) == 0.0
+
+
+def test_the_flare_gives_up_less_airspeed_against_the_wind() -> None:
+    p = FixedWingFlightParameters()
+    still = flare_airspeed(0.0, p)
+    assert 0.9 * p.landing_airspeed_m_s < still < p.landing_airspeed_m_s
+    assert flare_airspeed(-5.0, p) == still < flare_airspeed(2.0, p) < flare_airspeed(4.0, p)
+    assert flare_airspeed(20.0, p) == p.landing_airspeed_m_s
+
+
+@pytest.mark.parametrize("wind_m_s", [-6.0, 6.0])
+def test_airspeed_is_held_in_a_wind_that_fades(wind_m_s: float) -> None:
+    """The navigation state here has the wind of 10 m at all heights, as a filter that takes its time has."""
+    rig = Aircraft(
+        environment=Environment(wind_ned_m_s=(wind_m_s, 0.0, 0.0), profile=SURFACE_LAYER),
+        height_m=50.0,
+        seed=1,
+    )
+    rig.ctx.home_ned_m[2] = -REST_M
+    rig.rangefinder = True
+    task = LandTask(np.array([600.0, 0.0, -REST_M]), np.array([0.0, 0.0, -50.3]))
+    rig.fly(task)
+    airspeeds = []
+
+    def touched() -> bool:
+        if task.phase is LandPhase.FLARE:
+            airspeeds.append(float(rig.nav[n.AIRSPEED_M_S]))
+        return task.phase is LandPhase.ROLL_OUT
+
+    rig.run_until(touched, 90.0)
+    along, _ = finish(rig, task)
+    wanted = rig.parameters.landing_airspeed_m_s
+    assert 0.88 * wanted < airspeeds[-1] < 1.0 * wanted, (airspeeds[-1], wanted)
+    assert abs(along) < 5.0 and rig.touch_sink_m_s < 1.0
 
 
 def test_the_airspeed_that_lasts_is_the_one_in_the_wind_as_estimated() -> None:

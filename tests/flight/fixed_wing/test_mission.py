@@ -66,8 +66,7 @@ def cross_track(log: np.ndarray, start: Place, end: Place) -> tuple[np.ndarray, 
 def test_whole_flight_from_runway_to_runway(wind: tuple[float, float, float]) -> None:
     """6 m/s of wind and moderate turbulence: cross-track RMS under 5 m, height under 2, airspeed under 1."""
     turbulence = "moderate" if any(wind) else "none"
-    # With seed 1 it goes around, twice: its way is longer then, and its landing as soft.
-    rig = Aircraft(environment=Environment(wind_ned_m_s=wind, turbulence=turbulence), seed=2)
+    rig = Aircraft(environment=Environment(wind_ned_m_s=wind, turbulence=turbulence), seed=1)
     rig.rangefinder = True  # as the aircraft has it
     corners: list[Place] = [
         (700.0, 0.0, 80.0),

@@ -1,4 +1,4 @@
-"""Detection model and anomaly detector of the occupancy search (seed 003)."""
+"""Detection model and anomaly detector of the occupancy search (Lum et al. 2005)."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Map, decisions and the team's search (seed 003, section IV)."""
+"""Map, decisions and the team's search (Lum et al. 2005, section IV)."""
 
 import math
 

@@ -42,7 +42,7 @@ def test_the_angle_has_a_sign():
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_on_the_circle_the_bank_is_that_of_the_circle(direction):
-    """tan(phi) = v^2 / (g rho) in still air: what the paper prints without the square."""
+    """tan(phi) = v^2 / (g rho) in still air: Tolman et al. 2021 print it without the square."""
     parameters = OrbitParameters(radius_m=150.0, direction=direction)
     command = settled(parameters, (0.0, direction * 150.0), (25.0, 0.0), 0.0)
     assert command.chi_error_rad == pytest.approx(0.0, abs=1e-12)

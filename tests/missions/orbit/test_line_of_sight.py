@@ -1,4 +1,4 @@
-"""Equations 36 to 40 against the printed matrices and against geometry."""
+"""Equations 36 to 40 of Tolman et al. 2021, against the printed matrices and against geometry."""
 
 import math
 

@@ -1,0 +1,66 @@
+"""The files in `examples/` run as a user runs them, and the commands in their first lines parse."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from tests.clients.forked_process import flightstack_done
+from tests.documented_commands import commands_in, parse
+
+ROOT: Final = Path(__file__).parents[1]
+EXAMPLES: Final = ROOT / "examples"
+MISSION, ESTIMATOR, AIRCRAFT, ANALYSIS = (
+    EXAMPLES / name for name in ("own_mission.py", "own_estimator.py", "own_aircraft.toml", "log_analysis.py")
+)
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.*")), ids=lambda path: path.name)
+def test_each_shows_its_command(path: Path) -> None:
+    commands = commands_in(path.read_text(encoding="utf-8"))
+    assert commands
+    for line in commands:
+        parse(line)
+
+
+def analysed(log: Path) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [sys.executable, str(ANALYSIS), str(log)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+
+
+def test_own_mission_with_own_estimator_and_an_analysis_of_its_log(tmp_path: Path) -> None:
+    arguments = ("--altitude", "15", "--speed", "4", "--arg", "radius_m=15", "--estimator", str(ESTIMATOR))
+    flown = flightstack_done("fly", str(MISSION), *arguments, "--out", str(tmp_path / "run"))
+    assert flown.returncode == 0, flown.stderr
+    assert re.search(r"spiral flown at 1[45]\.\d m, \d+% battery left", flown.stdout)
+    assert re.search(r"climb, vehicle 1: \d+ estimates: alt [01]\.\d+ m RMS off autopilot", flown.stdout)
+
+    analysis = analysed(tmp_path / "run" / "flight.tlog")
+    assert analysis.returncode == 0, analysis.stderr
+    assert re.search(r"vehicle 1: at most \d+\.\d m above home", analysis.stdout)
+    assert re.search(r"altitude estimate: 0\.\d+ m RMS off the truth", analysis.stdout)
+    assert re.search(r"attitude, vehicle 1: roll 0\.\d+ deg RMS off the truth", analysis.stdout)
+
+
+def test_own_mission_refuses_arguments_that_are_not_possible(tmp_path: Path) -> None:
+    refused = flightstack_done("fly", str(MISSION), "--arg", "radius_m=1", "--out", str(tmp_path / "run"))
+    assert refused.returncode == 2
+    assert "ask for 2 <= spacing_m" in refused.stderr
+
+
+def test_the_analysis_refuses_what_is_no_log(tmp_path: Path) -> None:
+    (tmp_path / "empty.tlog").write_bytes(b"")
+    done = analysed(tmp_path / "empty.tlog")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+
+
+def test_own_aircraft_flies(tmp_path: Path) -> None:
+    arguments = ("--pattern", "L1", "--model", str(AIRCRAFT))  # a circle, which is the shortest pattern
+    flown = flightstack_done("fly", "lissajous", *arguments, "--out", str(tmp_path / "run"))
+    assert flown.returncode == 0, flown.stderr
+    assert "completed: lissajous" in flown.stdout
