@@ -51,9 +51,8 @@ class ParameterPolicy:
         set_echo_to_all: every PARAM_SET is answered on all channels (ArduPilot); else on the requesting
             channel, and on all channels once more if the value changed (PX4).
         hash_parameter: the list starts with `_HASH_CHECK`, and setting it ends the list (PX4).
-        identity: the parameters with the system id, and with the component id 1. They keep their values as
-            long
-            as the vehicle runs, and a change is refused: real vehicles apply a change at the next boot.
+        identity: the parameters with the system id, and with the component id 1. They keep their values while
+            the vehicle runs, and a change is refused: real vehicles apply a change at the next boot.
         list_per_tick: parameters sent per 50 Hz tick and channel while listing.
     """
 

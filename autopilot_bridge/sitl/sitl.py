@@ -181,8 +181,7 @@ class Sitl:
 
         Args:
             on_failure: called once with the reason when the log can't be written any more: the log ends
-                there, and the
-                vehicles keep flying. None: the step raises that TlogError.
+                there, but the vehicles keep flying. None: the step raises that TlogError.
 
         Returns:
             The client's ends of those links, on which a client can send messages to the vehicles.
