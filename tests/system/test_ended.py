@@ -31,7 +31,7 @@ def test_a_signal_leaves_the_vehicle_safe_and_the_run_whole(
         run.process.send_signal(number)
         said = run.finish(code)
         assert said.count("\n") == 1
-        assert "interrupted; was commanded to return; the log is in" in said
+        assert "interrupted; the vehicle was commanded to return; the log is in" in said
         assert run.summary["outcome"] == "interrupted"
         assert run.summary["vehicles"][0]["left"] == "was commanded to return"
 
