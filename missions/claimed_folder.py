@@ -1,4 +1,4 @@
-"""The folder of a run that is to be flown: claimed by its log, and given back when nothing is flown."""
+"""The folder of one run. It is claimed by creating its log, and given back when nothing is flown."""
 
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ class ClaimedFolder:
     published: list[Path] = field(default_factory=list)
 
     def give_back(self) -> None:
-        """Take away what this run has made here, and nothing else: nothing was flown."""
+        """Remove what this run has created here, and nothing else. Used when nothing was flown."""
         with suppress(TlogError):
             self.log.close()
         for file in (self.log.path, *self.published):
@@ -66,7 +66,7 @@ def _missing_folders(folder: Path) -> list[Path]:
     """Those of a folder and the folders it is in that are not there yet, innermost first."""
     try:
         return [path for path in (folder, *folder.parents) if not path.exists()]
-    except OSError:  # not to be looked at: making it will say why
+    except OSError:  # the folder cannot be examined: creating it will report the reason
         return []
 
 

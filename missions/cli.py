@@ -62,7 +62,7 @@ class _Commands(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run a command; who reads its output may stop when it has seen enough, which needs no words."""
+        """Run a command. A reader that closes the output early is not an error, and no message is shown."""
         try:
             return super().invoke(ctx)
         except BrokenPipeError:

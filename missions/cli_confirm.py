@@ -34,16 +34,16 @@ def confirmation(
     check: bool,
     screen: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> "Confirm | None":
-    """How the flight is confirmed; None: not asked for, on links of this machine.
+    """Return how the flight is confirmed; None: no confirmation is needed, on links of this machine.
 
     Args:
-        connections: of the vehicles.
-        yes: no question is asked; it flies when nothing is found against it.
-        check: on links of this machine too.
+        connections: connection strings of the vehicles.
+        yes: ask no question; fly when the checks find no problem.
+        check: also check vehicles on links of this machine.
         screen: makes a context in which nothing else writes to the terminal.
 
     Raises:
-        click.UsageError: a real vehicle, nobody to ask, and no --yes.
+        click.UsageError: the vehicle is real, there is no terminal to ask on, and --yes is missing.
     """
     hardware = is_hardware(connections)
     if not (hardware or check):

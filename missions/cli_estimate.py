@@ -17,7 +17,7 @@ _SECONDS = FiniteRange(min=0.0, min_open=True, max=1e9)
 
 
 class _Teller:
-    """Says what is lacking when that changes, and on a terminal how it goes."""
+    """Reports missing inputs when they change and, on a terminal, the progress."""
 
     def __init__(self) -> None:
         self._terminal = sys.stderr.isatty()
@@ -72,11 +72,11 @@ class _Teller:
 def estimate(**given: Any) -> int:
     """Run an estimator (attitude, lissajous, target-fusion, or a Python file of your own) on a live link.
 
-    It hears a vehicle, tells its estimates from a component id of its own, and logs everything: a replay of
-    flight.tlog in the run folder gives the same estimates.
+    It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
+    replay of flight.tlog in the run folder gives the same estimates.
 
-    Exit codes: 0 done, 1 the link was silent or lacks what the estimator needs (what there is was kept), 2
-    usage, 130 interrupted before --duration was over.
+    Exit codes: 0 done, 1 the link was silent or lacks messages that the estimator needs (the data received
+    are kept), 2 usage, 130 interrupted before --duration was over.
     """
     from autopilot_bridge.errors import AddressError, BridgeError
     from estimators.errors import EstimatorError

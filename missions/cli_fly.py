@@ -134,9 +134,8 @@ def fly(**given: Any) -> int:
     """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, a mission
     file (.plan, .waypoints), or a Python file of your own.
 
-    `flightstack fly MISSION --help` tells a mission's own options. Your own file has
-    `async def fly(vehicle, options)`.
-    The run folder gets flight.tlog, summary.json and track.png.
+    `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
+    options)`. The run folder gets flight.tlog, summary.json and track.png.
     """
     from missions.ending import signal_of
     from missions.errors import PlanError

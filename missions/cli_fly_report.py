@@ -17,11 +17,11 @@ _FAILED: Final = 1
 _PACE_S: Final = 5.0
 _PACE_LEAST_S: Final = 0.5
 KILLED: Final = 128
-"""Plus the signal's number: how shells tell of a command that was ended by one."""
+"""Added to the signal's number: the exit code by which shells report that a signal ended a command."""
 
 
 def leave_closed_terminal() -> None:
-    """Where the terminal is gone (SIGHUP), what is left to say is said to nobody, and fails no more."""
+    """When the terminal is closed (SIGHUP), discard all further output, so that writing does not fail."""
     for descriptor in (1, 2):
         try:
             os.write(descriptor, b"")
@@ -32,7 +32,7 @@ def leave_closed_terminal() -> None:
 
 
 class ProgressLine:
-    """The progress line on a terminal; nothing in a pipe, and nothing while it is held."""
+    """The progress line on a terminal. It shows nothing in a pipe, and nothing while it is paused."""
 
     def __init__(self) -> None:
         self._width = 0
@@ -105,7 +105,7 @@ class Pace:
 
 
 def tell(result: "RunResult", mission: "Mission[Any]") -> int:
-    """Say how a run went; gives the exit code."""
+    """Print the result of a run; returns the exit code."""
     from missions.run import POOR, wind_words
 
     summary = result.summary
@@ -151,7 +151,7 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
 
 
 def _tell_estimator(summary: Mapping[str, Any]) -> int:
-    """Say what the estimator of the flight has done; the exit code."""
+    """Print the result of the flight's estimator; returns the exit code."""
     from missions.estimation.report import warnings_of
 
     name = summary["estimator"]

@@ -4,10 +4,10 @@ import click
 
 
 class Losses:
-    """Tells of each on stderr when it happens. The vehicles fly on.
+    """Reports each loss on stderr when it happens. The vehicles continue to fly.
 
     Attributes:
-        any: there was one; the command fails in the end.
+        any: at least one loss happened; the command then exits with an error.
     """
 
     def __init__(self) -> None:
@@ -15,7 +15,7 @@ class Losses:
         self._log_ended = False
 
     def log_ended(self, why: str) -> None:
-        """The log takes no more; told once."""
+        """The log can no longer be written; reported once."""
         if not self._log_ended:
             self._log_ended = True
             self._tell(f"{why}; the log ends here, the vehicles fly on")

@@ -24,9 +24,11 @@ def somebody_is_there() -> bool:
 
 
 async def ask(question: str) -> str:
-    """Ask on stderr, and wait for a line from the terminal; "" when it ends or hangs up without one.
+    """Print a question on stderr and wait for a line from the terminal; "" when the terminal closes without
+    one.
 
-    Waits as any task does, not in `input()`: Ctrl-C ends it, and what is typed afterwards answers nothing.
+    This waits as a task, not in `input()`: Ctrl-C ends the wait, and text typed afterwards is not used as an
+    answer.
     """
     click.echo(f"{question}: ", nl=False, err=True)
     answer = ""

@@ -9,10 +9,10 @@ from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScen
 def scenario_of(
     camera: bool, targets: tuple[str, ...], map_file: str | None, map_target: str | None
 ) -> Scenario:
-    """Targets and payload from the options.
+    """Return the targets and the payload that the options describe.
 
     Raises:
-        ValueError: a target that can't be, or one that nobody could find.
+        ValueError: a target is impossible, or cannot be found by the mission.
     """
     if targets and not camera:
         raise ValueError("--target is seen by cameras only; add --camera")

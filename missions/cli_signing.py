@@ -38,7 +38,7 @@ def key_from(path: Path | None) -> "SigningKey | None":
 
 
 def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
-    """Say in one line of each link that listens to a network, when whoever speaks there is believed."""
+    """Print one line for each link that is open to a network and accepts unsigned messages from any sender."""
     from autopilot_bridge.links import listens_to_network, open_unsigned, parse_address
 
     for address in map(parse_address, connections) if key is None else ():
@@ -49,13 +49,13 @@ def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
 def vehicle_signing(
     key: Path | None, unsigned: str, store: Path | None, *, on_failure: Callable[[str], None]
 ) -> "SigningParameters":
-    """Signing of simulated vehicles, for clients that live in real time.
+    """Signing of simulated vehicles, for clients that run in real time.
 
     Args:
-        key: file with the key of all vehicles.
-        unsigned: from whom unsigned frames are taken: "none", "serial", "local" or "all".
+        key: file with the key that all vehicles use.
+        unsigned: senders from which unsigned frames are accepted: "none", "serial", "local" or "all".
         store: file in which keys and times are kept.
-        on_failure: told why, when that file can't be written any more.
+        on_failure: called with the reason when that file can no longer be written.
 
     Raises:
         SigningKeyError: a file can't be read or written, or holds something else; the message names it.
@@ -72,7 +72,7 @@ def vehicle_signing(
 
 
 def signed_how(signing: "SigningParameters", address: "Address") -> str:
-    """What a link takes, for the line that names it; empty while nothing is signed."""
+    """Text for the line that names the link: which frames it accepts. It is empty when signing is not used."""
     from autopilot_bridge.links import reach_of
     from autopilot_bridge.sitl.signing import POLICIES
 
@@ -83,7 +83,7 @@ def signed_how(signing: "SigningParameters", address: "Address") -> str:
 
 
 def warn_if_unsigned(address: "Address", signing: "SigningParameters") -> None:
-    """Say in one line that a vehicle can be flown by whoever is on the network."""
+    """Print one line when any sender on the network can command the vehicle."""
     from autopilot_bridge.links import Reach, open_unsigned, reach_of
     from autopilot_bridge.sitl.signing import POLICIES
 

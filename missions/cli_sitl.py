@@ -36,7 +36,8 @@ def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
 
 
 def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
-    """Parameters that give clients, who live in wall time, as long to answer as at speedup 1.
+    """Timeout parameters, stretched so that clients, which run in wall time, have as long to answer as at
+    speedup 1.
 
     PX4's own SITL stretches these when it runs faster (reference page, section 2); ArduPilot's does not.
     """
@@ -60,7 +61,7 @@ def _request_streams() -> bytes:
 
 @contextlib.contextmanager
 def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iterator[None]:
-    """A new log of what the vehicles say; it ends with the context, or where it can't be written any more.
+    """Write a new log of the vehicles' messages until the context ends or the file can no longer be written.
 
     Raises:
         TlogError: the file exists or can't be made.
@@ -204,9 +205,9 @@ def sitl(
     no_wait: bool,
     duration: float | None,
 ) -> int:
-    """SITL for other people's clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
+    """Simulated vehicles (SITL) for external clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
 
-    Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
+    Opens the ports that clients of the firmware use by default, prints them, and runs until Ctrl-C.
 
     Exit codes: 0 stopped, 1 the log, a picture or the signing keys could not be written, 2 usage,
     130 interrupted while it started.
@@ -279,7 +280,7 @@ def sitl(
                 opened = server.open([ports] if ports else None)
             at_end.callback(world.close)
             ending.remember()
-            if log is not None:  # made when nothing else can be refused any more
+            if log is not None:  # created last, when no other check can still fail
                 at_end.enter_context(_recording(world, log, autopilot, losses))
         except (ValueError, OSError, BridgeError) as error:
             raise click.UsageError(str(error)) from error

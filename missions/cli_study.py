@@ -15,7 +15,7 @@ _BAR: Final = 40
 
 
 class _Bar:
-    """The progress bar on a terminal; nothing in a pipe."""
+    """The progress bar on a terminal. In a pipe it shows nothing."""
 
     def __init__(self) -> None:
         self._terminal = sys.stderr.isatty()
@@ -40,7 +40,7 @@ class _Bar:
 
 
 class _Studies(click.Group):
-    """The studies; an unknown one is told with those there are."""
+    """The group of studies. An unknown name is reported with a list of the known ones."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -117,7 +117,7 @@ def _lissajous_localization(
     try:
         compile_study()
     except KeyboardInterrupt:
-        folder.rmdir()  # there is nothing to keep yet
+        folder.rmdir()  # no file is in it yet
         raise
     request = StudyRequest(runs=runs, seed=seed, workers=workers, equations=equations)
     result = run_study(request, bar)

@@ -122,11 +122,11 @@ def download(which: str, folder: Path, **given: Any) -> int:
 
 
 class DownloadLine:
-    """How far a log has come, how fast, and how long it will take, on a line of a terminal.
+    """Shows the progress, speed and remaining time of a log download on one line of a terminal.
 
     Args:
-        number: of the log.
-        size_bytes: of the log.
+        number: number of the log.
+        size_bytes: size of the log.
         monotonic: wall clock in seconds; None: there is no terminal, and nothing is shown.
     """
 

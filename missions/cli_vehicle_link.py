@@ -56,7 +56,7 @@ def address(text: str) -> "Address":
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
-    """Run to the end; what goes wrong is one line, and the exit code tells whose fault it was."""
+    """Run a coroutine to its end. An error is printed as one line, and the exit code gives its class."""
     from autopilot_bridge.errors import BridgeError
     from autopilot_bridge.parameters import ParameterError
     from missions.errors import MissionError, PlanError

@@ -23,7 +23,7 @@ def params() -> None:
 @click.argument("pattern", default="*")
 @connected
 def list_(pattern: str, **given: Any) -> int:
-    """All parameters, or those whose names match PATTERN (as MPC_*)."""
+    """List all parameters, or those whose names match PATTERN (for example MPC_*)."""
     from missions.vehicle_client.parameters import read_all
 
     values = with_client(given, read_all)
@@ -93,7 +93,7 @@ def save(file: Path, **given: Any) -> int:
         raise click.UsageError(f"{file}: there is no folder {file.parent}")
 
     async def work(client: "VehicleClient") -> tuple[int, str]:
-        format_values(file, {}, client.system_id)  # an unknown suffix is told before anything is read
+        format_values(file, {}, client.system_id)  # reports an unknown suffix before any parameter is read
         values = await read_all(client)
         return len(values), format_values(file, values, client.system_id)
 

@@ -1,7 +1,7 @@
 """A link as a mission sees it: the newest message of each kind, streams of messages, and waiting for one.
 
-Several hundred messages a second arrive, few of which a mission looks at. A frame that nobody waits for costs
-two dictionary operations; it is decoded when somebody asks for it.
+Several hundred messages a second arrive, and a mission uses few of them. A frame that no task waits for costs
+two dictionary operations; it is decoded only when it is requested.
 """
 
 import asyncio
@@ -60,14 +60,14 @@ class Connection:
     Args:
         link: an open link; the connection closes it. One that calls `on_receive` (memory) is not polled.
         clock: vehicle time; a `TelemetryClock` is fed from the vehicle's timestamps.
-        recorder: gets every frame of both directions.
-        identity: own system and component id.
-        vehicle_system_id: of the vehicle whose time the clock tells; None: of the first autopilot heard.
-        signing: signs what is sent; what it does not admit is not heard. None: unsigned.
+        recorder: receives every frame of both directions.
+        identity: system and component id of this client.
+        vehicle_system_id: of the vehicle whose time the clock follows; None: the first autopilot received.
+        signing: signs sent frames, and drops received frames that it does not accept. None: no signing.
 
     Attributes:
         parsers: one for each of the newest peers; their counters account for every byte ever received.
-        signing: as given.
+        signing: as passed to the constructor.
     """
 
     def __init__(
@@ -174,7 +174,7 @@ class Connection:
         return self._observed.time_us
 
     async def _keep_looking_after_link(self) -> None:
-        """Links whose descriptors come and go (servers, reconnecting clients), and those without any."""
+        """Poll links whose descriptors change (servers, reconnecting clients) and links without a descriptor."""
         loop = asyncio.get_running_loop()
         while True:
             current = list(self._link.filenos())
@@ -234,7 +234,7 @@ class Connection:
 
     @property
     def autopilots_heard(self) -> list[int]:
-        """System ids of the autopilots heard on this link, in rising order."""
+        """System ids of the autopilots received on this link, in ascending order."""
         return sorted(s for s, component in self._newest.components if component == AUTOPILOT_COMPONENT)
 
     def newest(self, system_id: int, component_id: int = AUTOPILOT_COMPONENT) -> Mapping[int, Frame]:
@@ -248,7 +248,7 @@ class Connection:
         return capacity
 
     def keep(self, system_id: int) -> None:
-        """Never forget this system's autopilot, however many others are heard."""
+        """Never drop this system's autopilot from the kept messages, however many other systems are received."""
         self._newest.keep((system_id, AUTOPILOT_COMPONENT))
 
     def listen(self, name: str, listener: Listener) -> Callable[[], None]:

@@ -24,10 +24,11 @@ class EndRequests(EndSignalHandler):
         self._raises = True
 
     def remember(self) -> None:
-        """Raise no more.
+        """Stop raising KeyboardInterrupt; requests are only remembered from now on.
 
         Raises:
-            KeyboardInterrupt: it was asked for before, where nothing can be raised (a finaliser, say).
+            KeyboardInterrupt: a request came earlier in a place where no exception can be raised (for example
+                a finaliser).
         """
         self._raises = False
         if self.asked:

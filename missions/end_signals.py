@@ -10,10 +10,11 @@ _ASKING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:
-    """SIGINT, SIGTERM and SIGHUP, as far as they are to be handled here and now.
+    """SIGINT, SIGTERM and SIGHUP, as far as this process should handle them now.
 
-    Those that are ignored (`nohup`, a background job) or have a handler of somebody's own are left alone, but
-    for `always`; and all of them outside the main thread, which alone may be told of signals.
+    Signals that are ignored (`nohup`, a background job) or that already have another handler are left out,
+    except those in `always`. Outside the main thread all are left out, because only the main thread can
+    handle signals.
     """
     if threading.current_thread() is not threading.main_thread():
         return ()

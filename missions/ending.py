@@ -1,7 +1,7 @@
-"""SIGTERM and SIGHUP do what Ctrl-C does: a process that is asked to end leaves its vehicles safe first.
+"""SIGTERM and SIGHUP act like Ctrl-C: a process that receives one leaves its vehicles safe before it ends.
 
-`kill`, `timeout` and service managers send SIGTERM, a terminal that is closed SIGHUP. By themselves both end
-a process where it stands, with its vehicles in the air.
+`kill`, `timeout` and service managers send SIGTERM; a closed terminal sends SIGHUP. By default both end a
+process immediately, with its vehicles in the air.
 """
 
 import asyncio
@@ -19,10 +19,10 @@ _SAME_S: Final = 1.0
 
 
 class AskedToEnd(KeyboardInterrupt):
-    """A KeyboardInterrupt that tells by which signal.
+    """A KeyboardInterrupt that carries the signal that caused it.
 
     Attributes:
-        number: the signal's.
+        number: the signal's number.
     """
 
     def __init__(self, number: int) -> None:

@@ -6,8 +6,8 @@ class MissionError(Exception):
 
 
 class VehicleTimeout(MissionError):
-    """Something awaited of the vehicle did not come in time; says what was awaited and what was heard
-    last.
+    """An awaited message or state of the vehicle did not come in time. The message names what was awaited and
+    what was received last.
     """
 
 

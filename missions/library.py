@@ -49,9 +49,10 @@ class PatternMission(Mission[FlightOptions]):
     """A mission that flies one search pattern.
 
     Args:
-        name: for people and file names.
-        make_curve: the pattern for some options.
-        size: what nobody chose of its size, so that an aircraft with wings can fly its turns.
+        name: name for users and for file names.
+        make_curve: creates the pattern from options.
+        size: gives values to size options that the user did not specify, so that a fixed-wing aircraft can
+            fly the turns.
     """
 
     def __init__(self, name: str, make_curve: CurveMaker, size: Sizing) -> None:
@@ -119,7 +120,7 @@ MAX_LENGTH_M: Final = 100_000.0
 """Longest pattern that is planned: some hours of flight, and what a planner holds in memory with ease."""
 
 MAX_FLIGHT_S: Final = 20_000.0
-"""The same in time: who flies fast may fly farther."""
+"""The same limit as a time: a faster vehicle may fly farther."""
 
 
 def _check_length(length_m: float, options: FlightOptions) -> None:
@@ -148,7 +149,7 @@ def _passes(options: FlightOptions, one_pass_m: float) -> int:
 
 
 def _in_passes(make: Callable[[int], Polyline], options: FlightOptions, rough_length_m: float) -> Polyline:
-    """As many passes as asked for of a pattern whose single pass has about a length."""
+    """The pattern with the requested number of passes; one pass has about the given length."""
     _check_length(rough_length_m, options)
     one_pass_m = make(1).length_m
     passes = _passes(options, one_pass_m)
@@ -287,8 +288,8 @@ class ScriptMission(Mission[FlightOptions]):
     """A user's own mission: a Python file with `async def fly(vehicle, options)`.
 
     The file may have a class `Mission` instead, made without arguments, with `async def fly(self, vehicle,
-    options)` and, if it likes, `def check(self, options)`, which raises `PlanError`. Each vehicle of a
-    team flies it; `options.index` tells them apart.
+    options)` and, optionally, `def check(self, options)`, which raises `PlanError`. Each vehicle of a team
+    flies it; `options.index` is the number of the vehicle.
 
     Raises:
         PlanError: the file can't be read, or has neither.

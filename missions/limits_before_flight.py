@@ -1,4 +1,4 @@
-"""What can be refused before a vehicle was heard, and options as one vehicle flies them."""
+"""Checks that are possible before a vehicle was received, and the options as one vehicle flies them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -48,13 +48,13 @@ def _at(limits: FixedWingLimits, alt_m: float) -> FixedWingLimits:
 
 
 def check_request(mission: Mission[Any], request: RunRequest) -> None:
-    """Refuse what no vehicle of the kind could fly, before anything is started.
+    """Refuse a request that no vehicle of the kind could fly, before anything is started.
 
-    What is refused for any aircraft is refused with the limits of the one that was asked for, so that the
-    advice is right the first time.
+    A request that every aircraft would refuse is checked with the limits of the requested aircraft, so that
+    the advice in the error is right for it.
 
     Raises:
-        PlanError: says what, and which option to change.
+        PlanError: names the reason and the option to change.
     """
     if not request.connect and len(request.models) != request.options.vehicles:
         raise PlanError(
@@ -128,7 +128,9 @@ def _check_any(mission: Mission[Any], request: RunRequest, options: MissionOptio
     refusals = []
     for kind in mission.kinds:
         limits = _WIDEST[kind]
-        try:  # the widest limits' airspeed is nobody's: what wind is too much, each aircraft's own say
+        # the airspeed of the widest limits belongs to no aircraft: each aircraft's own check decides about
+        # wind
+        try:
             mission.check(mission.adapted(options, limits), limits)
         except PlanError as refusal:
             refusals.append(refusal)

@@ -54,12 +54,11 @@ class MissionCommand:
     """A mission on the command line.
 
     Attributes:
-        help: what `flightstack fly NAME --help` says first.
-        options: beside those of every mission. The mission takes no others.
-        build: the mission's options from what was given. `chosen` names the fields of the options that
-            were; common values are passed on as they are.
-        fields: which fields of the mission's options each command-line option decides on, where the names
-            differ.
+        help: first text of `flightstack fly NAME --help`.
+        options: command-line options in addition to those of every mission. The mission accepts no others.
+        build: creates the mission's options from the given values. `chosen` names the fields that the user
+            specified; common values are passed unchanged.
+        fields: the fields of the mission's options that each command-line option sets, when the names differ.
     """
 
     help: str

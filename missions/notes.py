@@ -1,4 +1,4 @@
-"""What a mission tells about its flight while it flies: phases, progress, and what it commanded."""
+"""What a mission records about its flight while it flies: phases, progress, and the commanded path."""
 
 from dataclasses import dataclass, field
 
@@ -82,7 +82,7 @@ class FlightNotes:
     _open: tuple[str, int] | None = None
 
     def warn(self, text: str) -> None:
-        """Have the user told something when the flight is over; once, however often it is said."""
+        """Add a warning that is shown to the user after the flight; the same text is shown once."""
         if text not in self.warnings:
             self.warnings.append(text)
 

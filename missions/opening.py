@@ -20,17 +20,18 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, kw_only=True)
 class Stage:
-    """What a flight runs on.
+    """The links, clocks and event loop of a flight.
 
     Attributes:
         loop: event loop, on vehicle time when embedded.
         links, clocks: one per vehicle.
-        epoch_us: Unix time of vehicle time 0; None: the calendar's.
+        epoch_us: Unix time of vehicle time 0; None: vehicle time is Unix time.
         time_us: vehicle time.
-        on_truth: have frames of truth delivered.
-        parameters: those of one vehicle (index, names), without asking it; None: it must be asked.
-        home: of an embedded world; None: the vehicles tell theirs.
-        close: when all is done.
+        on_truth: subscribes to frames of truth.
+        parameters: reads parameters of one vehicle (index, names) without a request to it; None: they must be
+            requested.
+        home: home of an embedded world; None: the vehicles report theirs.
+        close: releases everything; called at the end.
     """
 
     loop: asyncio.AbstractEventLoop

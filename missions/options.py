@@ -43,17 +43,18 @@ def check_positive(**options: float | None) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionOptions:
-    """What every mission has: how many fly, and how high. Each mission has a class of its own made from this.
+    """Options that every mission has, such as the number of vehicles and the altitude. Each mission derives
+    its own class.
 
     Attributes:
-        altitude_m: above home.
-        vehicles, index: size of the team and which of it this is, 0 first.
-        separation_m: between the altitudes of a team.
-        centre: of the mission; None: the vehicle's home.
+        altitude_m: height above home.
+        vehicles, index: size of the team, and the number of this vehicle in it from 0.
+        separation_m: vertical distance between the vehicles of a team.
+        centre: centre of the mission; None: the vehicle's home.
         rate_hz: setpoints per vehicle second.
-        arguments: what else the user gave to a mission of theirs, by name.
-        given: names of the fields that were chosen by somebody; None: those that are not at their default. A
-            mission may give the others values that suit the vehicle (`for_vehicle`).
+        arguments: further arguments that the user gave to their own mission, by name.
+        given: names of the fields that the user specified; None: the fields that differ from their default. A
+            mission may give the other fields values that suit the vehicle (`for_vehicle`).
     """
 
     altitude_m: float = 10.0
@@ -78,20 +79,22 @@ class MissionOptions:
         return self.altitude_m + self.index * self.separation_m
 
     def chosen(self, name: str) -> bool:
-        """Whether somebody chose a field's value."""
+        """Whether the user specified a field's value."""
         if self.given is not None:
             return name in self.given
         default = next(f.default for f in fields(self) if f.name == name)
         return getattr(self, name) != default
 
     def unless_chosen(self, **values: float | str) -> Self:
-        """The same options, with other values where nobody chose one; `given` then tells what was chosen."""
+        """The same options, with new values for fields that were not specified; `given` then names the
+        specified ones.
+        """
         given = frozenset(f.name for f in fields(self) if f.name != "given" and self.chosen(f.name))
         changes: dict[str, Any] = {name: v for name, v in values.items() if name not in given}
         return replace(self, given=given, **changes)
 
     def for_vehicle(self, limits: Limits) -> Self:
-        """The same options as one vehicle flies them: what nobody chose suits its kind."""
+        """The same options as one vehicle flies them: options not specified get values that suit its kind."""
         return self
 
 
@@ -164,7 +167,9 @@ class FlightOptions(MissionOptions):
             raise PlanError("--period needs --via setpoints: waypoints are flown at a speed, not at times")
 
     def for_vehicle(self, limits: Limits) -> "FlightOptions":
-        """A fixed wing flies larger, higher and faster than a multicopter, unless it was told otherwise."""
+        """Options that were not specified get larger, higher and faster values for a fixed wing than for a
+        multicopter.
+        """
         if isinstance(limits, MulticopterLimits):
             return self
         speed_m_s = self.speed_m_s if self.chosen("speed_m_s") else limits.airspeed_trim_m_s

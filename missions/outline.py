@@ -1,4 +1,4 @@
-"""Where a mission is going to fly and how long, as far as it can be told before it is flown."""
+"""The planned path and duration of a mission, as far as they are known before the flight."""
 
 from dataclasses import dataclass
 

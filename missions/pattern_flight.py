@@ -88,13 +88,14 @@ def pattern_frequencies(curve: Curve, period_s: float) -> tuple[float, float]:
 
 
 async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> None:
-    """Fly a curve as the options say, from the ground back to the ground.
+    """Fly a curve as the options specify, including takeoff and landing.
 
-    The vehicle is ready (`wait_ready`) and on the ground. Its notes get the commanded path and the phases.
+    The vehicle is ready (`wait_ready`) and on the ground. The commanded path and the phases are stored in its
+    notes.
 
     Raises:
         PlanError: the vehicle's parameters don't allow the pattern.
-        MissionError: the flight went wrong.
+        MissionError: the flight failed.
     """
     limits = await vehicle.limits(options.own_altitude_m)
     if isinstance(limits, FixedWingLimits):

@@ -122,7 +122,7 @@ class FlightRecorder:
         self.record(frame, time_us)
 
     def flush(self) -> None:
-        """Hand everything to the operating system, so that `failure` says how the log is now."""
+        """Pass all data to the operating system, so that `failure` is up to date."""
         self._try(self._log.flush)
 
     def close(self) -> None:

@@ -80,12 +80,12 @@ def targets_of(scenario: Scenario) -> tuple[GroundTargetParameters, ...]:
 def magnetic_field_of(
     scenario: Scenario, *, home: Home, seed: int, decimal_year: float
 ) -> MagneticField | None:
-    """The field that magnetometers measure; a survey of a field that is made is published where the
-    scenario says.
+    """The field that magnetometers measure; when the field is generated, its survey is written to the file
+    that the scenario names.
 
     Raises:
-        ValueError: an unusable map, or a target outside it.
-        MissionError: the disk does not take the map.
+        ValueError: the map is unusable, or a target is outside it.
+        MissionError: the map cannot be written to the disk.
     """
     survey = scenario.survey
     if survey is None:

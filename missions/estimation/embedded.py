@@ -32,34 +32,34 @@ _HEARTBEAT_PERIOD_S: Final = 1.0
 
 
 class _Vehicle(Protocol):
-    """What is needed of `missions.vehicle.Vehicle`: its system id, 0 before it was heard."""
+    """What is needed of `missions.vehicle.Vehicle`: its system id, 0 before the vehicle was received."""
 
     @property
     def notes(self) -> FlightNotes: ...
 
 
 def heartbeat() -> Any:
-    """What a process on board says of itself."""
+    """The heartbeat of an onboard process."""
     return dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
     )
 
 
 class FlightEstimators:
-    """The estimators of a flight, one per vehicle or one for the team: a recorder around the flight's own.
+    """The estimators of a flight, one per vehicle or one for the team. They wrap the flight's recorder.
 
     Args:
-        name: of the estimator, or the path of a user's file.
+        name: name of the estimator, or the path of a user's file.
         settings: its parameters as NAME=VALUE.
-        component_id: own.
-        known: parameters that follow from the mission, by name: for an estimator that has them, where
-            `settings` does not say otherwise.
+        component_id: component id of the estimator.
+        known: parameters that follow from the mission, by name. They apply to an estimator that has them,
+            unless `settings` gives another value.
 
     Attributes:
         fleet: their runners.
 
     Raises:
-        EstimatorError: no such estimator or parameter.
+        EstimatorError: the estimator or a parameter does not exist.
     """
 
     def __init__(
@@ -153,7 +153,7 @@ class FlightEstimators:
             await clock.sleep(_HEARTBEAT_PERIOD_S)
 
     def _on_estimate(self, runner: Runner, time_us: int) -> None:
-        # Estimates from too little are no news for anybody.
+        # Estimates from too few inputs are not sent.
         if self._links and self._watch is not None and self._watch.enough:
             self._publisher.on_estimate(runner, time_us)
 

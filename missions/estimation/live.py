@@ -1,7 +1,7 @@
-"""An estimator in a process of its own, on a live link: hears, tells, logs.
+"""An estimator in its own process on a live link: it receives messages, sends estimates and writes a log.
 
-Everything that is heard and sent goes into the run folder's log, in the order in which the estimator heard
-it: the replay of that log gives the same estimates, bit for bit.
+Every frame that is received and sent goes into the run folder's log, in the order in which the estimator
+processed it: a replay of that log gives the same estimates, bit for bit.
 """
 
 import asyncio
@@ -42,19 +42,19 @@ _LOOK_S: Final = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveRequest:
-    """What is asked of an estimator process.
+    """The settings of an estimator process.
 
     Attributes:
         estimator: its name, or the path of a user's file.
         connect: connection string of the link.
         settings: parameters as NAME=VALUE.
-        duration_s: vehicle time since the vehicle was heard (wall time of one that tells none); None: until
-            it is stopped.
-        system_id: of the vehicle; None: the first that is heard.
-        component_id: own.
-        publish: whether estimates are told on the link.
-        request_rates: whether the autopilot is asked for the rates that the estimator needs.
-        silence_s: wall time without a word from the vehicle after which the run ends.
+        duration_s: vehicle time since the vehicle was first received (wall time when the vehicle sends no
+            time); None: until it is stopped.
+        system_id: system id of the vehicle; None: the first vehicle received.
+        component_id: component id of the estimator.
+        publish: whether estimates are sent on the link.
+        request_rates: whether the message rates that the estimator needs are requested from the autopilot.
+        silence_s: wall time without a message from the vehicle after which the run ends.
         against: what the estimates are compared with afterwards: "autopilot", "truth" or "both".
         out: run folder; None: the next `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
@@ -92,12 +92,12 @@ class LiveRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveProgress:
-    """How it goes, for whoever shows it.
+    """Progress of the run, for display.
 
     Attributes:
-        time_s: vehicle time since the vehicle was first heard.
-        estimates: made so far.
-        lacking: what the link does not give, in words.
+        time_s: vehicle time since the vehicle was first received.
+        estimates: number of estimates so far.
+        lacking: description of the messages that the link does not provide.
     """
 
     time_s: float
@@ -139,7 +139,7 @@ class _Process:
 
     @property
     def starvation(self) -> str:
-        """What the estimator had to do without for too long; "" if nothing."""
+        """Description of the inputs that the estimator lacked for too long; "" if none."""
         return self._watch.starvation
 
     def figures(self) -> dict[str, Any]:
@@ -151,7 +151,7 @@ class _Process:
         }
 
     async def run(self, on_progress: Callable[[LiveProgress], None] | None) -> None:
-        """Until the duration is over, the link is silent, the estimator fails, or somebody stops it."""
+        """Run until the duration is over, the link is silent, the estimator fails, or the user stops it."""
         request, clock, tap = self._request, self._clock, self._tap
         async with self.connection:
             heard, heard_wall_s = 0, wall_time_s()
@@ -209,9 +209,10 @@ class _Process:
         self._met = bool(self._fleet.runners)
 
     def _keep_time(self) -> None:
-        """Set the clock by whatever the vehicle stamps, where the connection finds nothing to set it by.
+        """Set the clock from any time stamp of the vehicle, when the connection finds no message to set it
+        by.
 
-        An autopilot may send no more than what it was asked for, such as HIGHRES_IMU.
+        An autopilot may send only the messages that were requested, such as HIGHRES_IMU.
         """
         if self._clock.vehicle_time_us is not None and not self._keeps_time:
             return
@@ -247,7 +248,7 @@ class _Process:
         return LiveProgress(time_s=since_us * 1e-6, estimates=count, lacking=tuple(self._watch.lacking))
 
     def _on_estimate(self, runner: Runner, time_us: int) -> None:
-        # Estimates from too little are no news for anybody.
+        # Estimates from too few inputs are not sent.
         if self._watch.enough:
             self._publisher.on_estimate(runner, time_us)
 
@@ -261,10 +262,10 @@ def estimate(
 ) -> EstimationResult:
     """Run an estimator on a live link and write its run folder. Blocks until it is done.
 
-    Ctrl-C, SIGTERM and SIGHUP end it in good order, as the end of its duration does.
+    Ctrl-C, SIGTERM and SIGHUP end it normally, as the end of its duration does.
 
     Raises:
-        EstimatorError: no such estimator or parameter; nothing was opened.
+        EstimatorError: the estimator or a parameter does not exist; nothing was opened.
         PlanError: the run folder can't be made.
         BridgeError: the link can't be opened.
     """

@@ -24,7 +24,7 @@ _IN_AIR: Final = "#f3f4f6"
 _MOST: Final = 6  # quantities in one picture
 _MOST_ALONE: Final = 9  # those without a reference
 _NOT_DRAWN: Final = ("target",)
-_POINTS: Final = 6000  # more can't be told apart
+_POINTS: Final = 6000  # more cannot be distinguished in the picture
 _UNITS: Final = {"deg": "deg", "m": "m", "m_s": "m/s"}
 
 
@@ -142,7 +142,7 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
 
 
 def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
-    """A column that nothing is known to compare with."""
+    """Draw a column that has no reference to compare with."""
     name, unit, factor = quantity_of(column)
     time_s = _continuous_s(c)
     _shade(axes, time_s, c.counted)

@@ -1,4 +1,4 @@
-"""Rates on a live link: what is heard, what of it is too slow, and asking the autopilot for more."""
+"""Message rates on a live link: measured rates, rates that are too low, and requests for higher ones."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -35,17 +35,17 @@ def interval_request(system_id: int, name: str, rate_hz: float) -> Any:
 
 
 class RateWatch:
-    """Measures rates between looks, and says what to ask for.
+    """Measures message rates between checks, and determines which rates to request.
 
     Args:
-        needs: of the estimator.
-        heard: frames by (system id, message id), counted by somebody else.
+        needs: messages and rates that the estimator needs.
+        heard: frame counts by (system id, message id); the caller updates them.
 
     Attributes:
-        lacking: what is missing at the newest look, in words.
-        enough: rates have been measured, and nothing is missing.
-        measured_s: vehicle time that was measured since there was enough for the first time.
-        starved_s: the part of it in which something was missing.
+        lacking: description of what was missing at the newest check.
+        enough: rates have been measured, and no message is missing or too slow.
+        measured_s: vehicle time measured since the rates were sufficient for the first time.
+        starved_s: the part of that time in which a message was missing or too slow.
     """
 
     def __init__(self, needs: Sequence[Need], heard: Mapping[tuple[int, int], int]) -> None:

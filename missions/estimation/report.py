@@ -50,21 +50,21 @@ _NOTHING: Final[Mapping[str, Any]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportRequest:
-    """What is to be reported.
+    """The inputs of a report.
 
     Attributes:
         folder: the run folder.
-        logs: that the estimators heard, open or the path of the run's own.
-        fleet: the estimators, done.
-        settings: parameters as they were given.
+        logs: logs that the estimators processed, open, or the path of the run's own log.
+        fleet: the estimators, finished.
+        settings: parameters as the user gave them.
         against: "autopilot", "truth" or "both".
         picture: whether to draw `errors.png`.
-        wall_time_s: how long it took.
-        failure: why there is not all that was asked for; "" if there is.
+        wall_time_s: wall time of the run.
+        failure: why the result is incomplete; "" if it is complete.
         interrupted: the user ended it early.
         command: the command line.
-        supplies, lacking: by system id, where known already; else taken from the log.
-        more: further entries of the summary.
+        supplies, lacking: by system id, when already known; otherwise read from the log.
+        more: additional entries of the summary.
     """
 
     folder: Path

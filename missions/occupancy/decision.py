@@ -59,14 +59,15 @@ def decide(
 ) -> Decision:
     """The neighbouring cell of greatest utility J = B_i - alpha |psi - psi_i| (heading difference wrapped).
 
-    Off the map the neighbourhood is that of the nearest cell, which then is a choice itself. Equal utilities
-    are decided by the smaller cell number, so that a flight can be repeated.
+    When the searcher is off the map, the neighbourhood is that of the nearest cell, and that cell can be
+    chosen too. Of cells with equal utility the one with the smallest number is chosen, so that a flight can
+    be repeated.
 
     Args:
         occupancy: the shared map.
-        north_m, east_m, heading_rad: the searcher.
-        parameters: its habits.
-        taken: cells that others are on their way to; chosen only when there is nothing else.
+        north_m, east_m, heading_rad: position and heading of the searcher.
+        parameters: parameters of its decisions.
+        taken: cells that other searchers fly to; chosen only when there is no other cell.
     """
     layout = occupancy.layout
     here = layout.cell_at(north_m, east_m)

@@ -185,7 +185,7 @@ class AnomalyDetector:
     def update(
         self, time_us: int, reading_nt: float, map_nt: float, north_m: float, east_m: float
     ) -> Anomaly | None:
-        """Take one reading and what the map says there.
+        """Process one reading and the map's value at its place.
 
         Returns:
             The anomaly that just ended, or None.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
 _WAITING: Final = 100  # readings: ten seconds of an ordinary magnetometer
-_GAP_US: Final = 2_000_000  # between two positions; across more nothing is interpolated
+_GAP_US: Final = 2_000_000  # longest time between two positions; longer gaps are not interpolated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,12 +91,12 @@ SampleListener = Callable[[PlacedReading, bool], None]
 
 
 class FieldWatch:
-    """Listens to one vehicle's magnetometer and position, and tells what the detector makes of them.
+    """Passes one vehicle's magnetometer readings and positions to the detector, and reports its anomalies.
 
     Attributes:
-        detector: threshold on reading less map.
-        placer: of the readings.
-        samples: readings compared with the map.
+        detector: threshold on the reading minus the map.
+        placer: gives each reading a position.
+        samples: number of readings compared with the map.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class FieldWatch:
         on_sample: SampleListener,
         on_anomaly: Callable[[Anomaly], None],
     ) -> None:
-        """Prepare; nothing is listened to before `start`."""
+        """Store the arguments; no message is processed before `start`."""
         self.detector = detector
         self.placer = ReadingPlacer(survey_map.frame())
         self.samples = 0

@@ -1,4 +1,4 @@
-"""What `summary.json` says of a search."""
+"""The entries of `summary.json` about a search."""
 
 import math
 from collections.abc import Mapping

@@ -20,12 +20,12 @@ SAME_RAD: Final = math.radians(5.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadingScore:
-    """Nose against command, settled. NaN where nothing settled.
+    """Heading error: yaw against commanded heading, after each command has settled. NaN when none settled.
 
     Attributes:
-        rms_rad, p95_rad, largest_rad: of the size of the error.
-        settled_s: for how long commands were settled.
-        commands: how many there were.
+        rms_rad, p95_rad, largest_rad: root mean square, 95th percentile and maximum of the absolute error.
+        settled_s: time for which commands were settled.
+        commands: number of commands.
     """
 
     rms_rad: float

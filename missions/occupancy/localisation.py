@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _SHAPE_ERROR: Final = 0.15  # of a reading: a target isn't quite round, and the level isn't quite right
-_LARGEST_SIGMA_M: Final = 60.0  # of the centre; beyond, the fit tells nothing
+_LARGEST_SIGMA_M: Final = 60.0  # standard deviation of the centre; a fit with a larger one is not used
 _LEAST_READINGS: Final = 6
 
 
@@ -24,12 +24,12 @@ def gaussian_centre(
     """Centre of the round Gaussian that fits readings best, by weighted least squares of their logarithms.
 
     Args:
-        north_m, east_m: (n,) places.
+        north_m, east_m: (n,) positions of the readings.
         residual_nt: (n,) readings less map; those of the sign of the largest are used.
-        noise_nt: standard deviation of one.
+        noise_nt: standard deviation of one reading.
 
     Returns:
-        (north m, east m); None where the readings don't tell.
+        (north m, east m); None when the readings do not determine it.
     """
     if len(residual_nt) == 0:
         return None

@@ -46,9 +46,9 @@ class _Flown:
     """The newest flight, for its debriefing.
 
     Attributes:
-        first_notes: of its first vehicle; they tell flights apart.
-        team: as it ended.
-        target_ne_m: where the target is; None: nobody knows.
+        first_notes: notes of the first vehicle; they identify the flight.
+        team: the team at the end of the flight.
+        target_ne_m: where the target is; None: not known.
     """
 
     first_notes: "FlightNotes"
@@ -86,7 +86,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
             check_reach(options, limits, load_survey_map(Path(options.map_file)).frame(), home)
 
     def scenario(self, options: OccupancyOptions, setting: Setting) -> Scenario:
-        """A magnetic map with a target in it; both from the seed where nobody gave them."""
+        """A magnetic map with a target in it. Both are drawn from the seed unless the user specified them."""
         target_ne_m, orientation_rad = drawn_target(options, setting.seed)
         given = None if options.map_file is None else Path(options.map_file)
         made = setting.folder / MAP_NAME

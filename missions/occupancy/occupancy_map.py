@@ -104,14 +104,14 @@ class GridLayout:
 class OccupancyMap:
     """Scores of the cells, shared by every searcher, and the probability of detection so far.
 
-    Scores start as the prior probability that the target is in a cell. They are scores from then on, not
+    The initial scores are the prior probability that the target is in a cell. Later they are no longer
     probabilities: equation 11 isn't normalised, and raising adds belief.
 
     Attributes:
         layout: the cells.
-        scores: (rows, columns), what decisions look at.
+        scores: (rows, columns), used for decisions.
         remaining: (rows, columns), prior probability times the probability of having missed the target there
-            so far. It knows nothing of what was identified, so that one less its sum is the cumulative
+            so far. It does not change when a target is identified, so 1 minus its sum is the cumulative
             probability of detection (Bourgault et al. 2003).
     """
 
@@ -154,9 +154,9 @@ class OccupancyMap:
         """Raise the scores around an identified target by a Gaussian, so that other searchers converge.
 
         Args:
-            north_m, east_m: of the target.
-            radius_m: beyond it nothing changes; two standard deviations of the Gaussian.
-            height: of its peak, in multiples of the prior's mean score.
+            north_m, east_m: position of the target.
+            radius_m: scores farther away do not change; it is two standard deviations of the Gaussian.
+            height: height of the Gaussian's peak, in multiples of the prior's mean score.
         """
         north, east = self.layout.centres()
         distance2 = (north - north_m) ** 2 + (east - east_m) ** 2

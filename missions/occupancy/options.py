@@ -33,27 +33,27 @@ class OccupancyOptions(MissionOptions):
     """One vehicle's part in a search with a shared occupancy map. Places are metres from the map's home.
 
     Attributes:
-        width_m, height_m: of the searched area, east and north.
-        area_ne_m: its centre.
+        width_m, height_m: size of the searched area, east and north.
+        area_ne_m: centre of the searched area.
         cell_m: side of a cell.
-        neighbourhood: cells in each direction that a decision looks at.
-        heading_penalty: alpha of equation 9; None: by the kind of vehicle, small for a multicopter.
-        detection_probability: of a target by a pass right over it.
+        neighbourhood: number of cells in each direction that a decision considers.
+        heading_penalty: alpha of equation 9; None: depends on the kind of vehicle, small for a multicopter.
+        detection_probability: probability to detect a target in a pass directly over it.
         detection_range_m: standard deviation of the fall-off with distance.
-        threshold_nt: of the differential measurement; what is beyond is an anomaly.
+        threshold_nt: threshold of the differential measurement; a larger value is an anomaly.
         noise_nt: standard deviation of the differential measurement where there is no target.
-        map_error_nt: standard deviation of the published map; None: what the map states, and 1 nT where it
-            states nothing.
-        confirmations: passes that must see an anomaly at one place.
+        map_error_nt: standard deviation of the published map; None: the value in the map file, or 1 nT when
+            the file has none.
+        confirmations: number of passes that must detect an anomaly at one place.
         raise_radius_m: scores are raised within this distance of an anomaly.
         search_time_s: the search is given up after this time.
-        speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: by the vehicle.
+        speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: the vehicle's default.
         map_file: published magnetic map; None: the embedded world makes one from its seed.
-        target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle what
-            the result is compared with.
-        amplitude_nt, sigma_along_m, sigma_across_m: of the embedded world's target, a Gaussian.
-        moment_a_m2, depth_m: of the embedded world's target as a dipole, magnetised along the Earth's
-            field, and its depth below home; None: it is a Gaussian.
+        target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle: the
+            place that the result is compared with.
+        amplitude_nt, sigma_along_m, sigma_across_m: Gaussian field of the embedded world's target.
+        moment_a_m2, depth_m: moment of the embedded world's target as a dipole that is magnetised along the
+            Earth's field, and its depth below home; None: the target is a Gaussian.
     """
 
     altitude_m: float = 80.0
@@ -168,7 +168,9 @@ class OccupancyOptions(MissionOptions):
         return DecisionParameters(neighbourhood=self.neighbourhood, heading_penalty=penalty)
 
     def for_vehicle(self, limits: Limits) -> "OccupancyOptions":
-        """The same options with the habits and the speed of a kind of vehicle, where nobody chose them."""
+        """The same options; those that were not specified get the decision parameters and the speed of the
+        kind of vehicle.
+        """
         if isinstance(limits, FixedWingLimits):
             penalty, speed_m_s = _PENALTY_OF_WINGS, limits.airspeed_trim_m_s
         else:
@@ -219,16 +221,16 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
 
 
 def check_reach(options: OccupancyOptions, limits: Limits, frame: LocalFrame, home: GeodeticPosition) -> None:
-    """Refuse an area too far from where a vehicle stands.
+    """Refuse an area that is too far from the vehicle's home.
 
     Args:
-        options: of the vehicle.
-        limits: of the vehicle.
-        frame: of the map.
-        home: of the vehicle.
+        options: options of the vehicle.
+        limits: limits of the vehicle.
+        frame: local frame of the map.
+        home: home of the vehicle.
 
     Raises:
-        PlanError: says how far it is, and what to change.
+        PlanError: names the distance and what to change.
     """
     north_m, east_m, _ = frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
     layout = options.layout

@@ -13,15 +13,16 @@ _PATIENCE_S: Final = 12.0  # for the turn, in the time a leg may take
 
 
 def heading_for_course(course_rad: float, airspeed_m_s: float, wind_ne_m_s: tuple[float, float]) -> float:
-    """The heading whose track over ground has a course: the wind triangle.
+    """The heading that gives a course over ground in wind (wind triangle).
 
     Args:
-        course_rad: wanted, clockwise from north.
+        course_rad: desired course, clockwise from north.
         airspeed_m_s: true airspeed.
-        wind_ne_m_s: where the air moves to.
+        wind_ne_m_s: velocity of the air, north and east.
 
     Returns:
-        Heading, 0..2 pi. In more cross wind than can be held, the largest correction.
+        Heading, 0..2 pi. When the cross wind is too strong to hold the course, the largest correction is
+        used.
     """
     across_m_s = wind_ne_m_s[1] * math.cos(course_rad) - wind_ne_m_s[0] * math.sin(course_rad)
     share = across_m_s / airspeed_m_s if airspeed_m_s > 0.0 else 0.0
@@ -30,15 +31,15 @@ def heading_for_course(course_rad: float, airspeed_m_s: float, wind_ne_m_s: tupl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """What a searcher's telemetry says, in the frame of the search.
+    """A searcher's motion from its telemetry, in the frame of the search.
 
     Attributes:
         time_us: vehicle time of the position.
-        north_m, east_m: place.
-        vel_ne_m_s: over ground.
-        yaw_rad: where the nose points.
+        north_m, east_m: position.
+        vel_ne_m_s: velocity over ground.
+        yaw_rad: yaw, clockwise from north.
         airspeed_m_s: true airspeed; 0: not known.
-        wind_ne_m_s: where the air moves to; zeros: not known.
+        wind_ne_m_s: velocity of the air, north and east; zeros: not known.
     """
 
     time_us: int
@@ -64,12 +65,12 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadingCommand:
-    """One heading a searcher was told.
+    """One heading command that was sent to a searcher.
 
     Attributes:
         time_us: vehicle time.
         heading_rad: 0..2 pi.
-        goal_ne_m: where it leads to.
+        goal_ne_m: the goal of the command.
     """
 
     time_us: int

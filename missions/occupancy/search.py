@@ -1,4 +1,6 @@
-"""The search of a team: one shared map, what was found, who flies where. No I/O; vehicles report to it."""
+"""The search of a team: the shared map, the anomalies found, and each searcher's goal. Without I/O; vehicles
+report to it.
+"""
 
 import math
 from collections.abc import Sequence
@@ -75,7 +77,9 @@ class Candidate:
 
     @property
     def place_ne_m(self) -> tuple[float, float]:
-        """Centre of a Gaussian through the readings; where they don't tell, weighted mean of the peaks."""
+        """Centre of a Gaussian fitted to the readings; when they do not determine it, the weighted mean of
+        the peaks.
+        """
         weights = np.array([abs(anomaly.peak_nt) for _, anomaly in self.anomalies])
         places = np.array([(anomaly.north_m, anomaly.east_m) for _, anomaly in self.anomalies])
         north_m, east_m = (weights @ places / weights.sum()).tolist()
@@ -94,8 +98,8 @@ class Snapshot:
     Attributes:
         time_us: vehicle time.
         scores: (rows, columns).
-        places_ne_m: of each searcher; NaN: not heard of yet.
-        event: it was kept for an anomaly that was just reported.
+        places_ne_m: position of each searcher; NaN: not yet received.
+        event: the snapshot was stored because an anomaly was reported.
     """
 
     time_us: int
@@ -164,14 +168,15 @@ class Search:
             self._keep_snapshot(time_us, event=False)
 
     def report_anomaly(self, searcher: int, anomaly: Anomaly, time_us: int | None = None) -> None:
-        """A searcher has seen an anomaly: raise the scores around it, and see whether it is the target.
+        """A searcher has detected an anomaly: raise the scores around it, and check whether it is the target.
 
-        An anomaly off the map is no candidate: it belongs to what isn't searched.
+        An anomaly off the map is not a candidate, because it is outside the searched area.
 
         Args:
-            searcher: who.
-            anomaly: what and where.
-            time_us: when it was over and could be told; None: when it was largest.
+            searcher: number of the searcher.
+            anomaly: the anomaly, with its place.
+            time_us: vehicle time at which the anomaly ended and could be reported; None: the time of its
+                peak.
         """
         parameters = self.parameters
         if not self.map.layout.contains(anomaly.north_m, anomaly.east_m):

@@ -1,12 +1,12 @@
-"""Whether the readings of a pass are a target, or no more than the error of the map they are compared with.
+"""Decides whether the readings of a pass show a target or only the error of the map they are compared with.
 
-A published map has an error that is the same on every pass: stripes of its survey's lines, and what lies
-between them. It is correlated over about half the distance of the lines, as wide as a target, so single
-readings beyond a threshold say little, however many they are. What a target adds has the shape of a bump. Its
-amplitude is estimated from all readings of the pass by generalised least squares, with the covariance of
-map error, noise and an unknown level; amplitude over its standard deviation is the signal-to-noise ratio of
-the matched filter (Kay, Fundamentals of Statistical Signal Processing II, section 4.4). The largest over
-places and widths of a bump counts.
+A published map has an error that is the same on every pass: stripes along the survey lines, and the
+interpolation between them. It is correlated over about half the distance of the lines, which is as wide as a
+target. Single readings beyond a threshold are therefore weak evidence, however many there are. A target adds
+a bump to the readings. Its amplitude is estimated from all readings of the pass by generalised least squares,
+with the covariance of map error, noise and an unknown level; amplitude over its standard deviation is the
+signal-to-noise ratio of the matched filter (Kay, Fundamentals of Statistical Signal Processing II, section
+4.4). The result is the largest ratio over places and widths of the bump.
 """
 
 from typing import Final

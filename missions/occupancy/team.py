@@ -29,7 +29,7 @@ SEARCH: Final = "search"
 
 _TAKEOFF_S: Final = 300.0  # the longest a vehicle may take, for those that wait on it
 _LANDING_S: Final = 900.0
-_MODE_AGE_US: Final = 2_500_000  # heartbeats tell of a change of mode by then
+_MODE_AGE_US: Final = 2_500_000  # within this time heartbeats report a change of mode
 _RING: Final = 0.25  # of the area: where the searchers of a team start, around its centre
 
 
@@ -66,11 +66,11 @@ class SearchTeam:
     def __init__(
         self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions], survey_map: SurveyMap
     ) -> None:
-        """Prepare; nothing is sent.
+        """Store the arguments; no message is sent.
 
         Args:
-            vehicles: each ready to arm.
-            options: of each, adapted to it.
+            vehicles: the vehicles, each ready to arm.
+            options: options of each vehicle, adapted to it.
             survey_map: the published map.
 
         Raises:
@@ -153,7 +153,7 @@ class SearchTeam:
         notes.end(clock.stamp_us)
 
     async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
-        """What can only be refused when the vehicle is heard, and still stands on the ground."""
+        """Check what can only be checked after the vehicle was received, while it still stands on the ground."""
         limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
         check_reach(own, limits, self._frame, vehicle.home)

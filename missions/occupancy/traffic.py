@@ -1,4 +1,4 @@
-"""Who of a team may take off or land now: vehicles cross no layer that another one flies in."""
+"""Which vehicles of a team may take off or land now: no vehicle crosses a layer in which another one flies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,8 +14,8 @@ class _State:
 class Traffic:
     """Order of a team whose vehicles fly in layers.
 
-    The highest layer rises first and comes down last, so that nobody climbs or sinks through a layer in use.
-    Nobody rises before everybody was checked on the ground.
+    The vehicle of the highest layer climbs first and descends last, so that no vehicle crosses a layer in
+    use. No vehicle takes off before all were checked on the ground.
     """
 
     def __init__(self, heights_m: Sequence[float]) -> None:
@@ -46,7 +46,7 @@ class Traffic:
         )
 
     def may_land(self, index: int) -> bool:
-        """Whether all layers below are empty: nobody there, or about to be."""
+        """Whether all layers below are empty: no vehicle is in one of them or about to enter it."""
         return all(
             self._states[other].down
             for other in range(len(self._states))

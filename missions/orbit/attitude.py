@@ -25,7 +25,7 @@ class AttitudeSource(Protocol):
 class AutopilotAttitude:
     """The autopilot's attitude (ATTITUDE), interpolated between its messages.
 
-    Before the oldest kept message, or half a second after the newest, nothing is known.
+    There is no attitude before the oldest kept message or later than half a second after the newest.
     """
 
     def __init__(self) -> None:

@@ -211,7 +211,7 @@ class OrbitFlight:
             )
 
     async def _give_altitude(self, following: "asyncio.Future[None]") -> None:
-        """An autopilot that holds altitude and airspeed itself is told them in its guided mode."""
+        """Send altitude and airspeed, in guided mode, to an autopilot that holds them itself."""
         from missions.vehicle.adapter import Mode
 
         vehicle = self._vehicle
@@ -226,7 +226,7 @@ class OrbitFlight:
             await self._pilot.begin()
 
     def _fly_on(self, entered_us: int) -> AttitudeSetpoint:
-        """The command of now, and what it says of the flight."""
+        """Compute the current command, and note the state of the flight."""
         now_us, options, tracker = self._now_us, self._options, self._tracker
         attitude = self._told_attitude()
         assert self._pilot is not None
@@ -235,7 +235,8 @@ class OrbitFlight:
         if min(unseen_s, (now_us - entered_us) * 1e-6) > options.lost_limit_s:
             seen = "never seen" if math.isinf(unseen_s) else f"lost {unseen_s:.0f} s ago"
             raise MissionError(f"the target was {seen}; {self._vehicle.heard()}")
-        # Without inertial messages nothing is seen either, and the flight ends by `lost_limit_s`; until then
+        # Without inertial messages no target is seen either, and the flight ends by `lost_limit_s`; until
+        # then
         # the autopilot's roll is better than an old one.
         own = self._look_out.filter
         filtered_rad = None if own is None else own.roll_rad(stamp_us)

@@ -20,12 +20,12 @@ _FUSION: Final = {
 
 
 class GpsSwitch:
-    """Takes GPS from one vehicle, and gives it back.
+    """Switches the GPS of one vehicle off and on again.
 
     Args:
-        vehicle: whose.
-        values: parameters that switch it off; none: by MAV_CMD_INJECT_FAILURE.
-        before: their values with GPS.
+        vehicle: the vehicle.
+        values: parameters that switch it off; empty: MAV_CMD_INJECT_FAILURE is used.
+        before: values of these parameters while GPS is on.
     """
 
     def __init__(self, vehicle: Vehicle, values: dict[str, float], before: dict[str, float]) -> None:
@@ -35,10 +35,10 @@ class GpsSwitch:
 
     @classmethod
     async def find(cls, vehicle: Vehicle, way: GpsOff) -> "GpsSwitch":
-        """The way that this vehicle takes; GPS stays on.
+        """Find the way that this vehicle supports; GPS stays on.
 
         Raises:
-            MissionError: there is none; the message says what to ask for instead.
+            MissionError: there is none; the message names the alternative.
         """
         answer = ""
         if way is not GpsOff.PARAMETER:

@@ -6,16 +6,17 @@ right (the paper's formula for it, with norms, loses the sign). Equation 35 asks
 
     chi_d = lambda (pi/2 - atan(k_o (rho - rho_d))),
 
-straight for the target from far away, abeam on the circle. The paper commands phi = phi_ff + k_p e + k_d
-de/dt, e = chi - chi_d, with phi_ff of the circle. Here the same terms are written as a turn rate of v:
+so far away the aircraft flies straight to the target, and on the circle the target is abeam. The paper
+commands phi = phi_ff + k_p e + k_d de/dt, e = chi - chi_d, with phi_ff of the circle. Here the same terms are
+written as a turn rate of v:
 
     omega = d(bearing)/dt - d(chi_d)/dt + k e,
 
-whose feed-forward is that of the circle on the circle, and right elsewhere too, so that de/dt = -k e from
-everywhere; the derivative terms come from the estimated velocity, not from differences of noisy angles.
-Bank makes the turn: v omega = g tan(phi) cos(crab), with the angle between heading and v, since lift pulls
-across the heading and not across v. In wind v changes along the circle, and the bank with it: v^2 / (g rho)
-where the paper prints v / (g rho).
+whose feed-forward equals the circle's on the circle and is also correct elsewhere, so that de/dt = -k e
+everywhere; the derivative terms come from the estimated velocity, not from differences of noisy angles. Bank
+makes the turn: v omega = g tan(phi) cos(crab). Crab is the angle between heading and v, since lift acts
+across the heading and not across v. In wind v changes along the circle, and the bank changes with it. The
+bank contains v^2 / (g rho) where the paper prints v / (g rho).
 """
 
 import math

@@ -49,15 +49,15 @@ def gimbal_angles(line_frd: Vector) -> tuple[float, float]:
 def line_of_sight_of_gimbal(
     image_x: float, image_y: float, gimbal: GimbalAttitude, q_ned_from_frd: Quaternion
 ) -> LineOfSight:
-    """Direction of a detection (equation 37) from a gimbal that tells its own attitude against the horizon,
-    as MAVLink has it.
+    """Direction of a detection (equation 37) from a gimbal that reports its own attitude against the horizon,
+    as defined in MAVLink.
 
-    Its quaternion is the first two rotations of the equation in one. The heading is the aircraft's.
+    Its quaternion combines the first two rotations of the equation. The heading is the aircraft's.
 
     Args:
         image_x, image_y: normalized image coordinates.
-        gimbal: where it looked when the image was taken.
-        q_ned_from_frd: attitude of the aircraft then.
+        gimbal: attitude of the gimbal when the image was taken.
+        q_ned_from_frd: attitude of the aircraft at that time.
     """
     line = rotate(gimbal.q, gimbal_from_camera(image_x, image_y))
     if not gimbal.from_north:

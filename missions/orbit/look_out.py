@@ -17,7 +17,7 @@ from missions.vehicle.vehicle import Vehicle
 
 TICK_HZ: Final = 25.0
 _GIMBAL_LEAD_S: Final = 0.15
-_BELIEVED_TO_M: Final = 20.0  # how well a place from somebody else is known (paper: 20 m)
+_BELIEVED_TO_M: Final = 20.0  # standard deviation of a place from another source (paper: 20 m)
 _DRIFT_STD_M_S: Final = 2.0
 _OLD_US: Final = 1_000_000
 _INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
@@ -103,7 +103,7 @@ class LookOut:
             vehicle.payload.point_gimbal(pitch_rad=angles[1], yaw_rad=angles[0])
 
     def _believe(self, now_us: int, airspeed_m_s: float) -> None:
-        """While there is GPS and the target was not seen: where it is said to be, against the aircraft."""
+        """While there is GPS and the target was not seen: use its believed place, relative to the aircraft."""
         p = self._vehicle.latest(telemetry.Position)
         attitude = self._vehicle.latest(telemetry.Attitude)
         if p is None or attitude is None or not self.informed:

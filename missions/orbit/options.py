@@ -16,7 +16,7 @@ WANDERING_M: Final = 100.0
 
 
 class AttitudeFrom(StrEnum):
-    """Whose roll and pitch the orbit is flown with."""
+    """The source of roll and pitch for the orbit."""
 
     AUTOPILOT = "autopilot"
     FILTER = "filter"
@@ -45,23 +45,23 @@ class OrbitOptions(MissionOptions):
     """A circle around a target on the ground.
 
     Attributes:
-        altitude_m: above home, and so above the target's ground when that is level.
-        radius_m: horizontal.
+        altitude_m: height above home, and so above the target's ground when the ground is level.
+        radius_m: horizontal radius.
         direction: +1 clockwise seen from above, -1 counter-clockwise.
-        duration_s: on the circle.
-        airspeed_m_s: equivalent; None: the aircraft's own.
-        target_ne_m: where the target is believed to be when the vehicle is first heard, from home.
-        target_speed_m_s, target_heading_rad: how it is believed to move, straight on.
-        target_motion: how it moves; None: straight on with a speed, else not. One that wanders (a circle, a
-            random walk) is believed to be within 100 m of its place.
-        target_ground_m: of the ground it is on, above home.
-        entry_bearing_rad: from the target to where GPS is lost.
-        entry_distance_m: between the two.
-        entry_heading_rad: of the nose there; None: towards the target.
+        duration_s: time on the circle.
+        airspeed_m_s: equivalent airspeed; None: the aircraft's default.
+        target_ne_m: believed position of the target from home, when the vehicle is first received.
+        target_speed_m_s, target_heading_rad: believed motion of the target, along a straight line.
+        target_motion: motion of the target; None: straight if it has a speed, else static. A target on a
+            circle or a random walk is believed to be within 100 m of its place.
+        target_ground_m: height of the ground at the target, above home.
+        entry_bearing_rad: bearing from the target to the place where GPS is lost.
+        entry_distance_m: distance between the two.
+        entry_heading_rad: heading of the aircraft at that place; None: towards the target.
         gps_fault: GPS is switched off for the orbit.
-        gps_off: how.
-        lost_limit_s: the mission ends when the target was not seen for so long.
-        attitude: whose roll and pitch it is flown with; the yaw is the autopilot's.
+        gps_off: how GPS is switched off.
+        lost_limit_s: the mission ends when the target was not seen for this time.
+        attitude: source of roll and pitch; the yaw is the autopilot's.
     """
 
     altitude_m: float = 100.0
@@ -151,7 +151,7 @@ class OrbitOptions(MissionOptions):
         """Refuse an orbit that the aircraft can't hold, or from which the target can't be seen.
 
         Raises:
-            PlanError: says why, and what to change.
+            PlanError: names the reason and what to change.
         """
         if not isinstance(limits, FixedWingLimits):
             raise PlanError("orbit is flown by aircraft with wings; choose --model aerosonde, or another one")

@@ -1,16 +1,18 @@
-"""Where the target is, and how it moves, against an aircraft that has no position of its own.
+"""Position and velocity of the target relative to an aircraft that does not know its own position.
 
-A Kalman filter on what a camera, a compass, a pitot tube and a barometer tell. Its state is the horizontal
-offset p from the aircraft to the target and the velocity u of the target against the air, in NED axes:
+A Kalman filter on measurements of a camera, a compass, a pitot tube and a barometer. Its state is the
+horizontal offset p from the aircraft to the target and the velocity u of the target against the air, in NED
+axes:
 
     dp/dt = u - v_air,    u = v_target - v_wind
 
-Wind and target motion enter the relative motion as one: u. So a still target in wind, and a moving one in
-still air, are the same to the filter, and neither GPS nor the wind's own value is needed. (The paper takes
-the relative velocity to be that of the aircraft, equation 34, and flies in still air.)
+Wind and target motion enter the relative motion only as their difference u. To the filter a static target in
+wind is the same as a moving one in still air, and neither GPS nor the wind is needed. (The paper takes the
+relative velocity to be that of the aircraft, equation 34, and flies in still air.)
 
-Measured are bearing and depression of the line of sight; equation 40, offset = height / tan(depression), is
-in the measurement model, so that a flat line of sight from far away weighs as little as it should.
+The measurements are bearing and depression of the line of sight. Equation 40, offset = height /
+tan(depression), is in the measurement model, so that a flat line of sight from far away has a correspondingly
+small weight.
 """
 
 import math
@@ -111,9 +113,9 @@ class RelativeTarget:
         drift_ne_m_s: tuple[float, float],
         drift_std_m_s: float,
     ) -> None:
-        """Begin (again) from what somebody else says of the target (equation 33).
+        """Start (again) from a target position of another source (equation 33).
 
-        The way through the air so far is kept: images on their way show the target from there.
+        The past track through the air is kept, because images that have not yet arrived were taken from it.
         """
         if self._known and time_us >= self._time_us:
             self.move(time_us, self._air)

@@ -1,7 +1,7 @@
-"""From what the aircraft's components say to where the target is, without I/O.
+"""From the messages of the aircraft's components to the target's position, without I/O.
 
-Attitudes, airspeeds, heights, gimbal attitudes and detections go in as they come; the relative target, and
-where the gimbal has to look, come out.
+Inputs are attitudes, airspeeds, heights, gimbal attitudes and detections in the order of their arrival.
+Outputs are the relative target and the direction in which the gimbal must point.
 """
 
 import math
@@ -88,8 +88,8 @@ class TargetTracker:
         drift_ne_m_s: tuple[float, float],
         drift_std_m_s: float,
     ) -> None:
-        """Begin with what another source says of the target (equation 33); detections so far still count
-        towards its acquisition.
+        """Start with a target position of another source (equation 33). Earlier detections still count
+        towards the target's acquisition.
         """
         self._seen_us = None
         self._status = TargetStatus.EXPECTED
@@ -102,7 +102,7 @@ class TargetTracker:
         )
 
     def count_anew(self) -> None:
-        """Begin the counts of losses and detections at nothing."""
+        """Reset the counts of losses and detections to zero."""
         self.losses = 0
         self.target.accepted = self.target.rejected = 0
 
@@ -122,12 +122,13 @@ class TargetTracker:
     # what comes out
 
     def step(self, time_us: int, airspeed_true_m_s: float, climb_m_s: float = 0.0) -> None:
-        """Go on to a time; then look at the images that have come. Nothing without attitude and airspeed.
+        """Advance to a time, then process the images that have arrived. Does nothing without attitude and
+        airspeed.
 
         Args:
-            time_us: now.
-            airspeed_true_m_s: along the nose.
-            climb_m_s: of which so much goes upwards.
+            time_us: present time.
+            airspeed_true_m_s: true airspeed, along the nose.
+            climb_m_s: upward part of it.
         """
         q = self._attitude.at(time_us)
         if q is None or not math.isfinite(airspeed_true_m_s + climb_m_s):

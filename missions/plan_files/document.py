@@ -47,16 +47,17 @@ LOITERS: Final = frozenset({NAV_LOITER_UNLIM, NAV_LOITER_TURNS, NAV_LOITER_TIME,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionDocument:
-    """What a mission file holds.
+    """The contents of a mission file.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         items: the mission, without a home item; DO_JUMP names its target by the index in this tuple.
-        fence, rally: items of the other two mission types.
-        home: where the plan begins; None: the file doesn't say.
-        kind: class of vehicle it is for; None: the file doesn't say.
-        firmware: "px4" or "ardupilot"; None: the file doesn't say, or means any.
-        cruise_speed_m_s, hover_speed_m_s: what the planner reckoned with, by wings and by rotors.
+        fence, rally: items of the geofence and of the rally points.
+        home: planned home; None: not in the file.
+        kind: class of vehicle that the plan is for; None: not in the file.
+        firmware: "px4" or "ardupilot"; None: not in the file, or any firmware.
+        cruise_speed_m_s, hover_speed_m_s: speeds that the planner assumed in fixed-wing and in hovering
+            flight.
     """
 
     path: Path

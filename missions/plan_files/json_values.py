@@ -1,4 +1,4 @@
-"""Values of a JSON file that somebody else wrote, with errors that say where they stand."""
+"""Values of a JSON file from another program. Errors name the place in the file."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -33,13 +33,13 @@ _MODELS: Final = {VehicleKind.MULTICOPTER: "iris", VehicleKind.FIXED_WING: "aero
 
 
 class FileMission(Mission[FileOptions]):
-    """A mission file, flown as it is.
+    """A mission file, flown unchanged.
 
     Attributes:
-        document: what the file holds.
+        document: contents of the file.
 
     Raises:
-        PlanError: the file can't be read, or what it says can't be flown.
+        PlanError: the file can't be read, or its contents can't be flown.
     """
 
     def __init__(self, path: Path) -> None:

@@ -12,7 +12,7 @@ from missions.vehicle.item_tracker import FlownOrder, ItemTracker, MissionModeWa
 from missions.vehicle.vehicle import Vehicle
 
 CURVED: Final = "mission"
-"""Name of the phase of a mission whose way is not only straight lines, and so is not scored."""
+"""Name of the phase of a mission whose path is not only straight lines. Such a phase is not scored."""
 
 _NAMES: Final = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT", "GLOBAL_POSITION_INT")
 

@@ -29,10 +29,10 @@ _RALLY: Final = 5100  # NAV_RALLY_POINT
 
 
 def read_plan(path: Path) -> MissionDocument:
-    """A plan file.
+    """Read a plan file.
 
     Raises:
-        PlanError: it can't be read, or is none; says where.
+        PlanError: the file can't be read or is not a plan; the message names the place in the file.
     """
 
     def refuse(where: str, why: str) -> PlanError:

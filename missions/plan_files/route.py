@@ -37,11 +37,11 @@ class Stop:
     """One place of the route.
 
     Attributes:
-        index: of the mission item.
-        command: its MAV_CMD.
-        position_ned_m: from home.
-        speed_m_s: commanded for the way to it; None: the vehicle's own.
-        stay_s: time spent there, as far as the item tells.
+        index: index of the mission item.
+        command: MAV_CMD of the item.
+        position_ned_m: position from home.
+        speed_m_s: speed commanded for the leg to it; None: the vehicle's default.
+        stay_s: time spent there, as far as the item specifies it.
     """
 
     index: int
@@ -96,7 +96,7 @@ def placed(items: Sequence[MissionItem], home: GeodeticPosition, unset: float) -
 
 
 def route_of(document: MissionDocument, home: GeodeticPosition) -> Route:
-    """Where the mission leads from a home; jumps are followed as often as they say."""
+    """The route of the mission from a home. Jumps are followed as often as they specify."""
     items = placed(document.items, home, 0.0)
     frame = LocalFrame(home)
     order = FlownOrder.of(items)

@@ -24,9 +24,9 @@ _VTOL: Final = frozenset({84, 85, 3000})
 
 
 def validated(document: MissionDocument) -> MissionDocument:
-    """The document, when it can be flown by some vehicle.
+    """Return the document if some vehicle can fly it.
 
-    What one autopilot takes and another does not, the autopilot says when it is uploaded.
+    An item that only some autopilots accept is not refused here: the autopilot answers at the upload.
 
     Raises:
         PlanError: names the file, the item, the value and what is accepted.

@@ -22,10 +22,11 @@ HEADER: Final = "QGC WPL 110"
 
 
 def read_wpl(path: Path) -> MissionDocument:
-    """A waypoint file. Its first row is home when it is an absolute waypoint, as ArduPilot's tools write it.
+    """Read a waypoint file. If the first row is an absolute waypoint, as ArduPilot's tools write it, it is
+    the home.
 
     Raises:
-        PlanError: it can't be read; says which item.
+        PlanError: the file can't be read; the message names the item.
     """
     from pymavlink import mavwp
 

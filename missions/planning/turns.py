@@ -43,20 +43,21 @@ def check_turns(
     size_m: tuple[float, float] | None = None,
     spacing_m: float | None = None,
 ) -> float:
-    """Refuse a curve that is too tight; gives the turn radius it was checked for.
+    """Refuse a curve that is too tight; returns the turn radius that it was checked for.
 
-    A polyline's corners are turned as `planning.corners` has it: each takes a part of both its legs.
+    A polyline's corners are rounded as in `planning.corners`: each corner uses a part of both its legs.
 
     Args:
-        curve: to be flown.
-        airspeed_m_s: equivalent.
-        limits: of the aircraft.
-        radius_m: tightest turn; None: what the limits say of a path that the autopilot's guidance follows.
-        size_m, spacing_m: width and height, and track spacing, that the curve was made for: a refusal then
-            tells those that would do.
+        curve: the curve to be flown.
+        airspeed_m_s: equivalent airspeed.
+        limits: limits of the aircraft.
+        radius_m: smallest turn radius; None: the limits' radius for a path that the autopilot's guidance
+            follows.
+        size_m, spacing_m: width and height, and track spacing, that the curve was made for; the error message
+            then names values that are sufficient.
 
     Raises:
-        PlanError: says how tight it is, and what to change.
+        PlanError: names the turn radius and what to change.
     """
     if radius_m is None:
         radius_m = limits.path_radius_m(airspeed_m_s)

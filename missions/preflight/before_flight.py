@@ -52,7 +52,9 @@ class Look:
 
 
 Confirm = Callable[[Sequence[Look]], Coroutine[Any, Any, bool]]
-"""Shown what was found, says whether to fly; it waits as tasks do, so that the link is kept up meanwhile."""
+"""Receives the findings and returns whether to fly. It is a coroutine, so that the link is serviced
+meanwhile.
+"""
 
 
 async def look(vehicle: Vehicle, mission: Mission[Any], options: MissionOptions) -> Look:
@@ -91,7 +93,7 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
     for name in (*_ASKED, FILTER_STATUS[vehicle.autopilot]):
         if vehicle.message(name) is None:
             await vehicle.set_message_rate(name, 2.0)
-    told: list[Mapping[str, Any]] = []  # of the filter
+    told: list[Mapping[str, Any]] = []  # reports of the navigation filter
     with vehicle.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
         await vehicle.clock.sleep(_LISTEN_S)
         parameters = await _parameters(vehicle)

@@ -14,13 +14,13 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What was found, and what to do about it.
+    """One result of a check, with advice.
 
     Attributes:
-        level: a problem keeps the vehicle from arming, or the mission from being flown.
-        subject: a word or two.
+        level: severity. A problem prevents arming, or prevents the mission from being flown.
+        subject: one or two words.
         text: what was found.
-        advice: what to do; "" where nothing is to be done.
+        advice: what to do; "" when no action is needed.
     """
 
     level: Level
@@ -34,7 +34,7 @@ class Finding:
 
 
 def ok(subject: str, text: str) -> Finding:
-    """Nothing to do."""
+    """A finding that needs no action."""
     return Finding(level=Level.OK, subject=subject, text=text)
 
 

@@ -1,4 +1,4 @@
-"""Checks of what the autopilot says of itself: sensors, arming, GPS, filter, home, battery, pilot."""
+"""Checks of the state that the autopilot reports: sensors, arming, GPS, filter, home, battery, pilot."""
 
 import math
 from typing import Final
@@ -91,19 +91,19 @@ def _bit_names(bits: int) -> str:
 
 
 def reasons_against_arming(texts: tuple[str, ...]) -> list[str]:
-    """The texts in which autopilots say why they don't arm, each once."""
+    """The texts in which autopilots report why they refuse to arm, without repetitions."""
     return list(dict.fromkeys(t.strip() for t in texts if t.startswith(_REASONS)))
 
 
 def not_ready_because(texts: tuple[str, ...], sensors_unhealthy: int) -> str:
-    """Why the pre-arm checks are not passed: the autopilot's texts, else the sensors that are not healthy.
+    """Why the pre-arm checks fail: the autopilot's texts or, without any, the sensors that are not healthy.
 
     Args:
-        texts: what the autopilot said when it was asked.
-        sensors_unhealthy: bits of SYS_STATUS: enabled, and not healthy.
+        texts: texts that the autopilot sent after a request.
+        sensors_unhealthy: SYS_STATUS bits of the sensors that are enabled and not healthy.
 
     Returns:
-        Words; "" where nothing is known.
+        The reasons as text; "" when none is known.
     """
     reasons = reasons_against_arming(texts)
     if reasons:
@@ -113,7 +113,7 @@ def not_ready_because(texts: tuple[str, ...], sensors_unhealthy: int) -> str:
 
 
 def arming(snapshot: Snapshot) -> Finding:
-    """Whether it could be armed, and what it said if not."""
+    """Whether it could be armed, and the reported reasons if not."""
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health")
     base_mode = snapshot.whole("HEARTBEAT", "base_mode") or 0
     if base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:

@@ -1,4 +1,4 @@
-"""What a vehicle has told, for checks that don't care how it was heard."""
+"""The data that a vehicle has reported, for checks that do not depend on how they were received."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ Fields = Mapping[str, Any]
 FILTER_STATUS: Final[Mapping[str, str]] = MappingProxyType(
     {"px4": "ESTIMATOR_STATUS", "ardupilot": "EKF_STATUS_REPORT"}
 )
-"""By flavour: the message by which the navigation filter tells how it is; see `usual`."""
+"""By flavour: the message in which the navigation filter reports its state; see `usual`."""
 
 
 def usual(messages: Sequence[Fields]) -> Fields:
@@ -36,15 +36,15 @@ def usual(messages: Sequence[Fields]) -> Fields:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """The newest of everything.
+    """The newest data of a vehicle.
 
     Attributes:
         flavour: "px4" or "ardupilot"; "" for another autopilot.
-        kind: class of vehicle; None: one that isn't flown here.
-        messages: newest of each name, from the autopilot.
-        texts: what it said, oldest first.
-        parameters: those that are known.
-        fence_items: of the vehicle's geofence; None: not known.
+        kind: class of vehicle; None: one that this program does not fly.
+        messages: the autopilot's newest message of each name.
+        texts: its status texts, oldest first.
+        parameters: the known parameters.
+        fence_items: items of the vehicle's geofence; None: not known.
     """
 
     flavour: str
