@@ -37,7 +37,7 @@ def _command_of(mission: str) -> "MissionCommand":
 
 
 def _declaring(mission: str) -> str:
-    """The mission class whose options apply, from the arguments on the command line."""
+    """Name of the mission whose options apply, from the mission argument of the command line."""
     if mission in _MISSIONS:
         return mission
     return _OWN if mission.endswith(".py") else _FILE

@@ -12,7 +12,7 @@ def scenario_of(
     """Return the targets and the payload that the options describe.
 
     Raises:
-        ValueError: a target is impossible, or cannot be found by the mission.
+        ValueError: a target is impossible, or the vehicle carries nothing that can detect it.
     """
     if targets and not camera:
         raise ValueError("--target is seen by cameras only; add --camera")

@@ -38,7 +38,7 @@ def key_from(path: Path | None) -> "SigningKey | None":
 
 
 def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
-    """Print one line for each link that is open to a network and accepts unsigned messages from any sender."""
+    """Print a line for each link that is open to a network and accepts unsigned messages of any sender."""
     from autopilot_bridge.links import listens_to_network, open_unsigned, parse_address
 
     for address in map(parse_address, connections) if key is None else ():
@@ -72,7 +72,7 @@ def vehicle_signing(
 
 
 def signed_how(signing: "SigningParameters", address: "Address") -> str:
-    """Text for the line that names the link: which frames it accepts. It is empty when signing is not used."""
+    """Text about the frames that a link accepts, for the line that names it; "" when signing is not used."""
     from autopilot_bridge.links import reach_of
     from autopilot_bridge.sitl.signing import POLICIES
 

@@ -174,7 +174,7 @@ class Connection:
         return self._observed.time_us
 
     async def _keep_looking_after_link(self) -> None:
-        """Poll links whose descriptors change (servers, reconnecting clients) and links without a descriptor."""
+        """Poll links whose descriptors change (servers, reconnecting clients) or that have none."""
         loop = asyncio.get_running_loop()
         while True:
             current = list(self._link.filenos())
@@ -248,7 +248,7 @@ class Connection:
         return capacity
 
     def keep(self, system_id: int) -> None:
-        """Never drop this system's autopilot from the kept messages, however many other systems are received."""
+        """Keep this system's autopilot among the newest messages, however many other systems are received."""
         self._newest.keep((system_id, AUTOPILOT_COMPONENT))
 
     def listen(self, name: str, listener: Listener) -> Callable[[], None]:

@@ -152,7 +152,7 @@ class Mission(Generic[AnyOptions]):
         return {}
 
     def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        """Lines that the command line prints after a completed flight, in addition to those of every flight."""
+        """Lines that the command line prints after a completed flight, besides those of every flight."""
         return ()
 
     def title(self, options: AnyOptions) -> str:

@@ -1,4 +1,4 @@
-"""A run: the folder with the log, the summary and the picture. Nothing is ever overwritten."""
+"""A run: the folder with the log, the summary and the picture. Existing files are never overwritten."""
 
 import json
 import math
@@ -71,7 +71,7 @@ def versions() -> dict[str, str]:
 
 
 def _checkout_version() -> str | None:
-    """What `pyproject.toml` says, when this runs from a checkout."""
+    """The version in `pyproject.toml`, when the program runs from a checkout."""
     try:
         text = (Path(__file__).resolve().parents[1] / "pyproject.toml").read_text(encoding="utf-8")
         project = tomllib.loads(text)["project"]
@@ -91,8 +91,8 @@ POOR: Final = "poor"
 def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
     """How a commanded path was followed: everywhere within the acceptance radius, or not; None: not measured.
 
-    The radius within which a waypoint counts as reached is what the user gave away: who is farther off the
-    path than that has not flown it, though the vehicle may have gone on to its end.
+    A waypoint counts as reached within the acceptance radius, so the user accepts this error. A vehicle that
+    was farther off the path has not flown it, even if it continued to the end.
     """
     if notes.commanded is None or score.path_max_error_m is None:
         return None
@@ -100,7 +100,7 @@ def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
 
 
 def how_left(blocks: Sequence[Mapping[str, Any]]) -> str:
-    """What was done with the vehicles of a flight that was broken off; "" if nothing had to be."""
+    """The action taken with the vehicles of a flight that ended early; "" if no action was needed."""
     left = {block["system_id"]: block["left"] for block in blocks if block["left"]}
     if len(blocks) == 1:
         return f"the vehicle {left[blocks[0]['system_id']]}" if left else ""
@@ -186,7 +186,7 @@ def whole(path: Path) -> Iterator[None]:
     """Leave no half of a new file that is written meanwhile, on a full disk."""
     try:
         yield
-    except FileExistsError:  # somebody else's, and whole
+    except FileExistsError:  # another process has written it completely
         raise
     except OSError:
         path.unlink(missing_ok=True)

@@ -1,7 +1,7 @@
-"""What a mission asks of the world it is flown in, when that is simulated: targets, payload, magnetic map.
+"""What a mission requires of a simulated world: targets, payload, magnetic map.
 
-Plain data; `missions.embedded` builds it. On a real vehicle all this is simply there; a
-mission can't tell.
+Plain data; `missions.embedded` creates the objects from it. With a real vehicle these exist already. A
+mission cannot detect the difference.
 """
 
 import math
@@ -29,16 +29,16 @@ class TargetScenario:
     """One target on the ground.
 
     Attributes:
-        north_m, east_m: of home, at the start; the centre of a circle.
-        motion: how it moves.
-        speed_m_s: over ground; not used by a static one.
-        course_rad: where a straight one goes, and a random walk begins.
-        range_m: radius of a circle; half the side of the square a random walk stays in.
-        tag: what a camera reads off it, 0..254; -1: nothing.
-        size_m: its extent.
+        north_m, east_m: initial position from home; for a circle, its centre.
+        motion: kind of motion.
+        speed_m_s: ground speed; not used by a static target.
+        course_rad: course of a straight motion, and initial course of a random walk.
+        range_m: radius of a circle; for a random walk, half the side of the square that it stays in.
+        tag: number of the tag that a camera reads, 0..254; -1: no tag.
+        size_m: size of the target.
 
     Raises:
-        PlanError: a place, speed or range that can't be.
+        PlanError: a place, speed or range is impossible.
     """
 
     north_m: float

@@ -1,10 +1,9 @@
-"""How well a flight followed what was commanded: numbers from the recorded frames.
+"""Scores of how well a flight followed the commanded path, from the recorded frames.
 
-Truth (HIL_STATE_QUATERNION, whoever of the system sent it) is the reference where there is any; otherwise
-the autopilot's own estimate is. The commanded path is laid out from where the vehicle truly stood when it
-was armed, since that is what "home" means to the person who put it there: a constant error of the receiver
-at start moves home and path alike. The same errors with home as the vehicle reports it are given as
-`..._absolute_m`.
+The reference is the truth (HIL_STATE_QUATERNION from any component of the system) when it is recorded,
+otherwise the autopilot's own estimate. The commanded path starts at the true position of the vehicle when it
+was armed, because that is the user's "home": a constant error of the receiver at the start moves home and
+path by the same amount. The same errors with home as the vehicle reports it are given as `..._absolute_m`.
 """
 
 from dataclasses import dataclass
@@ -52,7 +51,7 @@ class Track:
 
     @property
     def length_m(self) -> float:
-        """Distance flown, at up to 10 points a second so that noise adds nothing."""
+        """Distance flown, from at most 10 points a second, so that noise does not increase it."""
         if len(self.time_s) < 2:
             return 0.0
         step_s = float(np.median(np.diff(self.time_s)))
@@ -171,7 +170,7 @@ def _rms(values: Array) -> float | None:
 
 
 def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np.void], int]:
-    """Rows whose attitude (three angles, or a quaternion) is one, and the number of the others."""
+    """Rows with a valid attitude (three angles, or a quaternion), and the number of the other rows."""
     values = np.column_stack([table[name].astype(np.float64) for name in names])
     kept: NDArray[np.bool_] = np.all(np.isfinite(values), axis=1)
     if len(names) == 1:

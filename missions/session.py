@@ -72,14 +72,15 @@ class RunResult:
 
 
 class Flight:
-    """A run while it goes on, for whoever shows progress.
+    """The state of a run in progress, for displays of progress.
 
     Attributes:
-        vehicles: as soon as they are made.
-        recorder: of all that is sent and heard.
-        elsewhere: the vehicles are at the ends of links, not embedded.
+        vehicles: the vehicles, as soon as they are created.
+        recorder: recorder of all sent and received frames.
+        elsewhere: the vehicles are connected by links, not embedded.
         started_wall_s: wall clock when the run began.
-        started_us: vehicle time when the run began: boot of an embedded one, else when it was first heard.
+        started_us: vehicle time when the run began: the boot of an embedded vehicle, else the time when the
+            vehicle was first received.
     """
 
     def __init__(self) -> None:
@@ -99,10 +100,10 @@ class Flight:
         return max(0, self.clock.time_us - begun_us) * 1e-6
 
     def require_log(self) -> None:
-        """See that what was heard so far is in the log.
+        """Make sure that all frames received so far are in the log.
 
         Raises:
-            MissionError: the disk does not take it.
+            MissionError: the log cannot be written.
         """
         if self.recorder is not None:
             self.recorder.flush()
@@ -115,15 +116,15 @@ ProgressListener = Callable[[Flight], None]
 
 
 def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
-    """Fly a mission and write its run folder. Blocks until all is done.
+    """Fly a mission and write its run folder. Blocks until the run is finished.
 
     A mission that fails or is interrupted (Ctrl-C; in the main thread also SIGTERM and SIGHUP) leaves its
-    vehicles safe, and still gives a result and a whole log.
+    vehicles safe, and still returns a result and writes a complete log.
 
     Raises:
-        KeyboardInterrupt: it was interrupted before anything was begun, or while its results were written.
-        PlanError: what was asked for can't be flown; nothing was started.
-        MissionError: the disk does not take what an embedded world publishes; nothing was started.
+        KeyboardInterrupt: the run was interrupted before it began, or while its results were written.
+        PlanError: the request can't be flown; nothing was started.
+        MissionError: a file of the embedded world cannot be written; nothing was started.
         BridgeError: a link can't be opened.
     """
     with EndingSignals() as ending:

@@ -1,4 +1,4 @@
-"""A command whose libraries may crash, watched by the process that the user started."""
+"""Runs a command whose libraries may crash in a child process and watches it."""
 
 import contextlib
 import os
@@ -16,14 +16,14 @@ _ASKED_TO_END: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def supervised(command: Callable[[], int], *, crashed: str) -> int:
-    """Run a command in a process of its own and give its exit code.
+    """Run a command in a child process and return its exit code.
 
-    Call it before threads are started and libraries loaded: the process is forked.
+    Call it before threads are started and libraries are loaded, because the process is forked.
 
     Args:
-        command: gives its exit code.
-        crashed: what is said on stderr when the process was ended by a signal that nobody sent, in front of
-            the signal's name; the exit code is 1 then.
+        command: returns its exit code.
+        crashed: text printed on stderr, before the signal's name, when a signal of a crash ended the process;
+            the exit code is then 1.
     """
     _flush()
     # What asks us to end between the fork and the handler that passes it on must not leave the child alone.
@@ -57,8 +57,8 @@ def _flush() -> None:
 
 
 def _end_with_parent(lifeline: int) -> None:
-    """Nobody would hear what comes of it, or could end it, once the parent was killed."""
-    os.read(lifeline, 1)  # the end of it: nothing is ever written
+    """End this process when the parent is killed, because no other process could stop it then."""
+    os.read(lifeline, 1)  # returns at the end of the file; no data are ever written to it
     os.kill(os.getpid(), signal.SIGTERM)
 
 

@@ -208,9 +208,9 @@ SOURCES: Final[Mapping[type, tuple[str, Callable[[Any], Any]]]] = MappingProxyTy
 
 
 class StatusTextAssembler:
-    """Joins STATUSTEXTs that came in chunks of 50 characters (id, chunk_seq).
+    """Joins STATUSTEXTs that were sent in chunks of 50 characters (id, chunk_seq).
 
-    A text whose end is lost is dropped when its id is used again, or when 8 others are unfinished.
+    A text whose end is lost is dropped when its id is used again, or when 8 other texts are unfinished.
     """
 
     def __init__(self) -> None:

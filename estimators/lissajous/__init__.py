@@ -1,4 +1,4 @@
-"""Motion of a vehicle along a Lissajous pattern whose frequencies are not quite known (seed 000)."""
+"""Motion of a vehicle along a Lissajous pattern whose frequencies are uncertain (seed 000)."""
 
 from estimators.lissajous.estimate import LissajousEstimate
 from estimators.lissajous.estimator import LissajousEstimator

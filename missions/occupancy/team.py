@@ -153,7 +153,7 @@ class SearchTeam:
         notes.end(clock.stamp_us)
 
     async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
-        """Check what can only be checked after the vehicle was received, while it still stands on the ground."""
+        """Check what needs a received vehicle, while the vehicle still stands on the ground."""
         limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
         check_reach(own, limits, self._frame, vehicle.home)

@@ -1,4 +1,4 @@
-"""Which vehicles of a team may take off or land now: no vehicle crosses a layer in which another one flies."""
+"""The order of takeoffs and landings in a team: no vehicle crosses a layer in which another one flies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

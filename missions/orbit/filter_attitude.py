@@ -73,7 +73,7 @@ class FilterAttitude:
             self._kept.extend(self._filter.estimates)
 
     def at(self, time_us: int) -> Quaternion | None:
-        """`q_ned_from_frd` at a vehicle time; None when the filter or the autopilot has no attitude for it."""
+        """`q_ned_from_frd` at a vehicle time; None when filter or autopilot have no attitude for it."""
         heading = self._yaw.at(time_us)
         if heading is None:
             return None

@@ -103,7 +103,7 @@ class LookOut:
             vehicle.payload.point_gimbal(pitch_rad=angles[1], yaw_rad=angles[0])
 
     def _believe(self, now_us: int, airspeed_m_s: float) -> None:
-        """While there is GPS and the target was not seen: use its believed place, relative to the aircraft."""
+        """While there is GPS and the target was not seen: use its believed place relative to the aircraft."""
         p = self._vehicle.latest(telemetry.Position)
         attitude = self._vehicle.latest(telemetry.Attitude)
         if p is None or attitude is None or not self.informed:

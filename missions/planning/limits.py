@@ -10,7 +10,7 @@ from missions.kind import VehicleKind
 
 TURN_MARGIN: Final = 1.2  # of the radius, for gusts and for the time a bank takes
 FORECAST_WIND_M_S: Final = 5.0
-"""Wind that turns are planned for when no forecast was specified: a fresh breeze."""
+"""Wind that turns are planned for when no forecast was specified: a breezy day."""
 
 
 _MAY_BE_ZERO: Final = frozenset({"wind_m_s", "guidance_s", "waypoint_lead_s"})

@@ -81,7 +81,7 @@ FENCE_PARAMETERS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "ardupilot": ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_RADIUS", "FENCE_ALT_MAX", "FENCE_OPTIONS"),
     }
 )
-"""The parameters that identify the battery's type."""
+"""The parameters that define the geofence."""
 
 _FENCE_ALTITUDE, _FENCE_CIRCLE, _FENCE_POLYGONS = 1, 2, 4
 _FENCE_UNION: Final = 2  # of FENCE_OPTIONS

@@ -64,11 +64,11 @@ class StudyResult:
     """Errors of all runs.
 
     Attributes:
-        request: as given.
+        request: the request of the study.
         complete: whether all runs were done.
-        failure: why not, where nobody interrupted it; "".
-        errors: by equations: (cells, runs, estimators), in the order of `CELLS` and of the block's columns;
-            NaN: not done.
+        failure: reason why runs are missing; "" if none are missing or the user interrupted the study.
+        errors: errors by equations: (cells, runs, estimators), in the order of `CELLS` and of the block's
+            columns; NaN: the run was not done.
     """
 
     request: StudyRequest

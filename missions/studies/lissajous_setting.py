@@ -72,7 +72,7 @@ SIGHT: Final[Array] = 0.1 * np.array([[[0.28, 0.12], [0.12, 0.31]], [[0.33, -0.1
 TARGET_CENTRE: Final = (50.0, 50.0)
 TARGET_RADIUS: Final = 100.0
 TARGET_PERIOD: Final = 20.0
-"""The paper says a circle and no more. What shows in Table IV is its mean distance, some 135."""
+"""The paper specifies only a circle. Table IV depends on its mean distance, about 135."""
 
 
 class Equations(StrEnum):

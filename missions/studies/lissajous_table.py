@@ -60,7 +60,7 @@ def _figures(errors: Array, names: Sequence[str]) -> dict[str, float]:
         key = name.lower()
         figures[f"{key}_rmse"] = round(float(np.median(errors[:, column])), 5)
         figures[f"{key}_error"] = round(_median_error(errors[:, column]), 5)
-    three = errors[:, :3]  # the paper's contest is between N, K and P; who ties wins as well
+    three = errors[:, :3]  # the paper compares N, K and P; a tie counts as a win
     best = three.min(axis=1, keepdims=True)
     shares = 100.0 * np.mean(three <= best * (1.0 + 1e-9), axis=0)
     figures |= {

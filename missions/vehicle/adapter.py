@@ -134,7 +134,9 @@ class Adapter(Protocol):
 
 
 def missing_basics(vehicle: "Vehicle") -> list[str]:
-    """What every firmware must have said before the vehicle can be armed, and has not."""
+    """The messages that every firmware must have sent before the vehicle can be armed, and that were not
+    received.
+    """
     missing = []
     status = vehicle.message("SYS_STATUS")
     if status is None or not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK:

@@ -50,7 +50,9 @@ _EKF_CONST_POS: Final = 0x80
 
 
 class ArduCopter:
-    """ArduPilot copter: sends nothing until asked, numbers home as mission item 0, speaks PARAM_FLOAT."""
+    """ArduPilot copter: it sends nothing until requested, numbers home as mission item 0, and uses
+    PARAM_FLOAT.
+    """
 
     name = "ardupilot"
     kind = VehicleKind.MULTICOPTER

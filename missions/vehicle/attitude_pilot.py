@@ -89,7 +89,7 @@ class AttitudePilot:
 
     @property
     def airspeed_true_m_s(self) -> float:
-        """True airspeed; NaN when it is not told."""
+        """True airspeed; NaN when it is not reported."""
         pressure = self._vehicle.latest(telemetry.Pressure)
         air = self._vehicle.latest(telemetry.AirData)
         if pressure is None or air is None:
@@ -98,16 +98,17 @@ class AttitudePilot:
 
     @property
     def climb_m_s(self) -> float:
-        """Climb rate by the autopilot; 0 when it is not told."""
+        """Climb rate reported by the autopilot; 0 when it is not reported."""
         air = self._vehicle.latest(telemetry.AirData)
         return 0.0 if air is None else air.climb_m_s
 
     async def prepare(self, altitude_m: float, airspeed_m_s: float | None) -> None:
-        """Read what the loop needs to know of the aircraft; say what shall be held.
+        """Read the aircraft's parameters that the loop needs, and set the altitude and the airspeed to be
+        held.
 
         Args:
-            altitude_m: above the ground it started from.
-            airspeed_m_s: equivalent; None: the autopilot's own.
+            altitude_m: height above the ground at the start.
+            airspeed_m_s: equivalent airspeed; None: the autopilot's default.
         """
         vehicle = self._vehicle
         limits = await vehicle.limits()

@@ -51,7 +51,9 @@ class AttitudeSetpoint:
         return _IGNORE_RATES | thrust
 
     def message(self, time_us: int, system_id: int, offset_ned_m: Vector = (0.0, 0.0, 0.0)) -> Any:
-        """The message. An attitude has no place, so the offset of the local frame changes nothing."""
+        """The setpoint as a MAVLink message. An attitude has no position, so the offset of the local frame
+        has no effect.
+        """
         return dialect.MAVLink_set_attitude_target_message(
             time_us // 1000 & 0xFFFFFFFF,
             system_id,

@@ -88,9 +88,9 @@ class VehicleCommands(VehicleView):
 
     @property
     def may_be_armed(self) -> bool:
-        """Whether a heartbeat says armed, or none that knows has come since arming was asked for.
+        """Whether a heartbeat reports armed, or no later heartbeat has come since arming was requested.
 
-        A heartbeat within half a second may have been made before.
+        A heartbeat received within half a second of the request may have been sent before it.
         """
         if self.armed:
             return True

@@ -143,13 +143,13 @@ class FixedWingFlight(VehicleStore):
         wait: bool = True,
         timeout_s: float | None = None,
     ) -> None:
-        """Go to a place and circle it.
+        """Fly to a place and circle it.
 
         Args:
-            place: centre, and altitude above mean sea level; None: where it is now.
-            radius_m: None: the autopilot's own.
-            clockwise: seen from above.
-            wait: until it circles there, near its altitude.
+            place: centre, and altitude above mean sea level; None: the present position.
+            radius_m: radius; None: the autopilot's default.
+            clockwise: direction, seen from above.
+            wait: whether to wait until it circles there, near the altitude.
 
         Raises:
             PlanError: not a fixed wing, or too far away; nothing was sent.
@@ -240,7 +240,9 @@ class FixedWingFlight(VehicleStore):
         return math.remainder(heading, math.tau)
 
     def wind_ne_m_s(self) -> tuple[float, float] | None:
-        """The autopilot's estimate of the wind, where the air moves to (WIND_COV or WIND); None: not told."""
+        """The autopilot's estimate of the velocity of the air (WIND_COV or WIND), north and east; None: not
+        reported.
+        """
         m = self.message("WIND_COV")
         if m is not None and math.isfinite(m.wind_x) and math.isfinite(m.wind_y):
             return float(m.wind_x), float(m.wind_y)

@@ -26,8 +26,8 @@ _LEAD: Final = (
 class GuidedSession:
     """Setpoints streamed to one vehicle, at a fixed rate of vehicle time.
 
-    While the vehicle is not heard, the last place is held; a source goes on from there when it is back, if it
-    is still in the guided mode.
+    While no message is received from the vehicle, the last place is held. When the link is back and the
+    vehicle is still in the guided mode, the source continues from there.
     """
 
     def __init__(self, vehicle: "Vehicle", rate_hz: float, home_offset_ned_m: Vector) -> None:
@@ -90,7 +90,7 @@ class GuidedSession:
         vehicle, clock = self._vehicle, self._vehicle.clock
         due_us = clock.time_us
         while True:
-            if vehicle.link_quiet:  # nobody knows where the vehicle is: it shall not be led on
+            if vehicle.link_quiet:  # the vehicle's position is not known: hold the setpoint
                 self._start_us += self._period_us
                 self._last = _held(self._last)
             elif self._source is not None:

@@ -1,14 +1,17 @@
-"""How far a vehicle has come in an uploaded mission, from messages that may be lost, repeated or reordered.
+"""Progress of a vehicle in an uploaded mission, from messages that may be lost, repeated or reordered.
 
-Sans-IO: `ItemTracker` takes what MISSION_ITEM_REACHED, MISSION_CURRENT and positions say. Each is evidence by
-itself:
+Sans-IO: `ItemTracker` uses MISSION_ITEM_REACHED, MISSION_CURRENT and positions. Each of them is sufficient
+evidence alone:
 
-* MISSION_ITEM_REACHED: the item, and all before it, are done. PX4 1.16.1 and ArduPilot 4.6.3 send it for a
-  DO_ item and then not for the waypoint directly before it; PX4 repeats the newest one at 1 Hz, ten times.
-* MISSION_CURRENT: all items before the one that is flown to are done. ArduPilot adds that all are done.
-* Positions: a waypoint is done when the vehicle was within its radius and left it, or has stayed there.
+* MISSION_ITEM_REACHED: the item and all items before it are done. PX4 1.16.1 and ArduPilot 4.6.3 send it for
+  a DO_ item, and do not send it for the waypoint directly before that item; PX4 repeats the newest one at 1
+  Hz, ten times.
+* MISSION_CURRENT: all items before the one that is flown to are done. ArduPilot also reports when all are
+  done.
+* Positions: a waypoint is done when the vehicle was within its radius and left it, or when it has stayed
+  there.
 
-The place in the mission never goes back: what is older than the place is ignored.
+The place in the mission never goes back: evidence of an earlier place is ignored.
 """
 
 import math
@@ -83,15 +86,16 @@ class FlownOrder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionStep:
-    """One item at one place of the order.
+    """One item at one place of the flown order.
 
     Attributes:
-        index: of the item.
-        command: MAV_CMD.
-        place: where positions show that it is done; None: they don't show it.
-        radius_m: of the place; infinite: any position that is not lower than the place.
-        stay_s: within the radius, after which it counts as done; infinite: only messages tell.
-        through: it is done when the vehicle was within the radius and left it.
+        index: index of the item.
+        command: MAV_CMD of the item.
+        place: position at which the item is done; None: positions do not show that it is done.
+        radius_m: radius of the place; infinite: any position that is not lower than the place counts.
+        stay_s: time within the radius after which the item counts as done; infinite: only messages show that
+            it is done.
+        through: the item is done when the vehicle was within the radius and left it.
     """
 
     index: int
@@ -201,7 +205,7 @@ class ItemTracker:
 
     @property
     def at_the_last_place(self) -> bool:
-        """Whether the vehicle was within the radius of the last waypoint, and nothing else is left to fly."""
+        """Whether the vehicle was within the radius of the last waypoint, and no other item is left."""
         if self._again_from is not None or self._near_us is None:
             return False
         rest = [step for step in self._steps[self.behind :] if step.flown and step.command not in LANDINGS]

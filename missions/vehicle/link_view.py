@@ -1,6 +1,6 @@
-"""What a vehicle's messages say: identity, newest values, streams, waiting with deadlines.
+"""The data that a vehicle's messages contain: identity, newest values, streams, and waits with deadlines.
 
-The lower half of `Vehicle`: it listens, and sends nothing but what it is given.
+This is the lower half of `Vehicle`: it receives, and sends only the messages that it is given.
 """
 
 import asyncio
@@ -49,17 +49,17 @@ _FIRMWARES: Final = {
 
 
 class VehicleView:
-    """The listening half of a vehicle.
+    """The receiving half of a vehicle.
 
     Args:
         connection: a started connection.
-        system_id: the vehicle's; None: the first autopilot heard.
+        system_id: system id of the vehicle; None: the first autopilot received.
 
     Attributes:
-        connection: as given.
-        notes: where a mission notes its phases, its progress and what it commands, for the run's summary.
+        connection: the connection that was given.
+        notes: the mission's record of its phases, its progress and its commands, for the run's summary.
         status_texts: the newest texts from the autopilot, oldest first.
-        first_heard_us: vehicle time of the first heartbeat that came when that time was known.
+        first_heard_us: vehicle time of the first heartbeat that was received when vehicle time was known.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -158,7 +158,7 @@ class VehicleView:
 
     @property
     def link_quiet(self) -> bool:
-        """Whether nothing has come from the vehicle for three seconds, while something of it is awaited."""
+        """Whether no message was received from the vehicle for three seconds, while a task waits for one."""
         return self._watch.quiet
 
     @property
@@ -168,7 +168,7 @@ class VehicleView:
 
     @property
     def link_just_back(self) -> bool:
-        """Whether the vehicle was heard again a moment ago, after a silence."""
+        """Whether a silence of the vehicle ended a moment ago."""
         return self._watch.just_back
 
     def _link_lost(self) -> None:
@@ -203,8 +203,8 @@ class VehicleView:
         """Newest telemetry of a kind, as `latest(Position)`; None before the first.
 
         Kinds: `Position`, `LocalPosition`, `Attitude`, `AirData`, `Pressure`, `Battery`, `Gps`,
-        `MissionProgress`. A message whose numbers are none (NaN, infinite) is passed over: for a second the
-        one before it stands, then nothing is known.
+        `MissionProgress`. A message with NaN or infinite values is ignored: for one second the message before
+        it is returned, then None.
         """
         name, convert = SOURCES[kind]
         message = self.message(name)
@@ -284,7 +284,9 @@ class VehicleView:
         )
 
     def heard(self, *, silence: bool = True) -> str:
-        """What was heard last, for error messages; with `silence`, also how long ago when that is long."""
+        """What was received last, as text for error messages; with `silence`, also how long ago, when that is
+        long.
+        """
         if self._adapter is None or self._heard_us is None:
             return "nothing was received from an autopilot"
         parts = [f"last received: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
@@ -313,7 +315,7 @@ class VehicleView:
     async def deadline(self, seconds: float, awaited: str | Callable[[], str]) -> AsyncIterator[None]:
         """`async with`: TimeoutError after `seconds` of vehicle time, LinkClosed when the link is lost.
 
-        Where a lost link may come back, the time in which nothing is heard does not count.
+        When a lost link may come back, the time without received messages does not count.
         """
         if not self.regain_s:
             async with self.link_guard(awaited), self.clock.timeout(seconds):
@@ -327,7 +329,9 @@ class VehicleView:
                 running_out.cancel()
 
     async def _run_out(self, scope: asyncio.Timeout, seconds: float) -> None:
-        """Let a deadline pass; who was not heard then gets all of it anew when it is."""
+        """Let a deadline pass. If the link was silent then, the full time starts again when the vehicle is
+        received.
+        """
         await self.clock.sleep(seconds)
         while self._deaf:
             while self._deaf:
@@ -348,16 +352,17 @@ class VehicleView:
         on: Sequence[str],
         timeout_s: float,
     ) -> T:
-        """Wait until `predicate` gives something true, looked at now and after each message named in `on`.
+        """Wait until `predicate` returns a true value, and return it. It is called now and after each message
+        named in `on`.
 
         Args:
-            predicate: looks at the newest values; may raise to give up.
-            what: what is awaited, for the error.
-            on: message names.
+            predicate: checks the newest values; it may raise an error to end the wait.
+            what: description of what is awaited, for the error.
+            on: names of messages.
             timeout_s: vehicle seconds.
 
         Raises:
-            VehicleTimeout: says what was awaited and what was heard last.
+            VehicleTimeout: the message names what was awaited and what was received last.
             LinkClosed: the heartbeats stopped.
         """
         value = predicate()

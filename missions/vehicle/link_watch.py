@@ -15,21 +15,22 @@ _JUST_BACK_S: Final = 5.0
 
 
 class LinkWatch:
-    """Ends waits when no heartbeat has come for 10 s of the event loop's time, and `regain_s` more.
+    """Ends waits when no heartbeat was received for 10 s plus `regain_s` of the event loop's time.
 
-    That is wall time for a vehicle elsewhere, however fast it simulates, and vehicle time in the loop of an
-    embedded one. A vehicle slower than real time gets 10 s of its own. Time in which this process was busy
-    (the look at the link comes late by as much) is not silence. Before the first heartbeat nothing ends.
+    That is wall time for a vehicle that is not embedded, at any simulation speed, and vehicle time in the
+    loop of an embedded one. A vehicle slower than real time gets 10 s of its own time. Time in which this
+    process was busy (so that the check of the link was late by the same time) does not count as silence.
+    Before the first heartbeat no wait is ended.
 
     Args:
         clock: vehicle time.
-        heard: what was heard last, for the error.
+        heard: text of what was received last, for the error.
 
     Attributes:
-        regain_s: how long a lost link may take to come back.
-        quiet: no heartbeat for 3 s, while somebody waits.
+        regain_s: longest time for which a lost link may stay lost.
+        quiet: no heartbeat for 3 s, while a task waits.
         lost: the link counts as lost.
-        on_lost, on_regained: called when it is lost, and when it is back.
+        on_lost, on_regained: called when the link is lost, and when it is back.
     """
 
     def __init__(self, clock: Clock, heard: Callable[[], str]) -> None:

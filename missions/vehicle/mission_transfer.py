@@ -35,7 +35,7 @@ def _item_message(item: MissionItem, sequence: int, system_id: int, mission_type
 
 
 def renumbered(items: Sequence[MissionItem], by: int) -> list[MissionItem]:
-    """Items whose jumps lead to the same items when `by` others stand before them all."""
+    """The items with jump targets adjusted for `by` other items placed before all of them."""
     return [replace(i, param1=i.param1 + by) if i.command == _DO_JUMP and by else i for i in items]
 
 
@@ -50,15 +50,17 @@ async def upload(
     *,
     before: int = 0,
 ) -> None:
-    """Send a whole plan, numbered as the vehicle numbers it; anew from the start when a transfer gets stuck.
+    """Send a whole plan, numbered as the vehicle numbers it. A transfer that stalls is restarted from the
+    beginning.
 
     Args:
-        before: how many of the items are not the user's own (ArduPilot's home): an item that is refused is
-            numbered from 1 without them.
+        before: number of items that are not the user's own (ArduPilot's home). The error for a refused item
+            counts from 1 without them.
 
     Raises:
-        CommandRejected: the vehicle refused it; names the item where it says which.
-        VehicleTimeout: it stopped asking for items.
+        CommandRejected: the vehicle refused the plan; the message names the item when the vehicle reported
+            it.
+        VehicleTimeout: the vehicle stopped requesting items.
     """
     for sending in range(_SENDINGS):
         try:
@@ -113,7 +115,8 @@ async def _send_plan(
                     # "no transfer": it is over, and how it ended was lost
                     raise VehicleTimeout(f"how the vehicle took the {what} is not known; {vehicle.heard()}")
                 if reply.type in _GIVEN_UP and asked >= 0:
-                    # nothing was heard for long: PX4 (5 s) says so to the next item, ArduPilot (8 s) at once
+                    # long silence: PX4 (after 5 s) reports the timeout at the next item, ArduPilot (after 8
+                    # s) immediately
                     raise VehicleTimeout(
                         f"the vehicle gave the {what} up after {asked + 1} of {len(items)} items: "
                         f"{_result_name(reply.type)}; {vehicle.heard()}"
@@ -184,9 +187,9 @@ async def download(
 
 
 async def clear(vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION) -> None:
-    """Delete the plan the vehicle holds, and see that it is gone.
+    """Delete the plan that the vehicle holds, and verify that it is deleted.
 
-    An acknowledgement does not tell what it is for: one of an earlier upload may come late.
+    An acknowledgement does not state which request it answers: one of an earlier upload may arrive late.
     """
     what = _NAMES[mission_type]
     errors = 0

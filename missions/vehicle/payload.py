@@ -1,7 +1,7 @@
-"""What hangs on a vehicle beside the autopilot: camera, gimbal, survey magnetometer.
+"""The payload of a vehicle: camera, gimbal, survey magnetometer.
 
-Each is a MAVLink component of the vehicle's system with ids of its own (docs/fixed_wing.md). What they say is
-taken as it comes; nothing is sent but what is asked for.
+Each is a MAVLink component of the vehicle's system with its own component id (docs/fixed_wing.md). Their
+messages are used as they arrive; only requested messages are sent.
 """
 
 import math
@@ -20,7 +20,8 @@ GIMBAL_COMPONENT: Final = 154
 SURVEY_MAGNETOMETER_COMPONENT: Final = 158
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 
-_CONTROL_TOLD_US: Final = 3_000_000  # the gimbal manager tells by then who has the control
+# within this time the gimbal manager reports which component has the control
+_CONTROL_TOLD_US: Final = 3_000_000
 
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 _IN_EARTH_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
@@ -73,10 +74,10 @@ def detection(m: Any) -> Detection | None:
 
 
 def gimbal_attitude(m: Any) -> GimbalAttitude | None:
-    """From GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is none.
+    """The attitude from GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is invalid.
 
-    Roll and pitch are those against the horizon. Yaw is from north or from the vehicle's heading, as the
-    flags say; in gimbals older than those flags YAW_LOCK stands for north.
+    Roll and pitch are relative to the horizon. Yaw is relative to north or to the vehicle's heading, as the
+    flags specify; for gimbals older than those flags YAW_LOCK means north.
     """
     w, x, y, z = (float(value) for value in m.q)
     norm = math.sqrt(w * w + x * x + y * y + z * z)
@@ -95,7 +96,7 @@ class Payload:
     """The payload components of one vehicle.
 
     Args:
-        vehicle: whose.
+        vehicle: the vehicle that carries them.
     """
 
     def __init__(self, vehicle: "Vehicle") -> None:
@@ -144,10 +145,10 @@ class Payload:
         return self._vehicle.connection.listen(name, look)
 
     async def require(self, *components: int, timeout_s: float = 5.0) -> None:
-        """Wait until each of these components was heard.
+        """Wait until a message of each of these components was received.
 
         Raises:
-            VehicleTimeout: one was not; names it.
+            VehicleTimeout: a component was not received; the message names it.
         """
         vehicle = self._vehicle
         names = {
@@ -175,18 +176,18 @@ class Payload:
     # gimbal
 
     def gimbal_range_rad(self) -> tuple[float, float, float, float] | None:
-        """(lowest pitch, highest pitch, leftmost yaw, rightmost yaw) against the vehicle, by the gimbal
-        manager's information; None before it was told (`request_gimbal_information`).
+        """(lowest pitch, highest pitch, leftmost yaw, rightmost yaw) relative to the vehicle, reported by the
+        gimbal manager; None before it was received (`request_gimbal_information`).
         """
         vehicle = self._vehicle
         m = vehicle.connection.latest("GIMBAL_MANAGER_INFORMATION", vehicle.system_id, GIMBAL_COMPONENT)
         return None if m is None else (m.pitch_min, m.pitch_max, m.yaw_min, m.yaw_max)
 
     async def request_gimbal_information(self, timeout_s: float = 3.0) -> tuple[float, float, float, float]:
-        """Ask the gimbal manager for its range, and wait for it.
+        """Request the range from the gimbal manager, wait for it and return it as `gimbal_range_rad`.
 
         Raises:
-            VehicleTimeout: it does not say.
+            VehicleTimeout: the gimbal manager does not report it.
         """
         vehicle = self._vehicle
         self._command(
@@ -212,10 +213,11 @@ class Payload:
         )
 
     def gimbal_taken_by(self) -> tuple[int, int] | None:
-        """(system, component) of somebody else who has the primary control of the gimbal; None: nobody, or it
-        is not told.
+        """(system, component) of another component that has the primary control of the gimbal; None: no other
+        has it, or it is not reported.
 
-        By GIMBAL_MANAGER_STATUS. The gimbal takes no notice then of what this mission sends it.
+        From GIMBAL_MANAGER_STATUS. While another component has the control, the gimbal ignores this mission's
+        commands.
         """
         vehicle = self._vehicle
         m = vehicle.connection.latest("GIMBAL_MANAGER_STATUS", vehicle.system_id, GIMBAL_COMPONENT)

@@ -32,9 +32,10 @@ class VehicleStore(VehicleCommands):
     # missions
 
     async def upload_mission(self, items: Sequence[MissionItem]) -> int:
-        """Upload a plan; gives the wire number of its first item (1 for ArduPilot, whose item 0 is home).
+        """Upload a plan; returns the sequence number of its first item on the link (1 for ArduPilot, whose
+        item 0 is home).
 
-        It is flown from its first item on. Jumps name items by their index in `items`.
+        The flight starts at its first item. Jumps name items by their index in `items`.
         """
         first = 1 if self.adapter.first_mission_item_is_home else 0
         home = self.home

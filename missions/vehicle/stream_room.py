@@ -25,16 +25,17 @@ _LEFT_ALONE: Final = frozenset({"HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM
 
 
 async def make_room(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> list[str]:
-    """Look at what a serial line brings. When something needed comes too slowly, all that is not needed is
-    slowed down, and the rest asked for at the rates that are needed.
+    """Measure the message rates on a serial line. When a needed message is too slow, reduce the rates of all
+    messages that are not needed, and request the needed ones at the needed rates.
 
-    On other links nothing is done: they carry what is asked for, or do not tell what they carry.
+    On other links nothing is done: they have enough capacity for the requested messages, or their capacity is
+    not known.
 
     Args:
-        needed_hz: the rates of the messages that have to come.
+        needed_hz: needed rates by message name.
 
     Returns:
-        The messages that were slowed down.
+        The messages whose rates were reduced.
     """
     if vehicle.connection.bytes_per_s is None:
         return []

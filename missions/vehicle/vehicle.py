@@ -22,16 +22,17 @@ from missions.vehicle.guided import GuidedSession, SetpointSource
 
 _GROUND: Final = 1
 _ACCEPTED: Final = 0
-_REASONS_S: Final = 5.0  # at the end of a wait for readiness, in which the autopilot says what is missing
+# at the end of a wait for readiness: time in which the autopilot reports what is missing
+_REASONS_S: Final = 5.0
 _FARTHEST_M: Final = 10_000.0  # from home; beyond, latitude and longitude are more likely mistaken
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
 class Vehicle(FixedWingFlight):
-    """A vehicle over MAVLink, PX4 or ArduPilot: which one, its heartbeat says.
+    """A vehicle over MAVLink, PX4 or ArduPilot; its heartbeat identifies the firmware.
 
-    All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` says what was awaited and
-    what was heard. Heights are above home; local positions are NED metres from home.
+    All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` names what was awaited and what
+    was received. Heights are above home; local positions are NED metres from home.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -54,7 +55,7 @@ class Vehicle(FixedWingFlight):
     # beginning
 
     async def wait_heartbeat(self, timeout_s: float = 15.0) -> None:
-        """Wait for an autopilot to be heard; from then on its firmware and system id are known."""
+        """Wait for a heartbeat of an autopilot; from then on its firmware and system id are known."""
         await self.wait_until(
             lambda: self._adapter,
             what="heartbeat of a PX4 or ArduPilot autopilot",
@@ -90,10 +91,11 @@ class Vehicle(FixedWingFlight):
             await self._wait_readiness(ready, timeout_s)
 
     async def _wait_readiness(self, ready: Callable[[], bool], timeout_s: float) -> None:
-        """Wait; for the last seconds have the autopilot run its checks, so that it says what it lacks.
+        """Wait until the vehicle is ready. In the last seconds the autopilot is commanded to run its checks,
+        so that it reports what is missing.
 
         Raises:
-            VehicleTimeout: it is not ready; with the reasons that the autopilot reports.
+            VehicleTimeout: it is not ready; the message contains the reasons that the autopilot reported.
         """
 
         async def wait(seconds: float) -> None:
@@ -231,7 +233,7 @@ class Vehicle(FixedWingFlight):
     ) -> None:
         """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow.
 
-        For multicopters: an aircraft with wings can't be slow; see `loiter`.
+        For multicopters only; for a fixed wing use `loiter`.
 
         Raises:
             PlanError: the target is more than 10 km from home; nothing was sent.
@@ -353,7 +355,7 @@ class Vehicle(FixedWingFlight):
             await self.wait_disarmed(timeout_s)
 
     async def wait_landed(self, timeout_s: float = 300.0) -> None:
-        """Wait until the vehicle says it stands on the ground."""
+        """Wait until the vehicle reports that it is landed."""
         await self.wait_until(
             lambda: self.landed_state == _GROUND,
             what="landing",
@@ -364,9 +366,10 @@ class Vehicle(FixedWingFlight):
     # frames
 
     async def local_origin(self) -> GeodeticPosition:
-        """Where the autopilot's local frame (LOCAL_POSITION_NED, local setpoints) has its origin.
+        """The origin of the autopilot's local frame (LOCAL_POSITION_NED, local setpoints).
 
-        From GPS_GLOBAL_ORIGIN, or where a vehicle doesn't tell that, from positions in both frames.
+        It is taken from GPS_GLOBAL_ORIGIN or, when a vehicle doesn't report that, from positions in both
+        frames.
         """
         if self._local_origin is None:
             try:
@@ -416,7 +419,7 @@ class Vehicle(FixedWingFlight):
             raise
 
     async def _make_safe(self, action: Mode) -> None:
-        # heartbeats come once a second: a vehicle that was just armed doesn't say so yet
+        # Heartbeats come once a second: after arming, the newest heartbeat may still report disarmed.
         if self._adapter is not None and self.may_be_armed:
             await asyncio.shield(asyncio.ensure_future(self._command_safe(action)))
 
@@ -429,7 +432,8 @@ class Vehicle(FixedWingFlight):
             self.notes.left = f"was commanded to {mode} and did not answer"
             try:
                 await self.set_mode(mode, 5.0)
-            except LinkClosed:  # the vehicle may still hear us: what it was told first shall stand
+            # the vehicle may still receive our messages: it keeps the first action commanded
+            except LinkClosed:
                 return
             except MissionError:
                 continue

@@ -36,13 +36,13 @@ _SLOW_HEARTBEAT_HZ: Final = 0.7
 async def examine(
     address: Address, *, timeout_s: float, system_id: int | None, unix_time_us: int
 ) -> list[Finding]:
-    """All findings, in the order in which a person looks.
+    """Examine a vehicle; returns all findings, in the order of a manual inspection.
 
     Args:
-        unix_time_us: this machine's clock, when the examination begins.
+        unix_time_us: time of this machine's clock when the examination begins.
 
     Raises:
-        MissionError: no vehicle is heard.
+        MissionError: no vehicle is received.
         BridgeError: the link can't be opened.
     """
     begun_s = asyncio.get_running_loop().time()
@@ -57,7 +57,7 @@ async def examine(
             await client.wait_for(*wanted, timeout_s=_WAIT_S)
             return [*findings, *health_findings(client.snapshot()), problem("link", str(error), why)]
         await client.ask_for(wanted)
-        await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the reasons are told again
+        await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the reasons are reported again
         missing = await client.wait_for(*wanted, timeout_s=_WAIT_S)
         await asyncio.sleep(_TEXTS_S)
         try:
@@ -94,7 +94,9 @@ async def _fence_items(client: VehicleClient) -> int | None:
 
 
 async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
-    """What PX4's arming checks report by events; nothing where there are none, or MAVSDK has no names."""
+    """Findings from the events in which PX4 reports its arming checks; empty when there are no events, or
+    MAVSDK has no names for them.
+    """
     if snapshot.flavour != "px4":
         return []
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0

@@ -13,7 +13,7 @@ _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 
 
 async def information(client: VehicleClient) -> dict[str, Any]:
-    """Everything that `flightstack vehicle info` tells, as plain values; what is not known is None."""
+    """Everything that `flightstack vehicle info` prints, as plain values; None for unknown values."""
     wanted = WANTED.get(client.flavour, WANTED["px4"])
     await client.ask_for(wanted)
     version = float(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)

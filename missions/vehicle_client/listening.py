@@ -1,7 +1,7 @@
-"""Listening to a link with our own parser: who is there, and how much gets lost.
+"""Listening to a link with our own parser: the components on it, and the share of lost frames.
 
-MAVSDK hands messages over without their sequence numbers and keeps no count of losses, and it says nothing of
-what it hears of a link without an autopilot; both are told by the frames themselves.
+MAVSDK does not pass on sequence numbers, does not count losses, and reports nothing about a link without an
+autopilot. The frames themselves contain both.
 """
 
 import asyncio
@@ -20,20 +20,20 @@ SIGNED = (
     "it signs its messages, and may accept no message without its key; this command can't sign: use a link "
     "that takes unsigned frames (serial, USB), or clear the key"
 )
-"""Why a vehicle that is heard does not answer."""
+"""The reason why a vehicle does not answer although its messages are received."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkQuality:
-    """What came in over a while.
+    """The frames received in an interval.
 
     Attributes:
-        seconds: of listening.
-        frames, lost: good frames of the autopilot, and those missing in its sequence.
-        bytes_total, bytes_junk: received, and of those what was no frame.
-        rates_hz: of the autopilot's messages by name.
-        components: (system, component) heard.
-        signed: whether the autopilot signs what it says.
+        seconds: duration of listening.
+        frames, lost: valid frames of the autopilot, and frames missing in its sequence.
+        bytes_total, bytes_junk: bytes received, and bytes that belonged to no frame.
+        rates_hz: rates of the autopilot's messages, by name.
+        components: (system, component) pairs received.
+        signed: whether the autopilot signs its messages.
     """
 
     seconds: float
@@ -67,10 +67,10 @@ class LinkQuality:
 
 
 async def listen(address: Address, seconds: float, system_id: int | None = None) -> LinkQuality:
-    """Listen to a link of our own for so long, with heartbeats of a ground station.
+    """Open a link and listen for the given time, sending heartbeats as a ground station.
 
     Args:
-        system_id: of the autopilot whose frames count; None: the lowest heard.
+        system_id: system id of the autopilot whose frames are counted; None: the lowest received.
 
     Raises:
         BridgeError: the link can't be opened.

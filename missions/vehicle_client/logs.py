@@ -30,10 +30,10 @@ class VehicleLogs:
         self._plugin = LogFilesAsync(client.system)
 
     async def entries(self) -> list[Entry]:
-        """The logs the vehicle has, oldest first.
+        """Request the list of logs on the vehicle, oldest first.
 
         Raises:
-            MissionError: it doesn't tell.
+            MissionError: the vehicle does not report it.
         """
         try:
             found = await self._plugin.get_entries()
@@ -78,7 +78,7 @@ class VehicleLogs:
 
     @property
     def _armed(self) -> str:
-        """Why nothing came, if it is for that."""
+        """Reason why no log was received, if it is that the vehicle is armed."""
         base_mode = int(self._client.messages.get("HEARTBEAT", {}).get("base_mode", 0))
         return _ARMED if base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED else ""
 
@@ -128,7 +128,7 @@ def chosen(found: list[Entry], which: str) -> list[Entry]:
 
 
 def log_name(entry: Entry, head: bytes) -> str:
-    """A file name that tells number, date and, by its content, the format."""
+    """A file name that contains number, date and, from the content, the format."""
     suffix = next((s for magic, s in _HEADS if head.startswith(magic)), "")
     if not suffix:
         suffix = ".tlog" if len(head) > 8 and head[8] in _TLOG_MAGICS else ".log"

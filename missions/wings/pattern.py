@@ -22,10 +22,10 @@ _REACH_SAMPLES: Final = 1000
 
 
 def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -> float:
-    """Refuse a pattern that an aircraft can't fly; gives the turn radius it was checked for.
+    """Refuse a pattern that an aircraft can't fly; returns the turn radius that it was checked for.
 
     Raises:
-        PlanError: says what, and which option to change.
+        PlanError: names the reason and the option to change.
     """
     if options.period_s is not None:
         raise PlanError(

@@ -39,10 +39,10 @@ class PlaceOnPath:
         self._frame = LocalFrame(vehicle.home)
 
     def update(self) -> None:
-        """Look where the aircraft is now.
+        """Read the present position of the aircraft.
 
         Raises:
-            MissionError: it tells no position, or is not armed any more.
+            MissionError: it reports no position, or is no longer armed.
         """
         vehicle = self._vehicle
         p = vehicle.latest(telemetry.Position)

@@ -123,7 +123,7 @@ async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
 
 
 class _Stream:
-    """Setpoints by where the aircraft is along the route; tells the pattern's beginning and end."""
+    """Setpoints for the aircraft's place along the route; notes the beginning and the end of the pattern."""
 
     def __init__(
         self, vehicle: Vehicle, flight: PatternFlight, gains: PathRollParameters, effect: TurnEffect
