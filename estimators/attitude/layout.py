@@ -55,7 +55,7 @@ LIFT: Final = 30
 LIFT_SUM: Final = 31
 LIFT_WEIGHT: Final = 32
 CLIMB_WEIGHT: Final = 33
-"""First of the sums for the means from which lift and angle of attack are learned."""
+"""These sums belong to the means from which lift and angle of attack are learned."""
 DRAG: Final = 34
 """Drag acceleration of a multirotor per speed, 1/s."""
 SPEED_SQUARE: Final = 35

@@ -112,8 +112,8 @@ def _error(x: Array, p: Array, ax: float, ay: float, az: float) -> float:
         return p[par.REST_ERROR]
     steady = p[par.FLIGHT_ERROR]
     if x[at.FORM] == at.WING and not x[at.AIRSPEED] > 0.0:
-        # In a turn the force is along the wing's up axis at any bank; the error is what a usual airspeed
-        # would explain.
+        # In a turn the force is along the wing's up axis at any bank. Without an airspeed the resulting error
+        # is estimated with a typical airspeed.
         wx, wy, wz = x[at.SAMPLE_RATE], x[at.SAMPLE_RATE + 1], x[at.SAMPLE_RATE + 2]
         blind = min(_LOAD_MAX, math.sqrt(wx * wx + wy * wy + wz * wz) * _USUAL_AIRSPEED_M_S / GRAVITY_M_S2)
         return math.sqrt(steady * steady + blind * blind)
