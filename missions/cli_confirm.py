@@ -1,4 +1,4 @@
-"""The question before a flight with a real vehicle."""
+"""The confirmation before a flight with a real vehicle."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -18,7 +18,7 @@ def is_hardware(connections: Sequence[str]) -> bool:
     """Whether a link may lead to a real vehicle: serial, or a network beyond this machine.
 
     Raises:
-        AddressError: a connection string that is none.
+        AddressError: a connection string is invalid.
     """
     from autopilot_bridge.links import VEHICLE_FORMS, SerialPort, parse_address
     from autopilot_bridge.links.reach import Reach, reach_of

@@ -1,4 +1,4 @@
-"""`flightstack estimate`: an estimator on a live link, as a process of its own."""
+"""`flightstack estimate`: an estimator on a live link, in its own process."""
 
 import sys
 from pathlib import Path
@@ -25,7 +25,8 @@ class _Teller:
         self._shown = False
 
     def __call__(self, progress: "LiveProgress") -> None:
-        lacking = tuple(text.split(" at ")[0] for text in progress.lacking)  # rates change all the time
+        # rates change all the time and are not compared
+        lacking = tuple(text.split(" at ")[0] for text in progress.lacking)
         if lacking != self._told:
             self._told = lacking
             self.end()
@@ -39,7 +40,7 @@ class _Teller:
             self._shown = True
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the progress line."""
         if self._shown:
             click.echo("", err=True)
             self._shown = False

@@ -1,4 +1,4 @@
-"""What `flightstack fly` shows: a line of progress on a terminal, and at the end how the run went."""
+"""Output of `flightstack fly`: a progress line on a terminal, and the result of the run at the end."""
 
 import math
 import os
@@ -66,7 +66,7 @@ class ProgressLine:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """A block in which the screen belongs to something else: the line is wiped off, and not shown."""
+        """Context in which other code writes to the terminal: the progress line is erased and not shown."""
         if self._width:
             click.echo(f"\r{'':<{self._width}}\r", nl=False, err=True)
         self._width, self._held = 0, True
@@ -76,23 +76,24 @@ class ProgressLine:
             self._held = False
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the progress line."""
         if self._width:
             click.echo("", err=True)
             self._width = 0
 
 
 class Pace:
-    """Vehicle time against wall time over the last seconds."""
+    """Ratio of vehicle time to wall time over the last seconds."""
 
     def __init__(self) -> None:
         self._looks: deque[tuple[float, float]] = deque()
 
     def factor(self, wall_s: float, vehicle_s: float) -> float | None:
-        """Vehicle seconds in a wall second; None while too little is known.
+        """Vehicle seconds per wall second; None while too few values are known.
 
         Args:
-            wall_s, vehicle_s: now, by both clocks. When the vehicle's time is set anew, it begins anew.
+            wall_s, vehicle_s: present time of both clocks. When the vehicle's time is reset, the measurement
+                restarts.
         """
         looks = self._looks
         if looks and vehicle_s < looks[-1][1]:

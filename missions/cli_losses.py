@@ -1,4 +1,4 @@
-"""What a running SITL can't keep: the log, the signing keys, pictures."""
+"""Data that a running SITL could not write: the log, the signing keys, pictures."""
 
 import click
 
@@ -25,7 +25,7 @@ class Losses:
         self._tell(f"{why}; signing keys and times are kept in memory, a restart forgets them")
 
     def picture_lost(self, why: str) -> None:
-        """A photo, or the rest of a video."""
+        """A photo, or the rest of a video, could not be written."""
         self._tell(why)
 
     def _tell(self, text: str) -> None:

@@ -1,4 +1,4 @@
-"""What the vehicles of `flightstack sitl` carry and look for, from its options."""
+"""The payload and the targets of the vehicles of `flightstack sitl`, from its options."""
 
 import math
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What the commands that speak on links have in common: the option for a key, the warning without one."""
+"""Signing on the command line: the option for a key, and the warning when there is none."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def key_option(**attributes: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The option for a key."""
+    """Decorator for the option of a signing key."""
     return click.option(
         "--signing-key",
         type=click.Path(path_type=Path, dir_okay=False),
@@ -28,7 +28,7 @@ def key_from(path: Path | None) -> "SigningKey | None":
     """The key in the file that the option names; None without the option.
 
     Raises:
-        SigningKeyError: the file can't be read, or holds no key; the message names the file.
+        SigningKeyError: the file can't be read, or contains no key; the message names the file.
     """
     if path is None:
         return None

@@ -1,4 +1,4 @@
-"""`flightstack sitl`: vehicles for other people's clients."""
+"""`flightstack sitl`: simulated vehicles for external clients."""
 
 import contextlib
 import sys
@@ -26,7 +26,7 @@ _LOGGER = 255, 190  # MAV_COMP_ID_MISSIONPLANNER of a ground station
 
 
 def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
-    """Links from the options; none: the flavour's own are to be opened."""
+    """Links from the options; empty: the default links of the flavour are opened."""
     from autopilot_bridge.links import parse_address
     from autopilot_bridge.sitl import Port
 
@@ -52,7 +52,7 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
 
 
 def _request_streams() -> bytes:
-    """All of ArduPilot's streams, to every vehicle, at the rate that MAVProxy asks for."""
+    """Request for all of ArduPilot's streams from every vehicle, at the rate that MAVProxy requests."""
     from autopilot_bridge.mavlink import FrameEncoder, dialect
 
     request = dialect.MAVLink_request_data_stream_message(0, 0, dialect.MAV_DATA_STREAM_ALL, _LOG_RATE_HZ, 1)
@@ -70,7 +70,7 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
 
     recorder = PacketLog(path)
     for listener in world.record(recorder, losses.log_ended):
-        if autopilot == "ardupilot":  # which sends what it is asked for only
+        if autopilot == "ardupilot":  # it sends only what was requested
             listener.send(_request_streams())
     try:
         yield
@@ -262,7 +262,7 @@ def sitl(
                     turbulence=turbulence,
                 ),
                 seed=seed,
-                unix_epoch_us=unix_time_us(),  # its clients live by the calendar
+                unix_epoch_us=unix_time_us(),  # its clients use calendar time
             )
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)

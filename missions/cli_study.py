@@ -22,7 +22,7 @@ class _Bar:
         self._shown = -1
 
     def say(self, text: str) -> None:
-        """A line before it begins."""
+        """Print a line before the bar begins."""
         if self._terminal:
             click.echo(text, err=True)
 
@@ -34,7 +34,7 @@ class _Bar:
             click.echo(f"\r[{'#' * full}{'.' * (_BAR - full)}] {percent:3d} %", nl=False, err=True)
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the progress bar's line."""
         if self._shown >= 0:
             click.echo("", err=True)
 

@@ -1,4 +1,4 @@
-"""`flightstack vehicle params`: read, set, saved, loaded, compared."""
+"""`flightstack vehicle params`: list, get, set, save, load and compare parameters."""
 
 import fnmatch
 from collections.abc import Mapping
@@ -159,7 +159,8 @@ def compare(other: str, **given: Any) -> int:
         if other != "defaults":
             return differences(await read_all(client), read_untyped_parameter_file(Path(other)))
         found = differences(await read_all(client), _defaults(client), rounded=True)
-        return [d for d in found if d.vehicle is not None]  # our tables need not be the vehicle's
+        # our tables may contain parameters that the vehicle lacks
+        return [d for d in found if d.vehicle is not None]
 
     found = with_client(given, work)
     if given["as_json"]:

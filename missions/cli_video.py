@@ -1,4 +1,4 @@
-"""Options of `flightstack sitl` about the pictures of its cameras."""
+"""Options of `flightstack sitl` for the images of its cameras."""
 
 from collections.abc import Callable
 from pathlib import Path

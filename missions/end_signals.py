@@ -1,4 +1,4 @@
-"""The signals that ask a command to end: Ctrl-C, `kill` or a service manager, a terminal that is closed."""
+"""The signals that end a command: from Ctrl-C, `kill`, a service manager, or a closed terminal."""
 
 import signal
 import threading
@@ -23,10 +23,10 @@ def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:
 
 
 class EndSignalHandler(ABC):
-    """While it is entered, these signals are its own to handle.
+    """A context in which it handles these signals.
 
     Attributes:
-        always: handled whatever was done with them before, see `end_signals`.
+        always: signals that are handled even if they were ignored or had a handler, see `end_signals`.
     """
 
     always: ClassVar[tuple[signal.Signals, ...]] = ()
@@ -47,4 +47,4 @@ class EndSignalHandler(ABC):
 
     @abstractmethod
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        """One of them has come."""
+        """Handle one of the signals."""

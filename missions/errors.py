@@ -2,7 +2,7 @@
 
 
 class MissionError(Exception):
-    """A mission could not be done. The CLI prints the message and exits 1."""
+    """A mission failed. The CLI prints the message and exits 1."""
 
 
 class VehicleTimeout(MissionError):
@@ -15,7 +15,7 @@ class CommandRejected(MissionError):
     """The vehicle refused a command, a mission or a parameter.
 
     Attributes:
-        result: the MAV_RESULT or MAV_MISSION_RESULT it answered with.
+        result: the MAV_RESULT or MAV_MISSION_RESULT of the answer.
     """
 
     def __init__(self, message: str, result: int) -> None:
@@ -24,8 +24,8 @@ class CommandRejected(MissionError):
 
 
 class LinkClosed(MissionError):
-    """The link to the vehicle is gone."""
+    """The link to the vehicle is closed or lost."""
 
 
 class PlanError(ValueError):
-    """What was asked for can't be flown; found before flying. The CLI prints the message and exits 2."""
+    """The request can't be flown, found before the flight. The CLI prints the message and exits 2."""

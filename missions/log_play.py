@@ -1,4 +1,4 @@
-"""Plays a telemetry log to a link, as if the vehicle were there."""
+"""Plays a telemetry log to a link, like a connected vehicle."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,7 +14,8 @@ from estimators.logs.raw_records import positions, read_records
 MIN_SPEED: Final = 0.1
 _MOMENT_US: Final = 20_000
 _IDLE_MOMENTS: Final = 10
-_LONGEST_WAIT_US: Final = 200_000  # of log time, so that the link is looked after and progress is shown
+# of log time; the link is serviced and progress is shown at least this often
+_LONGEST_WAIT_US: Final = 200_000
 
 
 @dataclass(slots=True)
@@ -96,14 +97,14 @@ def play(
 
 
 def _wait() -> None:
-    """A moment of wall time, for what a link does at its own pace."""
+    """Wait a short wall time for the link's own work."""
     clock = RealTimeClock()
     clock.wait_until(0)
     clock.wait_until(_MOMENT_US)
 
 
 def _drain(link: Link) -> None:
-    """Let a slow stream take what it was sent, as long as it takes anything."""
+    """Let a slow stream transmit the queued data, as long as it makes progress."""
     counters = link.counters
     idle = 0
     while idle < _IDLE_MOMENTS and link.peers:

@@ -1,4 +1,4 @@
-"""What every mission is."""
+"""The base class of all missions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class Debriefing:
 
 
 def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "FlightScore"], str]) -> str:
-    """The verdicts on all vehicles of a flight in one sentence; "" if all have flown what was commanded."""
+    """The verdicts on all vehicles of a flight in one sentence; "" if all have flown the commanded paths."""
     told = {notes.system_id: verdict(notes, score) for notes, score in debriefing.flights}
     if len(told) == 1:
         return next(iter(told.values()))
@@ -91,9 +91,9 @@ class Mission(Generic[AnyOptions]):
         return options.for_vehicle(limits)
 
     def check(self, options: AnyOptions, limits: Limits) -> None:
-        """Refuse, with a PlanError, what one vehicle can't fly.
+        """Raise PlanError if one vehicle can't fly the mission.
 
-        Before anything is started, and again when its own limits are known.
+        Called before anything is started, and again when the vehicle's own limits are known.
         """
 
     def check_place(self, options: AnyOptions, limits: Limits, home: "GeodeticPosition") -> None:
@@ -103,7 +103,9 @@ class Mission(Generic[AnyOptions]):
         """
 
     def scenario(self, options: AnyOptions, setting: Setting) -> Scenario:
-        """What an embedded world must hold beside the vehicles; not asked for vehicles elsewhere."""
+        """The objects besides the vehicles that an embedded world must contain; not called for other
+        vehicles.
+        """
         return Scenario()
 
     async def outline(self, vehicle: "Vehicle", options: AnyOptions) -> "Outline | None":
@@ -111,7 +113,7 @@ class Mission(Generic[AnyOptions]):
         return None
 
     async def plan_items(self, vehicle: "Vehicle", options: AnyOptions) -> "Sequence[MissionItem]":
-        """What would be uploaded to one vehicle, which is ready to arm, for mission files.
+        """The mission items that would be uploaded to one vehicle, which is ready to arm; for mission files.
 
         Raises:
             PlanError: this mission is not flown by uploaded waypoints.
@@ -119,11 +121,11 @@ class Mission(Generic[AnyOptions]):
         raise PlanError(f"mission {self.name} is not flown by uploaded waypoints; there is no file of it")
 
     async def fly(self, vehicle: "Vehicle", options: AnyOptions) -> None:
-        """Fly one vehicle, which is ready to arm, from the ground back to the ground."""
+        """Fly one vehicle, which is ready to arm, including takeoff and landing."""
         raise PlanError(f"mission {self.name} flies no single vehicle")
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[AnyOptions]) -> None:
-        """Fly all vehicles of a team, each ready to arm; called instead of `fly` when `together`."""
+        """Fly all vehicles of a team, each ready to arm; called instead of `fly` if `together` is set."""
         raise PlanError(f"mission {self.name} flies no team")
 
     def estimator_settings(self, options: AnyOptions) -> Mapping[str, float]:

@@ -55,7 +55,7 @@ class FaultKind(StrEnum):
     STUCK = "stuck"
     """The value at the beginning of the fault is repeated."""
     GARBAGE = "garbage"
-    """Random values of the field, up to VALUE."""
+    """Random values between -VALUE and VALUE."""
     WRONG = "wrong"
     """VALUE is added."""
     DRIFT = "drift"

@@ -1,4 +1,4 @@
-"""A target's place, fused from what a team of drones sees of it (seed 000)."""
+"""A target's place, fused from the detections of a team of drones (seed 000)."""
 
 from estimators.target_fusion.estimate import TargetEstimate
 from estimators.target_fusion.estimator import TargetFusionEstimator

@@ -1,4 +1,4 @@
-"""An embedded SITL: the world in this process, on virtual time, one memory link per vehicle."""
+"""An embedded SITL: the simulated world in this process, on virtual time, one memory link per vehicle."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -129,7 +129,7 @@ class EmbeddedSitl:
 
     @property
     def home(self) -> GeodeticPosition:
-        """Where the vehicles stand."""
+        """The home of the vehicles."""
         place = self.sitl.configuration.place
         return GeodeticPosition(lat_deg=place.lat_deg, lon_deg=place.lon_deg, alt_m=place.alt_m)
 
@@ -139,7 +139,7 @@ class EmbeddedSitl:
         return self.sitl.time_us
 
     def on_truth(self, listener: TruthListener) -> None:
-        """Have frames of truth delivered at 50 Hz, for the log and the score."""
+        """Subscribe to frames of truth at 50 Hz, for the log and the score."""
         self.sitl.on_truth(listener)
 
     def close(self) -> None:
@@ -163,6 +163,6 @@ def model_kind(model: str | Path) -> VehicleKind:
     """Class of vehicle of a model.
 
     Raises:
-        ValueError: no such model.
+        ValueError: the model does not exist.
     """
     return VehicleKind(load_airframe(model).kind.value)

@@ -133,7 +133,7 @@ class _Process:
         )
 
     def stop(self) -> None:
-        """End the run soon."""
+        """Request the end of the run."""
         self.stopped = True
         self._stop.set()
 
@@ -143,7 +143,7 @@ class _Process:
         return self._watch.starvation
 
     def figures(self) -> dict[str, Any]:
-        """What became of the bytes of the link, and what was sent."""
+        """Figures about the bytes of the link and the sent messages."""
         return {
             "bytes_received": self._link.counters.bytes_in,
             "bytes_junk": self.connection.parsers.counters.bytes_junk,
@@ -155,7 +155,7 @@ class _Process:
         request, clock, tap = self._request, self._clock, self._tap
         async with self.connection:
             heard, heard_wall_s = 0, wall_time_s()
-            first_us: int | None = None  # when the vehicle was first heard, or first told its time
+            first_us: int | None = None  # when the vehicle, or its time, was first received
             timed = False
             while not self.stopped:
                 wall_s = wall_time_s()
@@ -190,10 +190,11 @@ class _Process:
                 due_s = wall_time_s() + wait_s
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), wait_s)
-                heard_wall_s += max(0.0, wall_time_s() - due_s)  # who sleeps late hears nothing meanwhile
+                # time in which this process was delayed is not silence
+                heard_wall_s += max(0.0, wall_time_s() - due_s)
 
     def _vehicles(self) -> tuple[int, ...]:
-        """System ids of the vehicles that count: the one asked for, the one it is for, or all of a team."""
+        """System ids of the vehicles to use: the one specified, the one received first, or all of a team."""
         heard = tuple(self._tap.autopilots)
         if self._fleet.team:
             return heard
@@ -202,7 +203,7 @@ class _Process:
         return tuple(self._fleet.runners) or heard[:1]
 
     def _meet(self) -> None:
-        """Speak as a part of the vehicle, once it is known which."""
+        """Use the vehicle's system id as sender id, once it is known."""
         vehicles = self._vehicles()
         if not self._met and vehicles and not self._fleet.team:
             self.connection.speak_as(vehicles[0], self._request.component_id)
@@ -222,7 +223,7 @@ class _Process:
             self._clock.observe(time_us)
 
     def _look(self, now_us: int) -> None:
-        """Measure rates, and ask for more where they are too low."""
+        """Measure rates, and request higher ones if they are too low."""
         if now_us < self._look_us:
             return
         self._look_us = now_us + round(CHECK_PERIOD_S * 1e6)
@@ -296,7 +297,7 @@ def estimate(
             recorder.close()
     finally:
         link.close()
-    # A full disk may refuse no more than the last of the log.
+    # A full disk may show only when the last part of the log is written.
     reason = process.reason or recorder.failure or process.starvation
     interrupted = process.stopped and request.duration_s is not None
     return report(
@@ -317,6 +318,6 @@ def estimate(
 
 
 def _end_on_signals(loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> None:
-    """Ctrl-C, SIGTERM and SIGHUP end the run in good order, until the loop is closed."""
+    """Make Ctrl-C, SIGTERM and SIGHUP end the run normally, until the loop is closed."""
     for number in end_signals(signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop)

@@ -71,12 +71,12 @@ class EstimatorTap:
             self.failure = str(failure)
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
-        """Record a frame of truth: not for estimators, but it has its place in the order of the log."""
+        """Record a frame of truth. It is not passed to estimators, but is placed in the order of the log."""
         self.record(frame, time_us)
 
 
 def _frame(raw: bytes) -> Frame:
-    """A frame from bytes that a parser has checked already, or that an encoder has made."""
+    """A frame from bytes that a parser has already checked, or that an encoder has created."""
     if raw[0] == _MAGIC_V2:
         return Frame(raw, raw[7] | raw[8] << 8 | raw[9] << 16, raw[5], raw[6], raw[4], 2, bool(raw[2] & 1))
     return Frame(raw, raw[5], raw[3], raw[4], raw[2], 1)
@@ -105,10 +105,10 @@ class Publisher:
         self.sent = 0
 
     def on_estimate(self, runner: Runner, time_us: int) -> None:
-        """A runner has a new estimate at a vehicle time.
+        """Send a runner's new estimate at a vehicle time, if the rate permits.
 
         Raises:
-            EstimatorFailure: the estimator raised an error, or what it gave is no message.
+            EstimatorFailure: the estimator raised an error, or returned something that is not a message.
         """
         system_id = runner.system_id or 0
         due_us = self._due_us.get(system_id)
