@@ -1,4 +1,4 @@
-"""How a mission declares what it takes from the command line."""
+"""Declaration of the command-line options of a mission."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from missions.options import MissionOptions
 
 Given = Mapping[str, Any]
-"""Values of the command line's options by name, with _ for -."""
+"""Values of the command line's options by name, with _ in place of -."""
 
 
 MISSION_GROUP: Final = "The mission's own"
@@ -19,7 +19,7 @@ MISSION_GROUP: Final = "The mission's own"
 
 
 class Scope(StrEnum):
-    """Which flights an option has an effect on."""
+    """The flights on which an option has an effect."""
 
     ANY = "any"
     EMBEDDED = "embedded"
@@ -67,7 +67,7 @@ class MissionCommand:
     fields: Mapping[str, tuple[str, ...]]
 
     def chosen_fields(self, chosen: frozenset[str]) -> frozenset[str]:
-        """Fields of the mission's options that were chosen on the command line."""
+        """Fields of the mission's options that the user specified on the command line."""
         found: set[str] = set()
         for name in chosen:
             found.update(
@@ -77,6 +77,6 @@ class MissionCommand:
 
 
 def option(*declarations: str, **attributes: Any) -> FlightOption:
-    """An option of a mission, with its default shown."""
+    """An option of a mission; its default is shown in the help."""
     show_default = attributes.pop("show_default", True)
     return FlightOption(declarations, group=MISSION_GROUP, show_default=show_default, **attributes)

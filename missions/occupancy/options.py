@@ -1,4 +1,4 @@
-"""What a person can choose about an occupancy-map search."""
+"""Options of an occupancy-map search."""
 
 import math
 from dataclasses import dataclass, replace
@@ -16,12 +16,12 @@ from missions.planning.limits import FixedWingLimits, Limits
 
 LARGEST_SIDE_M: Final = 50_000.0
 LEAST_SIGMAS: Final = 3.0
-"""Threshold over noise: below, noise alone makes anomalies."""
+"""Smallest ratio of threshold to noise; below it, noise alone exceeds the threshold."""
 
 LARGEST_DEPTH_M: Final = 1000.0
-_USUAL_ERROR_NT: Final = 1.0  # of a map that states none
+_USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
 _USUAL_LINES_M: Final = 200.0
-_SHARE_OF_LINES: Final = 0.5  # of their distance: over it the error of a map is alike
+_SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
 _PENALTY_OF_WINGS: Final = 0.2
 _PENALTY_OF_MULTICOPTERS: Final = 0.05
 _MULTICOPTER_M_S: Final = 10.0
@@ -124,7 +124,7 @@ class OccupancyOptions(MissionOptions):
             raise PlanError(
                 f"--depth {self.depth_m:g} m of the target is not within {LARGEST_DEPTH_M:g} m of home"
             )
-        layout = self.layout  # these refuse what makes no search
+        layout = self.layout  # these constructors refuse impossible values
         _ = self.search_parameters, self.decision_parameters
         if self.target_ne_m is not None and not layout.contains(*self.target_ne_m):
             raise PlanError(
@@ -142,7 +142,7 @@ class OccupancyOptions(MissionOptions):
 
     @property
     def search_parameters(self) -> SearchParameters:
-        """How the team searches."""
+        """Parameters of the team's search."""
         return SearchParameters(
             detection=DetectionModel(
                 probability_overhead=self.detection_probability, range_m=self.detection_range_m
@@ -153,7 +153,9 @@ class OccupancyOptions(MissionOptions):
         )
 
     def map_error(self, survey_map: SurveyMap) -> MapError:
-        """Error of a published map: what was chosen, else what the map states, else a careful survey's."""
+        """Error of a published map: specified by the user, else stated by the map, else that of a careful
+        survey.
+        """
         stated_nt = survey_map.error_nt if self.map_error_nt is None else self.map_error_nt
         spacing_m = survey_map.line_spacing_m or _USUAL_LINES_M
         return MapError(
@@ -163,7 +165,7 @@ class OccupancyOptions(MissionOptions):
 
     @property
     def decision_parameters(self) -> DecisionParameters:
-        """This vehicle's habits."""
+        """Parameters of this vehicle's decisions."""
         penalty = _PENALTY_OF_WINGS if self.heading_penalty is None else self.heading_penalty
         return DecisionParameters(neighbourhood=self.neighbourhood, heading_penalty=penalty)
 
@@ -187,11 +189,11 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
     """Refuse what one vehicle of the team can't fly.
 
     Args:
-        options: adapted to the vehicle.
-        limits: of the vehicle, in the wind to plan for.
+        options: options adapted to the vehicle.
+        limits: limits of the vehicle, with the wind to plan for.
 
     Raises:
-        PlanError: it names the option to change.
+        PlanError: names the option to change.
     """
     limits.check_separation(options.separation_m, options.vehicles)
     limits.check_altitude(options.own_altitude_m)

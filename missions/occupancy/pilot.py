@@ -1,4 +1,6 @@
-"""One searcher's flying: which cell next, when it is reached, the heading that leads there. No I/O."""
+"""The flight of one searcher: the next cell, the check whether it is reached, and the heading to it.
+No I/O.
+"""
 
 import math
 from dataclasses import dataclass
@@ -6,10 +8,10 @@ from typing import Final
 
 from missions.occupancy.search import Search
 
-_REACHED: Final = 0.35  # of a cell: this near to its centre it counts as reached
-_SLOWEST_M_S: Final = 3.0  # over ground; below, the nose is the course
-_WIND_SHARE: Final = 0.9  # of the airspeed; a cross wind beyond can't be held
-_PATIENCE_S: Final = 12.0  # for the turn, in the time a leg may take
+_REACHED: Final = 0.35  # of a cell: within this distance of its centre it counts as reached
+_SLOWEST_M_S: Final = 3.0  # ground speed, below which the yaw is used as the course
+_WIND_SHARE: Final = 0.9  # of the airspeed; a stronger cross wind cannot be compensated
+_PATIENCE_S: Final = 12.0  # time for the turn, added to the time limit of a leg
 
 
 def heading_for_course(course_rad: float, airspeed_m_s: float, wind_ne_m_s: tuple[float, float]) -> float:
@@ -52,12 +54,12 @@ class Motion:
 
     @property
     def ground_speed_m_s(self) -> float:
-        """Speed over ground."""
+        """Ground speed."""
         return math.hypot(*self.vel_ne_m_s)
 
     @property
     def course_rad(self) -> float:
-        """Direction over ground; when nearly at rest, where the nose points."""
+        """Course over ground; when nearly at rest, the yaw."""
         if self.ground_speed_m_s < _SLOWEST_M_S:
             return self.yaw_rad
         return math.atan2(self.vel_ne_m_s[1], self.vel_ne_m_s[0])
@@ -82,16 +84,16 @@ class Pilot:
     """Flies one searcher: to its start, then from cell to cell.
 
     Attributes:
-        commands: every heading commanded, in time.
+        commands: all commanded headings, in the order of time.
     """
 
     def __init__(self, search: Search, searcher: int, *, start_ne_m: tuple[float, float]) -> None:
-        """Begin.
+        """Initialise the pilot.
 
         Args:
-            search: of the team.
-            searcher: which of it.
-            start_ne_m: where its part of the search begins.
+            search: the team's search.
+            searcher: number of the searcher in the team.
+            start_ne_m: place at which its part of the search begins.
         """
         self.commands: list[HeadingCommand] = []
         self._search = search
@@ -102,7 +104,7 @@ class Pilot:
         self._deadline_us = 0
 
     def update(self, motion: Motion) -> HeadingCommand | None:
-        """Take the newest telemetry; a command when the next leg begins, else None."""
+        """Process the newest telemetry; returns a command when the next leg begins, else None."""
         if self._goal_ne_m is None:
             return self._fly_to(self._start_ne_m, motion)
         if not self._done(self._goal_ne_m, motion):
@@ -113,7 +115,7 @@ class Pilot:
         return self._fly_to(self._search.map.layout.centre_of(decision.cell), motion)
 
     def _done(self, goal_ne_m: tuple[float, float], motion: Motion) -> bool:
-        """Whether a goal is reached, abeam, or out of time."""
+        """Whether a goal is reached or abeam, or its time limit has passed."""
         to_n, to_e = goal_ne_m[0] - motion.north_m, goal_ne_m[1] - motion.east_m
         leg_n, leg_e = goal_ne_m[0] - self._from_ne_m[0], goal_ne_m[1] - self._from_ne_m[1]
         reached = math.hypot(to_n, to_e) <= _REACHED * self._search.map.layout.cell_m

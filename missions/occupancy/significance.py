@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LEAST_RATIO: Final = 4.0
-"""Signal-to-noise ratio that makes an anomaly; the bank of bumps is some 150 templates, partly alike."""
+"""Smallest signal-to-noise ratio of an anomaly; the bank of bumps has about 150 templates, some of them
+similar.
+"""
 
 _WIDTHS_M: Final = (
     90.0,
@@ -25,7 +27,7 @@ _WIDTHS_M: Final = (
     180.0,
 )  # bumps (1 + r^2 / w^2)^(-5/2): a dipole's decay, or a Gaussian of w / sqrt(5)
 _OFFSETS_M: Final = np.linspace(-120.0, 120.0, 7)
-_UNKNOWN_LEVEL: Final = 10.0  # standard deviation of the level, in errors of a reading
+_UNKNOWN_LEVEL: Final = 10.0  # standard deviation of the level, in multiples of a reading's error
 
 
 def signal_to_noise(
@@ -41,10 +43,10 @@ def signal_to_noise(
 
     Args:
         north_m, east_m: (n,) places of the readings, some 10 m apart.
-        difference_nt: (n,) readings less map, with any level.
+        difference_nt: (n,) readings minus map, with any level.
         noise_nt: standard deviation of a reading, white.
         map_error_nt: standard deviation of the map.
-        correlation_m: distance over which the map's error is alike (exponential).
+        correlation_m: correlation distance of the map's error (exponential).
     """
     apart_m = np.hypot(north_m[:, None] - north_m, east_m[:, None] - east_m)
     level_nt = _UNKNOWN_LEVEL * np.hypot(noise_nt, map_error_nt)

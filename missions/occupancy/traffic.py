@@ -19,28 +19,28 @@ class Traffic:
     """
 
     def __init__(self, heights_m: Sequence[float]) -> None:
-        """Begin on the ground.
+        """Initialise with all vehicles on the ground.
 
         Args:
-            heights_m: each vehicle's layer, above one common ground.
+            heights_m: height of each vehicle's layer above a common ground.
         """
         self._heights_m = tuple(heights_m)
         self._states = [_State() for _ in self._heights_m]
 
     def checked(self, index: int) -> None:
-        """A vehicle has passed the checks before takeoff."""
+        """Note that a vehicle has passed the checks before takeoff."""
         self._states[index].checked = True
 
     def risen(self, index: int) -> None:
-        """A vehicle is in its layer."""
+        """Note that a vehicle has reached its layer."""
         self._states[index].risen = True
 
     def down(self, index: int) -> None:
-        """A vehicle is on the ground again."""
+        """Note that a vehicle has landed."""
         self._states[index].down = True
 
     def may_rise(self, index: int) -> bool:
-        """Whether all layers above are taken, or left again."""
+        """Whether all higher layers are occupied, or have been left again."""
         return all(state.checked for state in self._states) and all(
             self._states[other].risen for other in self._higher(index)
         )
@@ -54,6 +54,6 @@ class Traffic:
         )
 
     def _higher(self, index: int) -> list[int]:
-        """Those in layers above; of equal heights the later vehicle counts as higher."""
+        """Vehicles in higher layers; of equal heights the later vehicle counts as higher."""
         own = (self._heights_m[index], index)
         return [k for k, height_m in enumerate(self._heights_m) if (height_m, k) > own]

@@ -1,4 +1,4 @@
-"""From a place in the image to a direction over ground and back (paper 004, equations 36 to 40).
+"""Conversion of a place in the image to a direction over ground and back (paper 004, equations 36 to 40).
 
 Frames: camera (x to the right of the image, y down, z along the optical axis), gimbal (x along the optical
 axis, y right, z down), body (FRD), NED. The paper's level frame is NED turned by the heading; here NED itself
@@ -17,8 +17,8 @@ class LineOfSight:
     """A direction from the aircraft.
 
     Attributes:
-        bearing_rad: clockwise from north.
-        depression_rad: below the horizon, positive down.
+        bearing_rad: bearing, clockwise from north.
+        depression_rad: angle below the horizon, positive down.
     """
 
     bearing_rad: float
@@ -26,7 +26,7 @@ class LineOfSight:
 
     @classmethod
     def along(cls, ned: Vector) -> "LineOfSight":
-        """Of a vector in NED."""
+        """The direction of a vector in NED."""
         return cls(
             bearing_rad=math.atan2(ned[1], ned[0]), depression_rad=math.atan2(ned[2], math.hypot(*ned[:2]))
         )
@@ -66,5 +66,5 @@ def line_of_sight_of_gimbal(
 
 
 def pointing_angles(offset_ned_m: Vector, q_ned_from_frd: Quaternion) -> tuple[float, float]:
-    """(azimuth, elevation), rad, of the gimbal that looks at a place `offset_ned_m` from the aircraft."""
+    """(azimuth, elevation), rad, of a gimbal that points at a place `offset_ned_m` from the aircraft."""
     return gimbal_angles(rotate(conjugate(q_ned_from_frd), offset_ned_m))
