@@ -1,6 +1,4 @@
-"""The flight of one searcher: the next cell, the check whether it is reached, and the heading to it.
-No I/O.
-"""
+"""The flight of one searcher: its next cell, the check whether that is reached, and the heading to it."""
 
 import math
 from dataclasses import dataclass

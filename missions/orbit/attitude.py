@@ -33,9 +33,7 @@ class AutopilotAttitude:
         self._kept: deque[tuple[int, Quaternion]] = deque(maxlen=_KEPT)
 
     def add(self, attitude: Attitude) -> bool:
-        """Add one message; returns False when it is not newer than the newest, or contains no valid
-        attitude.
-        """
+        """Add one message; returns False when it is not newer than the newest, or not a valid attitude."""
         if self._kept and attitude.time_us <= self._kept[-1][0]:
             return False
         if not math.isfinite(attitude.roll_rad + attitude.pitch_rad + attitude.yaw_rad):

@@ -109,8 +109,8 @@ class GpsSwitch:
 
 
 async def _refusal(vehicle: Vehicle) -> str:
-    """The reason why the vehicle refuses to inject failures; "" when it accepts. The request is for a working
-    GPS.
+    """The reason why the vehicle refuses to inject failures; "" when it accepts. The request uses failure
+    type OK.
     """
     try:
         result = await vehicle.try_command(_INJECT, float(_GPS), float(dialect.FAILURE_TYPE_OK), 0.0)

@@ -1,4 +1,4 @@
-"""Observation of the target: attitude and images go to the tracker, and the gimbal is pointed at the
+"""Observation of the target: passes attitude and images to the tracker, and points the gimbal at the
 target.
 """
 

@@ -65,8 +65,8 @@ class RelativeState:
 
     Attributes:
         time_us: vehicle time.
-        offset_ne_m: from the aircraft to the target.
-        offset_rate_ne_m_s: its rate: velocity of the target against the aircraft.
+        offset_ne_m: offset from the aircraft to the target.
+        offset_rate_ne_m_s: rate of the offset: velocity of the target relative to the aircraft.
         offset_std_m: standard deviation of the offset, the larger axis.
     """
 
@@ -77,10 +77,11 @@ class RelativeState:
 
 
 class RelativeTarget:
-    """The filter. Air velocities come in time order (`move`); a line of sight may be up to a second late.
+    """The filter. Air velocities must come in the order of time (`move`); a line of sight may be up to a
+    second late.
 
     Args:
-        parameters: noise.
+        parameters: noise parameters.
     """
 
     def __init__(self, parameters: RelativeTargetParameters | None = None) -> None:
@@ -101,7 +102,7 @@ class RelativeTarget:
 
     @property
     def drift_ne_m_s(self) -> tuple[float, float]:
-        """Velocity of the target against the air."""
+        """Velocity of the target relative to the air."""
         return float(self._x[2]), float(self._x[3])
 
     def start(
@@ -128,7 +129,7 @@ class RelativeTarget:
         self._known = True
 
     def move(self, time_us: int, air_velocity_ne_m_s: tuple[float, float]) -> None:
-        """Go on to a time, at which the aircraft moves through the air like this."""
+        """Advance to a time, with the aircraft's velocity through the air."""
         if not self._known or time_us <= self._time_us:
             self._air = air_velocity_ne_m_s
             return
@@ -150,12 +151,12 @@ class RelativeTarget:
         self._path.append((time_us, n0 + north, e0 + east))
 
     def see(self, time_us: int, line: LineOfSight, height_m: float) -> bool:
-        """Take a line of sight at the time of its image; False when it is not of this target.
+        """Fuse a line of sight at the time of its image; returns False when it is not of this target.
 
         Args:
-            time_us: of the image.
-            line: where it was.
-            height_m: of the aircraft over the target's ground.
+            time_us: time of the image.
+            line: measured line of sight.
+            height_m: height of the aircraft over the target's ground.
         """
         found = self._innovation(time_us, line, height_m)
         if found is None:
@@ -173,7 +174,7 @@ class RelativeTarget:
         return True
 
     def distance_squared(self, time_us: int, line: LineOfSight, height_m: float) -> float:
-        """Normalized innovation squared of a line of sight: how far it is from what is expected."""
+        """Normalized innovation squared of a line of sight."""
         found = self._innovation(time_us, line, height_m)
         return math.inf if found is None else float(found[0] @ found[3] @ found[0])
 
@@ -186,7 +187,7 @@ class RelativeTarget:
         if flown is None:
             return None
         late_s = (self._time_us - time_us) * 1e-6
-        # the offset when the image was taken: what has been flown since is undone
+        # the offset at the time of the image: the distance flown since is subtracted
         north = self._x[0] - late_s * self._x[2] + flown[0]
         east = self._x[1] - late_s * self._x[3] + flown[1]
         rho = max(_LEAST_OFFSET_M, math.hypot(north, east))
@@ -207,14 +208,16 @@ class RelativeTarget:
         h[:, OFFSET] = to_offset
         h[:, DRIFT] = -late_s * to_offset
         sigma2 = self.parameters.angle_rad**2
-        # near the vertical a bearing means little
+        # near the vertical the bearing is not meaningful
         noise = np.diag((sigma2 * slant2 / rho**2, sigma2))
         s = h @ self._p @ h.T + noise
         inverse: Array = np.asarray(np.linalg.inv(s), dtype=np.float64)
         return innovation, h, s, inverse
 
     def _flown_since(self, time_us: int) -> tuple[float, float] | None:
-        """Way through the air from a time to now, (north, east) m; None when it is too long ago."""
+        """Distance flown through the air since a time, (north, east) m; None when that time is too
+        long ago.
+        """
         last = self._path[-1]
         if time_us >= last[0]:
             dt = (time_us - last[0]) * 1e-6
@@ -231,7 +234,7 @@ class RelativeTarget:
         return None
 
     def state(self, time_us: int) -> RelativeState:
-        """The estimate at a time from now on, at the present velocity through the air."""
+        """The estimate at the present or a later time, at the present velocity through the air."""
         ahead_s = (time_us - self._time_us) * 1e-6
         rate = (float(self._x[2]) - self._air[0], float(self._x[3]) - self._air[1])
         return RelativeState(

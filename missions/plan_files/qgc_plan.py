@@ -130,7 +130,7 @@ def _note_id(entry: Mapping[str, Any], index: int, index_of_id: dict[int, int]) 
 
 
 def _with_index(item: MissionItem, index_of_id: Mapping[int, int], index: int, refuse: Refuse) -> MissionItem:
-    """A jump with its target as an index instead of a doJumpId."""
+    """A jump whose target is an index instead of a doJumpId."""
     if item.command != DO_JUMP:
         return item
     target = index_of_id.get(int(item.param1)) if math.isfinite(item.param1) else None

@@ -1,4 +1,4 @@
-"""What no vehicle could fly of a mission file, found before anything is started."""
+"""Finds the parts of a mission file that no vehicle could fly, before anything is started."""
 
 import math
 from typing import Final
@@ -16,7 +16,7 @@ from missions.errors import PlanError
 from missions.plan_files.document import DO_JUMP, FLOWN_TO, NAV_LAND, NAV_TAKEOFF, MissionDocument
 
 MAX_ITEMS: Final = 5000
-"""More than any flight controller stores."""
+"""More items than any flight controller stores."""
 
 _HIGHEST_M: Final = 50_000.0
 _HERE_IF_UNSET: Final = frozenset({NAV_TAKEOFF, NAV_LAND})

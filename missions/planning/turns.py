@@ -1,4 +1,6 @@
-"""Whether an aircraft that can't stop can follow a curve: its bends against the tightest turn."""
+"""Checks whether an aircraft that can't stop can follow a curve: compares its bends with the tightest
+turn.
+"""
 
 import math
 from typing import Final
@@ -12,7 +14,8 @@ from missions.planning.corners import corner_reach_m
 from missions.planning.limits import FixedWingLimits
 
 _SAMPLES: Final = 20_000
-_ROLL_S: Final = 1.0  # to roll from level into the steepest turn, with the time the roll takes to begin
+# time to roll from level into the steepest turn, including the delay before the roll begins
+_ROLL_S: Final = 1.0
 _SAME: Final = 1e-3
 _SHARPEST_RAD: Final = math.radians(170.0)
 
@@ -24,12 +27,12 @@ def smallest_radius_m(curve: Curve) -> float:
 
 
 def roll_in_m(airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Distance flown over ground while rolling into a turn, at most."""
+    """Largest distance flown over ground while rolling into a turn."""
     return (limits.true_airspeed_m_s(airspeed_m_s) + limits.wind_m_s) * _ROLL_S
 
 
 def leg_needed_m(turn_rad: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Length of a leg with such a corner at both its ends."""
+    """Length of a leg with such a corner at both ends."""
     radius_m = limits.path_radius_m(airspeed_m_s)
     return 2.0 * corner_reach_m(turn_rad, radius_m, roll_in_m(airspeed_m_s, limits))
 
@@ -86,7 +89,7 @@ def check_turns(
 
 
 def _shortest_leg(curve: Polyline, radius_m: float, ramp_m: float) -> tuple[float, float]:
-    """(needed over present length, present length m) of the leg that is shortest for its turns."""
+    """(needed length over present length, present length m) of the leg that is shortest for its turns."""
     vertices = curve.vertices_m
     lengths = curve.leg_lengths_m
     taken = [0.0] * len(lengths)
