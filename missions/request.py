@@ -1,4 +1,4 @@
-"""What a run is asked for."""
+"""The request of a run."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from missions.preflight.before_flight import Confirm
 
 REGAIN_S: Final = 60.0
-"""How long a lost link may take to come back."""
+"""Longest time for which a lost link may stay lost, s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,9 @@ from missions.notes import FlightNotes
 from missions.score import FlightScore
 
 EPOCH_UNIX_US: Final = 1_735_689_600_000_000
-"""2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that equal flights make equal logs."""
+"""2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that identical flights give
+identical logs.
+"""
 
 LOG_NAME: Final = "flight.tlog"
 SUMMARY_NAME: Final = "summary.json"
@@ -25,16 +27,16 @@ _PACKAGES: Final = ("flightstack", "jsbsim", "numpy", "numba", "pymavlink")
 
 
 def create_run_folder(out: Path | None, mission: str, runs: Path = RUNS) -> Path:
-    """Make the folder of a new run.
+    """Create the folder of a new run.
 
     Args:
-        out: the folder asked for; it must not exist, or be empty. None: `runs/<mission>-<n>` with the next
-            free number.
+        out: the requested folder; it must not exist, or must be empty. None: `runs/<mission>-<n>` with the
+            next free number.
         mission: name of the mission.
-        runs: where numbered runs go.
+        runs: folder of the numbered runs.
 
     Raises:
-        PlanError: the folder holds something, or can't be made.
+        PlanError: the folder is not empty, or can't be created.
     """
     try:
         if out is not None:
@@ -58,7 +60,7 @@ def create_run_folder(out: Path | None, mission: str, runs: Path = RUNS) -> Path
 
 
 def versions() -> dict[str, str]:
-    """Versions of what decides how a flight goes."""
+    """Versions of the software that affects a flight."""
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
@@ -151,7 +153,7 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
 
 
 def team_figures(blocks: list[dict[str, Any]]) -> dict[str, Any]:
-    """The run's own figures: those of a single vehicle, the sum or the worst of a team."""
+    """Figures of the whole run: those of a single vehicle, or the sum or the worst value of a team."""
 
     def worst(key: str) -> float | None:
         known = [block[key] for block in blocks if block[key] is not None]
@@ -165,7 +167,7 @@ def team_figures(blocks: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
-    """Write `summary.json`, whole or not at all. Numbers that are not finite become null."""
+    """Write `summary.json`; after an error no file remains. Numbers that are not finite become null."""
     text = json.dumps(_finite(summary), indent=2, allow_nan=False) + "\n"
     path = folder / SUMMARY_NAME
     with whole(path), path.open("x", encoding="utf-8") as file:
@@ -174,7 +176,7 @@ def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
 
 
 def replace_summary(folder: Path, summary: Mapping[str, Any]) -> None:
-    """Put another summary in the place of this run's own, if the disk takes it; else there is none."""
+    """Replace the summary of this run. If it can't be written, there is none."""
     path = folder / SUMMARY_NAME
     with suppress(OSError):
         path.unlink(missing_ok=True)
@@ -183,7 +185,7 @@ def replace_summary(folder: Path, summary: Mapping[str, Any]) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[None]:
-    """Leave no half of a new file that is written meanwhile, on a full disk."""
+    """Context that removes an incomplete new file when writing fails, for example on a full disk."""
     try:
         yield
     except FileExistsError:  # another process has written it completely
@@ -204,7 +206,7 @@ def _finite(value: Any) -> Any:
 
 
 def wind_words(wind: Mapping[str, Any]) -> str:
-    """The wind of an embedded flight in words: `summary.json`'s `wind`."""
+    """Text about the wind of an embedded flight, from the entry `wind` of `summary.json`."""
     speed_m_s, turbulence = wind["speed_m_s"], wind["turbulence"]
     steady = f"wind {speed_m_s:g} m/s from {wind['from_deg']:g} degrees" if speed_m_s else "no steady wind"
     if speed_m_s and wind["profile"] != "uniform":

@@ -11,7 +11,7 @@ from typing import Final
 
 FAILED: Final = 1
 _KILLED: Final = 128
-"""Plus the signal's number: what shells make of a command that was ended by one."""
+"""Added to the signal's number: the exit code that shells report for a command that a signal ended."""
 _ASKED_TO_END: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -26,7 +26,8 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
             the exit code is then 1.
     """
     _flush()
-    # What asks us to end between the fork and the handler that passes it on must not leave the child alone.
+    # A signal between the fork and the installation of the handler must not leave the child without its
+    # parent.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKED_TO_END)
     lifeline, held = os.pipe()
     child = os.fork()
@@ -36,7 +37,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
         threading.Thread(target=_end_with_parent, args=(lifeline,), daemon=True).start()
         code = command()
         _flush()
-        os._exit(code)  # what the caller still has to do is done once, and not here
+        os._exit(code)  # the caller's remaining work is done once, in the parent
     os.close(lifeline)
     status = _wait(child, mask)
     os.close(held)
@@ -52,7 +53,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
 
 def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # closed by whoever started us
+        if stream is not None:  # may have been closed by the parent process
             stream.flush()
 
 
@@ -63,11 +64,12 @@ def _end_with_parent(lifeline: int) -> None:
 
 
 def _wait(child: int, mask: Iterable[int]) -> int:
-    """Wait for a process, and pass on to it what asks us to end; a terminal's Ctrl-C reaches it anyway.
+    """Wait for a process, and pass on signals that end this process; a terminal's Ctrl-C reaches the child
+    directly.
 
     Args:
-        child: its number.
-        mask: signals that are blocked while it is waited for; what has come by now is passed on first.
+        child: its process id.
+        mask: blocked signals; those received before this call are passed on first.
     """
 
     def pass_on(number: int, frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""Doing things side by side on vehicle time."""
+"""Runs coroutines concurrently on vehicle time."""
 
 import asyncio
 from collections.abc import Coroutine, Iterable
@@ -28,7 +28,7 @@ async def together(coroutines: Iterable[Coroutine[Any, Any, None]]) -> None:
 
 
 def _single(error: BaseException) -> list[BaseException]:
-    """The errors of a group, and of the groups in it."""
+    """The single errors in a group and in the groups inside it."""
     if isinstance(error, BaseExceptionGroup):
         return [single for part in error.exceptions for single in _single(part)]
     return [error]

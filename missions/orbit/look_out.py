@@ -1,6 +1,4 @@
-"""Observation of the target: passes attitude and images to the tracker, and points the gimbal at the
-target.
-"""
+"""Observation of the target: attitude and images for the tracker, and pointing of the gimbal."""
 
 import math
 from collections.abc import Callable

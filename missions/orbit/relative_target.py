@@ -215,9 +215,7 @@ class RelativeTarget:
         return innovation, h, s, inverse
 
     def _flown_since(self, time_us: int) -> tuple[float, float] | None:
-        """Distance flown through the air since a time, (north, east) m; None when that time is too
-        long ago.
-        """
+        """Distance flown through the air since a time, (north, east) m; None when that is too long ago."""
         last = self._path[-1]
         if time_us >= last[0]:
             dt = (time_us - last[0]) * 1e-6

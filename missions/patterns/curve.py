@@ -60,9 +60,7 @@ def curvature_per_m(first: Array, second: Array) -> Array:
 
 
 def knots_by_length(curve: Curve, spacing_m: float, pieces: Array) -> Array:
-    """Knots of a curve whose smooth pieces are bounded by the parameters `pieces`: equal parts in each
-    piece.
-    """
+    """Knots of a curve with smooth pieces between the parameters `pieces`: equal parts in each piece."""
     parts = [pieces[:1]]
     for start, stop in itertools.pairwise(pieces):
         coarse = curve.points(np.linspace(start, stop, 17))

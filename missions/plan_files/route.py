@@ -78,9 +78,7 @@ class Route:
 
 
 def placed(items: Sequence[MissionItem], home: GeodeticPosition, unset: float) -> list[MissionItem]:
-    """The items as sent to a vehicle: "here" is replaced by a place, and values that are not set by
-    `unset`.
-    """
+    """The items as sent to a vehicle: "here" is replaced by a place, and unset values by `unset`."""
     given: list[MissionItem] = []
     last = (home.lat_deg, home.lon_deg)
     for item in items:

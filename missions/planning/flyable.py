@@ -109,9 +109,7 @@ class FlyablePath:
     def waypoints(
         self, *, deviation_m: float, spacing_min_m: float, spacing_max_m: float
     ) -> list[tuple[float, float]]:
-        """Points so close that straight legs stay within a deviation, as far as the smallest spacing
-        allows.
-        """
+        """Points so close that straight legs stay within a deviation, as far as the least spacing allows."""
         bend = np.maximum(np.abs(self.curvature_per_m), 1e-9)
         chord = np.clip(np.sqrt(8.0 * deviation_m / bend), spacing_min_m, spacing_max_m)
         density = 1.0 / chord

@@ -188,9 +188,7 @@ class FixedWingLimits(_Limits):
         return (self.true_airspeed_m_s(airspeed_m_s) + self.wind_m_s) * self.guidance_s
 
     def path_radius_m(self, airspeed_m_s: float) -> float:
-        """Radius of the tightest bend of a path for this aircraft, limited by its bank and by its
-        guidance.
-        """
+        """Radius of the tightest bend of a path for this aircraft, limited by its bank and its guidance."""
         return max(self.turn_radius_m(airspeed_m_s), self.guided_radius_m(airspeed_m_s))
 
 

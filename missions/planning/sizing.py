@@ -39,9 +39,7 @@ def legs_side_m(spacing_m: float) -> float:
 
 
 def spacing_within_m(side_m: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Track spacing that divides a side evenly, with room for turns; for a side too short, the default
-    one.
-    """
+    """Track spacing that divides a side evenly with room for turns; if the side is too short, the default."""
     legs = math.floor(side_m / (_ROOM * leg_needed_m(_SQUARE_RAD, airspeed_m_s, limits)))
     return side_m / legs if legs >= 1 else spacing_for_turns_m(airspeed_m_s, limits)
 

@@ -1,6 +1,4 @@
-"""Checks whether an aircraft that can't stop can follow a curve: compares its bends with the tightest
-turn.
-"""
+"""Checks whether an aircraft that can't stop can follow a curve, by its tightest turn."""
 
 import math
 from typing import Final

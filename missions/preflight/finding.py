@@ -1,11 +1,11 @@
-"""One thing that was looked at."""
+"""One result of the checks before a flight."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Level(StrEnum):
-    """How a finding stands in the way of a flight."""
+    """Severity of a finding."""
 
     OK = "ok"
     WARNING = "warning"
@@ -39,10 +39,10 @@ def ok(subject: str, text: str) -> Finding:
 
 
 def warning(subject: str, text: str, advice: str) -> Finding:
-    """Worth a thought."""
+    """A finding that the user should consider."""
     return Finding(level=Level.WARNING, subject=subject, text=text, advice=advice)
 
 
 def problem(subject: str, text: str, advice: str) -> Finding:
-    """In the way."""
+    """A finding that prevents the flight."""
     return Finding(level=Level.PROBLEM, subject=subject, text=text, advice=advice)

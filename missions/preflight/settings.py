@@ -1,4 +1,4 @@
-"""Checks of a vehicle's parameters: what a careful person would not leave so, by flavour."""
+"""Checks of a vehicle's parameters for unsafe values, by flavour."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -73,7 +73,7 @@ RULES: Final[Mapping[str, tuple[Rule, ...]]] = MappingProxyType(
         ),
     }
 )  # fmt: skip
-"""By flavour."""
+"""Rules by flavour."""
 
 FENCE_PARAMETERS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
@@ -84,7 +84,7 @@ FENCE_PARAMETERS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
 """The parameters that define the geofence."""
 
 _FENCE_ALTITUDE, _FENCE_CIRCLE, _FENCE_POLYGONS = 1, 2, 4
-_FENCE_UNION: Final = 2  # of FENCE_OPTIONS
+_FENCE_UNION: Final = 2  # bit of FENCE_OPTIONS
 
 
 def settings_findings(snapshot: Snapshot) -> list[Finding]:
@@ -115,10 +115,10 @@ def settings_findings(snapshot: Snapshot) -> list[Finding]:
 
 
 def fence(snapshot: Snapshot, planned: int = 0) -> Finding:
-    """Whether a geofence keeps the vehicle in.
+    """Finding on whether a geofence limits the flight.
 
     Args:
-        planned: points of the fence that the mission brings; it takes the place of the vehicle's own.
+        planned: number of points of the mission's fence, which replaces the vehicle's own.
     """
     parameters = snapshot.parameters
     items = planned or snapshot.fence_items or 0

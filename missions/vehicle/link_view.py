@@ -40,7 +40,7 @@ ADAPTERS: Final[Mapping[tuple[str, VehicleKind], Callable[[], Adapter]]] = Mappi
         ("ardupilot", VehicleKind.FIXED_WING): ArduPlane,
     }
 )
-"""By firmware and class of vehicle."""
+"""Adapters by firmware and class of vehicle."""
 
 _FIRMWARES: Final = {
     dialect.MAV_AUTOPILOT_PX4: "px4",
@@ -69,11 +69,12 @@ class VehicleView:
         self._system_id = system_id
         self._adapter: Adapter | None = None
         self._last_ack: Any = None
-        self._modes_asked: set[int] = set()  # custom modes asked for since the present `goto` began
+        self._modes_asked: set[int] = set()  # custom modes that were requested since the present `goto` began
         self._heard_us: int | None = None
-        self._sound: dict[type, tuple[Any, int]] = {}  # newest telemetry of use, and when it was looked at
+        # newest usable telemetry, and the time at which it was examined
+        self._sound: dict[type, tuple[Any, int]] = {}
         self.first_heard_us = 0
-        self._timed = False  # whether that was a time of the vehicle's
+        self._timed = False  # whether that was a time of the vehicle
         self._assembler = StatusTextAssembler()
         self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
         self._watch.on_lost = self._link_lost
@@ -94,7 +95,7 @@ class VehicleView:
 
     @property
     def adapter(self) -> Adapter:
-        """The firmware's ways."""
+        """The adapter of the vehicle's firmware."""
         return self._known(self._adapter)
 
     @property
