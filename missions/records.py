@@ -1,6 +1,4 @@
-"""The frames of a flight as columns: raw payloads are collected by message, and decoded together with
-numpy.
-"""
+"""The frames of a flight as columns: raw payloads, collected by message and decoded with numpy."""
 
 from collections import Counter
 from collections.abc import Callable

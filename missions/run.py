@@ -15,9 +15,7 @@ from missions.notes import FlightNotes
 from missions.score import FlightScore
 
 EPOCH_UNIX_US: Final = 1_735_689_600_000_000
-"""2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that identical flights give
-identical logs.
-"""
+"""2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that equal flights give equal logs."""
 
 LOG_NAME: Final = "flight.tlog"
 SUMMARY_NAME: Final = "summary.json"

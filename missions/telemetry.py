@@ -204,9 +204,7 @@ SOURCES: Final[Mapping[type, tuple[str, Callable[[Any], Any]]]] = MappingProxyTy
         MissionProgress: ("MISSION_CURRENT", progress),
     }
 )
-"""The message from which each kind of telemetry is made, and the conversion; an unusable message gives
-None.
-"""
+"""The source message of each kind of telemetry, and the conversion; an unusable message gives None."""
 
 
 class StatusTextAssembler:

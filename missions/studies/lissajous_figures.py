@@ -33,9 +33,7 @@ _ZOOM: Final = 12.0
 
 
 def draw_paths(path: Path, run: SampleRun) -> None:
-    """Figure 6: the paths of both drones and of the target, and the estimates of the first drone's
-    position.
-    """
+    """Figure 6: the paths of both drones and the target, and the estimates of the first drone's position."""
     figure = _figure("The paper's figure 6: drone paths", (10.5, 7.6))
     axes = figure.add_subplot()
     for drone in range(run.drones.shape[1]):

@@ -45,9 +45,7 @@ _TAKEOFF_PITCH_DEG: Final = 12.0  # lowest pitch in a mission's takeoff
 
 
 class ArduPlane(ArduCopter):
-    """ArduPilot plane: takes off in TAKEOFF, lands only in AUTO, and may control pitch and throttle
-    itself.
-    """
+    """ArduPilot plane: takes off in TAKEOFF, lands only in AUTO, may control pitch and throttle itself."""
 
     kind = VehicleKind.FIXED_WING
     # LOITER: circles where it is. It lands by a mission's landing only: LAND is the way home

@@ -118,9 +118,7 @@ class AttitudePilot:
             self._energy = EnergyController(await _energy_parameters(vehicle))
 
     async def begin(self) -> None:
-        """Send altitude and airspeed to an autopilot that holds them itself. It must be in its guided
-        mode.
-        """
+        """Send altitude and airspeed to an autopilot that holds them itself and is in its guided mode."""
         vehicle = self._vehicle
         if vehicle.adapter.roll_alone:
             await vehicle.change_altitude(self._altitude_m)

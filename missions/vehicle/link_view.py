@@ -74,7 +74,7 @@ class VehicleView:
         # newest usable telemetry, and the time at which it was examined
         self._sound: dict[type, tuple[Any, int]] = {}
         self.first_heard_us = 0
-        self._timed = False  # whether that was a time of the vehicle
+        self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
         self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
         self._watch.on_lost = self._link_lost
@@ -150,7 +150,7 @@ class VehicleView:
 
     @property
     def regain_s(self) -> float:
-        """How long a lost link may take to come back, in seconds of this machine's clock; 0: not at all."""
+        """Longest time for which a lost link may stay lost, in seconds of this machine's clock; 0: none."""
         return self._watch.regain_s
 
     @regain_s.setter
@@ -201,11 +201,11 @@ class VehicleView:
         return self.connection.latest(name, self.system_id)
 
     def latest(self, kind: type[T]) -> T | None:
-        """Newest telemetry of a kind, as `latest(Position)`; None before the first.
+        """Newest telemetry of a kind, for example `latest(Position)`; None before the first.
 
         Kinds: `Position`, `LocalPosition`, `Attitude`, `AirData`, `Pressure`, `Battery`, `Gps`,
-        `MissionProgress`. A message with NaN or infinite values is ignored: for one second the message before
-        it is returned, then None.
+        `MissionProgress`. A message whose numbers are none (NaN, infinite) is passed over: for a second the
+        one before it stands, then nothing is known.
         """
         name, convert = SOURCES[kind]
         message = self.message(name)
@@ -220,20 +220,20 @@ class VehicleView:
         return before[0] if before is not None and now_us - before[1] <= _SOUND_FOR_US else None
 
     def home_or_none(self) -> GeodeticPosition | None:
-        """Home as the vehicle reports it, when it has."""
+        """Home as reported by the vehicle, or None."""
         message = self.message("HOME_POSITION")
         return None if message is None else home(message)
 
     @property
     def home(self) -> GeodeticPosition:
-        """Home as the vehicle reports it."""
+        """Home as reported by the vehicle."""
         place = self.home_or_none()
         if place is None:
             raise VehicleTimeout("the vehicle has not reported its home position: call wait_ready first")
         return place
 
     async def position(self, timeout_s: float = 5.0) -> Position:
-        """Newest global position, waited for when there is none yet."""
+        """Newest global position; waits for one when there is none yet."""
         return await self.wait_until(
             lambda: self.latest(Position),
             what="position",
@@ -256,19 +256,19 @@ class VehicleView:
 
     @property
     def armed(self) -> bool:
-        """By the newest heartbeat."""
+        """Whether the newest heartbeat reports armed."""
         heartbeat = self.message("HEARTBEAT")
         return heartbeat is not None and bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
 
     @property
     def custom_mode(self) -> int:
-        """HEARTBEAT.custom_mode, as the firmware numbers it."""
+        """HEARTBEAT.custom_mode, in the firmware's numbering."""
         heartbeat = self.message("HEARTBEAT")
         return 0 if heartbeat is None else int(heartbeat.custom_mode)
 
     @property
     def mode(self) -> str:
-        """Flight mode by the newest heartbeat, as the firmware calls it."""
+        """Flight mode of the newest heartbeat, with the firmware's name."""
         return self.adapter.mode_name(self.custom_mode)
 
     @property
@@ -278,7 +278,7 @@ class VehicleView:
         return 0 if message is None else int(message.landed_state)
 
     def addressed_here(self, message: MAVLinkMessage) -> bool:
-        """Whether a reply is for this mission: for all, or for its own ids."""
+        """Whether a reply is for this mission: addressed to all, or to its own ids."""
         return message.target_system in (0, self.connection.system_id) and message.target_component in (
             0,
             self.connection.component_id,
@@ -309,7 +309,7 @@ class VehicleView:
     # waiting
 
     def link_guard(self, awaited: str | Callable[[], str]) -> AbstractAsyncContextManager[None]:
-        """`async with`: LinkClosed when the heartbeats stop while the block waits for what is named."""
+        """`async with`: raises LinkClosed when the heartbeats stop while the block waits for `awaited`."""
         return self._watch.guard(awaited if callable(awaited) else lambda: awaited)
 
     @asynccontextmanager
@@ -342,7 +342,7 @@ class VehicleView:
 
     @property
     def _deaf(self) -> bool:
-        """Whether no heartbeat has come for three seconds of vehicle time."""
+        """Whether no heartbeat was received for three seconds of vehicle time."""
         return self._heard_us is not None and self.clock.time_us - self._heard_us > _DEAF_AFTER_US
 
     async def wait_until(
@@ -368,7 +368,7 @@ class VehicleView:
         """
         value = predicate()
         if value:
-            await asyncio.sleep(0)  # a caller that polls in a loop lets the clock go on, too
+            await asyncio.sleep(0)  # also lets the clock advance for a caller that polls in a loop
             return value
         changed = asyncio.Event()
         stops = [self.connection.listen(name, lambda _frame: changed.set()) for name in on]
@@ -389,5 +389,5 @@ class VehicleView:
 
 
 def describe_ack(ack: Any) -> str:
-    """A COMMAND_ACK in words: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
+    """A COMMAND_ACK as text: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
     return f"{command_name(ack.command)}: {enum_name('MAV_RESULT', ack.result) or f'result {ack.result}'}"

@@ -1,4 +1,4 @@
-"""Whether a vehicle is still there: waits end when its heartbeats stop, unless they come back in time."""
+"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -47,7 +47,7 @@ class LinkWatch:
         self._timer: asyncio.TimerHandle | None = None
 
     def on_heartbeat(self) -> None:
-        """A heartbeat of the vehicle came just now."""
+        """Note that a heartbeat of the vehicle was received."""
         self._heard_s = asyncio.get_running_loop().time()
         if self.quiet:
             self.quiet = False
@@ -58,15 +58,16 @@ class LinkWatch:
 
     @property
     def just_back(self) -> bool:
-        """Whether a silence ended a moment ago: the autopilot may not have taken notice yet."""
+        """Whether a silence ended a moment ago, so that the autopilot may not have noticed it yet."""
         return self._back_s is not None and asyncio.get_running_loop().time() - self._back_s < _JUST_BACK_S
 
     @asynccontextmanager
     async def guard(self, awaited: Callable[[], str]) -> AsyncIterator[None]:
-        """Raises LinkClosed when the heartbeats stop, and don't come back in time, while the block waits.
+        """Context that raises LinkClosed when the heartbeats stop, and don't come back in time, while the
+        block waits.
 
         Args:
-            awaited: what the block waits for, for the error.
+            awaited: returns the description of what the block waits for, for the error.
         """
         scope = asyncio.timeout(None)
         try:
@@ -89,12 +90,12 @@ class LinkWatch:
         return 0.0 if self._heard_s is None else asyncio.get_running_loop().time() - self._heard_s
 
     def _slowness(self) -> float:
-        """Wall seconds in which a vehicle slower than real time lives one."""
+        """Wall seconds per vehicle second, for a vehicle slower than real time."""
         rate = self._clock.rate if isinstance(self._clock, TelemetryClock) else 1.0
         return 1.0 / min(1.0, rate)
 
     def _start(self) -> None:
-        # goes on over the many short waits of a command, and ends with the last of them
+        # continues during the many short waits of a command, and ends with the last of them
         if self._timer is None:
             loop = asyncio.get_running_loop()
             self._timer = loop.call_later(_LOOK_EVERY_S, self._look, loop.time() + _LOOK_EVERY_S)

@@ -1,4 +1,4 @@
-"""The MAVLink mission protocol, from the ground station's side: missions, geofences and rally points."""
+"""The MAVLink mission protocol of a ground station: missions, geofences and rally points."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
 _SENDINGS: Final = 3
-_STUCK_S: Final = 6.0  # PX4 gives a transfer up after 5 s
-_ERRORS_BORNE: Final = 10  # an item that ArduPilot asked for eight times may come eight times
+_STUCK_S: Final = 6.0  # PX4 cancels a transfer after 5 s
+_ERRORS_BORNE: Final = 10  # an item that ArduPilot requested eight times may be acknowledged eight times
 _GIVEN_UP: Final = (dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_OPERATION_CANCELLED)
 _DO_JUMP: Final = 177
 _NAMES: Final = {
@@ -99,7 +99,7 @@ async def _send_plan(
                     ) from None
                 if asked < 0:
                     vehicle.send(count)
-                else:  # its acknowledgement was lost: PX4 repeats it
+                else:  # the acknowledgement was lost: PX4 repeats it
                     vehicle.send(_item_message(items[-1], len(items) - 1, vehicle.system_id, mission_type))
                 continue
             if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
@@ -108,11 +108,11 @@ async def _send_plan(
                 if reply.type == dialect.MAV_MISSION_ACCEPTED:
                     if all_sent:
                         return
-                    continue  # of an earlier transfer
+                    continue  # belongs to an earlier transfer
                 if reply.type == dialect.MAV_MISSION_INVALID_SEQUENCE:
-                    continue  # to an item that was sent twice: the transfer stays open (ArduPilot)
+                    continue  # answers an item that was sent twice: the transfer stays open (ArduPilot)
                 if reply.type == dialect.MAV_MISSION_ERROR and all_sent and asked >= 0:
-                    # "no transfer": it is over, and how it ended was lost
+                    # "no transfer": it has ended, and the message with its result was lost
                     raise VehicleTimeout(f"how the vehicle took the {what} is not known; {vehicle.heard()}")
                 if reply.type in _GIVEN_UP and asked >= 0:
                     # long silence: PX4 (after 5 s) reports the timeout at the next item, ArduPilot (after 8
@@ -123,7 +123,7 @@ async def _send_plan(
                     )
                 errors += 1
                 if reply.type in _GIVEN_UP and asked < 0 and errors <= _ERRORS_BORNE:
-                    continue  # perhaps to an item of an earlier transfer that came twice
+                    continue  # may answer a repeated item of an earlier transfer
                 where = ""
                 if asked >= 0:
                     where = f" at item {asked - before + 1} ({command_name(items[asked].command)})"
@@ -143,7 +143,7 @@ async def _ask(
     mission_type: MissionType,
     sequence: int | None = None,
 ) -> Any:
-    """Send a request until its answer comes."""
+    """Send a request repeatedly until its answer is received."""
     with vehicle.messages(name) as replies:
         for _ in range(_RETRIES):
             vehicle.send(message)
@@ -177,7 +177,7 @@ def _end_download(vehicle: "VehicleCommands", mission_type: MissionType) -> None
 async def download(
     vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION
 ) -> list[MissionItem]:
-    """The whole plan the vehicle holds, as it numbers it."""
+    """Download the whole plan from the vehicle, in the vehicle's numbering."""
     items = []
     for k in range(await _ask_count(vehicle, mission_type)):
         request = dialect.MAVLink_mission_request_int_message(vehicle.system_id, 1, k, int(mission_type))

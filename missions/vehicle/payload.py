@@ -33,8 +33,8 @@ class Detection:
     """One object in one image (LANDING_TARGET of the camera).
 
     Attributes:
-        time_us: when the image was taken, vehicle time.
-        target: which object the camera's tracker believes it to be (`target_num`).
+        time_us: vehicle time at which the image was taken.
+        target: number that the camera's tracker assigns to the object (`target_num`).
         image_x, image_y: normalized image coordinates: x to the right, y down, unit focal length.
     """
 
@@ -46,13 +46,13 @@ class Detection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GimbalAttitude:
-    """Where the gimbal looks (GIMBAL_DEVICE_ATTITUDE_STATUS).
+    """The attitude of the gimbal (GIMBAL_DEVICE_ATTITUDE_STATUS).
 
     Attributes:
         time_us: vehicle time.
-        q: Hamilton quaternion (w x y z) that takes gimbal vectors (x along the line of sight, y right,
-            z down) to the reference frame.
-        from_north: the reference frame is NED; otherwise it is the vehicle's level frame, x along its
+        q: Hamilton quaternion (w x y z) that rotates gimbal vectors (x along the line of sight, y right, z
+            down) to the reference frame.
+        from_north: whether the reference frame is NED; otherwise it is the vehicle's level frame, x along its
         heading.
     """
 
@@ -62,7 +62,7 @@ class GimbalAttitude:
 
 
 def detection(m: Any) -> Detection | None:
-    """From LANDING_TARGET; None when its angles are no angles of an image."""
+    """From LANDING_TARGET; None when its angles are not possible in an image."""
     if not (abs(m.angle_x) < 0.5 * math.pi and abs(m.angle_y) < 0.5 * math.pi):
         return None
     return Detection(
@@ -101,21 +101,21 @@ class Payload:
 
     def __init__(self, vehicle: "Vehicle") -> None:
         self._vehicle = vehicle
-        self._control_since_us: int | None = None  # when control of the gimbal was asked for
+        self._control_since_us: int | None = None  # time at which control of the gimbal was requested
 
-    # listening
+    # receiving
 
     def on_detection(self, listener: Callable[[Detection], None]) -> Callable[[], None]:
-        """Call `listener` with each detection; returns what ends it."""
+        """Call `listener` with each detection; returns a function that ends this."""
         return self._listen("LANDING_TARGET", CAMERA_COMPONENT, detection, listener)
 
     def on_gimbal_attitude(self, listener: Callable[[GimbalAttitude], None]) -> Callable[[], None]:
-        """Call `listener` with each attitude of the gimbal; returns what ends it."""
+        """Call `listener` with each attitude of the gimbal; returns a function that ends this."""
         return self._listen("GIMBAL_DEVICE_ATTITUDE_STATUS", GIMBAL_COMPONENT, gimbal_attitude, listener)
 
     def on_total_field(self, listener: Callable[[int, float], None]) -> Callable[[], None]:
         """Call `listener` with (vehicle time us, total magnetic field nT) of each sample of the survey
-        magnetometer; returns what ends it.
+        magnetometer; returns a function that ends this.
         """
 
         def sample(m: Any) -> tuple[int, float] | None:
@@ -201,7 +201,7 @@ class Payload:
         )
 
     def take_gimbal_control(self) -> None:
-        """Become the primary control of the gimbal."""
+        """Request the primary control of the gimbal."""
         connection = self._vehicle.connection
         self._control_since_us = self._vehicle.clock.time_us
         self._command(
@@ -238,7 +238,7 @@ class Payload:
             )
 
     def set_gimbal_rate(self, rate_hz: float) -> None:
-        """Have the gimbal report its attitude at a rate."""
+        """Request the gimbal's attitude at a rate."""
         self._command(
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
             float(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS),
@@ -253,15 +253,15 @@ class Payload:
         pitch_rate_rad_s: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
-        """Point the gimbal, angles against the vehicle's body (pitch up and yaw right positive)."""
+        """Point the gimbal; angles are relative to the vehicle's body (pitch up and yaw right positive)."""
         self._set_pitchyaw(pitch_rad, yaw_rad, pitch_rate_rad_s, yaw_rate_rad_s)
 
     def turn_gimbal(self, *, pitch_rate_rad_s: float, yaw_rate_rad_s: float) -> None:
-        """Turn the gimbal at rates, wherever it looks."""
+        """Turn the gimbal at angular rates from its present attitude."""
         self._set_pitchyaw(math.nan, math.nan, pitch_rate_rad_s, yaw_rate_rad_s)
 
     def point_gimbal_at(self, lat_deg: float, lon_deg: float, alt_m: float) -> None:
-        """Have the gimbal look at a place by itself (region of interest)."""
+        """Command the gimbal to point at a place continuously (region of interest)."""
         vehicle = self._vehicle
         vehicle.send(
             dialect.MAVLink_command_int_message(

@@ -90,7 +90,7 @@ class VehicleClient:
         async for message in self.direct.subscribe_message(""):
             if message.component_id != _AUTOPILOT or message.system_id != self.system_id:
                 continue
-            with suppress(ValueError):  # NaN in a field is no JSON
+            with suppress(ValueError):  # NaN in a field is not valid JSON
                 fields = json.loads(message.fields_json)
                 self.messages[message.message_name] = fields
                 if message.message_name == FILTER_STATUS.get(self.flavour):
@@ -111,12 +111,12 @@ class VehicleClient:
 
     @property
     def kind(self) -> VehicleKind | None:
-        """Class of vehicle; None: one that isn't flown here."""
+        """Class of vehicle; None: one that this program does not fly."""
         return KIND_OF_TYPE.get(int(self.messages.get("HEARTBEAT", {}).get("type", -1)))
 
     @property
     def mode(self) -> str:
-        """Flight mode, as the firmware calls it."""
+        """Flight mode, with the firmware's name."""
         custom_mode = int(self.messages.get("HEARTBEAT", {}).get("custom_mode", 0))
         if self.kind is None or (self.flavour, self.kind) not in ADAPTERS:
             return f"mode {custom_mode}"
@@ -138,18 +138,18 @@ class VehicleClient:
             fence_items=fence_items,
         )
 
-    # asking
+    # requests
 
     async def wait_for(self, *names: str, timeout_s: float) -> list[str]:
-        """Wait until messages of these names have come; gives those that have not."""
+        """Wait until messages of these names were received; returns the names that were not."""
         return await _missing(names, self.messages, timeout_s)
 
     async def wait_for_types(self, names: Collection[str], *, timeout_s: float) -> list[str]:
-        """Wait until the types of these parameters are known; gives those that are not."""
+        """Wait until the types of these parameters are known; returns the names whose types are not."""
         return await _missing(names, self.parameter_types, timeout_s)
 
     async def command(self, command: int, *parameters: float) -> int | None:
-        """COMMAND_LONG; its MAV_RESULT, or None without an answer."""
+        """Send a COMMAND_LONG; returns its MAV_RESULT, or None without an answer."""
         fields = {f"param{k}": value for k, value in enumerate((*parameters, *(0.0,) * 7)[:7], start=1)}
         fields |= {"target_system": self.system_id, "target_component": _AUTOPILOT, "command": command}
         message = MavlinkMessage(
@@ -179,7 +179,7 @@ class VehicleClient:
             raise VehicleTimeout(f"vehicle {self.system_id} sends heartbeats, but does not answer")
 
     async def ask_for(self, names: Sequence[str], rate_hz: float = 2.0) -> None:
-        """Have messages streamed that are not (ArduPilot sends only what it was asked for)."""
+        """Request messages that are not streamed (ArduPilot sends only requested ones)."""
         for name in names:
             if name not in self.messages:
                 await self.command(
@@ -190,7 +190,7 @@ class VehicleClient:
 
 
 async def _missing(names: Collection[str], known: Container[str], timeout_s: float) -> list[str]:
-    """Wait until all names are known; gives those that are not in the end."""
+    """Wait until all names are known; returns those that are still missing at the end."""
     loop = asyncio.get_running_loop()
     end_s = loop.time() + timeout_s
     while missing := [name for name in names if name not in known]:
@@ -220,7 +220,7 @@ async def open_client(
 
     def keep(_level: object, message: str, _file: object, _line: int) -> bool:
         said.append(message)
-        return True  # not to the terminal
+        return True  # do not print it on the terminal
 
     log_subscribe(keep)
     configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
@@ -263,7 +263,7 @@ async def _find(mavsdk: Mavsdk, timeout_s: float, system_id: int | None) -> Syst
 
 
 async def _heard(address: Address) -> str:
-    """What there is on a link without the autopilot that was looked for."""
+    """Description of what is received on a link without the requested autopilot."""
     try:
         quality = await listen(address, _LISTEN_S)
     except BridgeError as error:

@@ -1,4 +1,4 @@
-"""How a vehicle is, and what keeps it from arming."""
+"""Examines a vehicle: its state, and what prevents arming."""
 
 import asyncio
 from contextlib import aclosing
@@ -101,7 +101,8 @@ async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
         return []
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
     events = EventsAsync(client.system)
-    await ComponentMetadataAsync(client.system).request_autopilot_component()  # gives events their names
+    # provides the names of the events
+    await ComponentMetadataAsync(client.system).request_autopilot_component()
     telling = asyncio.create_task(_next_report(events))
     try:
         for _ in range(_REPORTS):
@@ -121,7 +122,7 @@ async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
 
 
 async def _next_report(events: EventsAsync) -> HealthAndArmingCheckReport:
-    """The next report as a whole: asked for its last one, MAVSDK may give one that is still coming in."""
+    """The next complete report: MAVSDK's last report may still be incomplete."""
     async with aclosing(events.subscribe_health_and_arming_checks()) as reports:
         return await anext(reports)
 

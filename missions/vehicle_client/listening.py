@@ -47,11 +47,11 @@ class LinkQuality:
 
     @property
     def loss(self) -> float:
-        """Share of the autopilot's frames that did not come, 0..1."""
+        """Share of the autopilot's frames that were lost, 0..1."""
         return self.lost / max(1, self.frames + self.lost)
 
     def heard(self) -> str:
-        """In words, for an error."""
+        """What was received, as text for an error."""
         if not self.bytes_total:
             return f"nothing was received in {self.seconds:.0f} s: is it on, is this the right link?"
         if not self.components:
@@ -96,7 +96,7 @@ async def listen(address: Address, seconds: float, system_id: int | None = None)
                     who = (frame.system_id, frame.component_id)
                     if who in last:
                         gap = (frame.sequence - last[who] - 1) & 0xFF
-                        if gap < 128:  # a larger one is a frame that came late
+                        if gap < 128:  # a larger gap means that a frame came late
                             lost[who] += gap
                     last[who] = frame.sequence
                     signed |= frame.signed and frame.component_id == 1
