@@ -67,8 +67,8 @@ def reference(
 def _learn_drag(x: Array, p: Array, dt: float, ax: float, ay: float) -> None:
     """Learn the drag as the square root of the ratio of the mean squares of force and velocity.
 
-    Least squares of force by velocity makes the drag too small (the velocity has errors), of velocity by
-    force too great (gusts and vibration are in the force); this is the geometric mean of both.
+    Least squares of force by velocity makes the drag too small (the velocity has errors), and of velocity by
+    force too great (gusts and vibration are in the force). This is the geometric mean of both.
     """
     slow = min(1.0, dt / _SMOOTHING_S)
     x[at.SIDEWAYS] += slow * (ax - x[at.SIDEWAYS])

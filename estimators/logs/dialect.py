@@ -83,11 +83,11 @@ def load_dialect(name: str | Path | None = None) -> Dialect:
 
     Args:
         name: one of `dialect_names`, or the path of an XML definition file, whose includes are read too (one
-            of `dialect_names`, such as common.xml, need not be there as a file); None: every message of
+            of `dialect_names`, such as common.xml, need not exist as a file); None: every message of
             MAVLink's public definitions.
 
     Raises:
-        LogError: there is no such dialect, or the file can't be read or is not a definition file.
+        LogError: the dialect does not exist, or the file can't be read or is not a definition file.
     """
     text = DEFAULT_DIALECT if name is None else str(name)
     if isinstance(name, Path) or re.search(r"[/\\]|\.xml$", text, re.IGNORECASE):

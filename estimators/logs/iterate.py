@@ -38,7 +38,7 @@ def messages_in_order(source: LogSource, selections: Sequence[Selection]) -> Ite
         place = np.concatenate(places)
         sorting = np.argsort(place)
         taker_of = np.repeat(np.arange(len(places)), [len(order) for order in places])[sorting]
-        # One message at a time, each when it is asked for: thousands alive at once would keep the garbage
+        # One message at a time, each when it is requested: thousands alive at once would keep the garbage
         # collector busy.
         for time, taker in zip(time_us[place[sorting]].tolist(), taker_of.tolist(), strict=True):
             yield time, takers[taker]()

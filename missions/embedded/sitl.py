@@ -27,7 +27,7 @@ class EmbeddedConfiguration:
     """Configuration of the simulated world that a mission is flown in.
 
     Attributes:
-        vehicles: how many, with system ids 1, 2, ...
+        vehicles: number of vehicles, with system ids 1, 2, ...
         model: model of all vehicles, or one for each vehicle: a name, or a path.
         launch: launch method of the aircraft; None: the method in each aircraft's description.
         flavour: "px4" or "ardupilot".
@@ -41,7 +41,7 @@ class EmbeddedConfiguration:
         gps: receiver class of all vehicles, "differential" or "standalone".
         home: "lat,lon,alt[,heading]"; None: the default place of the flavour's own SITL.
         max_flight_s: vehicle time, s, after which a run that has not ended fails.
-        scenario: targets, payload and magnetic map that the mission asks for.
+        scenario: targets, payload and magnetic map that the mission needs.
     """
 
     vehicles: int = 1

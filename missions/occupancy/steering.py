@@ -59,7 +59,7 @@ class CourseReference:
         self._time_s = 0.0
 
     def turn_to(self, heading_rad: float) -> None:
-        """Turn to a heading."""
+        """Set the heading to turn to."""
         self._wanted_rad = heading_rad
 
     def stop(self) -> None:

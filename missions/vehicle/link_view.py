@@ -204,8 +204,8 @@ class VehicleView:
         """Newest telemetry of a kind, for example `latest(Position)`; None before the first.
 
         Kinds: `Position`, `LocalPosition`, `Attitude`, `AirData`, `Pressure`, `Battery`, `Gps`,
-        `MissionProgress`. A message whose numbers are none (NaN, infinite) is passed over: for a second the
-        one before it stands, then nothing is known.
+        `MissionProgress`. A message with NaN or infinite values is ignored: for one second the message before
+        it is returned, then None.
         """
         name, convert = SOURCES[kind]
         message = self.message(name)

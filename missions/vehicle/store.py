@@ -25,9 +25,7 @@ _ACCEPTANCE_M: Final = 2.0
 
 
 class VehicleStore(VehicleCommands):
-    """The part of a vehicle for stored data: uploads, follows and downloads plans, reads and sets
-    parameters.
-    """
+    """The part of a vehicle for stored data: plans are uploaded and followed, parameters read and set."""
 
     _tracker: ItemTracker | None = None  # tracker of the mission that was uploaded last
 

@@ -46,7 +46,7 @@ class Vehicle(FixedWingFlight):
             self._resuming = asyncio.get_running_loop().create_task(self._ask_again())
 
     async def _ask_again(self) -> None:
-        """Request the streams again, because the autopilot may have reset them while the link was lost."""
+        """Request the streams again, because a link that was lost may have restarted with its own streams."""
         with suppress(MissionError):
             await self.adapter.start_streams(self)
             for name, rate_hz in tuple(self._rates_hz.items()):
@@ -234,11 +234,11 @@ class Vehicle(FixedWingFlight):
     ) -> None:
         """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow.
 
-        For multicopters only; for a fixed wing use `loiter`.
+        For multicopters only, because a fixed wing can't be slow; see `loiter` for those.
 
         Raises:
             PlanError: the target is more than 10 km from home; nothing was sent.
-            MissionError: the vehicle disarmed, or changed to a mode this mission did not ask for (a
+            MissionError: the vehicle disarmed, or changed to a mode that this mission did not command (a
                 failsafe, a pilot).
         """
         if self.kind is VehicleKind.FIXED_WING:
@@ -293,9 +293,7 @@ class Vehicle(FixedWingFlight):
             )
 
     def _require_flying(self, expected: Set[int], where: Callable[[], str]) -> None:
-        """Raise an error when the vehicle is disarmed, or in a mode that was neither expected nor
-        requested.
-        """
+        """Raise an error when the vehicle is disarmed, or in a mode neither expected nor requested."""
         if not self.armed:
             happened = "is disarmed"
         elif self.custom_mode not in expected and self.custom_mode not in self._modes_asked:

@@ -1,6 +1,4 @@
-"""Flies a pattern with a fixed wing: along the path by setpoints, or as an uploaded mission with its
-landing.
-"""
+"""Flies a pattern with a fixed wing, by setpoints along the path or as an uploaded mission."""
 
 from functools import partial
 from typing import Final

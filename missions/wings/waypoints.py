@@ -161,9 +161,7 @@ def _waypoint(
 
 
 async def _passed(vehicle: Vehicle, place: PlaceOnPath, arc_m: float) -> None:
-    """Wait until the aircraft has passed a place, because waypoints count as reached before they are
-    passed.
-    """
+    """Wait until the aircraft has passed a place; waypoints count as reached before they are passed."""
 
     def there() -> bool:
         place.update()
