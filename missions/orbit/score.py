@@ -86,13 +86,14 @@ def _ned(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
 def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
     """The figures of the first vehicle's orbit; figures that were not measured are None.
 
-    radius_mean_error_percent: error of the mean distance to the target over the orbit. radius_std_m: standard
-    deviation of that distance. radius_max_error_m: largest difference from the commanded radius.
-    altitude_error_m: largest difference of the true height above the start from the commanded altitude.
-    orbit_s: duration of the orbit. radius_estimate_..., altitude_estimate_error_m: the same as the mission
-    believed in flight, by its filter
-        and by pressure.
-    target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
+    * radius_mean_error_percent: error of the mean distance to the target over the orbit.
+    * radius_std_m: standard deviation of that distance.
+    * radius_max_error_m: largest difference from the commanded radius.
+    * altitude_error_m: largest difference of the true height above the start from the commanded altitude.
+    * orbit_s: duration of the orbit.
+    * radius_estimate_..., altitude_estimate_error_m: the same figures from the mission's estimates in flight,
+      by its filter and by pressure.
+    * target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
     """
     if not debriefing.flights or not isinstance(debriefing.options, OrbitOptions):
         return {}
