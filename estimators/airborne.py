@@ -1,4 +1,4 @@
-"""When a vehicle was in the air, from its log."""
+"""The times at which a vehicle was in the air, from its log."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 __all__ = ["ALWAYS", "Spans", "airborne_spans", "duration_s", "within"]
 
 Spans = list[tuple[int, int]]
-"""From and to (exclusive), vehicle time in microseconds, ascending."""
+"""Spans of vehicle time in microseconds, (from, to), `to` exclusive, ascending."""
 
 ALWAYS: Final[tuple[int, int]] = (-(1 << 62), 1 << 62)
 
@@ -26,7 +26,9 @@ _CLEAR_SPEED_M_S: Final = 5.0
 _GROUND_TYPES: Final = (5, 10, 11, 12)
 """MAV_TYPE_ANTENNA_TRACKER, _GROUND_ROVER, _SURFACE_BOAT, _SUBMARINE."""
 _HOLD_US: Final = 2_500_000
-"""How long a state counts that is not reported again: one lost message of a 1 Hz stream doesn't end it."""
+"""Longest time for which a reported state holds without another report; one lost message of a 1 Hz stream
+does not end it.
+"""
 _AUTOPILOT: Final = 1
 
 Samples = tuple[NDArray[np.int64], NDArray[Any]]
@@ -35,24 +37,25 @@ _Judge = Callable[[NDArray[Any]], NDArray[np.bool_]]
 
 
 def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple[Spans, str]:
-    """When a vehicle was in the air, by the first evidence that shows any time in the air:
+    """The times at which a vehicle was in the air, by the first of these that shows any time in the air:
 
-    * EXTENDED_SYS_STATE. Some autopilots call a take-off run a flight: what comes before a vehicle is 2 m
-      above where it began, and after it was so much above where it ended, is left out.
+    * EXTENDED_SYS_STATE. Some autopilots report a take-off run as flight. Therefore the time before the
+      vehicle is 2 m above its first height and the time after it was last 2 m above its last height are left
+      out.
     * Armed and more than 2 m above home.
     * Armed and faster than 8 m/s through the air.
-    * Armed with the throttle above 20 % (a hover below 2 m, or in a hall where no height is known).
+    * Armed with the throttle above 20 % (a hover below 2 m, or indoors, where no height is known).
     * Above 10 m and faster than 5 m/s, though no message says that it was armed.
 
     A vehicle that can't fly (rover, boat, submarine, antenna tracker) counts while it is armed.
 
     Returns:
-        Spans, and what they are taken from; no spans and the reason where there is evidence and none of it
-        shows the vehicle in the air; all time where the log has no evidence of it ("all of the log").
+        Spans, and the name of their source. When there is evidence but none of it shows the vehicle in the
+        air: no spans, and the reason. When the log has no such evidence: all time, and "all of the log".
     """
 
     def column(name: str, field: str) -> Samples | None:
-        # Asked for by name only where it is: the log's dialect may not have it at all.
+        # Requested by name only if the log has it: the log's dialect may not define this message.
         if not any(key.name == name and key.system_id == system_id for key in log.keys):
             return None
         tables = log.tables(name, system_id=system_id, component_id=_AUTOPILOT, boot=boot)
@@ -79,7 +82,7 @@ def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple
     hud = {field: column("VFR_HUD", field) for field in ("airspeed", "groundspeed", "throttle")}
     high = spans_of(heights, lambda height: height > _LEAST_HEIGHT_MM)
     if heights is not None and np.ptp(heights[1].astype(np.int64)) < _LEAST_HEIGHT_MM // 2:
-        high, heights = [], None  # a height that never changes is none
+        high, heights = [], None  # a height that never changes is not used
     fast = spans_of(hud["airspeed"], lambda speed: speed > _LEAST_AIRSPEED_M_S)
     driven = spans_of(hud["throttle"], lambda percent: percent > _LEAST_THROTTLE_PERCENT)
     for spans, source in (
@@ -101,7 +104,7 @@ def airborne_spans(log: "Log", system_id: int, boot: int | None = None) -> tuple
 
 
 def within(spans: Spans, time_us: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which times are in one of the spans."""
+    """Mask of the times that are in one of the spans."""
     inside = np.zeros(len(time_us), dtype=np.bool_)
     for start_us, end_us in spans:
         inside |= (time_us >= start_us) & (time_us < end_us)
@@ -109,7 +112,7 @@ def within(spans: Spans, time_us: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 
 def duration_s(spans: Spans, time_us: NDArray[np.int64]) -> float:
-    """Time in the spans between the first and the last of some times."""
+    """Time in the spans, between the first and the last of the given times."""
     if not len(time_us):
         return 0.0
     first_us, last_us = int(time_us.min()), int(time_us.max())
@@ -117,7 +120,7 @@ def duration_s(spans: Spans, time_us: NDArray[np.int64]) -> float:
 
 
 def _spans(time_us: NDArray[np.int64], state: NDArray[np.bool_]) -> Spans:
-    """Where a state holds: from each message that says so to the next one."""
+    """Spans in which a state holds: from each message that reports it to the next message."""
     order = np.argsort(time_us, kind="stable")
     times, holds = time_us[order], state[order]
     ends = np.minimum(np.append(times[1:], times[-1:] + _HOLD_US), times + _HOLD_US)
@@ -133,7 +136,9 @@ def _spans(time_us: NDArray[np.int64], state: NDArray[np.bool_]) -> Spans:
 def _off_the_ground(
     span: tuple[int, int], time_us: NDArray[np.int64], height_mm: NDArray[np.int32]
 ) -> tuple[int, int]:
-    """A span without its time on the ground before and after; all of it where it never gets high."""
+    """A span without its time on the ground before and after the flight; the whole span if it never gets
+    high.
+    """
     inside = (time_us >= span[0]) & (time_us < span[1])
     times, heights = time_us[inside], height_mm[inside].astype(np.int64)
     if not len(times):
@@ -141,7 +146,7 @@ def _off_the_ground(
     risen = np.flatnonzero(heights > heights[0] + _LEAST_HEIGHT_MM)
     above = np.flatnonzero(heights > heights[-1] + _LEAST_HEIGHT_MM)
     start_us = int(times[risen[0]]) if len(risen) else span[0]
-    # The log may end in the air: then the last height is none of the ground's.
+    # The log may end in the air: then the last height is not a height of the ground.
     landed = len(above) > 0 and heights[-1] <= heights[0] + 2 * _LEAST_HEIGHT_MM
     end_us = int(times[above[-1]]) + 1 if landed else span[1]
     return (start_us, end_us) if start_us < end_us else span

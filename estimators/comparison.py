@@ -1,4 +1,4 @@
-"""Estimates beside references: errors over time, and their statistics over the part in the air."""
+"""Compares estimates with references: errors over time, and their statistics over the time in the air."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ AGAINST: Final[Mapping[str, Sequence[str]]] = {
     "truth": (TRUTH,),
     "both": (AUTOPILOT, TRUTH),
 }
-"""What estimates can be compared with, the main reference first."""
+"""The references that estimates can be compared with, the main one first."""
 
 _TARGET: Final = "target"
 
@@ -47,16 +47,16 @@ class Comparison:
     Attributes:
         label: "vehicle 1", "target 3".
         subject: system id; 0 for a target.
-        time_us: (n,) vehicle time of the estimates; after a new boot it begins anew.
-        boot: (n,) number of the boot of each.
+        time_us: (n,) vehicle time of the estimates; it restarts with each boot.
+        boot: (n,) number of each estimate's boot.
         estimates: (n,) columns by name.
         references: by name of the reference and of the column, at the estimates' times; NaN: not known.
-        sources: messages that each reference is taken from.
+        sources: messages from which each reference is taken.
         counted: (n,) estimates made in the air.
-        airborne_s: how long that was.
-        airborne_from: what says so.
-        figures: statistics by name of the reference.
-        not_compared: why there are no figures; "" where there are.
+        airborne_s: total time in the air.
+        airborne_from: the source of the time in the air.
+        figures: error statistics by name of the reference.
+        not_compared: reason why there are no figures; "" if there are.
     """
 
     label: str
@@ -74,7 +74,7 @@ class Comparison:
 
     @property
     def reference(self) -> str | None:
-        """The reference of the main figures; None where there is none."""
+        """Name of the reference of the main figures; None if there is none."""
         return next((name for name, figures in self.figures.items() if figures), None)
 
     def errors(self, reference: str, column: str) -> Column:
@@ -83,18 +83,18 @@ class Comparison:
 
 
 def comparisons(logs: "Sequence[Log]", runner: Runner, against: str = "both") -> list[Comparison]:
-    """Compare what a runner's estimator said with what its logs know.
+    """Compare the estimates of a runner with the references in its logs.
 
     Args:
-        logs: that the runner was fed with.
-        runner: when it is done.
+        logs: logs that the runner processed.
+        runner: a runner that has finished.
         against: one of `AGAINST`.
 
     Returns:
-        One for each vehicle or target that there are estimates of.
+        One comparison for each vehicle or target that has estimates.
 
     Raises:
-        ValueError: no such reference.
+        ValueError: `against` is not one of `AGAINST`.
     """
     if against not in AGAINST:
         raise ValueError(f"against {against!r} is not accepted; there are {', '.join(AGAINST)}")
@@ -120,7 +120,7 @@ def _compared(
     wanted: Sequence[str],
 ) -> Comparison:
     time_us, boot = table.time_us[rows], table.boot[rows]
-    if subject:  # a team's common time; the log has the vehicle's own
+    if subject:  # a team's common time; the log has the vehicle's own time
         time_us = time_us - runner.common_us(0, subject)
     estimates = dict(zip(table.columns, table.values[rows].T.copy(), strict=True))
     compared = [name for name in COMPARED if name in estimates]
@@ -185,7 +185,7 @@ def _why_not(
     counted: NDArray[np.bool_],
     airborne_from: str,
 ) -> str:
-    """Why estimates have no errors, in words."""
+    """The reason why estimates have no errors, as text."""
     compared = [column for column in columns if column in COMPARED]
     if not compared:
         known = ", ".join(COMPARED)
@@ -201,12 +201,12 @@ def _why_not(
 
 
 def _log_of(logs: "Sequence[Log]", subject: int) -> "Log | None":
-    """The log that a vehicle is in."""
+    """The log that contains a vehicle."""
     return next((log for log in logs if subject in log.systems), logs[0] if logs else None)
 
 
 def _boots_with_estimates(log: "Log", runner: Runner, system_id: int) -> list[int | None]:
-    """Boots of the log, as the runner has counted them: those in which something came that it was given."""
+    """Boots of the log, numbered as in the runner: those in which it received a message."""
     numbers = [boot.number for boot in log.boots if boot.system_id == system_id]
     if len(numbers) < 2:
         return [None]

@@ -1,4 +1,4 @@
-"""Euler angles of many quaternions at once."""
+"""Euler angles of arrays of quaternions."""
 
 import numpy as np
 from numpy.typing import NDArray

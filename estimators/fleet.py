@@ -1,4 +1,4 @@
-"""An estimator for every vehicle that is heard: a runner each, or one for the team."""
+"""Runners of estimators: one for each vehicle that is received, or one for the team."""
 
 from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
@@ -14,27 +14,27 @@ __all__ = ["AUTOPILOT_COMPONENT", "GROUND_SYSTEM", "MAX_VEHICLES", "Fleet"]
 
 AUTOPILOT_COMPONENT: Final = 1
 GROUND_SYSTEM: Final = 200
-"""System ids from here on are ground stations and simulated targets, by custom."""
+"""By convention, system ids from here on belong to ground stations and simulated targets."""
 MAX_VEHICLES: Final = 64
-"""Runners at most: anybody can send with any system id."""
+"""Largest number of runners, because any sender can use any system id."""
 
 
 class Fleet:
-    """Gives each vehicle's messages to its runner, and makes one where a new vehicle is heard.
+    """Passes each vehicle's messages to its runner, and creates a runner when a new vehicle is received.
 
     Args:
-        make: a fresh estimator.
-        system_ids: the vehicles that count; None: all. Without effect on estimators of a team.
-        single: only the first vehicle that is heard.
+        make: creates a new estimator.
+        system_ids: the vehicles to use; None: all. It has no effect for estimators of a team.
+        single: use only the first vehicle that is received.
 
     Attributes:
         name, needs, parameters: of the estimators.
-        team: one runner hears all vehicles.
-        names: messages that the estimators are given.
-        heard_names: what must be read of a log.
+        team: one runner receives the messages of all vehicles.
+        names: names of the messages that the estimators receive.
+        heard_names: names of the messages that must be read from a log.
 
     Raises:
-        EstimatorError: the estimator needs what it may not see.
+        EstimatorError: the estimator needs a message that it is not allowed to receive.
     """
 
     def __init__(
@@ -61,14 +61,15 @@ class Fleet:
 
     @property
     def runners(self) -> Mapping[int, Runner]:
-        """By system id; of a team the one runner, as 0."""
+        """Runners by system id; the runner of a team has the key 0."""
         return MappingProxyType(self._runners)
 
     def feed(self, frame: Frame) -> tuple[Runner, Outcome] | None:
-        """Take a frame of a link; every one that was heard, in order, for the time is told by all of them.
+        """Process a frame of a link. Pass every received frame, in order, because all of them define the
+        vehicle time.
 
         Returns:
-            The runner that took it and what became of it; None where it was left out.
+            The runner that processed it and the outcome; None if it was left out.
         """
         heard = self._read.get(frame.message_id)
         if heard is None:
@@ -82,11 +83,11 @@ class Fleet:
         return self.take(time_us, message) if message.name in self.heard_names else None
 
     def newest_us(self, system_id: int) -> int:
-        """Newest vehicle time that a system has told in the frames fed; 0: none yet."""
+        """Newest vehicle time of a system in the frames fed so far; 0: none yet."""
         return self._vehicle_time.newest_us(system_id)
 
     def take(self, time_us: int, message: Message) -> tuple[Runner, Outcome] | None:
-        """Take a message at its vehicle time; as `feed`.
+        """Process a message at its vehicle time; returns the same as `feed`.
 
         Raises:
             EstimatorFailure: the estimator raised an error.
@@ -96,7 +97,7 @@ class Fleet:
         return None if runner is None or outcome is None else (runner, outcome)
 
     def pass_over(self, time_us: int, message: Message) -> None:
-        """Leave a message out that is not asked for; the boots of its vehicle are counted all the same.
+        """Skip a message that is outside the selected part; the boots of its vehicle are still counted.
 
         Raises:
             EstimatorFailure: the estimator raised an error.
@@ -119,7 +120,7 @@ class Fleet:
             or len(self._runners) >= self._limit
         ):
             return None
-        # The first estimator was made to see what it needs.
+        # The first estimator was created only to read its needs.
         runner = self._spare if self._spare is not None else Runner(self._make())
         self._spare = None
         runner.system_id = system_id

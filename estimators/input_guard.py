@@ -1,4 +1,4 @@
-"""What an estimator may use: late, repeated and non-finite samples are kept out, jumps of time are told."""
+"""Input checks of an estimator: rejects late, repeated and non-finite samples, reports time jumps."""
 
 from collections.abc import Hashable
 from math import isfinite
@@ -9,17 +9,17 @@ from estimators.interface import Outcome
 __all__ = ["NEW_BOOT_US", "InputGuard"]
 
 NEW_BOOT_US: Final = 1_000_000
-"""Time that goes back by more than this is a vehicle that has started anew, not a late message."""
+"""Time that goes back by more than this means that the vehicle has rebooted, not that a message is late."""
 
 
 class InputGuard:
-    """Judges samples by their time and values before an estimator uses them. One guard serves one vehicle.
+    """Checks the time and the values of samples before an estimator uses them. One guard serves one vehicle.
 
-    Streams are told apart by a key, such as the message's name: each has its own newest time, because the
-    messages of one vehicle need not come in the order of their times across streams.
+    Streams are distinguished by a key, such as the message's name. Each has its own newest time, because the
+    messages of one vehicle need not arrive in the order of their times across streams.
 
     Args:
-        max_gap_us: longest silence of a leading stream that the estimator can bridge; None: any.
+        max_gap_us: longest gap of a leading stream that the estimator can bridge; None: any.
     """
 
     __slots__ = ("_last", "_max_gap_us")
@@ -27,29 +27,29 @@ class InputGuard:
     def __init__(self, max_gap_us: int | None = None) -> None:
         if max_gap_us is not None and max_gap_us <= 0:
             raise ValueError(f"max_gap_us {max_gap_us} is not above 0; None accepts any gap")
-        # Beyond any time that a vehicle can have: one comparison in place of two.
+        # Larger than any vehicle time, so that one comparison replaces two.
         self._max_gap_us = 1 << 62 if max_gap_us is None else max_gap_us
         self._last: dict[Hashable, tuple[int, tuple[float, ...]]] = {}
 
     def check(
         self, time_us: int, key: Hashable, values: tuple[float, ...], leads: bool = True
     ) -> Outcome | None:
-        """Judge one sample.
+        """Check one sample.
 
         Args:
             time_us: vehicle time.
             key: the stream.
-            values: what the estimator is going to use, as a tuple of numbers.
-            leads: whether a gap of this stream is one that the estimator must bridge; a slow or optional
-                stream that pauses is no reason to start anew.
+            values: the numbers that the estimator is going to use.
+            leads: whether a gap of this stream counts as a time jump; a pause of a slow or optional stream is
+                no reason to restart.
 
         Returns:
-            None for a sample to use: newer than the one before it in its stream, or as new with other values
-            (messages without a time of their own), so a time difference of zero is possible. NOT_FINITE, LATE
-            or REPEATED for one to leave out. TIME_JUMP: forget what was and start with this sample, as the
-            guard already has.
+            None for a sample to use: it is newer than the one before it in its stream, or has the same time
+            and other values (messages without their own time stamp), so a time difference of zero is
+            possible. NOT_FINITE, LATE or REPEATED for a sample to reject. TIME_JUMP: restart with this
+            sample, as the guard has already done.
         """
-        if not isfinite(sum(values)):  # one sum sees any NaN or infinity among them
+        if not isfinite(sum(values)):  # the sum is not finite if any value is NaN or infinite
             return Outcome.NOT_FINITE
         before = self._last.get(key)
         if before is not None:

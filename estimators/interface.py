@@ -1,7 +1,7 @@
-"""What an estimator is: a sans-IO class that takes messages and gives typed estimates.
+"""The interface of estimators: a sans-IO class that receives messages and returns typed estimates.
 
-The same class runs in a process of its own on a live link, embedded on virtual time, and over a log, with the
-same numbers: it sees nothing but messages and the vehicle time that they carry.
+The same class runs in its own process on a live link, embedded on virtual time, and over a log, with the same
+results, because its only inputs are messages and their vehicle time.
 """
 
 from abc import ABC, abstractmethod
@@ -20,30 +20,31 @@ P = TypeVar("P")
 
 
 class Outcome(Enum):
-    """What became of a message."""
+    """The result of processing a message."""
 
-    # Counted with every message: members are singletons, and Enum's own hash is five times as slow.
+    # Used as dictionary keys with every message: members are singletons, and Enum's own hash is five times as
+    # slow.
     __hash__ = object.__hash__
 
     UPDATED = "updated"
-    """A new estimate is there."""
+    """A new estimate is available."""
     USED = "used"
-    """Taken in; the estimate comes with another message."""
+    """The message was used; the estimate comes with another message."""
     IGNORED = "ignored"
-    """Of no concern."""
+    """The estimator does not use this message."""
     WAITING = "waiting"
-    """Can't be used yet: something that it needs has not been heard."""
+    """The message can't be used yet, because another input was not received."""
     LATE = "late"
-    """Older than what was used already."""
+    """The message is older than one that was already used."""
     REPEATED = "repeated"
-    """The same sample once more."""
+    """The message repeats the previous sample."""
     NOT_FINITE = "not finite"
     """A value that is NaN or infinite."""
     IMPLAUSIBLE = "implausible"
-    """Outside what the sensor can give, or rejected by a statistical test."""
+    """A value is outside the sensor's possible range, or a statistical test rejected it."""
     TIME_JUMP = "time jump"
-    """After a gap too long to bridge, or time went back: the estimator has started anew from this message.
-    Its first estimate comes with the next UPDATED.
+    """A gap was too long to bridge, or time went back: the estimator has restarted from this message. Its
+    first estimate comes with the next UPDATED.
     """
 
 
@@ -52,11 +53,13 @@ class Need:
     """An input of an estimator.
 
     Attributes:
-        messages: names of messages that serve, best first; any one of them is enough.
-        rate_hz: smallest rate that gives sensible numbers; 0: any.
-        purpose: what for, for the text that tells that it is missing: "angular rate and specific force".
-        wanted_rate_hz: what to ask a live autopilot for; `rate_hz` if less.
-        optional: works without.
+        messages: names of suitable messages, best first; any one of them is enough.
+        rate_hz: smallest rate that gives useful estimates; 0: any.
+        purpose: purpose of the input, for the text that reports it missing: "angular rate and specific
+            force".
+        wanted_rate_hz: rate to request from a live autopilot; if it is smaller than `rate_hz`, `rate_hz` is
+            requested.
+        optional: the estimator works without it.
     """
 
     messages: tuple[str, ...]
@@ -76,9 +79,9 @@ class Estimate(Protocol):
     """One estimate: a frozen dataclass of unit-suffixed values, with its uncertainty.
 
     Attributes:
-        COLUMNS: names of what `row` gives, unit-suffixed.
-        time_us: vehicle time it is for.
-        subject: system id of the vehicle it is about; 0 for a target.
+        COLUMNS: names of the values that `row` returns, with unit suffixes.
+        time_us: vehicle time of the estimate.
+        subject: system id of the estimated vehicle; 0 for a target.
     """
 
     COLUMNS: ClassVar[tuple[str, ...]]
@@ -95,15 +98,15 @@ class Estimate(Protocol):
 
 
 class Estimator(ABC, Generic[P]):
-    """Base of estimators. One instance serves one vehicle, or with `team` all that are heard.
+    """Base of estimators. One instance serves one vehicle, or, with `TEAM`, all vehicles that are received.
 
     Args:
         parameters: of the class `PARAMETERS`; None: its defaults.
 
     Attributes:
-        NAME: as on the command line.
+        NAME: name on the command line.
         PARAMETERS: frozen dataclass of the parameters, with unit-suffixed fields and checks.
-        TEAM: takes the messages of all vehicles.
+        TEAM: whether it receives the messages of all vehicles.
     """
 
     NAME: ClassVar[str]
@@ -116,38 +119,39 @@ class Estimator(ABC, Generic[P]):
     @property
     @abstractmethod
     def needs(self) -> tuple[Need, ...]:
-        """What it must hear."""
+        """The inputs that it needs."""
 
     @abstractmethod
     def handle(self, time_us: int, message: Message) -> Outcome:
-        """Take one message. Never raises for what a message says; the outcome tells, and `Runner` counts.
+        """Process one message. The content of a message never raises an error; the outcome is returned, and
+        `Runner` counts outcomes.
 
         Args:
             time_us: vehicle time of the message; for a team, on the time base common to all.
-            message: from `estimators.messages`, wire units. One that is none of the needs is IGNORED.
+            message: from `estimators.messages`, wire units. A message that is not among the needs is IGNORED.
         """
 
     @abstractmethod
     def reset(self) -> None:
-        """Forget everything but the parameters."""
+        """Discard everything except the parameters."""
 
     @property
     @abstractmethod
     def estimates(self) -> Sequence[Estimate]:
-        """What the newest UPDATED message has changed; most have one."""
+        """The estimates that the newest UPDATED message has changed; most estimators have one."""
 
     @property
     def origin(self) -> GeodeticPosition | None:
-        """Where `north_m` and `east_m` of its estimates are counted from; None: the vehicle's home."""
+        """The origin of `north_m` and `east_m` in its estimates; None: the vehicle's home."""
         return None
 
     def publish(self) -> Sequence[MAVLinkMessage]:
-        """Messages that tell the newest estimates, to be sent from a component id of the estimator's own."""
+        """Messages with the newest estimates, to be sent from the estimator's own component id."""
         return ()
 
     def remarks(self) -> Mapping[str, float | str]:
-        """Further figures for the summary: innovations, biases, what was rejected.
+        """Additional figures for the summary: innovations, biases, numbers of rejected messages.
 
-        A text under "warning" is said to the user as well.
+        A text under "warning" is also shown to the user.
         """
         return {}

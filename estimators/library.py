@@ -1,4 +1,4 @@
-"""An estimator by its name, or a user's own by the path of a Python file, with parameters from text."""
+"""Creates an estimator by its name, or from a user's Python file by its path, with parameters from text."""
 
 import importlib
 import importlib.util
@@ -26,7 +26,7 @@ ESTIMATORS: Final[Mapping[str, str]] = MappingProxyType(
         "target-fusion": "estimators.target_fusion",
     }
 )
-"""Module of each estimator that can be named; it is imported when somebody asks for it."""
+"""Module of each estimator that has a name; it is imported only when it is used."""
 
 _NAME: Final = re.compile(r"[\w-]+")
 _TRUE: Final = ("1", "true", "yes", "on")
@@ -34,14 +34,14 @@ _FALSE: Final = ("0", "false", "no", "off")
 
 
 def make_estimator(name: str, settings: Iterable[str] = ()) -> Estimator[Any]:
-    """An estimator with parameters.
+    """Create an estimator with parameters.
 
     Args:
         name: one of `ESTIMATORS`, or the path of a Python file.
         settings: parameters as NAME=VALUE.
 
     Raises:
-        EstimatorError: no such estimator or parameter; says which there are.
+        EstimatorError: the estimator or a parameter does not exist; the message lists the existing ones.
     """
     found = estimator_class(name)
     return found(parameters_from(found, settings))
@@ -51,7 +51,7 @@ def estimator_class(name: str) -> type[Estimator[Any]]:
     """The class of an estimator; a file must hold exactly one.
 
     Raises:
-        EstimatorError: no such estimator; the file can't be loaded, or holds none or several.
+        EstimatorError: the estimator does not exist, or the file can't be loaded or contains none or several.
     """
     if name.endswith(".py"):
         path = Path(name)
@@ -72,7 +72,8 @@ def estimator_class(name: str) -> type[Estimator[Any]]:
 def _load(path: Path) -> types.ModuleType:
     if not path.is_file():
         raise EstimatorError(f"estimator file {path} does not exist")
-    # Registered under a name that no package has: dataclasses look their module up while it is being loaded.
+    # Registered under a name that no package has, because dataclasses look up their module while it is being
+    # loaded.
     label = f"_estimator_file_{path.stem}"
     spec = importlib.util.spec_from_file_location(label, path)
     if spec is None or spec.loader is None:
@@ -81,14 +82,14 @@ def _load(path: Path) -> types.ModuleType:
     sys.modules[label] = module
     try:
         spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # a script that is no module may end itself
+    except (Exception, SystemExit) as error:  # a script that is not meant as a module may exit
         del sys.modules[label]
         raise EstimatorError(f"estimator file {path} can't be loaded: {described(error)}") from error
     return module
 
 
 def _the_one(module: types.ModuleType, where: str) -> type[Estimator[Any]]:
-    """The estimator that a module defines itself; those that it imports don't count."""
+    """The estimator class that a module defines itself; imported classes do not count."""
     found: list[type[Estimator[Any]]] = [
         item
         for item in vars(module).values()
@@ -107,7 +108,7 @@ def _the_one(module: types.ModuleType, where: str) -> type[Estimator[Any]]:
 
 
 def _checked(found: type[Estimator[Any]], path: Path) -> type[Estimator[Any]]:
-    """A user's class has what the command line needs of it."""
+    """Check that a user's class has everything that the command line needs."""
     name = getattr(found, "NAME", None)
     if not (isinstance(name, str) and _NAME.fullmatch(name)):
         raise EstimatorError(
@@ -130,10 +131,11 @@ def _checked(found: type[Estimator[Any]], path: Path) -> type[Estimator[Any]]:
 
 
 def parameters_from(found: type[Estimator[Any]], settings: Iterable[str]) -> Any:
-    """Parameters of an estimator from NAME=VALUE texts; what isn't named keeps its default.
+    """Parameters of an estimator from NAME=VALUE texts; parameters that are not named keep their defaults.
 
     Raises:
-        EstimatorError: not NAME=VALUE, no such parameter, or a value that it doesn't take.
+        EstimatorError: a text is not NAME=VALUE, the parameter does not exist, or it does not accept the
+            value.
     """
     kinds = _kinds(found.PARAMETERS)
     values: dict[str, Any] = {}
@@ -158,7 +160,7 @@ def _kinds(parameters: type[Any]) -> dict[str, Any]:
 
 
 def _value(text: str, kind: Any, name: str) -> Any:
-    """A text as a value of an annotated type."""
+    """Convert a text to a value of an annotated type."""
     origin = get_origin(kind)
     if origin in (Union, types.UnionType):
         return _one_of(text, get_args(kind), name)
@@ -202,7 +204,7 @@ def _one_of(text: str, kinds: tuple[Any, ...], name: str) -> Any:
     if type(None) in kinds and text.lower() in ("none", ""):
         return None
     complaints: list[str] = []
-    # Text fits everything, so it is tried last.
+    # Every input is valid text, so text is tried last.
     for kind in sorted((k for k in kinds if k is not type(None)), key=lambda k: k is str):
         try:
             return _value(text, kind, name)

@@ -1,8 +1,8 @@
 """Messages as estimators read them: light named tuples of wire values, the same from a link and from a log.
 
 pymavlink's message objects cost some ten microseconds each; these cost a tenth, and a log makes them from
-columns. Values are as on the wire (degE7, mG, millimetres, ... of the definition files): who uses
-one converts it.
+columns. Values are in the units on the wire (degE7, mG, millimetres, ... of the definition files); the user
+of a value converts it.
 """
 
 import keyword
@@ -16,11 +16,11 @@ from autopilot_bridge.mavlink import DEFINITIONS, Frame, MessageDefinition
 Message = Any
 """A named tuple made by `message_class`.
 
-It has the fields of the definition (with a trailing underscore where the name is a Python keyword) and before
+It has the fields of the definition (with a trailing underscore if the name is a Python keyword) and, before
 them:
 
 Attributes:
-    src_system, src_component: who sent it.
+    src_system, src_component: ids of the sender.
 
 Its class has `name` ("ATTITUDE") and `message_id`. Arrays are tuples; strings end at their first zero.
 """
@@ -29,25 +29,25 @@ SOURCE_FIELDS: Final = ("src_system", "src_component")
 
 
 def field_name(name: str) -> str:
-    """The attribute that holds a field."""
+    """Name of the attribute that holds a field."""
     return f"{name}_" if keyword.iskeyword(name) else name
 
 
 def message_class(found: MessageDefinition) -> Any:
-    """The named tuple of one message definition; the same class each time for the dialect's own."""
+    """The named tuple of one message definition; always the same class for a definition of the dialect."""
     return _dialect_class(found.message_id) if DEFINITIONS.get(found.message_id) is found else _make(found)
 
 
 def read_message(frame: Frame) -> Message:
-    """The message in a frame of the parser; never raises."""
+    """Decode the message in a frame of the parser; never raises."""
     return _reader(frame.message_id)(frame)
 
 
 def rows(made: Any, system_id: int, component_id: int, columns: Iterable[Iterable[Any]]) -> Iterator[Message]:
-    """Messages from columns, one per field in the order of the definition's `wire_fields`.
+    """Make messages from columns, one column per field in the order of the definition's `wire_fields`.
 
     Args:
-        made: class from `message_class`.
+        made: class returned by `message_class`.
         columns: Python values (`ndarray.tolist()`), tuples for arrays.
     """
     make = made._make
@@ -56,13 +56,13 @@ def rows(made: Any, system_id: int, component_id: int, columns: Iterable[Iterabl
 
 
 def text(raw: bytes) -> str:
-    """A string field: up to its first zero; bytes that are not ASCII become U+FFFD."""
+    """Decode a string field up to its first zero; bytes that are not ASCII become U+FFFD."""
     return raw.split(b"\0", 1)[0].decode("ascii", "replace")
 
 
 def _make(found: MessageDefinition) -> Any:
     names = [*SOURCE_FIELDS, *(field_name(field.name) for field in found.wire_fields)]
-    made = namedtuple(found.name, names)  # type: ignore[misc]  # names are known at run time only
+    made = namedtuple(found.name, names)  # type: ignore[misc]  # names are known only at run time
     made.name = found.name  # type: ignore[attr-defined]
     made.message_id = found.message_id  # type: ignore[attr-defined]
     return made

@@ -1,4 +1,4 @@
-"""What an estimator needs and a log or a link gives, compared and told in words."""
+"""Compares an estimator's needs with the messages of a log or a link, and describes the result."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -9,20 +9,21 @@ from estimators.interface import Need
 __all__ = ["EstimatorError", "Supply", "lacking", "message_names", "supplies", "wanted_rate_hz"]
 
 NOT_STREAMED = frozenset({"PARAM_VALUE"})
-"""Messages that an autopilot sends on request or when something changes: no rate can be asked for."""
+"""Messages that an autopilot sends on request or when a value changes; no rate can be requested for them."""
 RATE_TOLERANCE = 0.95
-"""Streams come a little slower than they are asked for: 19.2 Hz of IMU serve where 20 are needed."""
+"""Streams are a little slower than requested: 19.2 Hz of IMU are enough when 20 Hz are needed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Supply:
-    """How one need is served.
+    """The messages available for one need.
 
     Attributes:
         need: the need.
-        message: the alternative that serves it, or would if it were faster; "" where there is none of them.
+        message: the alternative that is used, or the fastest one if all are too slow; "" when none is
+            available.
         rate_hz: rate of that message.
-        met: whether that is enough.
+        met: whether this rate is sufficient.
     """
 
     need: Need
@@ -32,7 +33,9 @@ class Supply:
 
     @property
     def text(self) -> str:
-        """What is lacking, in words ("RAW_IMU at 1.2 Hz; needs 20 Hz or more for ..."), or what serves."""
+        """Text about what is missing ("RAW_IMU at 1.2 Hz; needs 20 Hz or more for ..."), or about the message
+        used.
+        """
         need = self.need
         if self.met:
             return f"{self.message} at {_hz(self.rate_hz)}" if self.message else f"{need.purpose}: not needed"
@@ -43,27 +46,27 @@ class Supply:
 
 
 def supplies(needs: Iterable[Need], rate_hz: Callable[[str], float]) -> list[Supply]:
-    """How each need is served: by the first of its messages that is fast enough, else by the fastest.
+    """The supply of each need: the first of its messages that is fast enough, else the fastest.
 
     Args:
-        needs: of an estimator.
-        rate_hz: rate of a message by name; 0 where it is absent.
+        needs: needs of an estimator.
+        rate_hz: returns the rate of a message by name; 0 if it is absent.
     """
     return [_supply(need, rate_hz) for need in needs]
 
 
 def lacking(needs: Iterable[Need], rate_hz: Callable[[str], float]) -> list[str]:
-    """What is missing and can't be done without, in words; empty when the estimator can work."""
+    """Texts about missing inputs that are not optional; empty when the estimator can work."""
     return [s.text for s in supplies(needs, rate_hz) if not s.met and not s.need.optional]
 
 
 def message_names(needs: Sequence[Need]) -> frozenset[str]:
-    """Every message that serves a need."""
+    """Names of all messages that can satisfy a need."""
     return frozenset(name for need in needs for name in need.messages)
 
 
 def wanted_rate_hz(need: Need) -> float:
-    """What to ask an autopilot for; a message that may come at any rate is asked for each second."""
+    """Rate to request from an autopilot; 1 Hz for a message that may come at any rate."""
     return max(need.rate_hz, need.wanted_rate_hz) or 1.0
 
 

@@ -1,7 +1,7 @@
-"""What estimates are compared with: the autopilot's word, and a simulator's truth, where a log has it.
+"""References for estimates: the autopilot's own estimate and, if the log contains it, a simulator's truth.
 
-Estimates and references meet by the names of their columns: `roll_rad`, `north_m`. Nothing here is for
-estimators; they never see truth.
+Estimates and references are matched by the names of their columns: `roll_rad`, `north_m`. Estimators do not
+use this module; they never receive the truth.
 """
 
 import math
@@ -40,14 +40,14 @@ AUTOPILOT: Final = "autopilot"
 TRUTH: Final = "truth"
 
 MAX_AWAY_US: Final = 100_000
-"""An estimate further from every sample of the reference than this has none."""
+"""An estimate that is farther from every sample of the reference has no reference value, microseconds."""
 MAX_BRIDGED_US: Final = 1_000_000
-"""A longer gap of the reference is not interpolated across."""
+"""Longest gap of the reference that is interpolated, microseconds."""
 _LEAST_SPEED_M_S: Final = 1.0
-"""Slower than this, the direction of travel says nothing."""
+"""Below this speed the direction of travel is not meaningful."""
 _TARGET_SYSTEM: Final = 251
 _SIMULATORS: Final = (25, 1)
-"""Components that tell truth, the preferred first: our SITL's, PX4's own."""
+"""Components that send the truth, the preferred one first: our SITL's, PX4's own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +55,10 @@ class Series:
     """A quantity over time.
 
     Attributes:
-        source: message that it is taken from.
-        time_us: (n,) vehicle time, rising.
-        values: (n,) finite.
-        angle: wraps around at a full turn.
+        source: name of the message it is taken from.
+        time_us: (n,) vehicle time, ascending.
+        values: (n,) finite values.
+        angle: whether it wraps around at a full turn.
     """
 
     source: str
@@ -67,8 +67,8 @@ class Series:
     angle: bool
 
     def at(self, time_us: NDArray[np.int64]) -> Column:
-        """Linear between samples (angles the short way round); NaN where there is none within 0.1 s, or
-        none across a gap of a second.
+        """Values at the given times, linear between samples (angles the short way round); NaN when no sample
+        is within 0.1 s, and in gaps longer than a second.
         """
         times = self.time_us
         if not len(times):
@@ -85,11 +85,11 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """Somebody's word on a vehicle.
+    """A source that estimates of a vehicle are compared with.
 
     Attributes:
         name: "autopilot" or "truth".
-        columns: quantities by the names that estimates have for them.
+        columns: quantities by the column names of the estimates.
     """
 
     name: str
@@ -97,20 +97,20 @@ class Reference:
 
     @property
     def sources(self) -> list[str]:
-        """Messages that it is taken from."""
+        """Names of the messages it is taken from."""
         return list(dict.fromkeys(series.source for series in self.columns.values()))
 
 
 def references(
     log: "Log", system_id: int, *, origin: GeodeticPosition | None = None, boot: int | None = None
 ) -> dict[str, Reference]:
-    """What a log says of a vehicle; empty references are left out.
+    """The references of a vehicle in a log, by name; empty references are left out.
 
     Args:
         log: an open log.
-        system_id: the vehicle.
-        origin: where `north_m` and `east_m` are counted from; None: its home.
-        boot: of the log; None: all of it.
+        system_id: system id of the vehicle.
+        origin: origin of `north_m` and `east_m`; None: the vehicle's home.
+        boot: number of a boot of the log; None: the whole log.
     """
     place = home_of(log, system_id, boot) if origin is None else origin
     frame = None if place is None else LocalFrame(place)
@@ -119,7 +119,7 @@ def references(
 
 
 def lacking_references(log: "Log", system_id: int, columns: Sequence[str]) -> list[str]:
-    """Messages that columns would be compared with, and that a vehicle's autopilot has not sent."""
+    """Messages that would be the references of columns, and that a vehicle's autopilot has not sent."""
     angles = ("roll_rad", "pitch_rad", "yaw_rad")
     needed = ["ATTITUDE"] if any(column in angles for column in columns) else []
     if any(column not in angles for column in columns):
@@ -132,11 +132,11 @@ def lacking_references(log: "Log", system_id: int, columns: Sequence[str]) -> li
 def target_reference(
     log: "Log", number: int, *, origin: GeodeticPosition | None, boot: int | None = None
 ) -> Reference | None:
-    """Where a ground target of our SITL really was.
+    """The true position of a ground target of our SITL.
 
     Args:
-        number: of its tag; where only one target is known, that one counts whatever its number.
-        origin: where `north_m` and `east_m` are counted from; None: not compared.
+        number: number of its tag; when only one target is known, it is used regardless of its number.
+        origin: origin of `north_m` and `east_m`; None: they are not compared.
     """
     name = "HIL_STATE_QUATERNION"
     known = sorted(
@@ -153,7 +153,7 @@ def target_reference(
 
 
 def home_of(log: "Log", system_id: int, boot: int | None = None) -> GeodeticPosition | None:
-    """A vehicle's home: the newest HOME_POSITION that is a place; None where it has told none."""
+    """A vehicle's home: the newest valid HOME_POSITION; None when it has sent none."""
     table = _table(log, "HOME_POSITION", system_id, boot)
     if table is None:
         return None
@@ -165,7 +165,7 @@ def home_of(log: "Log", system_id: int, boot: int | None = None) -> GeodeticPosi
 
 
 def _table(log: "Log", name: str, system_id: int, boot: int | None) -> "Table | None":
-    """A message of the autopilot, or None."""
+    """A message of the autopilot as a table, or None."""
     tables = _tables(log, name, system_id, boot, (1,))
     return tables[0] if tables else None
 
@@ -173,8 +173,8 @@ def _table(log: "Log", name: str, system_id: int, boot: int | None) -> "Table | 
 def _tables(
     log: "Log", name: str, system_id: int, boot: int | None, preferred: Sequence[int]
 ) -> "list[Table]":
-    """A message of one system, from the preferred components first; not asked for by a name that the log's
-    dialect may not have.
+    """A message of one system, from the preferred components first. It is looked up only if the log contains
+    it, because the log's dialect may not define it.
     """
     if not any(key.name == name and key.system_id == system_id for key in log.keys):
         return []
@@ -217,7 +217,7 @@ def _from_simstate(table: "Table", frame: LocalFrame | None) -> dict[str, Series
 
 def _from_sim_state(table: "Table", frame: LocalFrame | None) -> dict[str, Series]:
     angles = {f"{axis}_rad": _floats(table[axis]) for axis in ("roll", "pitch", "yaw")}
-    # `lat` and `lon` are floats, good for some metres; the integers came later and may be 0.
+    # `lat` and `lon` are floats, accurate to some metres; the integers came later and may be 0.
     whole = np.any(table["lat_int"]) or np.any(table["lon_int"])
     lat = 1e-7 * _floats(table["lat_int"]) if whole else _floats(table["lat"])
     lon = 1e-7 * _floats(table["lon_int"]) if whole else _floats(table["lon"])
@@ -230,11 +230,11 @@ _TRUTHS: Final[Mapping[str, Callable[["Table", LocalFrame | None], dict[str, Ser
     "SIM_STATE": _from_sim_state,
     "SIMSTATE": _from_simstate,
 }
-"""Best first: SIMSTATE has no time of its own."""
+"""Best first. SIMSTATE has no time of its own."""
 
 
 def _places(table: "Table", frame: LocalFrame | None) -> dict[str, Column]:
-    """Position and velocity as GLOBAL_POSITION_INT and HIL_STATE_QUATERNION have them."""
+    """Position and velocity from GLOBAL_POSITION_INT and HIL_STATE_QUATERNION."""
     lat, lon = 1e-7 * _floats(table["lat"]), 1e-7 * _floats(table["lon"])
     north, east = 1e-2 * _floats(table["vx"]), 1e-2 * _floats(table["vy"])
     places = _placed(lat, lon, frame) | {"alt_m": 1e-3 * _floats(table["alt"])}
@@ -257,7 +257,7 @@ def _moving(north_m_s: Column, east_m_s: Column) -> dict[str, Column]:
 
 
 def _series(table: "Table", columns: Mapping[str, Column]) -> dict[str, Series]:
-    """Columns over the table's time: sorted, each time once, finite."""
+    """Series over the table's time: sorted, finite, and with each time once."""
     time_us, first = np.unique(table.time_us, return_index=True)
     made = {}
     for name, values in columns.items():
@@ -272,7 +272,7 @@ def _floats(values: NDArray[Any]) -> Column:
 
 
 def errors(name: str, estimate: Column, reference: Column) -> Column:
-    """Estimate minus reference; angles within half a turn, degrees of latitude and longitude as they are."""
+    """Estimate minus reference; angles are wrapped to half a turn, but not latitude and longitude."""
     difference = estimate - reference
     if name.endswith("_rad"):
         return np.remainder(difference + math.pi, 2.0 * math.pi) - math.pi
@@ -286,7 +286,7 @@ class ErrorFigures:
     Attributes:
         quantity: "roll", "north".
         unit: "deg", "m", "m_s".
-        samples: how many estimates were compared.
+        samples: number of compared estimates.
         mean, rms, mse, max: mean, root of the mean square, mean square, largest magnitude.
     """
 
@@ -311,7 +311,7 @@ class ErrorFigures:
 
 
 def quantity_of(column: str) -> tuple[str, str, float]:
-    """What a column is called, its unit for people, and the factor to that: `roll_rad` in degrees."""
+    """Name of a column's quantity, its unit for users, and the factor to that unit: `roll_rad` in degrees."""
     for suffix, unit, factor in (("_rad", "deg", 180.0 / math.pi), ("_m_s", "m_s", 1.0), ("_m", "m", 1.0)):
         if column.endswith(suffix):
             return column.removesuffix(suffix), unit, factor
@@ -319,7 +319,7 @@ def quantity_of(column: str) -> tuple[str, str, float]:
 
 
 def error_figures(column: str, error: Column, counted: NDArray[np.bool_]) -> ErrorFigures | None:
-    """Statistics of the errors that are counted and known; None where there is none."""
+    """Statistics of the errors that are counted and finite; None when there are none."""
     name, unit, factor = quantity_of(column)
     chosen = factor * error[counted & np.isfinite(error)]
     if not len(chosen):

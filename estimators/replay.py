@@ -1,4 +1,4 @@
-"""A log through an estimator. Only the messages that it needs are read: seconds for hours of flight."""
+"""Runs an estimator over a log. Only the messages that it needs are read: seconds for hours of flight."""
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["Replay", "log_rate_hz", "log_supplies", "replay", "vehicles_in"]
 
 _LEARNT_FROM = 20
-"""SYSTEM_TIMEs of each vehicle that are looked at before several logs are put in order."""
+"""Number of SYSTEM_TIMEs of each vehicle that are read before several logs are put in order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part of a log, as `Log.inside` takes it."""
+    """A part of a log; the fields are arguments of `Log.inside`."""
 
     from_s: float | None = None
     to_s: float | None = None
@@ -34,14 +34,15 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Replay:
-    """What a replay gave.
+    """The result of a replay.
 
     Attributes:
-        logs: what was replayed.
+        logs: the replayed logs.
         fleet: runners with their estimates and counters.
-        supplies: by system id: how each need was served.
-        lacking: by system id: what was missing, in words. Such a vehicle was not run, nor a team with it.
-        failure: what an estimator's own error said; estimates end there. "" if none.
+        supplies: by system id: the supply of each need.
+        lacking: by system id: texts about missing messages. The estimator was not run for such a vehicle, nor
+            for a team with it.
+        failure: message of an error that the estimator raised; the estimates end there. "" if none.
     """
 
     logs: Sequence["Log"]
@@ -52,7 +53,7 @@ class Replay:
 
     @property
     def partial(self) -> bool:
-        """Something was missing, so that there is not all that was asked for."""
+        """Whether messages were missing, so that the result is incomplete."""
         return bool(self.failure or self.lacking or not self.supplies)
 
 
@@ -65,18 +66,18 @@ def replay(
     to_s: float | None = None,
     boot: int | None = None,
 ) -> Replay:
-    """Run an estimator over a log, one for each vehicle in it; or over the logs of a team.
+    """Run an estimator over a log, with one runner for each vehicle in it, or over the logs of a team.
 
     Args:
-        logs: open; several only for an estimator of a team, each with vehicles of its own.
-        make: a fresh estimator.
-        system_id: the one vehicle that counts; None: all in the log.
-        from_s, to_s, boot: part of each log to read, as `Log.inside` takes them.
+        logs: open logs; several only for an estimator of a team, each with different vehicles.
+        make: creates a new estimator.
+        system_id: the only vehicle to use; None: all in the log.
+        from_s, to_s, boot: part of each log to read, with the meaning they have in `Log.inside`.
 
     Raises:
-        EstimatorError: the estimator needs what it may not see; several logs for an estimator of one vehicle,
-            or with the same vehicle in them.
-        LogError: there is no such part in a log.
+        EstimatorError: the estimator needs a message that it is not allowed to receive; or there are several
+            logs for an estimator of one vehicle, or with the same vehicle in them.
+        LogError: a log has no such part.
     """
     opened = [logs] if not isinstance(logs, Sequence) else list(logs)
     probe = Fleet(make)
@@ -90,7 +91,8 @@ def replay(
     if not (fleet.team and lacking) and served:
         try:
             for time_us, message, inside in _messages(opened, fleet, system_id, Part(from_s, to_s, boot)):
-                # A parameter is logged once and holds from then on, also before the part that counts.
+                # A parameter is logged once and is valid from then on, also when it was logged before the
+                # selected part.
                 if inside or message.name in NOT_STREAMED:
                     fleet.take(time_us, message)
                 else:
@@ -101,7 +103,7 @@ def replay(
 
 
 def vehicles_in(log: "Log", needs: Sequence[Need]) -> list[int]:
-    """System ids of vehicles: whose autopilot has sent a heartbeat, or something that is needed."""
+    """System ids of vehicles: those whose autopilot has sent a heartbeat or a needed message."""
     names = {"HEARTBEAT"} | {name for need in needs for name in need.messages}
     return sorted(
         {
@@ -113,8 +115,8 @@ def vehicles_in(log: "Log", needs: Sequence[Need]) -> list[int]:
 
 
 def log_rate_hz(log: "Log", system_id: int, name: str) -> float:
-    """Rate of a message in a log, from whichever component of a vehicle sends most; 0 where it is absent, and
-    not 0 where it came once.
+    """Rate of a message in a log, from the component of a vehicle that sends most. It is 0 only if the
+    message is absent; a message that came once has a positive rate.
     """
     components = [
         key.component_id
@@ -128,12 +130,12 @@ def log_rate_hz(log: "Log", system_id: int, name: str) -> float:
 
 
 def log_supplies(log: "Log", system_id: int, needs: Sequence[Need]) -> list[Supply]:
-    """How a log serves needs on a vehicle's messages."""
+    """The supply of the needs from a vehicle's messages in a log."""
     return supplies(needs, lambda name: log_rate_hz(log, system_id, name))
 
 
 def missing_of(given: Sequence[Supply]) -> list[str]:
-    """What can't be done without and is not there, in words."""
+    """Texts about missing inputs that are not optional."""
     return [supply.text for supply in given if not supply.met and not supply.need.optional]
 
 
@@ -155,8 +157,8 @@ def _own_vehicles(logs: Sequence["Log"], needs: Sequence[Need], system_id: int |
 def _messages(
     logs: Sequence["Log"], fleet: Fleet, system_id: int | None, part: Part
 ) -> Iterator[tuple[int, Message, bool]]:
-    """Needed messages in the order of the file, and whether they lie in the part that counts; of several
-    logs, in the order of the team's common time.
+    """Needed messages in the order of the file, and whether they are in the selected part; of several logs,
+    in the order of the team's common time.
     """
     names = sorted(fleet.heard_names)
     streams = [_messages_of(log, _present(log, names), system_id, part) for log in logs]

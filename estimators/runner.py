@@ -1,7 +1,7 @@
-"""The one loop behind every way to run an estimator: messages in, columns of estimates out.
+"""The common loop of all ways to run an estimator: its input is messages, its output is columns of estimates.
 
-Live and embedded flights feed it frames, a log gives it messages; from there on all is the same, so that the
-same messages in the same order give the same estimates, bit for bit.
+Live and embedded flights feed it frames, and a log feeds it messages. All further processing is the same, so
+that the same messages in the same order give the same estimates, bit for bit.
 """
 
 from array import array
@@ -32,10 +32,10 @@ __all__ = [
 ]
 
 TRUTH_COMPONENT: Final = 25
-"""The simulator in an embedded SITL (MAV_COMP_ID_USER1)."""
+"""Component id of the simulator in an embedded SITL (MAV_COMP_ID_USER1)."""
 TRUTH_MESSAGES: Final = frozenset({"SIMSTATE", "SIM_STATE", "HIL_STATE", "HIL_STATE_QUATERNION"})
 ESTIMATOR_COMPONENTS: Final = frozenset(range(191, 195))
-"""Onboard computers: where estimators run, and what works with cameras and other sensors of its own."""
+"""Onboard computers. Estimators run there, as do programs that use their own cameras and other sensors."""
 ESTIMATE_MESSAGES: Final = frozenset(
     {
         "ATTITUDE",
@@ -51,15 +51,16 @@ ESTIMATE_MESSAGES: Final = frozenset(
         "WIND_COV",
     }
 )
-"""What estimators publish: none hears these of an onboard computer, in flight or in its log, and so none
-hears itself. What else comes from there was measured: a LANDING_TARGET, say.
+"""Messages that estimators publish. No estimator receives these from an onboard computer, in flight or from a
+log, so that no estimator receives its own output. Other messages from there are measurements, for example
+LANDING_TARGET.
 """
 
 _SYSTEM_TIME: Final = "SYSTEM_TIME"
 
 
 def why_unheard(name: str, component_id: int) -> str | None:
-    """Why estimators don't hear a component's message; None when they do."""
+    """The reason why estimators don't receive a component's message; None when they do."""
     if component_id == TRUTH_COMPONENT:
         return "truth"
     if component_id in ESTIMATOR_COMPONENTS and name in ESTIMATE_MESSAGES:
@@ -74,8 +75,8 @@ class EstimateTable:
         kind: class of the estimates.
 
     Attributes:
-        name: of that class.
-        columns: names of the values, unit-suffixed.
+        name: name of that class.
+        columns: names of the values, with unit suffixes.
     """
 
     __slots__ = ("_keys", "_values", "columns", "name")
@@ -87,10 +88,10 @@ class EstimateTable:
         self._values = array("d")
 
     def append(self, estimate: Estimate, boot: int) -> None:
-        """Take one estimate, of the boot with this number; whole or not at all.
+        """Append one estimate of the boot with this number. After an error nothing is appended.
 
         Raises:
-            TypeError, ValueError: its row is not as long as `columns`, or it has something that is no number.
+            TypeError, ValueError: its row is not as long as `columns`, or a value is not a number.
         """
         values = array("d", estimate.row())
         if len(values) != len(self.columns):
@@ -108,22 +109,22 @@ class EstimateTable:
 
     @property
     def time_us(self) -> NDArray[np.int64]:
-        """Vehicle time of each; of a team, the time common to it."""
+        """Vehicle time of each estimate; for a team, the time common to it."""
         return self._key(0)
 
     @property
     def subject(self) -> NDArray[np.int64]:
-        """System id that each is about; 0 for a target."""
+        """System id that each estimate is about; 0 for a target."""
         return self._key(1)
 
     @property
     def boot(self) -> NDArray[np.int64]:
-        """Boot of the vehicle that each was made in; 0 is the first that was heard."""
+        """Number of the vehicle's boot of each estimate; 0 is the first that was received."""
         return self._key(2)
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """One row per estimate, as `columns` names them."""
+        """One row per estimate, with the values named in `columns`."""
         return np.array(self._values, dtype=np.float64).reshape(len(self), len(self.columns))
 
     def __getitem__(self, column: str) -> NDArray[np.float64]:
@@ -133,27 +134,29 @@ class EstimateTable:
 
 
 class Runner:
-    """Gives an estimator what it may hear, and keeps what it says.
+    """Passes the permitted messages to an estimator, and stores its estimates.
 
-    Left out: truth, what estimators publish, messages of no concern, and, unless the estimator serves a team,
-    other vehicles. When the vehicle has booted anew, an estimator of one vehicle is reset.
+    Not passed on are the truth, messages that estimators publish, messages that are not needed, and, unless
+    the estimator serves a team, other vehicles. When the vehicle reboots, an estimator of one vehicle is
+    reset.
 
     Args:
-        estimator: fresh.
-        system_id: the vehicle it is for; None: the one whose autopilot gives the first message that it needs.
-            For a team it must be None.
+        estimator: a new estimator.
+        system_id: the vehicle to use; None: the one whose autopilot sends the first needed message. For a
+            team it must be None.
 
     Attributes:
-        estimator: the one given.
-        system_id: the vehicle; None as long as none was heard, and for a team.
-        names: messages that are given to the estimator.
-        outcomes: how often which.
-        left_out: messages kept from it, by reason.
+        estimator: the estimator that was given.
+        system_id: the vehicle; None until one was received, and for a team.
+        names: names of the messages that are passed to the estimator.
+        outcomes: number of messages by outcome.
+        left_out: number of messages not passed on, by reason.
         boot: number of the vehicle's boot, from 0.
         tables: estimates by the name of their class.
 
     Raises:
-        EstimatorError: the estimator needs what it may not see, or a system id was given for a team.
+        EstimatorError: the estimator needs a message that it is not allowed to receive, or a system id was
+            given for a team.
     """
 
     def __init__(self, estimator: Estimator[Any], *, system_id: int | None = None) -> None:
@@ -176,28 +179,30 @@ class Runner:
         self.tables: dict[str, EstimateTable] = {}
         self._kinds: dict[type[Any], EstimateTable] = {}
         self._vehicle_time = VehicleTime()
-        self._trial = FrameEncoder(1, 1)  # what can't be packed is to be the estimator's failure
+        self._trial = FrameEncoder(1, 1)  # a message that can't be packed is a failure of the estimator
         self._team_time = TeamTime() if estimator.TEAM else None
         self._newest_us: int | None = None
 
     @property
     def heard_names(self) -> frozenset[str]:
-        """What must be read of a log: what the estimator needs, and for a team what its common time needs."""
+        """Names of the messages to read from a log: those that the estimator needs and, for a team, those
+        that its common time needs.
+        """
         return self.names | {_SYSTEM_TIME} if self._team_time is not None else self.names
 
     @property
     def remarks(self) -> Mapping[str, float | str]:
-        """Further figures of the estimator's own."""
+        """Additional figures of the estimator."""
         try:
             return dict(self.estimator.remarks())
         except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
             return {"remarks_failed": described(error)}
 
     def publish(self) -> tuple[MAVLinkMessage, ...]:
-        """Messages that tell the newest estimates.
+        """Messages with the newest estimates.
 
         Raises:
-            EstimatorFailure: the estimator raised an error, or what it gave can't be sent.
+            EstimatorFailure: the estimator raised an error, or its message can't be packed.
         """
         estimator = self.estimator
         try:
@@ -209,19 +214,20 @@ class Runner:
         return messages
 
     def feed(self, frame: Frame) -> Outcome | None:
-        """Take a frame of a link; every one that was heard, in order, for the time is told by all of them.
+        """Process a frame of a link. Pass every received frame, in order, because all of them define the
+        vehicle time.
 
         Returns:
-            What became of it; None for one that was left out.
+            The outcome; None for a frame that was left out.
         """
         message = read_message(frame)
         return self.take(self._vehicle_time.stamp(message), message)
 
     def take(self, time_us: int, message: Message) -> Outcome | None:
-        """Take a message at its vehicle time.
+        """Process a message at its vehicle time.
 
         Returns:
-            What became of it; None for one that was left out.
+            The outcome; None for a message that was left out.
 
         Raises:
             EstimatorFailure: the estimator raised an error.
@@ -246,7 +252,7 @@ class Runner:
         return self._handle(time_us, message)
 
     def pass_over(self, time_us: int, message: Message) -> None:
-        """Leave a message out that is not asked for; its vehicle's boots are counted all the same.
+        """Skip a message that is outside the selected part; the boots of its vehicle are still counted.
 
         Raises:
             EstimatorFailure: the estimator raised an error.
@@ -255,13 +261,15 @@ class Runner:
             self._watch_boots(time_us)
 
     def _is_own(self, message: Message) -> bool:
-        """Whether it is of the one vehicle that counts: of the first autopilot heard, if none was named."""
+        """Whether a message is of the selected vehicle or, if none was specified, of the first autopilot
+        received.
+        """
         if self.system_id is None and message.src_component == 1:
             self.system_id = message.src_system
         return bool(message.src_system == self.system_id)
 
     def learn_times(self, system_times: Iterable[tuple[int, Message]]) -> None:
-        """Learn when the vehicles of a team booted, before their messages come.
+        """Learn when the vehicles of a team booted, before their messages are processed.
 
         Args:
             system_times: vehicle times and SYSTEM_TIMEs.
@@ -272,7 +280,7 @@ class Runner:
                 self._team_time.learn(time_us, message)
 
     def common_us(self, time_us: int, system_id: int) -> int:
-        """The time common to a team of a vehicle's time; of one vehicle it is its own."""
+        """The team's common time for a vehicle's time; for a single vehicle its own time."""
         return time_us if self._team_time is None else self._team_time.common_us(time_us, system_id)
 
     def _watch_boots(self, time_us: int) -> None:
@@ -284,7 +292,7 @@ class Runner:
             self._newest_us = time_us
 
     def start_boot(self) -> None:
-        """The vehicle has booted anew: what the estimator knew is of no use.
+        """Process a reboot of the vehicle: the estimator's state is no longer valid.
 
         Raises:
             EstimatorFailure: the estimator raised an error.

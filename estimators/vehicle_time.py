@@ -1,23 +1,24 @@
-"""Vehicle time of messages, from the messages and their order alone.
+"""Vehicle time of messages, determined only from the messages and their order.
 
-A vehicle's messages are told apart by their system id; its clock is that of its autopilot, component 1. A
-message that carries a time of that clock has it; any other has the newest that was heard before. Not when a
-message arrived but what came before it decides, so a live link and the log of it agree to the microsecond.
+The messages of a vehicle are identified by their system id; its clock is that of its autopilot, component 1.
+A message that carries a time of that clock gets this time; any other message gets the newest time received
+before. The time depends on the messages before it and not on the time of arrival, so a live link and its log
+agree to the microsecond.
 
 In full, for each system:
 
-* The *own stamp* of a message is `time_boot_ms`, or else `time_usec` below 10^15 (above, it is a Unix time);
-  0 is none, and SERVO_OUTPUT_RAW's is none: its 32 bits wrap after 71 minutes.
-* The autopilot leads. As long as it has not been heard with a stamp, any component does.
-* A leader's stamp no older than a second before the newest is the message's time, and the newest if it is
-  greater.
-* An older one that is also more than a second older than the newest of the same message is a new boot if it
-  is less than half of the newest time or 30 s older, or if the stamps have stayed behind while they went on
-  by 3 s. Otherwise it is late: a radio or a serial line can deliver frames of the past in a burst. One that
-  is not older than the newest of the same message has gone stale (a receiver without a fix repeats the time
-  of its last one). Late and stale messages have the newest time.
-* A stamp of another component counts for its message when it is within a second of the newest (it may have
-  booted with the vehicle); otherwise the message has the newest.
+* The *own stamp* of a message is `time_boot_ms`, or else `time_usec` below 10^15 (a larger value is a Unix
+  time). A value of 0 is not a stamp, and neither is SERVO_OUTPUT_RAW's, whose 32 bits wrap after 71 minutes.
+* The autopilot leads. Until a stamp of the autopilot was received, any component leads.
+* A leader's stamp that is at most a second older than the newest time is the message's time; if it is greater
+  than the newest time, it becomes the newest time.
+* An older stamp that is also more than a second older than the newest of the same message means a new boot if
+  it is less than half of the newest time, or 30 s older, or if the stamps have stayed behind while they
+  advanced by 3 s. Otherwise it is late: a radio or a serial line can deliver old frames in a burst. An old
+  stamp that is not older than the newest of the same message is stale (a receiver without a fix repeats the
+  time of its last fix). Late and stale messages get the newest time.
+* A stamp of another component is used for its message when it is within a second of the newest time (the
+  component may have booted with the vehicle); otherwise the message gets the newest time.
 * Before the first stamp the time is 0.
 """
 
@@ -34,24 +35,24 @@ AUTOPILOT: Final = 1
 """Component id of autopilots (MAV_COMP_ID_AUTOPILOT1)."""
 
 LATE_US: Final = 1_000_000
-"""A stamp that is further behind is late, or begins a new boot."""
+"""A stamp that is farther behind is late, or begins a new boot."""
 FAR_BACK_US: Final = 30_000_000
-"""No burst of late frames is so old: a step back by more is a new boot."""
+"""Late frames are never this old: a larger step back means a new boot."""
 SETTLED_US: Final = 3_000_000
-"""Stamps that go on for so long behind the newest time are of a new boot."""
+"""Stamps that advance by this much while they are behind the newest time belong to a new boot."""
 
 UNIX_TIME_US: Final = 1_000_000_000_000_000
-"""`time_usec` from here on is a Unix time (this one is of September 2001)."""
+"""A `time_usec` from this value on is a Unix time (this one is in September 2001)."""
 
 _WITHOUT: Final = frozenset({"SERVO_OUTPUT_RAW"})
 _STAMPS: Final = (("time_boot_ms", 1000), ("time_usec", 1))
 
 
 def stamp_field(name: str, fields: Any) -> tuple[str, int] | None:
-    """The field that holds the own stamp of a message, and its unit in microseconds; None: it has none.
+    """The field that holds a message's own stamp, and its unit in microseconds; None: it has none.
 
     Args:
-        name: of the message.
+        name: name of the message.
         fields: names of its fields.
     """
     if name in _WITHOUT:
@@ -64,12 +65,12 @@ class _SystemTime:
     newest_us: int = 0
     boot: int = 0
     led: bool = False
-    behind_us: int = -1  # the stamp with which the time stepped back and has not returned yet
+    behind_us: int = -1  # the stamp at which the time stepped back, until it has returned
     by_message: dict[tuple[int, int], int] = field(default_factory=dict)
 
 
 class VehicleTime:
-    """Gives messages their vehicle time, one after the other, in the order in which they came."""
+    """Determines the vehicle time of messages, one after the other, in the order of their arrival."""
 
     __slots__ = ("_fields", "_systems")
 
@@ -130,12 +131,12 @@ class VehicleTime:
         return system.newest_us
 
     def newest_us(self, system_id: int) -> int:
-        """Newest time of a system; 0 before it has told one."""
+        """Newest time of a system; 0 before one was received."""
         found = self._systems.get(system_id)
         return 0 if found is None else found.newest_us
 
     def boot(self, system_id: int) -> int:
-        """How often the time of a system has started anew."""
+        """How often the time of a system has restarted."""
         found = self._systems.get(system_id)
         return 0 if found is None else found.boot
 
@@ -146,11 +147,11 @@ def vehicle_times(
     systems: NDArray[np.int64],
     components: NDArray[np.int64],
 ) -> NDArray[np.int64]:
-    """Vehicle times of a whole log; the same as `VehicleTime.stamp` gives one after the other.
+    """Vehicle times of a whole log; the same as `VehicleTime.stamp` returns for them one after the other.
 
     Args:
         own_us: own stamps in the order of the file, 0 for none; overwritten with the vehicle times.
-        streams: which stream (message, system and component) each message belongs to.
+        streams: number of each message's stream (message, system and component).
         systems, components: ids of each stream.
 
     Returns:
@@ -170,7 +171,8 @@ def _vehicle_times(
     begins: NDArray[np.uint8],
 ) -> None:
     newest = np.zeros(256, dtype=np.int64)
-    epoch = np.zeros(256, dtype=np.int64)  # of what is remembered by stream; older is forgotten
+    # epoch of the values stored by stream; values of an older epoch are invalid
+    epoch = np.zeros(256, dtype=np.int64)
     led = np.zeros(256, dtype=np.bool_)
     behind = np.full(256, -1, dtype=np.int64)
     last_of = np.zeros(len(systems), dtype=np.int64)

@@ -1,1 +1,1 @@
-"""What a mission may ask of a vehicle, the missions themselves, reports and the command line."""
+"""The missions, the interface to a vehicle that they use, reports and the command line."""

@@ -1,4 +1,4 @@
-"""`python -m missions`: the command line."""
+"""Entry point of `python -m missions`: the command line."""
 
 from missions.cli import main
 

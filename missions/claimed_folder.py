@@ -1,4 +1,4 @@
-"""The folder of a run that is to be flown: claimed by its log, and given back when nothing is flown."""
+"""The folder of one run. It is claimed by creating its log, and given back when nothing is flown."""
 
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -12,13 +12,13 @@ from missions.run import LOG_NAME, RUNS, create_run_folder
 
 @dataclass(slots=True, kw_only=True)
 class ClaimedFolder:
-    """A run folder that no other run writes to, or takes away.
+    """A run folder that no other run writes to or removes.
 
     Attributes:
         path: the folder.
-        log: the run's, open; whoever makes it has the folder.
-        published: files that the run's world puts beside it.
-        made: folders that were made for it, innermost first.
+        log: the run's log, open. The run that creates the log owns the folder.
+        published: files that the run's world writes next to it.
+        made: folders that were created for it, innermost first.
     """
 
     path: Path
@@ -27,7 +27,7 @@ class ClaimedFolder:
     published: list[Path] = field(default_factory=list)
 
     def give_back(self) -> None:
-        """Take away what this run has made here, and nothing else: nothing was flown."""
+        """Remove what this run has created here, and nothing else. Used when nothing was flown."""
         with suppress(TlogError):
             self.log.close()
         for file in (self.log.path, *self.published):
@@ -37,15 +37,15 @@ class ClaimedFolder:
 
 
 def claim_folder(out: Path | None, mission: str) -> ClaimedFolder:
-    """Make the folder of a new run, and its log.
+    """Create the folder of a new run, and its log.
 
     Args:
-        out: the folder asked for; None: the next `runs/<mission>-<n>`.
+        out: the requested folder; None: the next `runs/<mission>-<n>`.
         mission: name of the mission.
 
     Raises:
-        PlanError: the folder holds something, another run's log maybe, or can't be made.
-        TlogError: the log can't be made.
+        PlanError: the folder is not empty (for example, it has another run's log) or can't be created.
+        TlogError: the log can't be created.
     """
     made = _missing_folders(out or RUNS)
     path = create_run_folder(out, mission)
@@ -54,7 +54,7 @@ def claim_folder(out: Path | None, mission: str) -> ClaimedFolder:
     try:
         return ClaimedFolder(path=path, log=TlogWriter(path / LOG_NAME), made=made)
     except TlogError as error:
-        if isinstance(error.__cause__, FileExistsError):  # it was empty for two at a time
+        if isinstance(error.__cause__, FileExistsError):  # two runs found it empty at the same time
             raise PlanError(
                 f"another run has begun in {path}, and nothing is overwritten; choose another --out"
             ) from error
@@ -63,10 +63,10 @@ def claim_folder(out: Path | None, mission: str) -> ClaimedFolder:
 
 
 def _missing_folders(folder: Path) -> list[Path]:
-    """Those of a folder and the folders it is in that are not there yet, innermost first."""
+    """The folder and its parents that do not exist yet, innermost first."""
     try:
         return [path for path in (folder, *folder.parents) if not path.exists()]
-    except OSError:  # not to be looked at: making it will say why
+    except OSError:  # the folder cannot be examined: creating it will report the reason
         return []
 
 

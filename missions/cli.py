@@ -1,7 +1,7 @@
 """The command line: `flightstack`.
 
-Heavy modules (numba, JSBSim, matplotlib) are imported by the command that needs them, so that help and
-errors are quick.
+Heavy modules (numba, JSBSim, matplotlib) are imported by the command that needs them, so that help and error
+messages appear quickly.
 """
 
 import contextlib
@@ -62,7 +62,7 @@ class _Commands(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run a command; who reads its output may stop when it has seen enough, which needs no words."""
+        """Run a command. A reader that closes the output early is not an error, and no message is shown."""
         try:
             return super().invoke(ctx)
         except BrokenPipeError:
@@ -85,7 +85,7 @@ def command_line() -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Entry point: runs the command line and exits. Every error is one line on stderr."""
+    """Entry point: runs the command line and exits. Every error is printed as one line on stderr."""
     _open_closed_streams()
     words = sys.argv[1:] if arguments is None else arguments
     if words[:1] == ["vehicle"]:  # MAVSDK is native code
@@ -95,7 +95,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def run_command_line(arguments: list[str] | None = None) -> int:
-    """Run the command line and give the exit code back."""
+    """Run the command line and return the exit code."""
     try:
         result = command_line.main(args=arguments, prog_name="flightstack", standalone_mode=False)
     except click.exceptions.Exit as stop:
@@ -124,9 +124,9 @@ def run_command_line(arguments: list[str] | None = None) -> int:
 
 
 def _open_closed_streams() -> None:
-    """Put the null device in place of standard streams that were closed (`2>&-`).
+    """Replace standard streams that were closed (`2>&-`) by the null device.
 
-    What is written there is lost, as the user wants, and no file or socket gets the number of one of them.
+    Output to them is discarded, as the user requested, and no file or socket gets the number of one of them.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is not None:
@@ -143,7 +143,9 @@ def _open_closed_streams() -> None:
 
 
 def _let_go_of_output() -> None:
-    """Forget what could not be written: the interpreter would try again as it ends, and complain."""
+    """Discard output that could not be written; otherwise the interpreter would try again at exit and print
+    an error.
+    """
     if sys.stdout is not None:
         with contextlib.suppress(OSError), open(os.devnull, "wb") as nothing:
             os.dup2(nothing.fileno(), sys.stdout.fileno())

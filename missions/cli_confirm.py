@@ -1,4 +1,4 @@
-"""The question before a flight with a real vehicle."""
+"""The confirmation before a flight with a real vehicle."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -18,7 +18,7 @@ def is_hardware(connections: Sequence[str]) -> bool:
     """Whether a link may lead to a real vehicle: serial, or a network beyond this machine.
 
     Raises:
-        AddressError: a connection string that is none.
+        AddressError: a connection string is invalid.
     """
     from autopilot_bridge.links import VEHICLE_FORMS, SerialPort, parse_address
     from autopilot_bridge.links.reach import Reach, reach_of
@@ -34,16 +34,16 @@ def confirmation(
     check: bool,
     screen: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> "Confirm | None":
-    """How the flight is confirmed; None: not asked for, on links of this machine.
+    """Return how the flight is confirmed; None: no confirmation is needed, on links of this machine.
 
     Args:
-        connections: of the vehicles.
-        yes: no question is asked; it flies when nothing is found against it.
-        check: on links of this machine too.
+        connections: connection strings of the vehicles.
+        yes: ask no question; fly when the checks find no problem.
+        check: also check vehicles on links of this machine.
         screen: makes a context in which nothing else writes to the terminal.
 
     Raises:
-        click.UsageError: a real vehicle, nobody to ask, and no --yes.
+        click.UsageError: the vehicle is real, there is no terminal to ask on, and --yes is missing.
     """
     hardware = is_hardware(connections)
     if not (hardware or check):

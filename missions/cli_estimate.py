@@ -1,4 +1,4 @@
-"""`flightstack estimate`: an estimator on a live link, as a process of its own."""
+"""`flightstack estimate`: an estimator on a live link, in its own process."""
 
 import sys
 from pathlib import Path
@@ -17,7 +17,7 @@ _SECONDS = FiniteRange(min=0.0, min_open=True, max=1e9)
 
 
 class _Teller:
-    """Says what is lacking when that changes, and on a terminal how it goes."""
+    """Reports missing inputs when they change and, on a terminal, the progress."""
 
     def __init__(self) -> None:
         self._terminal = sys.stderr.isatty()
@@ -25,7 +25,8 @@ class _Teller:
         self._shown = False
 
     def __call__(self, progress: "LiveProgress") -> None:
-        lacking = tuple(text.split(" at ")[0] for text in progress.lacking)  # rates change all the time
+        # rates change all the time and are not compared
+        lacking = tuple(text.split(" at ")[0] for text in progress.lacking)
         if lacking != self._told:
             self._told = lacking
             self.end()
@@ -39,7 +40,7 @@ class _Teller:
             self._shown = True
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the progress line."""
         if self._shown:
             click.echo("", err=True)
             self._shown = False
@@ -72,11 +73,11 @@ class _Teller:
 def estimate(**given: Any) -> int:
     """Run an estimator (attitude, lissajous, target-fusion, or a Python file of your own) on a live link.
 
-    It hears a vehicle, tells its estimates from a component id of its own, and logs everything: a replay of
-    flight.tlog in the run folder gives the same estimates.
+    It receives a vehicle's messages, sends its estimates from its own component id, and logs everything: a
+    replay of flight.tlog in the run folder gives the same estimates.
 
-    Exit codes: 0 done, 1 the link was silent or lacks what the estimator needs (what there is was kept), 2
-    usage, 130 interrupted before --duration was over.
+    Exit codes: 0 done, 1 the link was silent or lacks messages that the estimator needs (the data received
+    are kept), 2 usage, 130 interrupted before --duration was over.
     """
     from autopilot_bridge.errors import AddressError, BridgeError
     from estimators.errors import EstimatorError

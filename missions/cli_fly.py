@@ -1,4 +1,4 @@
-"""`flightstack fly`: a mission from one command."""
+"""`flightstack fly`: flies a mission with one command."""
 
 import sys
 from functools import partial
@@ -26,7 +26,7 @@ _flight = partial(flight_option, group="The flight")
 _estimator = partial(flight_option, group="An estimator beside it")
 _results = partial(flight_option, group="Results")
 
-_FORECAST_HEIGHT_M: Final = 100.0  # at least; the wind of a profile grows little above it
+_FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile increases little
 
 
 @click.command(cls=FlyCommand, context_settings={"show_default": True})
@@ -134,9 +134,8 @@ def fly(**given: Any) -> int:
     """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, a mission
     file (.plan, .waypoints), or a Python file of your own.
 
-    `flightstack fly MISSION --help` tells a mission's own options. Your own file has
-    `async def fly(vehicle, options)`.
-    The run folder gets flight.tlog, summary.json and track.png.
+    `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
+    options)`. The run folder gets flight.tlog, summary.json and track.png.
     """
     from missions.ending import signal_of
     from missions.errors import PlanError
@@ -154,7 +153,7 @@ def fly(**given: Any) -> int:
 def _models(
     given: tuple[str, ...], mission: "Mission[Any]", vehicles: int | None, connections: int
 ) -> list[str]:
-    """A model for each vehicle."""
+    """The models of the vehicles, one for each."""
     models = [name.strip() for text in given for name in text.split(",")]
     if not all(models):
         raise click.UsageError(

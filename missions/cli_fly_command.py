@@ -1,4 +1,6 @@
-"""`fly MISSION` as a command: the options of every flight and the mission's own, and which go together."""
+"""`fly MISSION` as a command: the options of every flight, the mission's own, and their permitted
+combinations.
+"""
 
 import importlib
 from collections.abc import Callable, Mapping
@@ -27,7 +29,7 @@ _FILES: Final[Mapping[str, tuple[str, str]]] = {
     _OWN: ("missions.own_command", "COMMAND"),
     _FILE: ("missions.plan_files.command", "COMMAND"),
 }
-"""Where each mission declares its options."""
+"""The module in which each mission declares its options."""
 
 
 def _command_of(mission: str) -> "MissionCommand":
@@ -37,7 +39,7 @@ def _command_of(mission: str) -> "MissionCommand":
 
 
 def _declaring(mission: str) -> str:
-    """Whose options a mission takes, by what stands on the command line."""
+    """Name of the mission whose options apply, from the mission argument of the command line."""
     if mission in _MISSIONS:
         return mission
     return _OWN if mission.endswith(".py") else _FILE
@@ -57,7 +59,7 @@ def _owners(option_name: str) -> list[str]:
 
 
 class FlyCommand(click.Command):
-    """`fly MISSION`: the options are those of every flight, and those the mission declares."""
+    """`fly MISSION`: its options are those of every flight and those that the mission declares."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         named = self._mission_named(args)
@@ -74,7 +76,7 @@ class FlyCommand(click.Command):
             raise
 
     def _mission_named(self, args: list[str]) -> str | None:
-        """The mission among the arguments, which is no option's value."""
+        """The mission among the arguments; values of options are skipped."""
         valued = {
             name
             for parameter in self.params
@@ -102,7 +104,7 @@ class FlyCommand(click.Command):
                 formatter.write_paragraph()
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The options under the headings of their groups, the mission's own first."""
+        """Write the options under the headings of their groups, the mission's own first."""
         groups: dict[str, list[tuple[str, str]]] = {MISSION_GROUP: []}
         for parameter in self.get_params(ctx):
             record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
@@ -118,12 +120,12 @@ class FlyCommand(click.Command):
 def flight_option(
     *declarations: str, **attributes: Any
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """An option of every flight."""
+    """Decorator for an option of every flight."""
     return click.option(*declarations, cls=FlightOption, **attributes)
 
 
 def chosen_names(context: click.Context) -> frozenset[str]:
-    """Options that stand on the command line."""
+    """Names of the options that the user specified on the command line."""
     return frozenset(
         name
         for name in context.params
@@ -134,11 +136,12 @@ def chosen_names(context: click.Context) -> frozenset[str]:
 def refuse_idle_options(context: click.Context, *, connected: bool) -> None:
     """Refuse options on the command line that would have no effect on this flight.
 
-    Options of other missions are refused by the parser. These are options of the embedded SITL for a vehicle
-    elsewhere, options for vehicles elsewhere on the embedded SITL, and options that another one replaces.
+    Options of other missions are refused by the parser. This function refuses options of the embedded SITL
+    when vehicles are connected by links, options for connected vehicles with the embedded SITL, and options
+    that another option replaces.
 
     Raises:
-        click.UsageError: names the options, and what they are for.
+        click.UsageError: the message names the options and their use.
     """
     chosen = chosen_names(context)
     options = {

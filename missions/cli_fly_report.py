@@ -1,4 +1,4 @@
-"""What `flightstack fly` shows: a line of progress on a terminal, and at the end how the run went."""
+"""Output of `flightstack fly`: a progress line on a terminal, and the result of the run at the end."""
 
 import math
 import os
@@ -17,11 +17,11 @@ _FAILED: Final = 1
 _PACE_S: Final = 5.0
 _PACE_LEAST_S: Final = 0.5
 KILLED: Final = 128
-"""Plus the signal's number: how shells tell of a command that was ended by one."""
+"""Added to the signal's number: the exit code by which shells report that a signal ended a command."""
 
 
 def leave_closed_terminal() -> None:
-    """Where the terminal is gone (SIGHUP), what is left to say is said to nobody, and fails no more."""
+    """When the terminal is closed (SIGHUP), discard all further output, so that writing does not fail."""
     for descriptor in (1, 2):
         try:
             os.write(descriptor, b"")
@@ -32,7 +32,7 @@ def leave_closed_terminal() -> None:
 
 
 class ProgressLine:
-    """The progress line on a terminal; nothing in a pipe, and nothing while it is held."""
+    """The progress line on a terminal. It shows nothing in a pipe, and nothing while it is paused."""
 
     def __init__(self) -> None:
         self._width = 0
@@ -66,7 +66,7 @@ class ProgressLine:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """A block in which the screen belongs to something else: the line is wiped off, and not shown."""
+        """Context in which other code writes to the terminal: the progress line is erased and not shown."""
         if self._width:
             click.echo(f"\r{'':<{self._width}}\r", nl=False, err=True)
         self._width, self._held = 0, True
@@ -76,23 +76,24 @@ class ProgressLine:
             self._held = False
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the progress line."""
         if self._width:
             click.echo("", err=True)
             self._width = 0
 
 
 class Pace:
-    """Vehicle time against wall time over the last seconds."""
+    """Ratio of vehicle time to wall time over the last seconds."""
 
     def __init__(self) -> None:
         self._looks: deque[tuple[float, float]] = deque()
 
     def factor(self, wall_s: float, vehicle_s: float) -> float | None:
-        """Vehicle seconds in a wall second; None while too little is known.
+        """Vehicle seconds per wall second; None while too few values are known.
 
         Args:
-            wall_s, vehicle_s: now, by both clocks. When the vehicle's time is set anew, it begins anew.
+            wall_s, vehicle_s: present time of both clocks. When the vehicle's time is reset, the measurement
+                restarts.
         """
         looks = self._looks
         if looks and vehicle_s < looks[-1][1]:
@@ -105,7 +106,7 @@ class Pace:
 
 
 def tell(result: "RunResult", mission: "Mission[Any]") -> int:
-    """Say how a run went; gives the exit code."""
+    """Print the result of a run; returns the exit code."""
     from missions.run import POOR, wind_words
 
     summary = result.summary
@@ -151,7 +152,7 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
 
 
 def _tell_estimator(summary: Mapping[str, Any]) -> int:
-    """Say what the estimator of the flight has done; the exit code."""
+    """Print the result of the flight's estimator; returns the exit code."""
     from missions.estimation.report import warnings_of
 
     name = summary["estimator"]

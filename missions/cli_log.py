@@ -1,4 +1,4 @@
-"""`flightstack log`: look into logs, and make others of them."""
+"""`flightstack log`: inspects logs, and makes other logs from them."""
 
 import json
 import math
@@ -22,7 +22,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class _Failed(click.ClickException):
-    """The log can't be read, or does not hold what was asked for."""
+    """The log can't be read, or does not contain the requested data."""
 
     exit_code = 1
 
@@ -69,7 +69,7 @@ def _selection_options(command: Command) -> Command:
 
 
 def _open(path: Path, dialect: str | None) -> "Log":
-    """The log; what the path is, is usage, what is in the file is not."""
+    """Open the log. A wrong path is a usage error; an error in the file's content is not."""
     if path.is_dir():
         raise click.UsageError(f"{path} is a directory; give the path of a log")
     if not path.exists():
@@ -110,7 +110,7 @@ def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
             click.echo(f"the times fit to boots {several}; all count, --boot chooses one", err=True)
         return window(log, selections, given["from_s"], given["to_s"], given["boot"])
     except NothingThere:
-        raise  # about what is in the log, not about how it was asked for
+        raise  # an error about the content of the log, not about the arguments
     except BridgeError as error:
         raise click.UsageError(str(error)) from error
 

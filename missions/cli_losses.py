@@ -1,13 +1,13 @@
-"""What a running SITL can't keep: the log, the signing keys, pictures."""
+"""Data that a running SITL could not write: the log, the signing keys, pictures."""
 
 import click
 
 
 class Losses:
-    """Tells of each on stderr when it happens. The vehicles fly on.
+    """Reports each loss on stderr when it happens. The vehicles continue to fly.
 
     Attributes:
-        any: there was one; the command fails in the end.
+        any: at least one loss happened; the command then exits with an error.
     """
 
     def __init__(self) -> None:
@@ -15,7 +15,7 @@ class Losses:
         self._log_ended = False
 
     def log_ended(self, why: str) -> None:
-        """The log takes no more; told once."""
+        """The log can no longer be written; reported once."""
         if not self._log_ended:
             self._log_ended = True
             self._tell(f"{why}; the log ends here, the vehicles fly on")
@@ -25,7 +25,7 @@ class Losses:
         self._tell(f"{why}; signing keys and times are kept in memory, a restart forgets them")
 
     def picture_lost(self, why: str) -> None:
-        """A photo, or the rest of a video."""
+        """A photo, or the rest of a video, could not be written."""
         self._tell(why)
 
     def _tell(self, text: str) -> None:

@@ -1,4 +1,4 @@
-"""A question to whoever sits at the terminal, asked by a task that goes on with other things meanwhile."""
+"""A question to the user on the terminal, asked by one task while other tasks continue."""
 
 import asyncio
 import os
@@ -10,23 +10,25 @@ import click
 
 _CHUNK_BYTES: Final = 4096
 YES_WORDS: Final = "yes (or y)"
-"""What a question that `is_yes` judges asks for."""
+"""The answers that `is_yes` accepts, for the text of a question."""
 
 
 def is_yes(answer: str) -> bool:
-    """Whether an answer agrees; everything else, no answer too, does not."""
+    """Whether an answer is a yes; any other answer, or no answer, is not."""
     return answer.strip().lower() in ("y", "yes")
 
 
 def somebody_is_there() -> bool:
-    """Whether there is a terminal to ask at; the input may also be closed."""
+    """Whether there is a terminal for questions; the input may also be closed."""
     return sys.stdin is not None and not sys.stdin.closed and sys.stdin.isatty()
 
 
 async def ask(question: str) -> str:
-    """Ask on stderr, and wait for a line from the terminal; "" when it ends or hangs up without one.
+    """Print a question on stderr and wait for a line from the terminal; "" when the terminal closes without
+    one.
 
-    Waits as any task does, not in `input()`: Ctrl-C ends it, and what is typed afterwards answers nothing.
+    This waits as a task, not in `input()`: Ctrl-C ends the wait, and text typed afterwards is not used as an
+    answer.
     """
     click.echo(f"{question}: ", nl=False, err=True)
     answer = ""
@@ -34,7 +36,7 @@ async def ask(question: str) -> str:
         answer = await _line(sys.stdin.fileno())
     finally:
         if not answer.endswith("\n"):
-            with suppress(OSError):  # a terminal that has hung up
+            with suppress(OSError):  # the terminal may have been closed
                 click.echo(err=True)
     return answer.strip()
 
@@ -47,7 +49,7 @@ async def _line(terminal: int) -> str:
     def read() -> None:
         try:
             data = os.read(terminal, _CHUNK_BYTES)
-        except OSError:  # it has hung up
+        except OSError:  # the terminal was closed
             data = b""
         typed.extend(data)
         if not done.done() and (not data or b"\n" in typed):

@@ -1,4 +1,4 @@
-"""`flightstack replay`: logs through an estimator."""
+"""`flightstack replay`: runs an estimator over logs."""
 
 import sys
 from pathlib import Path

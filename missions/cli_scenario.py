@@ -1,4 +1,4 @@
-"""What the vehicles of `flightstack sitl` carry and look for, from its options."""
+"""The payload and the targets of the vehicles of `flightstack sitl`, from its options."""
 
 import math
 from pathlib import Path
@@ -9,10 +9,10 @@ from missions.scenario import Scenario, SurveyScenario, TargetMotion, TargetScen
 def scenario_of(
     camera: bool, targets: tuple[str, ...], map_file: str | None, map_target: str | None
 ) -> Scenario:
-    """Targets and payload from the options.
+    """Return the targets and the payload that the options describe.
 
     Raises:
-        ValueError: a target that can't be, or one that nobody could find.
+        ValueError: a target is impossible, or the vehicle carries nothing that can detect it.
     """
     if targets and not camera:
         raise ValueError("--target is seen by cameras only; add --camera")

@@ -1,4 +1,4 @@
-"""What the commands that speak on links have in common: the option for a key, the warning without one."""
+"""Signing on the command line: the option for a key, and the warning when there is none."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def key_option(**attributes: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The option for a key."""
+    """Decorator for the option of a signing key."""
     return click.option(
         "--signing-key",
         type=click.Path(path_type=Path, dir_okay=False),
@@ -28,7 +28,7 @@ def key_from(path: Path | None) -> "SigningKey | None":
     """The key in the file that the option names; None without the option.
 
     Raises:
-        SigningKeyError: the file can't be read, or holds no key; the message names the file.
+        SigningKeyError: the file can't be read, or contains no key; the message names the file.
     """
     if path is None:
         return None
@@ -38,7 +38,7 @@ def key_from(path: Path | None) -> "SigningKey | None":
 
 
 def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
-    """Say in one line of each link that listens to a network, when whoever speaks there is believed."""
+    """Print a line for each link that is open to a network and accepts unsigned messages of any sender."""
     from autopilot_bridge.links import listens_to_network, open_unsigned, parse_address
 
     for address in map(parse_address, connections) if key is None else ():
@@ -49,13 +49,13 @@ def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
 def vehicle_signing(
     key: Path | None, unsigned: str, store: Path | None, *, on_failure: Callable[[str], None]
 ) -> "SigningParameters":
-    """Signing of simulated vehicles, for clients that live in real time.
+    """Signing of simulated vehicles, for clients that run in real time.
 
     Args:
-        key: file with the key of all vehicles.
-        unsigned: from whom unsigned frames are taken: "none", "serial", "local" or "all".
+        key: file with the key that all vehicles use.
+        unsigned: senders from which unsigned frames are accepted: "none", "serial", "local" or "all".
         store: file in which keys and times are kept.
-        on_failure: told why, when that file can't be written any more.
+        on_failure: called with the reason when that file can no longer be written.
 
     Raises:
         SigningKeyError: a file can't be read or written, or holds something else; the message names it.
@@ -72,7 +72,7 @@ def vehicle_signing(
 
 
 def signed_how(signing: "SigningParameters", address: "Address") -> str:
-    """What a link takes, for the line that names it; empty while nothing is signed."""
+    """Text about the frames that a link accepts, for the line that names it; "" when signing is not used."""
     from autopilot_bridge.links import reach_of
     from autopilot_bridge.sitl.signing import POLICIES
 
@@ -83,7 +83,7 @@ def signed_how(signing: "SigningParameters", address: "Address") -> str:
 
 
 def warn_if_unsigned(address: "Address", signing: "SigningParameters") -> None:
-    """Say in one line that a vehicle can be flown by whoever is on the network."""
+    """Print one line when any sender on the network can command the vehicle."""
     from autopilot_bridge.links import Reach, open_unsigned, reach_of
     from autopilot_bridge.sitl.signing import POLICIES
 

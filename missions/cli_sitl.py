@@ -1,4 +1,4 @@
-"""`flightstack sitl`: vehicles for other people's clients."""
+"""`flightstack sitl`: simulated vehicles for external clients."""
 
 import contextlib
 import sys
@@ -26,7 +26,7 @@ _LOGGER = 255, 190  # MAV_COMP_ID_MISSIONPLANNER of a ground station
 
 
 def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
-    """Links from the options; none: the flavour's own are to be opened."""
+    """Links from the options; empty: the default links of the flavour are opened."""
     from autopilot_bridge.links import parse_address
     from autopilot_bridge.sitl import Port
 
@@ -36,7 +36,8 @@ def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
 
 
 def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
-    """Parameters that give clients, who live in wall time, as long to answer as at speedup 1.
+    """Timeout parameters, stretched so that clients, which run in wall time, have as long to answer as at
+    speedup 1.
 
     PX4's own SITL stretches these when it runs faster (docs/firmware/px4.md, section 2); ArduPilot's does
     not.
@@ -52,7 +53,7 @@ def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
 
 
 def _request_streams() -> bytes:
-    """All of ArduPilot's streams, to every vehicle, at the rate that MAVProxy asks for."""
+    """Request for all of ArduPilot's streams from every vehicle, at the rate that MAVProxy requests."""
     from autopilot_bridge.mavlink import FrameEncoder, dialect
 
     request = dialect.MAVLink_request_data_stream_message(0, 0, dialect.MAV_DATA_STREAM_ALL, _LOG_RATE_HZ, 1)
@@ -61,7 +62,7 @@ def _request_streams() -> bytes:
 
 @contextlib.contextmanager
 def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iterator[None]:
-    """A new log of what the vehicles say; it ends with the context, or where it can't be written any more.
+    """Write a new log of the vehicles' messages until the context ends or the file can no longer be written.
 
     Raises:
         TlogError: the file exists or can't be made.
@@ -70,7 +71,7 @@ def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iter
 
     recorder = PacketLog(path)
     for listener in world.record(recorder, losses.log_ended):
-        if autopilot == "ardupilot":  # which sends what it is asked for only
+        if autopilot == "ardupilot":  # it sends only what was requested
             listener.send(_request_streams())
     try:
         yield
@@ -205,9 +206,9 @@ def sitl(
     no_wait: bool,
     duration: float | None,
 ) -> int:
-    """SITL for other people's clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
+    """Simulated vehicles (SITL) for external clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
 
-    Opens the ports where clients of the firmware look for it, says which, and runs until Ctrl-C.
+    Opens the ports that clients of the firmware use by default, prints them, and runs until Ctrl-C.
 
     Exit codes: 0 stopped, 1 the log, a picture or the signing keys could not be written, 2 usage,
     130 interrupted while it started.
@@ -262,7 +263,7 @@ def sitl(
                     turbulence=turbulence,
                 ),
                 seed=seed,
-                unix_epoch_us=unix_time_us(),  # its clients live by the calendar
+                unix_epoch_us=unix_time_us(),  # its clients use calendar time
             )
             memory = VehicleCards(storage, count)
             at_end.callback(memory.close)
@@ -280,7 +281,7 @@ def sitl(
                 opened = server.open([ports] if ports else None)
             at_end.callback(world.close)
             ending.remember()
-            if log is not None:  # made when nothing else can be refused any more
+            if log is not None:  # created last, when no other check can still fail
                 at_end.enter_context(_recording(world, log, autopilot, losses))
         except (ValueError, OSError, BridgeError) as error:
             raise click.UsageError(str(error)) from error

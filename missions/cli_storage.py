@@ -1,4 +1,4 @@
-"""The memory cards of a SITL's vehicles: in a folder that stays, in one that goes, or in memory."""
+"""The memory cards of a SITL's vehicles: in a permanent folder, in a temporary folder, or in memory."""
 
 import tempfile
 from pathlib import Path
@@ -20,8 +20,8 @@ class VehicleCards:
     """Memory cards for the vehicles of a SITL.
 
     Args:
-        storage: as on the command line; None: the default.
-        count: vehicles; the first one's card is the folder `vehicle1`, and so on.
+        storage: value of the command-line option; None: the default.
+        count: number of vehicles; the first one's card is the folder `vehicle1`, and so on.
 
     Attributes:
         cards: one for each vehicle.
@@ -56,7 +56,7 @@ class VehicleCards:
         self.cards = [MemoryCard(files=store, logs=True) for store in self._stores]
 
     def close(self) -> None:
-        """Give the folders back; a temporary one is removed."""
+        """Release the folders; a temporary one is removed."""
         for store in self._stores:
             store.close()
         if self._temporary is not None:

@@ -15,14 +15,14 @@ _BAR: Final = 40
 
 
 class _Bar:
-    """The progress bar on a terminal; nothing in a pipe."""
+    """The progress bar on a terminal. In a pipe it shows nothing."""
 
     def __init__(self) -> None:
         self._terminal = sys.stderr.isatty()
         self._shown = -1
 
     def say(self, text: str) -> None:
-        """A line before it begins."""
+        """Print a line before the bar begins."""
         if self._terminal:
             click.echo(text, err=True)
 
@@ -34,13 +34,13 @@ class _Bar:
             click.echo(f"\r[{'#' * full}{'.' * (_BAR - full)}] {percent:3d} %", nl=False, err=True)
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the progress bar's line."""
         if self._shown >= 0:
             click.echo("", err=True)
 
 
 class _Studies(click.Group):
-    """The studies; an unknown one is told with those there are."""
+    """The group of studies. An unknown name is reported with a list of the known ones."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -117,7 +117,7 @@ def _lissajous_localization(
     try:
         compile_study()
     except KeyboardInterrupt:
-        folder.rmdir()  # there is nothing to keep yet
+        folder.rmdir()  # no file is in it yet
         raise
     request = StudyRequest(runs=runs, seed=seed, workers=workers, equations=equations)
     result = run_study(request, bar)

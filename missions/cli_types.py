@@ -1,4 +1,4 @@
-"""Kinds of numbers that the command line takes."""
+"""Types of numbers on the command line."""
 
 import math
 from typing import Any, Final
@@ -7,7 +7,7 @@ import click
 
 
 class FiniteRange(click.FloatRange):
-    """A range of numbers without NaN, which compares as if it were in every range, and without infinity."""
+    """A range of numbers that excludes infinity and NaN, which would compare as if it were in every range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
         """The number, or a usage error that names it."""

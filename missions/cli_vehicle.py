@@ -122,11 +122,11 @@ def download(which: str, folder: Path, **given: Any) -> int:
 
 
 class DownloadLine:
-    """How far a log has come, how fast, and how long it will take, on a line of a terminal.
+    """Shows the progress, speed and remaining time of a log download on one line of a terminal.
 
     Args:
-        number: of the log.
-        size_bytes: of the log.
+        number: number of the log.
+        size_bytes: size of the log.
         monotonic: wall clock in seconds; None: there is no terminal, and nothing is shown.
     """
 
@@ -137,10 +137,10 @@ class DownloadLine:
         self._shown_s = -math.inf
 
     def __call__(self, done: float) -> None:
-        """Show it, five times a second at most.
+        """Show the progress, at most five times a second.
 
         Args:
-            done: share that has come, 0..1; NaN while it is not known.
+            done: received share, 0..1; NaN while it is not known.
         """
         if self._monotonic is None or not math.isfinite(done):
             return
@@ -158,7 +158,7 @@ class DownloadLine:
         click.echo(f"\r{text:<60}", nl=False, err=True)
 
     def end(self) -> None:
-        """Leave the line."""
+        """End the progress line."""
         if self._begun_s is not None:
             click.echo("", err=True)
 
@@ -230,7 +230,7 @@ def doctor(**given: Any) -> int:
 
 
 def _verdict(problems: int, *, would_arm: bool) -> str:
-    """The last line of the doctor."""
+    """The last line that the doctor prints."""
     if not problems:
         return "it would arm; no problems"
     noun = "1 problem" if problems == 1 else f"{problems} problems"

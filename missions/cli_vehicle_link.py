@@ -1,4 +1,4 @@
-"""What all of `flightstack vehicle` shares: the link, errors in one line, JSON, the question."""
+"""Common parts of all `flightstack vehicle` commands: the link, one-line errors, JSON, the confirmation."""
 
 import asyncio
 import json
@@ -38,14 +38,14 @@ _OPTIONS = (
 
 
 def connected(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options of every command that talks to a vehicle."""
+    """Decorator for the options of every command that connects to a vehicle."""
     for add in reversed(_OPTIONS):
         command = add(command)
     return command
 
 
 def address(text: str) -> "Address":
-    """A connection string of the command line."""
+    """Parse a connection string of the command line."""
     from autopilot_bridge.errors import AddressError
     from autopilot_bridge.links import VEHICLE_FORMS, parse_address
 
@@ -56,7 +56,7 @@ def address(text: str) -> "Address":
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
-    """Run to the end; what goes wrong is one line, and the exit code tells whose fault it was."""
+    """Run a coroutine to its end. An error is printed as one line, and the exit code gives its class."""
     from autopilot_bridge.errors import BridgeError
     from autopilot_bridge.parameters import ParameterError
     from missions.errors import MissionError, PlanError
@@ -75,7 +75,7 @@ def with_client(
     *,
     asks: bool = True,
 ) -> T:
-    """Do something with the vehicle that the options name; with `asks`, only when it answers."""
+    """Run `work` with the vehicle that the options name; with `asks`, only if the vehicle answers."""
     link = address(given["connect"])
     from missions.errors import VehicleTimeout
     from missions.vehicle_client.client import open_client
@@ -99,7 +99,7 @@ def with_client(
 
 
 def print_json(value: Any) -> None:
-    """Plain values as JSON; numbers that are none as null."""
+    """Print plain values as JSON; NaN and infinity become null."""
     click.echo(json.dumps(_finite(value), indent=2, allow_nan=False))
 
 
@@ -114,7 +114,7 @@ def _finite(value: Any) -> Any:
 
 
 async def confirm(question: str, yes: bool) -> None:
-    """Ask for a yes; without a terminal, --yes must be given."""
+    """Ask the user for a yes; without a terminal, --yes must be specified."""
     if yes:
         return
     if not somebody_is_there():

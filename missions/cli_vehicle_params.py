@@ -1,4 +1,4 @@
-"""`flightstack vehicle params`: read, set, saved, loaded, compared."""
+"""`flightstack vehicle params`: list, get, set, save, load and compare parameters."""
 
 import fnmatch
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ def params() -> None:
 @click.argument("pattern", default="*")
 @connected
 def list_(pattern: str, **given: Any) -> int:
-    """All parameters, or those whose names match PATTERN (as MPC_*)."""
+    """List all parameters, or those whose names match PATTERN (for example MPC_*)."""
     from missions.vehicle_client.parameters import read_all
 
     values = with_client(given, read_all)
@@ -93,7 +93,7 @@ def save(file: Path, **given: Any) -> int:
         raise click.UsageError(f"{file}: there is no folder {file.parent}")
 
     async def work(client: "VehicleClient") -> tuple[int, str]:
-        format_values(file, {}, client.system_id)  # an unknown suffix is told before anything is read
+        format_values(file, {}, client.system_id)  # reports an unknown suffix before any parameter is read
         values = await read_all(client)
         return len(values), format_values(file, values, client.system_id)
 
@@ -159,7 +159,8 @@ def compare(other: str, **given: Any) -> int:
         if other != "defaults":
             return differences(await read_all(client), read_untyped_parameter_file(Path(other)))
         found = differences(await read_all(client), _defaults(client), rounded=True)
-        return [d for d in found if d.vehicle is not None]  # our tables need not be the vehicle's
+        # our tables may contain parameters that the vehicle lacks
+        return [d for d in found if d.vehicle is not None]
 
     found = with_client(given, work)
     if given["as_json"]:

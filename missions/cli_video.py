@@ -1,4 +1,4 @@
-"""Options of `flightstack sitl` about the pictures of its cameras."""
+"""Options of `flightstack sitl` for the images of its cameras."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -29,12 +29,12 @@ def video_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def start_video(
     world: "Sitl", video: str | None, pictures: Path | None, on_loss: Callable[[str], None]
 ) -> "VideoService | None":
-    """Serve video and keep pictures as the options say; None: there is nothing to do.
+    """Serve video and keep pictures as the options specify; None: neither was requested.
 
     Args:
-        world: with the cameras.
-        video, pictures: as on the command line.
-        on_loss: told what could not be kept, and why.
+        world: the world that has the cameras.
+        video, pictures: values of the command-line options.
+        on_loss: called with what could not be written, and the reason.
 
     Raises:
         ValueError: an option that can't be met, or one that needs a camera.

@@ -1,7 +1,7 @@
 """A link as a mission sees it: the newest message of each kind, streams of messages, and waiting for one.
 
-Several hundred messages a second arrive, few of which a mission looks at. A frame that nobody waits for costs
-two dictionary operations; it is decoded when somebody asks for it.
+Several hundred messages a second arrive, and a mission uses few of them. A frame that no task waits for costs
+two dictionary operations; it is decoded only when it is requested.
 """
 
 import asyncio
@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 
 AUTOPILOT_COMPONENT: Final = 1
 GROUND_STATION: Final = (255, 190)
-"""System and component id of a mission on the ground (MAV_COMP_ID_MISSIONPLANNER, as ground stations use)."""
+"""System and component id of a mission on the ground (MAV_COMP_ID_MISSIONPLANNER, as in ground stations)."""
 ONBOARD_COMPUTER: Final = (1, 191)
-"""The same for a mission on board of system 1."""
+"""System and component id of a mission on board of system 1."""
 
 _HEARTBEAT_PERIOD_S: Final = 1.0
 _STREAM_LIMIT: Final = 4096
-_AT_ONCE: Final = 64  # messages that are read in a row without giving other tasks a turn
+_AT_ONCE: Final = 64  # largest number of messages that are read in a row without giving other tasks a turn
 _TIMESTAMPED: Final = {2: 8, 30: 0, 31: 0, 32: 0, 33: 0}  # message id: offset of time_boot_ms in the payload
 _POLL_S: Final = 0.002  # for links without a file descriptor
 
 
 class Recorder(Protocol):
-    """Where all frames of a connection go, both directions."""
+    """Receives all frames of a connection, in both directions."""
 
     def record(self, frame: bytes, time_us: int) -> None:
-        """Take one frame that passed at a vehicle time."""
+        """Process one frame that was sent or received at a vehicle time."""
         ...
 
 
@@ -60,14 +60,14 @@ class Connection:
     Args:
         link: an open link; the connection closes it. One that calls `on_receive` (memory) is not polled.
         clock: vehicle time; a `TelemetryClock` is fed from the vehicle's timestamps.
-        recorder: gets every frame of both directions.
-        identity: own system and component id.
-        vehicle_system_id: of the vehicle whose time the clock tells; None: of the first autopilot heard.
-        signing: signs what is sent; what it does not admit is not heard. None: unsigned.
+        recorder: receives every frame of both directions.
+        identity: system and component id of this client.
+        vehicle_system_id: of the vehicle whose time the clock follows; None: the first autopilot received.
+        signing: signs sent frames, and drops received frames that it does not accept. None: no signing.
 
     Attributes:
         parsers: one for each of the newest peers; their counters account for every byte ever received.
-        signing: as given.
+        signing: as passed to the constructor.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class Connection:
         await self.close()
 
     def start(self) -> None:
-        """Begin to receive, and to send a HEARTBEAT each second of vehicle time."""
+        """Start receiving, and sending a HEARTBEAT each second of vehicle time."""
         loop = asyncio.get_running_loop()
         self._watched = list(self._link.filenos())
         for fileno in self._watched:
@@ -141,7 +141,7 @@ class Connection:
         for peer, data in self._link.receive():
             self._on_bytes(peer, data)
             if self._forget is not None and not self.parsers.understood(peer):
-                self._forget(peer)  # a stranger on a server's port gets no commands to overhear
+                self._forget(peer)  # an unknown peer on a server's port must not receive commands
 
     def _on_bytes(self, peer: object, data: bytes) -> None:
         frames = self.parsers.parse(peer, data)
@@ -156,14 +156,14 @@ class Connection:
             put(frame)
             if self._observed is not None and message_id in _TIMESTAMPED:
                 time_us = self._observe(frame)
-            if recorder is not None and message_id != SETUP_SIGNING:  # a log holds no keys
+            if recorder is not None and message_id != SETUP_SIGNING:  # a log contains no keys
                 recorder.record(frame.raw, time_us)
             if message_id in listeners:
                 for listener in tuple(listeners[message_id]):
                     listener(frame)
 
     def _observe(self, frame: Frame) -> int:
-        """Set the clock by the vehicle's autopilot."""
+        """Set the clock from the messages of the vehicle's autopilot."""
         assert self._observed is not None
         if frame.component_id == AUTOPILOT_COMPONENT:
             if self._clock_source is None:
@@ -174,7 +174,7 @@ class Connection:
         return self._observed.time_us
 
     async def _keep_looking_after_link(self) -> None:
-        """Links whose descriptors come and go (servers, reconnecting clients), and those without any."""
+        """Poll links whose descriptors change (servers, reconnecting clients) or that have none."""
         loop = asyncio.get_running_loop()
         while True:
             current = list(self._link.filenos())
@@ -189,7 +189,7 @@ class Connection:
     # sending
 
     def speak_as(self, system_id: int, component_id: int) -> None:
-        """Take another identity: a process on board learns its system id from the vehicle."""
+        """Change the sender ids: a process on board learns its system id from the vehicle."""
         if (system_id, component_id) != (self.system_id, self.component_id):
             self.system_id, self.component_id = system_id, component_id
             self._encoder = FrameEncoder(system_id, component_id)
@@ -234,25 +234,25 @@ class Connection:
 
     @property
     def autopilots_heard(self) -> list[int]:
-        """System ids of the autopilots heard on this link, in rising order."""
+        """System ids of the autopilots received on this link, in ascending order."""
         return sorted(s for s, component in self._newest.components if component == AUTOPILOT_COMPONENT)
 
     def newest(self, system_id: int, component_id: int = AUTOPILOT_COMPONENT) -> Mapping[int, Frame]:
-        """The newest frame of each message from one component, by message id, as they are now."""
+        """The present newest frame of each message from one component, by message id."""
         return self._newest.of((system_id, component_id))
 
     @property
     def bytes_per_s(self) -> float | None:
-        """What the link carries in a second; None: not known, or a network."""
+        """Capacity of the link in bytes per second; None: not known, or a network."""
         capacity: float | None = getattr(self._link, "bytes_per_s", None)
         return capacity
 
     def keep(self, system_id: int) -> None:
-        """Never forget this system's autopilot, however many others are heard."""
+        """Keep this system's autopilot among the newest messages, however many other systems are received."""
         self._newest.keep((system_id, AUTOPILOT_COMPONENT))
 
     def listen(self, name: str, listener: Listener) -> Callable[[], None]:
-        """Call `listener` with each frame of a message name; returns what ends it."""
+        """Call `listener` with each frame of a message name; returns a function that ends this."""
         message_id = definition(name).message_id
         self._listeners.setdefault(message_id, []).append(listener)
 
@@ -270,7 +270,7 @@ class Connection:
     ) -> "MessageStream":
         """Stream of the messages with these names: `async for message in connection.messages("ATTITUDE")`.
 
-        Begins with the first message that arrives after this call.
+        The stream begins with the first message that arrives after this call.
         """
         return MessageStream(self, names, system_id, component_id)
 
@@ -279,7 +279,7 @@ class MessageStream:
     """Decoded messages as they arrive, in order. Close it, or use it as a context manager.
 
     Attributes:
-        dropped: messages lost because the reader was more than 4096 of them behind.
+        dropped: number of messages lost because the reader was more than 4096 messages behind.
     """
 
     def __init__(
@@ -326,11 +326,11 @@ class MessageStream:
         return decode(self._queue.popleft())
 
     def take(self) -> MAVLinkMessage | None:
-        """Next message if one has arrived, without waiting."""
+        """The next message if one has arrived, else None; does not wait."""
         return decode(self._queue.popleft()) if self._queue else None
 
     def close(self) -> None:
-        """Stop listening."""
+        """Stop receiving messages."""
         for stop in self._stops:
             stop()
         self._stops = []

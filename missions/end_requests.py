@@ -1,4 +1,4 @@
-"""What asks a command to end: Ctrl-C, SIGTERM, and the end of its terminal (SIGHUP)."""
+"""Signals that end a command: Ctrl-C, SIGTERM, and SIGHUP from a closed terminal."""
 
 import signal
 from types import FrameType
@@ -7,13 +7,13 @@ from missions.end_signals import EndSignalHandler
 
 
 class EndRequests(EndSignalHandler):
-    """A context in which such a signal ends the command in good order.
+    """A context in which such a signal ends the command with an orderly shutdown.
 
-    At first it raises KeyboardInterrupt, so that a start ends wherever it is; from `remember` on it is kept
-    for whoever looks at `asked`. SIGHUP stays ignored where it is on entry (`nohup`). For the main thread.
+    At first a signal raises KeyboardInterrupt, so that it stops the start at any point; after `remember` it
+    only sets `asked`. SIGHUP stays ignored if it is ignored on entry (`nohup`). For the main thread only.
 
     Attributes:
-        asked: such a signal has come.
+        asked: whether such a signal was received.
     """
 
     always = (signal.SIGINT, signal.SIGTERM)
@@ -24,10 +24,11 @@ class EndRequests(EndSignalHandler):
         self._raises = True
 
     def remember(self) -> None:
-        """Raise no more.
+        """Stop raising KeyboardInterrupt; requests are only remembered from now on.
 
         Raises:
-            KeyboardInterrupt: it was asked for before, where nothing can be raised (a finaliser, say).
+            KeyboardInterrupt: a request came earlier in a place where no exception can be raised (for example
+                a finaliser).
         """
         self._raises = False
         if self.asked:
@@ -35,5 +36,5 @@ class EndRequests(EndSignalHandler):
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         again, self.asked = self.asked, True
-        if self._raises and not again:  # the second time it is on its way out
+        if self._raises and not again:  # at the second signal the command is already ending
             raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""The signals that ask a command to end: Ctrl-C, `kill` or a service manager, a terminal that is closed."""
+"""The signals that end a command: from Ctrl-C, `kill`, a service manager, or a closed terminal."""
 
 import signal
 import threading
@@ -10,10 +10,11 @@ _ASKING: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:
-    """SIGINT, SIGTERM and SIGHUP, as far as they are to be handled here and now.
+    """SIGINT, SIGTERM and SIGHUP, as far as this process should handle them now.
 
-    Those that are ignored (`nohup`, a background job) or have a handler of somebody's own are left alone, but
-    for `always`; and all of them outside the main thread, which alone may be told of signals.
+    Signals that are ignored (`nohup`, a background job) or that already have another handler are left out,
+    except those in `always`. Outside the main thread all are left out, because only the main thread can
+    handle signals.
     """
     if threading.current_thread() is not threading.main_thread():
         return ()
@@ -22,10 +23,10 @@ def end_signals(*always: signal.Signals) -> tuple[signal.Signals, ...]:
 
 
 class EndSignalHandler(ABC):
-    """While it is entered, these signals are its own to handle.
+    """A context in which it handles these signals.
 
     Attributes:
-        always: handled whatever was done with them before, see `end_signals`.
+        always: signals that are handled even if they were ignored or had a handler, see `end_signals`.
     """
 
     always: ClassVar[tuple[signal.Signals, ...]] = ()
@@ -46,4 +47,4 @@ class EndSignalHandler(ABC):
 
     @abstractmethod
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
-        """One of them has come."""
+        """Handle one of the signals."""

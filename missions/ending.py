@@ -1,7 +1,7 @@
-"""SIGTERM and SIGHUP do what Ctrl-C does: a process that is asked to end leaves its vehicles safe first.
+"""SIGTERM and SIGHUP act like Ctrl-C: a process that receives one leaves its vehicles safe before it ends.
 
-`kill`, `timeout` and service managers send SIGTERM, a terminal that is closed SIGHUP. By themselves both end
-a process where it stands, with its vehicles in the air.
+`kill`, `timeout` and service managers send SIGTERM; a closed terminal sends SIGHUP. By default both end a
+process immediately, with its vehicles in the air.
 """
 
 import asyncio
@@ -15,14 +15,16 @@ from autopilot_bridge.clock.pacing import wall_time_s
 from missions.end_signals import EndSignalHandler
 
 _SAME_S: Final = 1.0
-"""A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: that is asked once."""
+"""A closed terminal and its shell both send SIGHUP, and `timeout` sends SIGTERM twice: within this time they
+count as one.
+"""
 
 
 class AskedToEnd(KeyboardInterrupt):
-    """A KeyboardInterrupt that tells by which signal.
+    """A KeyboardInterrupt that carries the signal that caused it.
 
     Attributes:
-        number: the signal's.
+        number: the signal's number.
     """
 
     def __init__(self, number: int) -> None:
@@ -31,15 +33,15 @@ class AskedToEnd(KeyboardInterrupt):
 
 
 def signal_of(interrupt: KeyboardInterrupt) -> int:
-    """The signal that has interrupted."""
+    """The signal that caused the interrupt."""
     return interrupt.number if isinstance(interrupt, AskedToEnd) else signal.SIGINT
 
 
 class EndingSignals(EndSignalHandler):
-    """While it is entered, Ctrl-C, SIGTERM and SIGHUP interrupt alike.
+    """A context in which Ctrl-C, SIGTERM and SIGHUP interrupt in the same way.
 
-    While `run` runs, the first one cancels what is run, and one that comes later stops at once; outside of it
-    the first one does. Which of them are left alone: `end_signals`.
+    During `run`, the first signal cancels the coroutine, and a later one stops it immediately; outside `run`,
+    the first one stops immediately. See `end_signals` for the signals that are not handled.
     """
 
     def __init__(self) -> None:
@@ -52,7 +54,7 @@ class EndingSignals(EndSignalHandler):
         """Run a coroutine on a loop as `autopilot_bridge.clock.run` does.
 
         Raises:
-            AskedToEnd: it was interrupted, and is done.
+            AskedToEnd: it was interrupted, and has ended.
         """
         try:
             run(self._interruptible(main), loop)
@@ -74,4 +76,5 @@ class EndingSignals(EndSignalHandler):
         if again or task is None or task.done():
             raise AskedToEnd(self._number)
         task.cancel()
-        task.get_loop().call_soon_threadsafe(lambda: None)  # which waits for something else, maybe for long
+        # wakes the loop, which may be waiting for a long time
+        task.get_loop().call_soon_threadsafe(lambda: None)

@@ -2,12 +2,12 @@
 
 
 class MissionError(Exception):
-    """A mission could not be done. The CLI prints the message and exits 1."""
+    """A mission failed. The CLI prints the message and exits 1."""
 
 
 class VehicleTimeout(MissionError):
-    """Something awaited of the vehicle did not come in time; says what was awaited and what was heard
-    last.
+    """An awaited message or state of the vehicle did not come in time. The message names what was awaited and
+    what was received last.
     """
 
 
@@ -15,7 +15,7 @@ class CommandRejected(MissionError):
     """The vehicle refused a command, a mission or a parameter.
 
     Attributes:
-        result: the MAV_RESULT or MAV_MISSION_RESULT it answered with.
+        result: the MAV_RESULT or MAV_MISSION_RESULT of the answer.
     """
 
     def __init__(self, message: str, result: int) -> None:
@@ -24,8 +24,8 @@ class CommandRejected(MissionError):
 
 
 class LinkClosed(MissionError):
-    """The link to the vehicle is gone."""
+    """The link to the vehicle is closed or lost."""
 
 
 class PlanError(ValueError):
-    """What was asked for can't be flown; found before flying. The CLI prints the message and exits 2."""
+    """The request can't be flown, found before the flight. The CLI prints the message and exits 2."""

@@ -1,4 +1,4 @@
-"""What class of vehicle an autopilot flies, as a mission sees it in the heartbeat."""
+"""The class of vehicle that an autopilot flies, from its heartbeat."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -28,4 +28,4 @@ KIND_OF_TYPE: Final[Mapping[int, VehicleKind]] = MappingProxyType(
         dialect.MAV_TYPE_DECAROTOR: VehicleKind.MULTICOPTER,
     }
 )
-"""By MAV_TYPE; what is not in it can't be flown."""
+"""Class by MAV_TYPE; other types can't be flown."""

@@ -1,4 +1,4 @@
-"""The missions that come with the package, and a user's own."""
+"""The missions of this package, and users' own missions."""
 
 import importlib.util
 import inspect
@@ -49,9 +49,10 @@ class PatternMission(Mission[FlightOptions]):
     """A mission that flies one search pattern.
 
     Args:
-        name: for people and file names.
-        make_curve: the pattern for some options.
-        size: what nobody chose of its size, so that an aircraft with wings can fly its turns.
+        name: name for users and for file names.
+        make_curve: creates the pattern from options.
+        size: gives values to size options that the user did not specify, so that a fixed-wing aircraft can
+            fly the turns.
     """
 
     def __init__(self, name: str, make_curve: CurveMaker, size: Sizing) -> None:
@@ -71,7 +72,7 @@ class PatternMission(Mission[FlightOptions]):
         check_pattern(self.curve(options), options, limits)
 
     def curve(self, options: FlightOptions) -> Curve:
-        """The pattern around its centre, as often as asked."""
+        """The pattern around its centre, with the requested number of passes."""
         return self._make_curve(options)
 
     async def plan_items(self, vehicle: Vehicle, options: FlightOptions) -> Sequence[MissionItem]:
@@ -91,7 +92,7 @@ class PatternMission(Mission[FlightOptions]):
 
     def estimator_settings(self, options: FlightOptions) -> Mapping[str, float]:
         if options.period_s is None:
-            return {}  # at a speed, the motion is not harmonic
+            return {}  # at constant speed the motion is not harmonic
         from missions.pattern_flight import pattern_frequencies
 
         x_rad_s, y_rad_s = pattern_frequencies(self.curve(options), options.period_s)
@@ -116,14 +117,14 @@ class PatternMission(Mission[FlightOptions]):
 
 
 MAX_LENGTH_M: Final = 100_000.0
-"""Longest pattern that is planned: some hours of flight, and what a planner holds in memory with ease."""
+"""Longest pattern that is planned: some hours of flight, and small enough for a planner's memory."""
 
 MAX_FLIGHT_S: Final = 20_000.0
-"""The same in time: who flies fast may fly farther."""
+"""The same limit as a time: a faster vehicle may fly farther."""
 
 
 def _check_length(length_m: float, options: FlightOptions) -> None:
-    """Refuse a pattern by its rough length, before it is built point by point."""
+    """Refuse a pattern by its approximate length, before its points are computed."""
     most_m = max(MAX_LENGTH_M, MAX_FLIGHT_S * options.speed_m_s)
     if length_m > most_m:
         raise PlanError(
@@ -133,13 +134,13 @@ def _check_length(length_m: float, options: FlightOptions) -> None:
 
 
 def _lissajous_length_m(shape: Lissajous, laps: float) -> float:
-    """Rough length: the root mean square of the speed in the parameter, times its range."""
+    """Approximate length: the root mean square of the speed in the parameter, times its range."""
     speed = math.hypot(shape.amplitude_x_m * shape.ratio_x, shape.amplitude_y_m * shape.ratio_y)
     return math.sqrt(0.5) * speed * shape.end * laps
 
 
 def _passes(options: FlightOptions, one_pass_m: float) -> int:
-    """Whole passes for `--periods`, or enough of them for the search time."""
+    """Number of whole passes from `--periods`, or enough passes for the search time."""
     if options.search_time_s is not None:
         return max(1, math.ceil(options.search_time_s * options.speed_m_s / one_pass_m))
     if not float(options.periods).is_integer():
@@ -148,7 +149,7 @@ def _passes(options: FlightOptions, one_pass_m: float) -> int:
 
 
 def _in_passes(make: Callable[[int], Polyline], options: FlightOptions, rough_length_m: float) -> Polyline:
-    """As many passes as asked for of a pattern whose single pass has about a length."""
+    """The pattern with the requested number of passes; one pass has about the given length."""
     _check_length(rough_length_m, options)
     one_pass_m = make(1).length_m
     passes = _passes(options, one_pass_m)
@@ -157,7 +158,9 @@ def _in_passes(make: Callable[[int], Polyline], options: FlightOptions, rough_le
 
 
 def lissajous_curve(options: FlightOptions) -> Curve:
-    """The Lissajous pattern the options describe, in laps; a team's vehicles start evenly spread over it."""
+    """The Lissajous pattern that the options describe, in laps; the vehicles of a team start evenly spaced on
+    it.
+    """
     if options.ratio is None:
         shape = named_lissajous(options.pattern, width_m=options.width_m, height_m=options.height_m)
     else:
@@ -243,17 +246,17 @@ def _sector_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOptio
 
 
 def _sweep_size(options: FlightOptions, limits: FixedWingLimits) -> FlightOptions:
-    """A sweep makes its spacing smaller until it parts the side: the one is chosen by the other."""
+    """A sweep reduces its spacing until it divides the side, so each of the two depends on the other."""
     if options.chosen("width_m") or options.chosen("height_m"):
         short_m = min(options.width_m, options.height_m)
-        # tracks as long as they are apart, and half their distance beyond at either end
+        # tracks as long as their spacing, and half the spacing beyond each end
         _require_room(options, max(options.width_m, options.height_m), 2.0, limits)
         return options.unless_chosen(spacing_m=spacing_within_m(short_m, options.speed_m_s, limits))
     return _square_size(options, limits)
 
 
 def _require_room(options: FlightOptions, side_m: float, spacings: float, limits: FixedWingLimits) -> None:
-    """Refuse a chosen side that has no room for the track spacing the aircraft's turns need."""
+    """Refuse a specified side that is too small for the track spacing that the aircraft's turns need."""
     spacing_m = spacing_for_turns_m(options.speed_m_s, limits)
     if not options.chosen("spacing_m") and side_m < spacings * spacing_m:
         raise PlanError(
@@ -280,15 +283,15 @@ MISSIONS: Final[Mapping[str, Mission[Any]]] = MappingProxyType(
         "occupancy": OccupancyMission(),
     }
 )
-"""The missions that can be named on the command line."""
+"""The missions with a name on the command line."""
 
 
 class ScriptMission(Mission[FlightOptions]):
     """A user's own mission: a Python file with `async def fly(vehicle, options)`.
 
     The file may have a class `Mission` instead, made without arguments, with `async def fly(self, vehicle,
-    options)` and, if it likes, `def check(self, options)`, which raises `PlanError`. Each vehicle of a
-    team flies it; `options.index` tells them apart.
+    options)` and, optionally, `def check(self, options)`, which raises `PlanError`. Each vehicle of a team
+    flies it; `options.index` is the number of the vehicle.
 
     Raises:
         PlanError: the file can't be read, or has neither.
@@ -345,7 +348,7 @@ def find_mission(name: str) -> Mission[Any]:
     """A mission by name, a user's own by path (anything ending in .py), or a mission file.
 
     Raises:
-        PlanError: no such mission; lists the known ones.
+        PlanError: the mission does not exist; the message lists the known ones.
     """
     if name.endswith(".py"):
         return ScriptMission(Path(name))

@@ -1,4 +1,4 @@
-"""What can be refused before a vehicle was heard, and options as one vehicle flies them."""
+"""Checks that are possible before a vehicle was received, and the options as one vehicle flies them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -28,13 +28,13 @@ def vehicle_options(options: MissionOptions, index: int) -> MissionOptions:
 def adapted(
     mission: Mission[Any], options: MissionOptions, limits: Limits, ground_alt_m: float
 ) -> tuple[MissionOptions, Limits]:
-    """The options as one vehicle flies them, and its limits where it then flies.
+    """The options as one vehicle flies them, and its limits at the altitude of the flight.
 
     Args:
-        mission: what is flown.
-        options: of this vehicle.
-        limits: of this vehicle.
-        ground_alt_m: of its home, above mean sea level.
+        mission: the mission to be flown.
+        options: options of this vehicle.
+        limits: limits of this vehicle.
+        ground_alt_m: altitude of its home above mean sea level.
     """
     if not isinstance(limits, FixedWingLimits):
         return mission.adapted(options, limits), limits
@@ -48,13 +48,13 @@ def _at(limits: FixedWingLimits, alt_m: float) -> FixedWingLimits:
 
 
 def check_request(mission: Mission[Any], request: RunRequest) -> None:
-    """Refuse what no vehicle of the kind could fly, before anything is started.
+    """Refuse a request that no vehicle of the kind could fly, before anything is started.
 
-    What is refused for any aircraft is refused with the limits of the one that was asked for, so that the
-    advice is right the first time.
+    A request that every aircraft would refuse is checked with the limits of the requested aircraft, so that
+    the advice in the error is right for it.
 
     Raises:
-        PlanError: says what, and which option to change.
+        PlanError: names the reason and the option to change.
     """
     if not request.connect and len(request.models) != request.options.vehicles:
         raise PlanError(
@@ -76,7 +76,7 @@ def check_request(mission: Mission[Any], request: RunRequest) -> None:
 
 
 def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> None:
-    """Refuse what the vehicles of an embedded world can't fly: their parameters and their place are known."""
+    """Refuse what the vehicles of an embedded world can't fly. Their parameters and their place are known."""
     if stage.parameters is None or stage.home is None:
         return
     for index, model in enumerate(request.models):
@@ -88,7 +88,7 @@ def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> Non
 
 
 def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> None:
-    """Refuse with the limits of one embedded aircraft alone, without the world that the mission needs."""
+    """Check with the limits of one embedded aircraft, without creating the world that the mission needs."""
     from missions.embedded import EmbeddedConfiguration, open_embedded
 
     try:
@@ -115,7 +115,7 @@ def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> N
 def _check_with(
     mission: Mission[Any], request: RunRequest, index: int, limits: Limits, ground_alt_m: float
 ) -> MissionOptions:
-    """Check one vehicle with its own limits; gives its options."""
+    """Check one vehicle with its own limits; returns its options."""
     if isinstance(limits, FixedWingLimits):
         limits = replace(limits, wind_m_s=request.planning_wind_m_s)
     own, limits = adapted(mission, vehicle_options(request.options, index), limits, ground_alt_m)
@@ -124,11 +124,13 @@ def _check_with(
 
 
 def _check_any(mission: Mission[Any], request: RunRequest, options: MissionOptions) -> None:
-    """Of a vehicle elsewhere even the kind is not known yet: refuse what none could fly."""
+    """For a vehicle that is not embedded not even the kind is known yet: refuse what no kind could fly."""
     refusals = []
     for kind in mission.kinds:
         limits = _WIDEST[kind]
-        try:  # the widest limits' airspeed is nobody's: what wind is too much, each aircraft's own say
+        # the airspeed of the widest limits belongs to no aircraft: each aircraft's own check decides about
+        # wind
+        try:
             mission.check(mission.adapted(options, limits), limits)
         except PlanError as refusal:
             refusals.append(refusal)
@@ -147,7 +149,9 @@ def _kind(model: str) -> VehicleKind:
 
 
 def _kind_limits(request: RunRequest, model: str) -> Limits:
-    """By the firmware's defaults and the parameters given; an aircraft's own come with the aircraft."""
+    """Limits from the firmware's defaults and the specified parameters. For a fixed wing the widest limits
+    are returned, because its own limits come with the aircraft.
+    """
     kind = _kind(model)
     if kind is VehicleKind.FIXED_WING:
         return WIDEST_FIXED_WING_LIMITS

@@ -1,4 +1,4 @@
-"""Plays a telemetry log to a link, as if the vehicle were there."""
+"""Plays a telemetry log to a link, like a connected vehicle."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -14,16 +14,18 @@ from estimators.logs.raw_records import positions, read_records
 MIN_SPEED: Final = 0.1
 _MOMENT_US: Final = 20_000
 _IDLE_MOMENTS: Final = 10
-_LONGEST_WAIT_US: Final = 200_000  # of log time, so that the link is looked after and progress is shown
+# of log time; the link is serviced and progress is shown at least this often
+_LONGEST_WAIT_US: Final = 200_000
 
 
 @dataclass(slots=True)
 class Played:
-    """How far it is.
+    """Progress of the playback.
 
     Attributes:
-        frames: sent, or dropped by a link whose reader is too slow or gone (`Link.counters`).
-        log_s: seconds of the log behind us, since the first record that is played.
+        frames: number of frames sent, or dropped by a link whose reader is too slow or disconnected
+            (`Link.counters`).
+        log_s: seconds of the log played so far, from the first played record.
     """
 
     frames: int = 0
@@ -40,17 +42,17 @@ def play(
     on_progress: Callable[[Played], None] | None = None,
     sign: Callable[[bytes], bytes] | None = None,
 ) -> Played:
-    """Send the frames of a log when their time has come; blocks until all are sent.
+    """Send the frames of a log at their recorded times. Blocks until all are sent; returns the progress.
 
-    Begins when there is somebody to send to: a server (tcpin, udpin) waits for its first client. As fast as
-    possible is as fast as a stream's reader takes it. What the link brings is read and dropped: a log answers
-    nobody.
+    Playback begins when there is a receiver: a server (tcpin, udpin) waits for its first client. At infinite
+    speed the reader of a stream limits the rate. Received data are read and discarded: a log does not answer
+    requests.
 
     Args:
         log: an open telemetry log.
         selections: what to play, from `Log.select`.
         link: an open link.
-        speed: log seconds per wall second, from 0.1; infinity: as fast as possible.
+        speed: log seconds per wall second, at least 0.1; infinity: as fast as possible.
         loop: begin again at the end, until interrupted.
         on_progress: called a few times a second.
         sign: puts a signature under each frame; None: they are sent as they are in the log.
@@ -95,14 +97,14 @@ def play(
 
 
 def _wait() -> None:
-    """A moment of wall time, for what a link does at its own pace."""
+    """Wait a short wall time for the link's own work."""
     clock = RealTimeClock()
     clock.wait_until(0)
     clock.wait_until(_MOMENT_US)
 
 
 def _drain(link: Link) -> None:
-    """Let a slow stream take what it was sent, as long as it takes anything."""
+    """Let a slow stream transmit the queued data, as long as it makes progress."""
     counters = link.counters
     idle = 0
     while idle < _IDLE_MOMENTS and link.peers:

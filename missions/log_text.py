@@ -1,4 +1,4 @@
-"""What `flightstack log info` prints of a log's report."""
+"""The text that `flightstack log info` prints for a log's report."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -17,7 +17,7 @@ def report_lines(report: LogReport) -> Iterator[str]:
     started = "" if report.start_unix_us is None else f", from {_date(report.start_unix_us)}"
     dialect = (
         "" if report.dialect == report.format else f"; dialect {report.dialect}"
-    )  # onboard logs have none
+    )  # onboard logs have no such entry
     yield f"duration {report.duration_s:.1f} s{started}{dialect}"
     yield "bytes: " + _counts(report.bytes_by_kind)
     if any(report.drops.values()):
@@ -85,7 +85,8 @@ def _span(start_us: int, end_us: int) -> str:
 
 
 def _rate(rate_hz: float) -> str:
-    return f"{rate_hz:.2f}" if rate_hz else "-"  # one message, or all at once: no rate is known
+    # no rate is known for one message, or for messages at the same time
+    return f"{rate_hz:.2f}" if rate_hz else "-"
 
 
 def _date(unix_us: int) -> str:

@@ -1,4 +1,4 @@
-"""What every mission is."""
+"""The base class of all missions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ AnyOptions = TypeVar("AnyOptions", bound=MissionOptions)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldDefaults:
-    """The embedded world a mission is flown in unless somebody asks for another.
+    """The embedded world that a mission is flown in, unless the user selects another.
 
     Attributes:
-        model: vehicle.
+        model: vehicle model.
         wind: "SPEED[@FROM]", m/s and degrees.
         turbulence: "none", "light", "moderate" or "severe".
         autopilot: flavour; None: any.
-        home: "lat,lon,alt[,heading]"; None: the flavour's own.
+        home: "lat,lon,alt[,heading]"; None: the flavour's default.
     """
 
     model: str = "iris"
@@ -45,12 +45,12 @@ class WorldDefaults:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Debriefing:
-    """What there is to say of a flight when it is over.
+    """What is known about a flight when it is over.
 
     Attributes:
-        records: of all vehicles and, embedded, of the truth.
+        records: recorded messages of all vehicles and, embedded, of the truth.
         flights: notes and scores, one per vehicle.
-        options: of the first vehicle.
+        options: options of the first vehicle.
     """
 
     records: "FlightRecords"
@@ -59,7 +59,7 @@ class Debriefing:
 
 
 def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "FlightScore"], str]) -> str:
-    """The verdicts on all vehicles of a flight in one sentence; "" if all have flown what was commanded."""
+    """The verdicts on all vehicles of a flight in one sentence; "" if all have flown the commanded paths."""
     told = {notes.system_id: verdict(notes, score) for notes, score in debriefing.flights}
     if len(told) == 1:
         return next(iter(told.values()))
@@ -67,14 +67,15 @@ def verdict_of_all(debriefing: Debriefing, verdict: Callable[["FlightNotes", "Fl
 
 
 class Mission(Generic[AnyOptions]):
-    """Something that can be flown. Subclasses say what they do differently.
+    """A mission that can be flown. Subclasses override what differs.
 
     Attributes:
-        name: for people and file names.
-        world_defaults: the world it is flown in.
-        kinds: of vehicles that can fly it, the usual one first.
-        together: the vehicles of a team are flown by one `fly_team`, not each by a `fly`.
-        commands: it commands its vehicle; one that does not leaves it as it is, in the air too.
+        name: name for users and for file names.
+        world_defaults: the world it is flown in by default.
+        kinds: kinds of vehicles that can fly it, the default one first.
+        together: one call of `fly_team` flies all vehicles of a team, instead of one call of `fly` for each.
+        commands: the mission commands its vehicle. A mission that only observes leaves the vehicle in its
+            current state, even in flight.
     """
 
     name: str = "mission"
@@ -84,31 +85,35 @@ class Mission(Generic[AnyOptions]):
     commands = True
 
     def adapted(self, options: AnyOptions, limits: Limits) -> AnyOptions:
-        """The options as one vehicle flies them: what nobody chose suits it."""
+        """The options as one vehicle flies them: options that were not specified get values that suit the
+        vehicle.
+        """
         return options.for_vehicle(limits)
 
     def check(self, options: AnyOptions, limits: Limits) -> None:
-        """Refuse, with a PlanError, what one vehicle can't fly.
+        """Raise PlanError if one vehicle can't fly the mission.
 
-        Before anything is started, and again when its own limits are known.
+        Called before anything is started, and again when the vehicle's own limits are known.
         """
 
     def check_place(self, options: AnyOptions, limits: Limits, home: "GeodeticPosition") -> None:
-        """Refuse, with a PlanError, what one vehicle can't fly from its home; before it takes off.
+        """Raise PlanError, before takeoff, if one vehicle can't fly the mission from its home.
 
-        Called for embedded vehicles, whose home is known; for others the mission itself does it.
+        Called for embedded vehicles, whose home is known; for other vehicles the mission itself calls it.
         """
 
     def scenario(self, options: AnyOptions, setting: Setting) -> Scenario:
-        """What an embedded world must hold beside the vehicles; not asked for vehicles elsewhere."""
+        """The objects besides the vehicles that an embedded world must contain; not called for other
+        vehicles.
+        """
         return Scenario()
 
     async def outline(self, vehicle: "Vehicle", options: AnyOptions) -> "Outline | None":
-        """Where one vehicle, which is ready to arm, would fly; None: it can't be told."""
+        """The path that one vehicle, which is ready to arm, would fly; None: it is not known in advance."""
         return None
 
     async def plan_items(self, vehicle: "Vehicle", options: AnyOptions) -> "Sequence[MissionItem]":
-        """What would be uploaded to one vehicle, which is ready to arm, for mission files.
+        """The mission items that would be uploaded to one vehicle, which is ready to arm; for mission files.
 
         Raises:
             PlanError: this mission is not flown by uploaded waypoints.
@@ -116,17 +121,18 @@ class Mission(Generic[AnyOptions]):
         raise PlanError(f"mission {self.name} is not flown by uploaded waypoints; there is no file of it")
 
     async def fly(self, vehicle: "Vehicle", options: AnyOptions) -> None:
-        """Fly one vehicle, which is ready to arm, from the ground back to the ground."""
+        """Fly one vehicle, which is ready to arm, including takeoff and landing."""
         raise PlanError(f"mission {self.name} flies no single vehicle")
 
     async def fly_team(self, vehicles: "Sequence[Vehicle]", options: Sequence[AnyOptions]) -> None:
-        """Fly all vehicles of a team, each ready to arm; called instead of `fly` when `together`."""
+        """Fly all vehicles of a team, each ready to arm; called instead of `fly` if `together` is set."""
         raise PlanError(f"mission {self.name} flies no team")
 
     def estimator_settings(self, options: AnyOptions) -> Mapping[str, float]:
-        """Parameters of estimators that follow from what is flown, by name.
+        """Parameter values of estimators that follow from the mission, by name.
 
-        An estimator that is taken along gets those that it has and nobody has set.
+        An estimator that runs during the flight receives the parameters that it has and that the user did not
+        set.
         """
         return {}
 
@@ -148,7 +154,7 @@ class Mission(Generic[AnyOptions]):
         return {}
 
     def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
-        """Lines that the command line says of a completed flight, beside those of every flight."""
+        """Lines that the command line prints after a completed flight, besides those of every flight."""
         return ()
 
     def title(self, options: AnyOptions) -> str:

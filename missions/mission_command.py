@@ -1,4 +1,4 @@
-"""How a mission declares what it takes from the command line."""
+"""Declaration of the command-line options of a mission."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from missions.options import MissionOptions
 
 Given = Mapping[str, Any]
-"""Values of the command line's options by name, with _ for -."""
+"""Values of the command line's options by name, with _ in place of -."""
 
 
 MISSION_GROUP: Final = "The mission's own"
@@ -19,7 +19,7 @@ MISSION_GROUP: Final = "The mission's own"
 
 
 class Scope(StrEnum):
-    """Which flights an option has an effect on."""
+    """The flights on which an option has an effect."""
 
     ANY = "any"
     EMBEDDED = "embedded"
@@ -54,12 +54,11 @@ class MissionCommand:
     """A mission on the command line.
 
     Attributes:
-        help: what `flightstack fly NAME --help` says first.
-        options: beside those of every mission. The mission takes no others.
-        build: the mission's options from what was given. `chosen` names the fields of the options that
-            were; common values are passed on as they are.
-        fields: which fields of the mission's options each command-line option decides on, where the names
-            differ.
+        help: first text of `flightstack fly NAME --help`.
+        options: command-line options in addition to those of every mission. The mission accepts no others.
+        build: creates the mission's options from the given values. `chosen` names the fields that the user
+            specified; common values are passed unchanged.
+        fields: the fields of the mission's options that each command-line option sets, when the names differ.
     """
 
     help: str
@@ -68,7 +67,7 @@ class MissionCommand:
     fields: Mapping[str, tuple[str, ...]]
 
     def chosen_fields(self, chosen: frozenset[str]) -> frozenset[str]:
-        """Fields of the mission's options that were chosen on the command line."""
+        """Fields of the mission's options that the user specified on the command line."""
         found: set[str] = set()
         for name in chosen:
             found.update(
@@ -78,6 +77,6 @@ class MissionCommand:
 
 
 def option(*declarations: str, **attributes: Any) -> FlightOption:
-    """An option of a mission, with its default shown."""
+    """An option of a mission; its default is shown in the help."""
     show_default = attributes.pop("show_default", True)
     return FlightOption(declarations, group=MISSION_GROUP, show_default=show_default, **attributes)

@@ -1,4 +1,4 @@
-"""What a mission tells about its flight while it flies: phases, progress, and what it commanded."""
+"""What a mission records about its flight while it flies: phases, progress, and the commanded path."""
 
 from dataclasses import dataclass, field
 
@@ -14,12 +14,12 @@ PATTERN = "pattern"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandedPath:
-    """What the vehicle was asked to fly.
+    """The path that the vehicle was commanded to fly.
 
     Attributes:
         origin: geodetic origin of the local frame: the vehicle's home.
         points_ned_m: the commanded curve, finely sampled (n, 3).
-        waypoints_ned_m: the waypoints (m, 3); none when flown by setpoints.
+        waypoints_ned_m: the waypoints (m, 3); empty when flown by setpoints.
         acceptance_m: radius within which a waypoint counts as reached.
     """
 
@@ -40,7 +40,7 @@ class Phase:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkLoss:
-    """A time without the vehicle, in its own time; `end_us` None: it never came back."""
+    """A time in which the link was lost, in vehicle time; `end_us` None: it was never regained."""
 
     start_us: int
     end_us: int | None = None
@@ -52,17 +52,18 @@ class FlightNotes:
 
     Attributes:
         phases: finished phases in order.
-        commanded: what it was asked to fly.
-        progress: 0..1 of the pattern.
-        system_id, autopilot, kind: of the vehicle.
+        commanded: the commanded path.
+        progress: flown share of the pattern, 0..1.
+        system_id, autopilot, kind: properties of the vehicle.
         options: as the vehicle flies them.
-        left: how the vehicle was left when the flight failed or was interrupted; "": it was not.
-        warnings: what the user should know, each once.
-        link_losses: when the link was lost, and back.
-        lost_link: what the autopilot does without its ground station, in words; "": not known.
-        reached: items of a mission file (index from 0) and when, in their order.
-        cut_short: the time that the user gave for the mission ended it before all was flown.
-        marks: moments and figures that the mission gives a name to, for its own score.
+        left: state in which the vehicle was left when the flight failed or was interrupted; "": neither
+            happened.
+        warnings: warnings for the user, without repetitions.
+        link_losses: times at which the link was lost and regained.
+        lost_link: the autopilot's reaction to the loss of its ground station, as text; "": not known.
+        reached: items of a mission file (index from 0) and the times at which they were reached, in order.
+        cut_short: whether the user's time limit ended the mission before all was flown.
+        marks: named times and figures that the mission stores for its own score.
     """
 
     phases: list[Phase] = field(default_factory=list)
@@ -82,27 +83,27 @@ class FlightNotes:
     _open: tuple[str, int] | None = None
 
     def warn(self, text: str) -> None:
-        """Have the user told something when the flight is over; once, however often it is said."""
+        """Add a warning that is shown to the user after the flight; the same text is shown once."""
         if text not in self.warnings:
             self.warnings.append(text)
 
     @property
     def current(self) -> str:
-        """Name of the phase that is going on, or ""."""
+        """Name of the present phase, or ""."""
         return self._open[0] if self._open else ""
 
     def begin(self, name: str, time_us: int) -> None:
-        """Begin a phase; ends the one before."""
+        """Begin a phase and end the previous one."""
         self.end(time_us)
         self._open = (name, time_us)
 
     def end(self, time_us: int) -> None:
-        """End the phase that is going on."""
+        """End the present phase."""
         if self._open is not None:
             if time_us > self._open[1]:
                 self.phases.append(Phase(name=self._open[0], start_us=self._open[1], end_us=time_us))
             self._open = None
 
     def phase(self, name: str) -> Phase | None:
-        """The first finished phase of a name."""
+        """The first finished phase with a name."""
         return next((p for p in self.phases if p.name == name), None)

@@ -1,4 +1,4 @@
-"""Opening what a flight runs on: an embedded world, or links to vehicles elsewhere."""
+"""Opens the world of a flight: an embedded world, or links to vehicles."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -20,17 +20,18 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True, kw_only=True)
 class Stage:
-    """What a flight runs on.
+    """The links, clocks and event loop of a flight.
 
     Attributes:
         loop: event loop, on vehicle time when embedded.
         links, clocks: one per vehicle.
-        epoch_us: Unix time of vehicle time 0; None: the calendar's.
+        epoch_us: Unix time of vehicle time 0; None: vehicle time is Unix time.
         time_us: vehicle time.
-        on_truth: have frames of truth delivered.
-        parameters: those of one vehicle (index, names), without asking it; None: it must be asked.
-        home: of an embedded world; None: the vehicles tell theirs.
-        close: when all is done.
+        on_truth: subscribes to frames of truth.
+        parameters: reads parameters of one vehicle (index, names) without a request to it; None: they must be
+            requested.
+        home: home of an embedded world; None: the vehicles report theirs.
+        close: releases everything; called at the end.
     """
 
     loop: asyncio.AbstractEventLoop
@@ -45,11 +46,11 @@ class Stage:
 
 
 def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder) -> Stage:
-    """An embedded SITL with what the mission needs in it.
+    """Open an embedded SITL with the objects that the mission needs.
 
     Raises:
-        PlanError: a value that the message names, with what is accepted.
-        MissionError: the disk does not take what the world publishes.
+        PlanError: a value is not accepted; the message names it and what is accepted.
+        MissionError: a file that the world publishes cannot be written.
     """
     from missions.embedded import EmbeddedConfiguration, open_embedded
 
@@ -90,10 +91,10 @@ def open_world(mission: Mission[Any], request: RunRequest, folder: ClaimedFolder
 
 
 def open_vehicles(request: RunRequest) -> Stage:
-    """Links to vehicles elsewhere.
+    """Open links to vehicles that are not embedded.
 
     Raises:
-        PlanError: an address that is no vehicle's.
+        PlanError: an address cannot be that of a vehicle.
         BridgeError: a link can't be opened.
     """
     from autopilot_bridge.links import VEHICLE_FORMS, ReplayLog, open_link, parse_address

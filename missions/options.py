@@ -1,4 +1,4 @@
-"""What a person can choose about a flight."""
+"""Options of a flight."""
 
 import math
 from collections.abc import Mapping
@@ -22,20 +22,22 @@ MAX_SPEED_M_S: Final = 150.0
 MIN_ACCEPTANCE_M: Final = 0.1
 MAX_ACCEPTANCE_M: Final = 1000.0
 MIN_SIDE_M: Final = 1.0
-_SEPARATION_M: Final = 20.0  # of aircraft with wings
+_SEPARATION_M: Final = 20.0  # of fixed wings
 _LOWEST_LAYER_M: Final = 40.0
 MAX_PHASE_RAD: Final = math.radians(3600.0) + 1e-9
 
 
 class Via(StrEnum):
-    """How a pattern is commanded."""
+    """The way in which a pattern is commanded."""
 
     WAYPOINTS = "waypoints"
     SETPOINTS = "setpoints"
 
 
 def check_positive(**options: float | None) -> None:
-    """Refuse options that are given and not more than 0; names are the command line's with _ for -."""
+    """Refuse specified options that are not above 0; names are those of the command line with _ in place of
+    -.
+    """
     for name, value in options.items():
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise PlanError(f"--{name.replace('_', '-')} {value:g} is not possible; ask for more than 0")
@@ -43,17 +45,18 @@ def check_positive(**options: float | None) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionOptions:
-    """What every mission has: how many fly, and how high. Each mission has a class of its own made from this.
+    """Options that every mission has, such as the number of vehicles and the altitude. Each mission derives
+    its own class.
 
     Attributes:
-        altitude_m: above home.
-        vehicles, index: size of the team and which of it this is, 0 first.
-        separation_m: between the altitudes of a team.
-        centre: of the mission; None: the vehicle's home.
+        altitude_m: height above home.
+        vehicles, index: size of the team, and the number of this vehicle in it from 0.
+        separation_m: vertical distance between the vehicles of a team.
+        centre: centre of the mission; None: the vehicle's home.
         rate_hz: setpoints per vehicle second.
-        arguments: what else the user gave to a mission of theirs, by name.
-        given: names of the fields that were chosen by somebody; None: those that are not at their default. A
-            mission may give the others values that suit the vehicle (`for_vehicle`).
+        arguments: further arguments that the user gave to their own mission, by name.
+        given: names of the fields that the user specified; None: the fields that differ from their default. A
+            mission may give the other fields values that suit the vehicle (`for_vehicle`).
     """
 
     altitude_m: float = 10.0
@@ -78,41 +81,45 @@ class MissionOptions:
         return self.altitude_m + self.index * self.separation_m
 
     def chosen(self, name: str) -> bool:
-        """Whether somebody chose a field's value."""
+        """Whether the user specified a field's value."""
         if self.given is not None:
             return name in self.given
         default = next(f.default for f in fields(self) if f.name == name)
         return getattr(self, name) != default
 
     def unless_chosen(self, **values: float | str) -> Self:
-        """The same options, with other values where nobody chose one; `given` then tells what was chosen."""
+        """The same options, with new values for fields that were not specified; `given` then names the
+        specified ones.
+        """
         given = frozenset(f.name for f in fields(self) if f.name != "given" and self.chosen(f.name))
         changes: dict[str, Any] = {name: v for name, v in values.items() if name not in given}
         return replace(self, given=given, **changes)
 
     def for_vehicle(self, limits: Limits) -> Self:
-        """The same options as one vehicle flies them: what nobody chose suits its kind."""
+        """The same options as one vehicle flies them: options not specified get values that suit its kind."""
         return self
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightOptions(MissionOptions):
-    """One vehicle's flight of a pattern, in the units a mission computes with. Missions take what concerns
-    them.
+    """One vehicle's flight of a pattern, in the units that missions compute with. Each mission uses the
+    fields that apply to it.
 
     Attributes:
-        pattern: named Lissajous pattern, "L1".."L4"; not used when `ratio` is given.
+        pattern: named Lissajous pattern, "L1".."L4"; not used when `ratio` is specified.
         width_m, height_m: size of the pattern, east and north.
         ratio: frequencies x:y of a Lissajous pattern.
-        phase_x_rad, phase_y_rad: its phases; None: the named pattern's, or pi/2 and 0 for a ratio.
+        phase_x_rad, phase_y_rad: its phases; None: the phases of the named pattern, or pi/2 and 0 for a
+            ratio.
         spacing_m: track spacing of sweeps and squares.
         heading_rad: direction of the first leg of the IAMSAR patterns.
-        speed_m_s: ground speed; of a fixed wing: airspeed.
-        period_s: time once round in a Lissajous pattern's own time law, in place of the speed.
-        periods: times round, or passes.
+        speed_m_s: ground speed; for a fixed wing: airspeed.
+        period_s: time of one lap in a Lissajous pattern's own time law; it replaces the speed.
+        periods: number of laps or passes.
         search_time_s: end the pattern after this time; it is repeated until then.
         via: uploaded waypoints or streamed setpoints.
-        acceptance_m: radius within which a waypoint counts as reached; corners are rounded by as much.
+        acceptance_m: radius within which a waypoint counts as reached; corners are rounded by the same
+            distance.
     """
 
     pattern: str = "L3"
@@ -164,7 +171,9 @@ class FlightOptions(MissionOptions):
             raise PlanError("--period needs --via setpoints: waypoints are flown at a speed, not at times")
 
     def for_vehicle(self, limits: Limits) -> "FlightOptions":
-        """A fixed wing flies larger, higher and faster than a multicopter, unless it was told otherwise."""
+        """Options that were not specified get larger, higher and faster values for a fixed wing than for a
+        multicopter.
+        """
         if isinstance(limits, MulticopterLimits):
             return self
         speed_m_s = self.speed_m_s if self.chosen("speed_m_s") else limits.airspeed_trim_m_s
@@ -190,7 +199,7 @@ def parse_wind(text: str) -> tuple[float, float]:
     """Wind from "SPEED" or "SPEED@FROM_DEG", for example "5@270": (m/s, degrees it comes from).
 
     Raises:
-        PlanError: not of this form, or a speed out of 0..40 m/s.
+        PlanError: the text is not of this form, or the speed is out of 0..40 m/s.
     """
     speed_text, _, from_text = text.partition("@")
     try:
@@ -203,15 +212,15 @@ def parse_wind(text: str) -> tuple[float, float]:
 
 
 def parse_pair(text: str, name: str, separators: str) -> tuple[float, float]:
-    """Two numbers like "3:4" or "100x80"; a single one stands for both.
+    """Parse two numbers like "3:4" or "100x80"; a single number is used for both.
 
     Args:
-        text: what the user gave.
-        name: of the option, for the error.
-        separators: characters that may part the numbers; the first is shown in the error.
+        text: the user's text.
+        name: name of the option, for the error.
+        separators: characters that may separate the numbers; the first is shown in the error.
 
     Raises:
-        PlanError: not of this form.
+        PlanError: the text is not of this form.
     """
     cleaned = text.strip().lower()
     for separator in separators:
@@ -230,7 +239,7 @@ def parameters_from_file(path: str | Path) -> dict[str, float]:
     """Parameters from a file (`autopilot_bridge.parameter_files`); the vehicle checks names and ranges.
 
     Raises:
-        PlanError: the file can't be read or understood; names the line.
+        PlanError: the file can't be read or parsed; the message names the line.
     """
     try:
         return read_untyped_parameter_file(Path(path))

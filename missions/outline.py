@@ -1,4 +1,4 @@
-"""Where a mission is going to fly and how long, as far as it can be told before it is flown."""
+"""The planned path and duration of a mission, as far as they are known before the flight."""
 
 from dataclasses import dataclass
 
@@ -8,13 +8,13 @@ from autopilot_bridge.mission_plan import MissionItem
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outline:
-    """What is looked at before a flight.
+    """The planned flight, for the checks before it.
 
     Attributes:
-        points_ned_m: places it flies through, from home.
-        duration_s: of the flight without takeoff and landing; None: not known.
-        plan_home: where the plan begins; None: wherever the vehicle stands.
-        fence: that the mission uploads; empty: the vehicle keeps its own.
+        points_ned_m: places on its path, from home.
+        duration_s: duration of the flight without takeoff and landing; None: not known.
+        plan_home: home of the plan; None: the vehicle's place.
+        fence: geofence that the mission uploads; empty: the vehicle keeps its own.
     """
 
     points_ned_m: tuple[tuple[float, float, float], ...] = ()

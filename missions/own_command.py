@@ -1,4 +1,4 @@
-"""A mission file of a user's own on the command line: what it finds in its `options`."""
+"""The command line of a user's own mission file: the contents of its `options`."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

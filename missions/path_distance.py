@@ -12,12 +12,13 @@ Array = NDArray[np.float64]
 
 @kernel
 def follow_path(path: Array, track: Array, back_m: float, ahead_m: float, errors: Array) -> None:
-    """errors[k] = distance of track[k] from the path (m, 3), near the place found for track[k - 1].
+    """Write the distance of track[k] from the path (m, 3) to errors[k], searched near the place found for
+    track[k - 1].
 
-    Legs are looked at from `back_m` before that place to `ahead_m` and the last error beyond it.
+    Legs are searched from `back_m` before that place to `ahead_m` plus the last error after it.
     """
-    first = 0  # leg that holds the place found last
-    along_m = 0.0  # of the place, from the leg's start
+    first = 0  # leg of the place that was found last
+    along_m = 0.0  # distance of that place from the leg's start
     last_error = ahead_m
     legs = path.shape[0] - 1
     for k in range(track.shape[0]):

@@ -1,4 +1,4 @@
-"""The search patterns on the command line."""
+"""The command-line options of the search patterns."""
 
 import math
 from collections.abc import Mapping
@@ -13,7 +13,7 @@ _WINGS: Final = " Aircraft: {}."
 
 
 def ratio_of(text: str) -> tuple[float, float]:
-    """ "3:4", or a single number for so much to one."""
+    """Parse "3:4"; a single number is the ratio to one."""
     from missions.options import parse_pair
 
     x, y = parse_pair(text, "--ratio", ":/,")
@@ -26,7 +26,7 @@ def ratio_of(text: str) -> tuple[float, float]:
 
 
 def _shape(given: Given) -> dict[str, Any]:
-    """What the options of one pattern alone decide on."""
+    """Options that apply to only one pattern."""
     from missions.options import parse_pair
 
     if "pattern" not in given:
@@ -36,7 +36,7 @@ def _shape(given: Given) -> dict[str, Any]:
     if given["phase"] is not None:
         phase_x_deg, phase_y_deg = parse_pair(given["phase"], "--phase", ",")
         if "," not in given["phase"]:
-            phase_y_deg = 0.0  # one number is the difference of the two phases
+            phase_y_deg = 0.0  # a single number is the difference of the two phases
     return {
         "pattern": given["pattern"],
         "ratio": None if given["ratio"] is None else ratio_of(given["ratio"]),

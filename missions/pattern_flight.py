@@ -1,4 +1,4 @@
-"""Flying a pattern: as an uploaded waypoint mission, or by streamed setpoints."""
+"""Flies a pattern: as an uploaded waypoint mission, or by streamed setpoints."""
 
 import asyncio
 import math
@@ -43,7 +43,7 @@ _SPEED_STEP_M_S: Final = 0.5
 
 
 def check_pattern(curve: Curve, options: FlightOptions, limits: Limits) -> None:
-    """Refuse, with a PlanError, a pattern that a vehicle with these limits can't fly."""
+    """Raise PlanError if a vehicle with these limits can't fly the pattern."""
     if isinstance(limits, FixedWingLimits):
         check_wings(curve, options, limits)
     else:
@@ -52,7 +52,7 @@ def check_pattern(curve: Curve, options: FlightOptions, limits: Limits) -> None:
 
 
 def plan_pattern(curve: Curve, options: FlightOptions, limits: MulticopterLimits) -> Trajectory:
-    """The pattern in time, around its own centre.
+    """The trajectory of the pattern around its own centre.
 
     Raises:
         PlanError: the vehicle can't fly it.
@@ -88,21 +88,23 @@ def pattern_frequencies(curve: Curve, period_s: float) -> tuple[float, float]:
 
 
 async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> None:
-    """Fly a curve as the options say, from the ground back to the ground.
+    """Fly a curve as the options specify, including takeoff and landing.
 
-    The vehicle is ready (`wait_ready`) and on the ground. Its notes get the commanded path and the phases.
+    The vehicle is ready (`wait_ready`) and on the ground. The commanded path and the phases are stored in its
+    notes.
 
     Raises:
         PlanError: the vehicle's parameters don't allow the pattern.
-        MissionError: the flight went wrong.
+        MissionError: the flight failed.
     """
     limits = await vehicle.limits(options.own_altitude_m)
     if isinstance(limits, FixedWingLimits):
         await fly_pattern_with_wings(vehicle, options, curve, limits)
         return
-    if isinstance(asyncio.get_running_loop(), VirtualTimeLoop):  # time stands still, and flights are equal
+    # virtual time stands still, so that flights are reproducible
+    if isinstance(asyncio.get_running_loop(), VirtualTimeLoop):
         trajectory = plan_pattern(curve, options, limits)
-    else:  # heartbeats go on
+    else:  # heartbeats continue
         trajectory = await asyncio.to_thread(plan_pattern, curve, options, limits)
     centre = _centre(vehicle, options)
     if options.via is Via.SETPOINTS:
@@ -112,7 +114,7 @@ async def fly_pattern(vehicle: Vehicle, options: FlightOptions, curve: Curve) ->
 
 
 def pattern_outline(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> Outline:
-    """Where and how long a pattern is flown, before it is planned in detail."""
+    """The path and the duration of a pattern, before it is planned in detail."""
     table = ArcLengthTable.of(curve, _OUTLINE_STEP_M)
     north_m, east_m, _ = _centre(vehicle, options)
     points = [(float(n) + north_m, float(e) + east_m, -options.own_altitude_m) for n, e in table.points_m]
@@ -161,7 +163,7 @@ async def _fly_setpoints(
     )
     notes.begin("takeoff", clock.stamp_us)
     await vehicle.takeoff(altitude_m)
-    notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
+    notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set the home again
     above_home = (0.0, 0.0, -altitude_m)
     first = setpoint_at(trajectory.at(0.0), centre)
     last = setpoint_at(trajectory.at(trajectory.duration_s), centre)
@@ -187,7 +189,7 @@ async def _fly_setpoints(
 async def _fly_line(
     vehicle: Vehicle, guided: GuidedSession, start: Vector, stop: Vector, limits: MulticopterLimits
 ) -> None:
-    """Turn the nose along the way, and fly straight from rest to rest."""
+    """Turn to the direction of the leg, and fly straight from rest to rest."""
     if math.dist(start, stop) < _SAME_PLACE_M:
         return
     line = line_trajectory(start, stop, speed_m_s=_TRANSIT_M_S, limits=limits)
@@ -198,7 +200,7 @@ async def _fly_line(
 async def _turn(
     vehicle: Vehicle, guided: GuidedSession, position: Vector, yaw_rad: float, limits: MulticopterLimits
 ) -> None:
-    """Stay in a place, turn the nose at no more than the yaw rate, and settle for a moment."""
+    """Stay in a place, turn with at most the yaw rate, and settle for a short time."""
     attitude = vehicle.latest(Attitude)
     start_rad = yaw_rad if attitude is None else attitude.yaw_rad
     turn_rad = math.remainder(yaw_rad - start_rad, math.tau)
@@ -220,7 +222,7 @@ async def _turn(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WaypointPlan:
-    """A plan to upload, and where the pattern is in it.
+    """A plan to upload, and the items of the pattern in it.
 
     Attributes:
         items: the plan.
@@ -239,7 +241,7 @@ def waypoint_plan(
     options: FlightOptions,
     centre: Vector,
 ) -> WaypointPlan:
-    """The plan to upload: takeoff, waypoints with their speeds, and the way home."""
+    """The plan to upload: takeoff, waypoints with their speeds, and return."""
     home = vehicle.home
     frame = LocalFrame(home)
     unset = vehicle.adapter.unset
@@ -263,7 +265,7 @@ def waypoint_plan(
         first = len(items) if first is None else first
         items.append(over(waypoint, north_m + centre[0], east_m + centre[1], altitude_m))
     last = len(items) - 1
-    if options.vehicles > 1:  # home in its own layer: returns all climb to one altitude
+    if options.vehicles > 1:  # return in its own layer: RTL takes all vehicles to the same altitude
         items.append(_speed_item(options.speed_m_s))
         items += [over(waypoint, 0.0, 0.0, altitude_m), replace(over(land, 0.0, 0.0, 0.0), param2=0.0)]
     else:
@@ -284,7 +286,7 @@ def _speed_item(speed_m_s: float) -> MissionItem:
 
 
 def _length_m(options: FlightOptions) -> float | None:
-    """Length of a pattern that ends by its search time."""
+    """Length of a pattern that ends with its search time."""
     return None if options.search_time_s is None else options.search_time_s * options.speed_m_s
 
 
@@ -293,7 +295,7 @@ def _points_and_plan(
 ) -> tuple[list[tuple[float, float]], WaypointPlan]:
     """The pattern's waypoints around its centre, and the plan to upload."""
     points = waypoints_along(curve, length_m=_length_m(options))
-    # a polyline's corners are the vehicle's own business: its long legs are flown at full speed
+    # the vehicle rounds a polyline's corners by itself: its long legs are flown at full speed
     speeds = [options.speed_m_s] * len(points)
     if not isinstance(curve, Polyline):
         speeds = leg_speeds(points, trajectory)
@@ -301,7 +303,7 @@ def _points_and_plan(
 
 
 async def pattern_items(vehicle: Vehicle, options: FlightOptions, curve: Curve) -> list[MissionItem]:
-    """The mission that flies a pattern, takeoff and landing included, as it would be uploaded.
+    """The mission items that would be uploaded for a pattern, including takeoff and landing.
 
     Raises:
         PlanError: the vehicle's parameters don't allow the pattern.
@@ -350,7 +352,7 @@ async def _fly_waypoints(
         if options.search_time_s is None:
             raise
         notes.cut_short = True
-        await vehicle.return_to_launch(wait=False)  # the search time is over
+        await vehicle.return_to_launch(wait=False)  # the search time has ended
     notes.begin("return", clock.stamp_us)
     await vehicle.wait_disarmed(300.0 + 2.0 * reach_m)
     notes.end(clock.stamp_us)

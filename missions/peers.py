@@ -1,6 +1,6 @@
-"""What a connection keeps of those it hears: the newest frames of each component.
+"""The newest frames of each component that a connection receives.
 
-Components come and go, and anybody can send with any ids: they are kept for a limited number.
+Components come and go, and any sender can use any ids, so only a limited number of components is kept.
 """
 
 from collections.abc import Mapping
@@ -15,10 +15,10 @@ ComponentId = tuple[int, int]
 
 
 class NewestFrames:
-    """The newest frame of each message of up to 64 components, decoded when asked for.
+    """The newest frame of each message of up to 64 components, decoded when requested.
 
-    The component that was heard first is forgotten first, until it is heard again; autopilots named with
-    `keep` never are.
+    When there are too many, the component that was first received first is removed; it is added again when it
+    is received again. Autopilots named with `keep` are never removed.
     """
 
     __slots__ = ("_decoded", "_frames", "_kept")
@@ -34,19 +34,19 @@ class NewestFrames:
 
     @property
     def components(self) -> list[ComponentId]:
-        """Those that were heard and are not forgotten."""
+        """The components that were received and are still kept."""
         return list(self._frames)
 
     def of(self, component: ComponentId) -> Mapping[int, Frame]:
-        """The newest frames of a component by message id, as they are now."""
+        """The present newest frames of a component, by message id."""
         return dict(self._frames.get(component, {}))
 
     def keep(self, component: ComponentId) -> None:
-        """Never forget this component."""
+        """Never remove this component."""
         self._kept.add(component)
 
     def put(self, frame: Frame) -> None:
-        """Take a frame."""
+        """Store a frame as the newest of its message."""
         component = (frame.system_id, frame.component_id)
         frames = self._frames.get(component)
         if frames is None:

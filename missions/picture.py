@@ -1,4 +1,4 @@
-"""The picture of a run: the track from above, and altitude and error against time below it."""
+"""The picture of a run: the track from above, and below it altitude and error over time."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
 
     Args:
         path: the file; it must not exist.
-        title: above the picture.
+        title: title above the picture.
         flights: notes and scores, one per vehicle. Tracks of a team are drawn around the first vehicle's
             home.
     """
@@ -42,8 +42,8 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
     figure.suptitle(title, fontsize=13, fontweight="bold", color=_INK)
     _draw_from_above(above, flights)
     _draw_altitude(altitude, flights)
-    for error in rest:  # there is a curve to be off from
-        error.sharex(altitude)  # whose times there always are, also of a flight that never came to its curve
+    for error in rest:  # there is a path to compare with
+        error.sharex(altitude)  # the altitude always has times, even if the flight never reached its curve
         _draw_error(error, flights)
         altitude.tick_params(labelbottom=False)
     for axes in (above, altitude, *rest):
@@ -54,7 +54,7 @@ def draw_run(path: Path, title: str, flights: list[tuple[FlightNotes, FlightScor
 
 
 def tidy(axes: Any) -> None:
-    """Quiet axes: thin grid, two spines."""
+    """Simple axes: thin grid, two spines."""
     axes.tick_params(colors=_INK, labelsize=8)
     axes.grid(True, color=_GRID, linewidth=0.6)
     axes.set_axisbelow(True)
@@ -65,7 +65,7 @@ def tidy(axes: Any) -> None:
 
 
 def _shown(track: Track, notes: FlightNotes) -> Track:
-    """The part of a track that is flight, thinned to what a picture can show."""
+    """The part of a track in flight, reduced to the points that a picture can show."""
     if notes.phases:
         track = track.between(notes.phases[0].start_us, notes.phases[-1].end_us)
     stride = max(1, len(track.time_s) // 6000)
@@ -77,7 +77,7 @@ def _shown(track: Track, notes: FlightNotes) -> Track:
 
 
 def _offset(notes: FlightNotes, first: FlightNotes) -> tuple[float, float]:
-    """North and east of this vehicle's home from the first one's."""
+    """North and east of this vehicle's home relative to the first vehicle's home."""
     if notes.commanded is None or first.commanded is None or notes is first:
         return 0.0, 0.0
     home = notes.commanded.origin
@@ -145,17 +145,19 @@ def _draw_from_above(axes: Any, flights: list[tuple[FlightNotes, FlightScore]]) 
 
 
 def _truth_style(colour: str, team: bool) -> dict[str, Any]:
-    """Truth: a thin dark line; of a team, a line in the vehicle's colour."""
+    """Style of the truth: a thin dark line; for a team, a line in the vehicle's colour."""
     return {"color": colour if team else _TRUTH, "linewidth": 1.3 if team else 0.9}
 
 
 def _estimate_style(colour: str, team: bool) -> dict[str, Any]:
-    """The autopilot's estimate: a line in the vehicle's colour; of a team, a pale band below the truth."""
+    """Style of the autopilot's estimate: a line in the vehicle's colour; for a team, a pale band below the
+    truth.
+    """
     return {"color": colour, "linewidth": 3.0 if team else 1.6, "alpha": 0.3 if team else 0.85}
 
 
 def _draw_marks(axes: Any, track: Track, north: float, east: float) -> None:
-    """Heading arrows evenly along the track, start and end."""
+    """Draw heading arrows evenly along the track, and marks at start and end."""
     steps = np.linalg.norm(np.diff(track.pos_ned_m[:, :2], axis=0), axis=1)
     arc = np.concatenate(([0.0], np.cumsum(steps)))
     if arc[-1] > 1.0:
@@ -183,7 +185,7 @@ def _draw_marks(axes: Any, track: Track, north: float, east: float) -> None:
 
 
 def _draw_scale(axes: Any, span_m: float) -> None:
-    """A bar of a round length in the lower right corner, in the axes' own scale."""
+    """Draw a bar of a round length in the lower right corner, in the scale of the axes."""
     exponent = math.floor(math.log10(span_m / 4.0))
     length = max(m * 10.0**exponent for m in (1, 2, 5) if m * 10.0**exponent <= span_m / 4.0)
     bar = AnchoredSizeBar(

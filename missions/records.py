@@ -1,6 +1,4 @@
-"""What a flight's frames hold, as columns: raw payloads collected per message, decoded in one go with
-numpy.
-"""
+"""The frames of a flight as columns: raw payloads, collected by message and decoded with numpy."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -30,13 +28,13 @@ SCORED_MESSAGES: Final = frozenset(
 """Messages kept for the summary and the picture; all others are only counted."""
 
 UnixTime = Callable[[], int]
-"""Microseconds of the Unix epoch."""
+"""Returns microseconds of the Unix epoch."""
 
 _MAGIC_V2: Final = 0xFD
 
 
 class FlightRecords:
-    """Counts of all messages of a flight, and the payloads of those that are scored."""
+    """Counts of all messages of a flight, and the payloads of messages that are scored."""
 
     def __init__(self) -> None:
         self._counts: Counter[int] = Counter()
@@ -44,14 +42,14 @@ class FlightRecords:
 
     @classmethod
     def from_tlog(cls, path: Path) -> "FlightRecords":
-        """Records of a log that was written before."""
+        """Records from an existing log."""
         records = cls()
         for _, frame in TlogReader(path):
             records.add(frame.raw)
         return records
 
     def add(self, raw: bytes) -> None:
-        """Take one good frame."""
+        """Add one valid frame."""
         if raw[0] == _MAGIC_V2:
             message_id = raw[7] | raw[8] << 8 | raw[9] << 16
             self._counts[message_id] += 1
@@ -87,17 +85,17 @@ class FlightRecords:
 
 
 class FlightRecorder:
-    """Takes the frames of all connections, and the truth, into the log and the records.
+    """Writes the frames of all connections, and the truth, to the log and the records.
 
     Args:
         log: an open log.
         epoch_us: Unix time of vehicle time 0 (embedded flights), or None to stamp with `unix_time_us`.
-        unix_time_us: wall clock for flights of vehicles elsewhere.
+        unix_time_us: wall clock for flights of vehicles that are not embedded.
 
     Attributes:
-        records: of all frames.
-        failure: why the log takes no more; it ends there, and what is recorded goes on without it. "" while
-            all is well.
+        records: records of all frames.
+        failure: reason why the log can no longer be written. The log ends there, and recording continues
+            without it. "" without a failure.
     """
 
     def __init__(self, log: TlogWriter, *, epoch_us: int | None, unix_time_us: UnixTime) -> None:
@@ -108,7 +106,7 @@ class FlightRecorder:
         self._unix_time_us = unix_time_us
 
     def record(self, frame: bytes, time_us: int) -> None:
-        """Log one frame that passed at vehicle time `time_us`."""
+        """Log one frame that was sent or received at vehicle time `time_us`."""
         stamp = self._unix_time_us() if self._epoch_us is None else self._epoch_us + time_us
         if not self.failure:
             try:
@@ -122,7 +120,7 @@ class FlightRecorder:
         self.record(frame, time_us)
 
     def flush(self) -> None:
-        """Hand everything to the operating system, so that `failure` says how the log is now."""
+        """Pass all data to the operating system, so that `failure` is up to date."""
         self._try(self._log.flush)
 
     def close(self) -> None:

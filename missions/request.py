@@ -1,4 +1,4 @@
-"""What a run is asked for."""
+"""The request of a run."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,38 +15,41 @@ if TYPE_CHECKING:
     from missions.preflight.before_flight import Confirm
 
 REGAIN_S: Final = 60.0
-"""How long a lost link may take to come back."""
+"""Longest time for which a lost link may stay lost, s."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunRequest:
-    """Everything about a run but the mission itself.
+    """All settings of a run except the mission itself.
 
     Attributes:
-        options: what the mission is to do.
-        connect: connection strings, one per vehicle; empty: an embedded SITL.
-        system_ids: of the vehicles, one per connection; empty: the first heard on each.
-        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, wind_profile, turbulence, gps, home: of the
-            embedded SITL.
-        model: its vehicle: of all of a team, or one for each.
-        launch: how its aircraft get into the air: "runway", "catapult", "hand"; None: as described with them.
-        expected_wind_m_s: forecast, to plan turns for; None: 5 m/s. What blows in an embedded SITL is not
-            looked at: a mission plans the same for vehicles there and elsewhere.
+        options: options of the mission.
+        connect: connection strings, one per vehicle; empty: the vehicles are embedded (SITL).
+        system_ids: system ids of the vehicles, one per connection; empty: the first vehicle received on each
+            connection.
+        autopilot, seed, speedup, wind_speed_m_s, wind_from_deg, wind_profile, turbulence, gps, home: settings
+            of the embedded SITL.
+        model: its vehicle model: one for all vehicles of a team, or one for each.
+        launch: launch method of its aircraft: "runway", "catapult", "hand"; None: the method in the
+            aircraft's description.
+        expected_wind_m_s: forecast wind that turns are planned for; None: 5 m/s. The wind of an embedded SITL
+            is not used: a mission plans in the same way for embedded and for other vehicles.
         parameters: autopilot parameters to set before the flight.
         out: run folder; None: the next `runs/<mission>-<n>`.
         picture: whether to draw `track.png`.
-        identity: MAVLink system and component id of the mission.
-        on_failure: what the vehicle is told when the mission fails or is interrupted.
-        max_error_m: a check: the run has failed when the path error exceeds it; None: no check.
-        estimator: one to run beside the flight: its name, or the path of a user's file; None: none.
+        identity: MAVLink system and component id that the mission sends with.
+        on_failure: action that is commanded when the mission fails or is interrupted.
+        max_error_m: the run counts as failed when the path error exceeds it; None: no check.
+        estimator: estimator that runs during the flight: its name, or the path of a user's file; None: no
+            estimator.
         estimator_settings: its parameters as NAME=VALUE.
-        confirm: shown what was found of the vehicles before they fly, says whether to go on (a coroutine
-            function); None: they are not looked at.
-        on_open: called once the links are open, or the world is.
-        regain_s: how long a lost link may take to come back before the mission is given up, in seconds of
+        confirm: coroutine function that receives the findings about the vehicles before they fly and returns
+            whether to continue; None: the vehicles are not checked.
+        on_open: called once the links or the world are open.
+        regain_s: longest time for which a lost link may stay lost before the mission fails, in seconds of
             this machine's clock.
         command: the command line, for the summary.
-        signing_key: shared with vehicles elsewhere; None: unsigned.
+        signing_key: signing key, shared with vehicles that are not embedded; None: no signing.
     """
 
     options: MissionOptions = field(default_factory=FlightOptions)

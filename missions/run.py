@@ -1,4 +1,4 @@
-"""A run: the folder with the log, the summary and the picture. Nothing is ever overwritten."""
+"""A run: the folder with the log, the summary and the picture. Existing files are never overwritten."""
 
 import json
 import math
@@ -15,7 +15,7 @@ from missions.notes import FlightNotes
 from missions.score import FlightScore
 
 EPOCH_UNIX_US: Final = 1_735_689_600_000_000
-"""2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that equal flights make equal logs."""
+"""2025-01-01T00:00:00Z: time 0 of embedded flights in the log, so that equal flights give equal logs."""
 
 LOG_NAME: Final = "flight.tlog"
 SUMMARY_NAME: Final = "summary.json"
@@ -25,16 +25,16 @@ _PACKAGES: Final = ("flightstack", "jsbsim", "numpy", "numba", "pymavlink")
 
 
 def create_run_folder(out: Path | None, mission: str, runs: Path = RUNS) -> Path:
-    """Make the folder of a new run.
+    """Create the folder of a new run.
 
     Args:
-        out: the folder asked for; it must not exist, or be empty. None: `runs/<mission>-<n>` with the next
-            free number.
+        out: the requested folder; it must not exist, or must be empty. None: `runs/<mission>-<n>` with the
+            next free number.
         mission: name of the mission.
-        runs: where numbered runs go.
+        runs: folder of the numbered runs.
 
     Raises:
-        PlanError: the folder holds something, or can't be made.
+        PlanError: the folder is not empty, or can't be created.
     """
     try:
         if out is not None:
@@ -58,7 +58,7 @@ def create_run_folder(out: Path | None, mission: str, runs: Path = RUNS) -> Path
 
 
 def versions() -> dict[str, str]:
-    """Versions of what decides how a flight goes."""
+    """Versions of the software that affects a flight."""
     found = {"python": platform.python_version()}
     for package in _PACKAGES:
         try:
@@ -71,7 +71,7 @@ def versions() -> dict[str, str]:
 
 
 def _checkout_version() -> str | None:
-    """What `pyproject.toml` says, when this runs from a checkout."""
+    """The version in `pyproject.toml`, when the program runs from a checkout."""
     try:
         text = (Path(__file__).resolve().parents[1] / "pyproject.toml").read_text(encoding="utf-8")
         project = tomllib.loads(text)["project"]
@@ -91,8 +91,8 @@ POOR: Final = "poor"
 def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
     """How a commanded path was followed: everywhere within the acceptance radius, or not; None: not measured.
 
-    The radius within which a waypoint counts as reached is what the user gave away: who is farther off the
-    path than that has not flown it, though the vehicle may have gone on to its end.
+    A waypoint counts as reached within the acceptance radius, so the user accepts this error. A vehicle that
+    was farther off the path has not flown it, even if it continued to the end.
     """
     if notes.commanded is None or score.path_max_error_m is None:
         return None
@@ -100,7 +100,7 @@ def tracking(notes: FlightNotes, score: FlightScore) -> str | None:
 
 
 def how_left(blocks: Sequence[Mapping[str, Any]]) -> str:
-    """What was done with the vehicles of a flight that was broken off; "" if nothing had to be."""
+    """The action taken with the vehicles of a flight that ended early; "" if no action was needed."""
     left = {block["system_id"]: block["left"] for block in blocks if block["left"]}
     if len(blocks) == 1:
         return f"the vehicle {left[blocks[0]['system_id']]}" if left else ""
@@ -151,7 +151,7 @@ def vehicle_summary(notes: FlightNotes, score: FlightScore) -> dict[str, Any]:
 
 
 def team_figures(blocks: list[dict[str, Any]]) -> dict[str, Any]:
-    """The run's own figures: those of a single vehicle, the sum or the worst of a team."""
+    """Figures of the whole run: those of a single vehicle, or the sum or the worst value of a team."""
 
     def worst(key: str) -> float | None:
         known = [block[key] for block in blocks if block[key] is not None]
@@ -165,7 +165,7 @@ def team_figures(blocks: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
-    """Write `summary.json`, whole or not at all. Numbers that are not finite become null."""
+    """Write `summary.json`; after an error no file remains. Numbers that are not finite become null."""
     text = json.dumps(_finite(summary), indent=2, allow_nan=False) + "\n"
     path = folder / SUMMARY_NAME
     with whole(path), path.open("x", encoding="utf-8") as file:
@@ -174,7 +174,7 @@ def write_summary(folder: Path, summary: Mapping[str, Any]) -> Path:
 
 
 def replace_summary(folder: Path, summary: Mapping[str, Any]) -> None:
-    """Put another summary in the place of this run's own, if the disk takes it; else there is none."""
+    """Replace the summary of this run. If it can't be written, there is none."""
     path = folder / SUMMARY_NAME
     with suppress(OSError):
         path.unlink(missing_ok=True)
@@ -183,10 +183,10 @@ def replace_summary(folder: Path, summary: Mapping[str, Any]) -> None:
 
 @contextmanager
 def whole(path: Path) -> Iterator[None]:
-    """Leave no half of a new file that is written meanwhile, on a full disk."""
+    """Context that removes an incomplete new file when writing fails, for example on a full disk."""
     try:
         yield
-    except FileExistsError:  # somebody else's, and whole
+    except FileExistsError:  # another process has written it completely
         raise
     except OSError:
         path.unlink(missing_ok=True)
@@ -204,7 +204,7 @@ def _finite(value: Any) -> Any:
 
 
 def wind_words(wind: Mapping[str, Any]) -> str:
-    """The wind of an embedded flight in words: `summary.json`'s `wind`."""
+    """Text about the wind of an embedded flight, from the entry `wind` of `summary.json`."""
     speed_m_s, turbulence = wind["speed_m_s"], wind["turbulence"]
     steady = f"wind {speed_m_s:g} m/s from {wind['from_deg']:g} degrees" if speed_m_s else "no steady wind"
     if speed_m_s and wind["profile"] != "uniform":

@@ -1,7 +1,7 @@
-"""What a mission asks of the world it is flown in, when that is simulated: targets, payload, magnetic map.
+"""What a mission requires of a simulated world: targets, payload, magnetic map.
 
-Plain data; `missions.embedded` builds it. On a real vehicle all this is simply there; a
-mission can't tell.
+Plain data; `missions.embedded` creates the objects from it. With a real vehicle these exist already. A
+mission cannot detect the difference.
 """
 
 import math
@@ -16,7 +16,7 @@ MAX_DISTANCE_M: Final = 50_000.0
 
 
 class TargetMotion(StrEnum):
-    """How a ground target moves."""
+    """Kinds of motion of a ground target."""
 
     STATIC = "static"
     STRAIGHT = "straight"
@@ -29,16 +29,16 @@ class TargetScenario:
     """One target on the ground.
 
     Attributes:
-        north_m, east_m: of home, at the start; the centre of a circle.
-        motion: how it moves.
-        speed_m_s: over ground; not used by a static one.
-        course_rad: where a straight one goes, and a random walk begins.
-        range_m: radius of a circle; half the side of the square a random walk stays in.
-        tag: what a camera reads off it, 0..254; -1: nothing.
-        size_m: its extent.
+        north_m, east_m: initial position from home; for a circle, its centre.
+        motion: kind of motion.
+        speed_m_s: ground speed; not used by a static target.
+        course_rad: course of a straight motion, and initial course of a random walk.
+        range_m: radius of a circle; for a random walk, half the side of the square that it stays in.
+        tag: number of the tag that a camera reads, 0..254; -1: no tag.
+        size_m: size of the target.
 
     Raises:
-        PlanError: a place, speed or range that can't be.
+        PlanError: a place, speed or range is impossible.
     """
 
     north_m: float
@@ -65,20 +65,20 @@ class TargetScenario:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SurveyScenario:
-    """A magnetic field with a target's signature in it, and the map that a survey has made of it.
+    """A magnetic field with a target's signature, and a survey's map of it.
 
     Attributes:
-        map_path: the published map; None: one is made from the seed, `width_m` by `height_m` about home.
-            The true field differs from it by a survey's error.
-        publish_to: where a map that is made is written, for the mission to read.
-        width_m, height_m: of a map that is made, east and north.
-        survey_height_m: above home, what a map that is made is valid at.
-        target_ne_m: of the signature; None: no target.
-        amplitude_nt: its peak.
+        map_path: the published map; None: one is generated from the seed, `width_m` by `height_m` around
+            home. The true field differs from it by a survey's error.
+        publish_to: path to which a generated map is written, for the mission to read.
+        width_m, height_m: size of a generated map, east and north.
+        survey_height_m: height above home at which a generated map is valid.
+        target_ne_m: place of the signature; None: no target.
+        amplitude_nt: peak of the signature.
         sigma_along_m, sigma_across_m: its standard deviations.
-        orientation_rad: of its long axis.
-        moment_a_m2, depth_m: the target is a dipole along the Earth's field, this far below home; None: a
-            two-dimensional Gaussian (Lum et al. 2005).
+        orientation_rad: direction of its long axis.
+        moment_a_m2, depth_m: moment and depth below home of a target that is a dipole along the Earth's
+            field; None: a two-dimensional Gaussian (Lum et al. 2005).
     """
 
     map_path: Path | None = None
@@ -97,12 +97,12 @@ class SurveyScenario:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scenario:
-    """What there is in the world and on board.
+    """The objects in the world and on board.
 
     Attributes:
-        targets: on the ground.
-        camera: every vehicle carries a camera on a gimbal.
-        survey: every vehicle carries a survey magnetometer, over this.
+        targets: targets on the ground.
+        camera: whether every vehicle carries a camera on a gimbal.
+        survey: field for the survey magnetometer that every vehicle then carries.
     """
 
     targets: tuple[TargetScenario, ...] = ()
@@ -111,18 +111,18 @@ class Scenario:
 
     @property
     def published(self) -> tuple[Path, ...]:
-        """Files that are written when the world is made."""
+        """Files that are written when the world is created."""
         to = None if self.survey is None or self.survey.map_path is not None else self.survey.publish_to
         return () if to is None else (to,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """What a scenario may depend on beside the options.
+    """Values besides the options that a scenario may depend on.
 
     Attributes:
-        seed: of the world: what a mission leaves to chance is drawn from it.
-        folder: of the run, for files that the scenario publishes.
+        seed: seed of the world; a mission's random values are drawn from it.
+        folder: folder of the run, for files that the scenario publishes.
     """
 
     seed: int

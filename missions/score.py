@@ -1,10 +1,9 @@
-"""How well a flight followed what was commanded: numbers from the recorded frames.
+"""Scores of how well a flight followed the commanded path, from the recorded frames.
 
-Truth (HIL_STATE_QUATERNION, whoever of the system sent it) is the reference where there is any; otherwise
-the autopilot's own estimate is. The commanded path is laid out from where the vehicle truly stood when it
-was armed, since that is what "home" means to the person who put it there: a constant error of the receiver
-at start moves home and path alike. The same errors with home as the vehicle reports it are given as
-`..._absolute_m`.
+The reference is the truth (HIL_STATE_QUATERNION from any component of the system) when it is recorded,
+otherwise the autopilot's own estimate. The commanded path starts at the true position of the vehicle when it
+was armed, because that is the user's "home": a constant error of the receiver at the start moves home and
+path by the same amount. The same errors with home as the vehicle reports it are given as `..._absolute_m`.
 """
 
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from missions.waypoint_passes import waypoint_misses_m
 
 Array = NDArray[np.float64]
 
-_BACK_M: Final = 3.0  # how far back along the path the nearest point is looked for
+_BACK_M: Final = 3.0  # distance back along the path within which the nearest point is searched
 _AHEAD_M: Final = 15.0
 _IN_FLIGHT_M: Final = 0.5
 _LEVEL_M: Final = 0.01
@@ -52,7 +51,7 @@ class Track:
 
     @property
     def length_m(self) -> float:
-        """Distance flown, at up to 10 points a second so that noise adds nothing."""
+        """Distance flown, from at most 10 points a second, so that noise does not increase it."""
         if len(self.time_s) < 2:
             return 0.0
         step_s = float(np.median(np.diff(self.time_s)))
@@ -62,15 +61,16 @@ class Track:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FlightScore:
-    """Everything the summary and the picture need of one vehicle's flight. None: not measured.
+    """The data of one vehicle's flight for the summary and the picture. None: not measured.
 
     Attributes:
         truth, estimate: tracks; times strictly increasing.
-        error_time_s, error_m: distance to the commanded path along the pattern, of the reference track.
+        error_time_s, error_m: times, and distances of the reference track to the commanded path, during the
+            pattern.
         reference: "truth" or "estimate".
-        altitude_rms_error_m: of the height alone, along a pattern that is level.
-        messages_not_finite: messages that were left out because their attitude is no attitude: NaN,
-            infinite, or a quaternion of no length.
+        altitude_rms_error_m: error of the height only, along a level pattern.
+        messages_not_finite: number of messages that were left out because their attitude is invalid: NaN,
+            infinite, or a quaternion of zero length.
     """
 
     truth: Track | None
@@ -153,8 +153,8 @@ def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
 def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
     """Distance (n,) from each track point to the path, following the path onwards.
 
-    The nearest point is looked for near the one found before, 3 m back to 15 m ahead (more when far off),
-    so that where a path crosses itself the other branch doesn't count.
+    The nearest point is searched near the previous one, from 3 m back to 15 m ahead (more when the error is
+    large), so that at a crossing of the path the other branch is not used.
     """
     if len(path_ned_m) < 2 or not len(track_ned_m):
         return np.zeros(0)
@@ -171,7 +171,7 @@ def _rms(values: Array) -> float | None:
 
 
 def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np.void], int]:
-    """Rows whose attitude (three angles, or a quaternion) is one, and the number of the others."""
+    """Rows with a valid attitude (three angles, or a quaternion), and the number of the other rows."""
     values = np.column_stack([table[name].astype(np.float64) for name in names])
     kept: NDArray[np.bool_] = np.all(np.isfinite(values), axis=1)
     if len(names) == 1:
@@ -180,7 +180,7 @@ def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np
 
 
 def _in_time_order(table: NDArray[np.void], field: str) -> NDArray[np.void]:
-    """Rows of strictly increasing time: late and repeated ones are left out."""
+    """Rows with strictly increasing time: late and repeated ones are left out."""
     if not len(table):
         return table
     times = table[field].astype(np.int64)
@@ -290,7 +290,7 @@ def _attitude_error_deg(truth: Any, attitude: Any, track: Track | None) -> float
 
 
 def _tracking_error_deg(target: Any, attitude: Any, track: Track | None) -> float | None:
-    """Largest angle between the attitude the controller wanted and the autopilot's attitude, in flight."""
+    """Largest angle between the controller's attitude setpoint and the autopilot's attitude, in flight."""
     if len(target) < 2 or len(attitude) < 2:
         return None
     return _largest_angle_deg(

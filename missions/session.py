@@ -1,6 +1,6 @@
-"""One run from beginning to end: a world or a link, the mission on it, and the run folder.
+"""One run from beginning to end: a world or links, the mission on it, and the run folder.
 
-This is the shell around the missions: it opens things, starts the event loop, and looks at the wall clock.
+This module opens the world or the links, starts the event loop, and reads the wall clock.
 """
 
 import asyncio
@@ -54,14 +54,14 @@ INTERRUPTED: Final = "interrupted"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunResult:
-    """How a run went.
+    """The result of a run.
 
     Attributes:
         outcome: "completed", "failed" or "interrupted".
         reason: why it failed; "" otherwise.
         folder: the run folder.
-        summary: what `summary.json` holds.
-        signal: the signal that interrupted it; 0: none did.
+        summary: contents of `summary.json`.
+        signal: the signal that interrupted it; 0: none.
     """
 
     outcome: str
@@ -72,14 +72,15 @@ class RunResult:
 
 
 class Flight:
-    """A run while it goes on, for whoever shows progress.
+    """The state of a run in progress, for displays of progress.
 
     Attributes:
-        vehicles: as soon as they are made.
-        recorder: of all that is sent and heard.
-        elsewhere: the vehicles are at the ends of links, not embedded.
+        vehicles: the vehicles, as soon as they are created.
+        recorder: recorder of all sent and received frames.
+        elsewhere: the vehicles are connected by links, not embedded.
         started_wall_s: wall clock when the run began.
-        started_us: vehicle time when the run began: boot of an embedded one, else when it was first heard.
+        started_us: vehicle time when the run began: the boot of an embedded vehicle, else the time when the
+            vehicle was first received.
     """
 
     def __init__(self) -> None:
@@ -92,17 +93,19 @@ class Flight:
 
     @property
     def elapsed_s(self) -> float:
-        """Vehicle time since the run began: since boot of an embedded one, else since its first message."""
+        """Vehicle time since the run began: since the boot of an embedded vehicle, else since its first
+        message.
+        """
         if self.clock is None:
             return 0.0
         begun_us = self.vehicles[0].first_heard_us if self.elsewhere else self.started_us
         return max(0, self.clock.time_us - begun_us) * 1e-6
 
     def require_log(self) -> None:
-        """See that what was heard so far is in the log.
+        """Make sure that all frames received so far are in the log.
 
         Raises:
-            MissionError: the disk does not take it.
+            MissionError: the log cannot be written.
         """
         if self.recorder is not None:
             self.recorder.flush()
@@ -115,15 +118,15 @@ ProgressListener = Callable[[Flight], None]
 
 
 def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
-    """Fly a mission and write its run folder. Blocks until all is done.
+    """Fly a mission and write its run folder. Blocks until the run is finished.
 
     A mission that fails or is interrupted (Ctrl-C; in the main thread also SIGTERM and SIGHUP) leaves its
-    vehicles safe, and still gives a result and a whole log.
+    vehicles safe, and still returns a result and writes a complete log.
 
     Raises:
-        KeyboardInterrupt: it was interrupted before anything was begun, or while its results were written.
-        PlanError: what was asked for can't be flown; nothing was started.
-        MissionError: the disk does not take what an embedded world publishes; nothing was started.
+        KeyboardInterrupt: the run was interrupted before it began, or while its results were written.
+        PlanError: the request can't be flown; nothing was started.
+        MissionError: a file of the embedded world cannot be written; nothing was started.
         BridgeError: a link can't be opened.
     """
     with EndingSignals() as ending:
@@ -302,7 +305,7 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
 
 
 async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request: RunRequest) -> None:
-    vehicle.notes.begin("flight", vehicle.clock.stamp_us)  # until the mission names a phase of its own
+    vehicle.notes.begin("flight", vehicle.clock.stamp_us)  # until the mission begins its own phase
     async with vehicle.safe_on_exit(request.on_failure):
         await flying
         if vehicle.armed:
@@ -331,7 +334,7 @@ def _debrief(
 
 
 def _missed_check(request: RunRequest, blocks: list[dict[str, Any]]) -> str:
-    """The check that a completed flight has missed, in words; "" if none."""
+    """The check that a completed flight has failed, as text; "" if none."""
     most_m = request.max_error_m
     for block in blocks:
         error_m = block["path_max_error_m"]
@@ -398,7 +401,7 @@ def _summary(
 
 
 def title(mission: Mission[Any], debriefing: Debriefing, summary: Mapping[str, Any]) -> str:
-    """What stands above the picture of a run: what was flown, how it went, the wind where it is known."""
+    """Title of the picture of a run: mission, result, and wind if known."""
     parts = [mission.title(debriefing.options), summary["autopilot"]]
     rms = summary["path_rms_error_m"]
     figures = f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.0f} s"

@@ -1,4 +1,4 @@
-"""Signing on a client's side: the key from a file, time from the calendar."""
+"""Signing for a client: the key from a file, the time from the calendar."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 
 def now() -> int:
-    """The calendar, as a timestamp of signatures."""
+    """The present calendar time as a timestamp of signatures."""
     return signing_time(unix_time_us())
 
 
 def read_key(path: Path) -> SigningKey:
-    """The key in a file.
+    """Read the key from a file.
 
     Raises:
-        SigningKeyError: the file can't be read, or holds no key; the message names the file.
+        SigningKeyError: the file can't be read, or contains no key; the message names the file.
     """
     try:
         return SigningKey.parse(path.read_bytes())
@@ -34,22 +34,22 @@ def read_key(path: Path) -> SigningKey:
 
 
 def client_signing(key: SigningKey | None, *, link_id: int = 0) -> LinkSigning | None:
-    """Signing of one link of a client, which then takes signed frames only; None without a key.
+    """Signing of one link of a client, which then accepts only signed frames; None without a key.
 
     Args:
-        key: shared with the vehicle.
+        key: key shared with the vehicle.
         link_id: different for the links of one client.
     """
     return None if key is None else LinkSigning(SigningState(key, clock=now), link_id=link_id, policy=RADIO)
 
 
 async def require_key(request: "RunRequest", vehicle: "Vehicle") -> None:
-    """See that a vehicle that signs answers us, before anything is set or uploaded.
+    """Check that a vehicle that signs its messages answers, before anything is set or uploaded.
 
-    A vehicle that signs may take unsigned frames all the same (PX4 and ArduPilot do on USB).
+    A vehicle that signs may still accept unsigned frames (PX4 and ArduPilot do on USB).
 
     Raises:
-        VehicleTimeout: it does not answer, and no key was given.
+        VehicleTimeout: it does not answer, and no key was specified.
     """
     if request.signing_key is not None or not vehicle.signs:
         return

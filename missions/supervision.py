@@ -1,4 +1,4 @@
-"""A command whose libraries may crash, watched by the process that the user started."""
+"""Runs a command whose libraries may crash in a child process and watches it."""
 
 import contextlib
 import os
@@ -11,22 +11,23 @@ from typing import Final
 
 FAILED: Final = 1
 _KILLED: Final = 128
-"""Plus the signal's number: what shells make of a command that was ended by one."""
+"""Added to the signal's number: the exit code that shells report for a command that a signal ended."""
 _ASKED_TO_END: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def supervised(command: Callable[[], int], *, crashed: str) -> int:
-    """Run a command in a process of its own and give its exit code.
+    """Run a command in a child process and return its exit code.
 
-    Call it before threads are started and libraries loaded: the process is forked.
+    Call it before threads are started and libraries are loaded, because the process is forked.
 
     Args:
-        command: gives its exit code.
-        crashed: what is said on stderr when the process was ended by a signal that nobody sent, in front of
-            the signal's name; the exit code is 1 then.
+        command: returns its exit code.
+        crashed: text printed on stderr, before the signal's name, when a signal of a crash ended the process;
+            the exit code is then 1.
     """
     _flush()
-    # What asks us to end between the fork and the handler that passes it on must not leave the child alone.
+    # A signal between the fork and the installation of the handler must not leave the child without its
+    # parent.
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ASKED_TO_END)
     lifeline, held = os.pipe()
     child = os.fork()
@@ -36,7 +37,7 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
         threading.Thread(target=_end_with_parent, args=(lifeline,), daemon=True).start()
         code = command()
         _flush()
-        os._exit(code)  # what the caller still has to do is done once, and not here
+        os._exit(code)  # the caller's remaining work is done once, in the parent
     os.close(lifeline)
     status = _wait(child, mask)
     os.close(held)
@@ -52,22 +53,23 @@ def supervised(command: Callable[[], int], *, crashed: str) -> int:
 
 def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:  # closed by whoever started us
+        if stream is not None:  # may have been closed by the parent process
             stream.flush()
 
 
 def _end_with_parent(lifeline: int) -> None:
-    """Nobody would hear what comes of it, or could end it, once the parent was killed."""
-    os.read(lifeline, 1)  # the end of it: nothing is ever written
+    """End this process when the parent is killed, because no other process could stop it then."""
+    os.read(lifeline, 1)  # returns at the end of the file; no data are ever written to it
     os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _wait(child: int, mask: Iterable[int]) -> int:
-    """Wait for a process, and pass on to it what asks us to end; a terminal's Ctrl-C reaches it anyway.
+    """Wait for a process, and pass on signals that end this process; a terminal's Ctrl-C reaches the child
+    directly.
 
     Args:
-        child: its number.
-        mask: signals that are blocked while it is waited for; what has come by now is passed on first.
+        child: its process id.
+        mask: blocked signals; those received before this call are passed on first.
     """
 
     def pass_on(number: int, frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""Telemetry as a mission reads it: frozen values in SI units and radians, made from MAVLink messages."""
+"""Telemetry for missions: immutable values in SI units and radians, made from MAVLink messages."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -21,8 +21,8 @@ class Position:
     Attributes:
         time_us: vehicle time.
         lat_deg, lon_deg: WGS84.
-        alt_m: above mean sea level.
-        height_m: above home.
+        alt_m: altitude above mean sea level.
+        height_m: height above home.
         vel_ned_m_s: ground velocity.
     """
 
@@ -60,12 +60,12 @@ class Attitude:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AirData:
-    """What a pilot's head-up display shows (VFR_HUD; it has no time of its own).
+    """Air data of a pilot's head-up display (VFR_HUD; the message has no time stamp).
 
     Attributes:
         airspeed_m_s: equivalent airspeed.
-        climb_m_s: up.
-        throttle: 0..1.
+        climb_m_s: climb rate, positive upwards.
+        throttle: throttle, 0..1.
     """
 
     airspeed_m_s: float
@@ -83,7 +83,7 @@ class Pressure:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Battery:
-    """Battery (SYS_STATUS). NaN where the vehicle doesn't know."""
+    """Battery (SYS_STATUS). NaN for values that the vehicle does not know."""
 
     voltage_v: float
     current_a: float
@@ -112,7 +112,7 @@ class StatusText:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionProgress:
-    """MISSION_CURRENT: the item being flown, as numbered on the wire."""
+    """MISSION_CURRENT: the present item, with its sequence number on the link."""
 
     sequence: int
 
@@ -130,7 +130,7 @@ def position(m: Any) -> Position:
 
 
 def local_position(m: Any) -> LocalPosition | None:
-    """From LOCAL_POSITION_NED; None when it is no position."""
+    """From LOCAL_POSITION_NED; None when the position is invalid."""
     if not math.isfinite(m.x + m.y + m.z + m.vx + m.vy + m.vz):
         return None
     return LocalPosition(
@@ -139,7 +139,7 @@ def local_position(m: Any) -> LocalPosition | None:
 
 
 def attitude(m: Any) -> Attitude | None:
-    """From ATTITUDE; None when its angles are none."""
+    """From ATTITUDE; None when its angles are invalid."""
     if not math.isfinite(m.roll + m.pitch + m.yaw):
         return None
     return Attitude(
@@ -152,7 +152,7 @@ def attitude(m: Any) -> Attitude | None:
 
 
 def air_data(m: Any) -> AirData | None:
-    """From VFR_HUD; None when airspeed or climb rate is no number."""
+    """From VFR_HUD; None when airspeed or climb rate is not a number."""
     if not math.isfinite(m.airspeed + m.climb):
         return None
     return AirData(airspeed_m_s=m.airspeed, climb_m_s=m.climb, throttle=0.01 * m.throttle)
@@ -204,30 +204,30 @@ SOURCES: Final[Mapping[type, tuple[str, Callable[[Any], Any]]]] = MappingProxyTy
         MissionProgress: ("MISSION_CURRENT", progress),
     }
 )
-"""Which message each kind of telemetry is made from, and how; a message of no use makes None."""
+"""The source message of each kind of telemetry, and the conversion; an unusable message gives None."""
 
 
 class StatusTextAssembler:
-    """Joins STATUSTEXTs that came in chunks of 50 characters (id, chunk_seq).
+    """Joins STATUSTEXTs that were sent in chunks of 50 characters (id, chunk_seq).
 
-    A text whose end is lost is dropped when its id is used again, or when 8 others are unfinished.
+    A text whose end is lost is dropped when its id is used again, or when 8 other texts are unfinished.
     """
 
     def __init__(self) -> None:
         self._parts: dict[int, dict[int, str]] = {}
 
     def add(self, m: Any) -> StatusText | None:
-        """Take one message; the text when it is complete."""
+        """Add one message; returns the text when it is complete."""
         text = str(m.text)
         if not m.id:
             return StatusText(severity=m.severity, text=text.rstrip("\t"))
         parts = self._parts.pop(m.id, {})
         newest = max(parts, default=-1)
         if m.chunk_seq < newest or parts.get(m.chunk_seq, text) != text:
-            parts = {}  # chunks come in order: the id is used for another text
+            parts = {}  # chunks come in order, so the id is now used for another text
         parts[m.chunk_seq] = text
         if len(text) >= _CHUNK:
-            self._parts[m.id] = parts  # as the newest
+            self._parts[m.id] = parts  # stored as the newest
             if len(self._parts) > _UNFINISHED_TEXTS:
                 del self._parts[next(iter(self._parts))]
             return None

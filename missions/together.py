@@ -1,4 +1,4 @@
-"""Doing things side by side on vehicle time."""
+"""Runs coroutines concurrently on vehicle time."""
 
 import asyncio
 from collections.abc import Coroutine, Iterable
@@ -9,12 +9,12 @@ from missions.errors import MissionError, PlanError
 
 
 async def together(coroutines: Iterable[Coroutine[Any, Any, None]]) -> None:
-    """Run them all; the first failure ends the others, and is the one that is told.
+    """Run all coroutines. The first failure cancels the others and is raised.
 
-    What else failed before it had ended is not lost: it hangs on the error as notes (PEP 678).
+    Other failures that happen before all have ended are added to the raised error as notes (PEP 678).
 
     Raises:
-        MissionError, PlanError, BridgeError: what the first failure was.
+        MissionError, PlanError, BridgeError: the first failure.
     """
     try:
         async with asyncio.TaskGroup() as group:
@@ -28,7 +28,7 @@ async def together(coroutines: Iterable[Coroutine[Any, Any, None]]) -> None:
 
 
 def _single(error: BaseException) -> list[BaseException]:
-    """The errors of a group, and of the groups in it."""
+    """The single errors in a group and in the groups inside it."""
     if isinstance(error, BaseExceptionGroup):
         return [single for part in error.exceptions for single in _single(part)]
     return [error]

@@ -1,7 +1,7 @@
-"""Whether a flight has flown what was commanded, by the vehicle's own messages.
+"""Decides from the vehicle's own messages whether a flight has followed the commanded path.
 
-A vehicle that reports the end of a mission may have flown something else. The judge is the track of
-GLOBAL_POSITION_INT, which a mission has on every vehicle; truth is for the score.
+A vehicle that reports the end of a mission may have flown something else. The check therefore uses the track
+of GLOBAL_POSITION_INT, which a mission receives from every vehicle; the truth is used only for the score.
 """
 
 import math
@@ -20,25 +20,25 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 PATH_BOUND_M: Final = {VehicleKind.MULTICOPTER: 10.0, VehicleKind.FIXED_WING: 40.0}
-"""Farthest from the commanded path, by class of vehicle."""
+"""Largest distance from the commanded path, by class of vehicle."""
 WAYPOINT_SLACK_M: Final = {VehicleKind.MULTICOPTER: 3.0, VehicleKind.FIXED_WING: 15.0}
-"""Beyond its acceptance radius: nearest approach to a waypoint that counts as a pass."""
+"""Distance beyond the acceptance radius at which an approach to a waypoint still counts as a pass."""
 
-_AROUND_US: Final = 1_000_000  # before and after the phase: positions come at some Hz
+_AROUND_US: Final = 1_000_000  # before and after the phase: positions arrive at some Hz
 _GAP_S: Final = 2.0
 _PLACES: Final = 100
 _NAMED: Final = 3
 
 
 def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | None = None) -> str:
-    """Why the commanded path was not flown; "" if it was, or none was commanded.
+    """The reason why the commanded path was not flown; "" if it was flown or none was commanded.
 
     The track must stay within a bound of the path, and pass every waypoint (of a path without waypoints: 100
-    places along it), in their order. What was not received is no evidence against the flight.
+    places along it), in order. Positions that were not received do not count against the flight.
 
     Args:
-        notes, score: of one vehicle.
-        max_error_m: bound of the user's in place of `PATH_BOUND_M`; waypoints get as much room.
+        notes, score: notes and score of one vehicle.
+        max_error_m: the user's bound in place of `PATH_BOUND_M`; it also applies to waypoints.
     """
     commanded = notes.commanded
     if commanded is None:
@@ -53,7 +53,7 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
     bound_m = PATH_BOUND_M[kind] if max_error_m is None else max_error_m
     points = commanded.points_ned_m
     error_m = _largest_error_m(points, track.between(phase.start_us, phase.end_us))
-    if max_error_m is None and error_m > bound_m:  # the user's own bound is a check of its own
+    if max_error_m is None and error_m > bound_m:  # the user's own bound is checked separately
         return (
             f"the vehicle was up to {error_m:.1f} m off the commanded path by its own position; accepted: "
             f"{bound_m:g} m (--max-error)"
@@ -75,7 +75,7 @@ NO_TRACK: Final = "no position (GLOBAL_POSITION_INT) was received along the comm
 
 
 def flown_track(score: "FlightScore", phase: Phase) -> "Track | None":
-    """The vehicle's own track over a phase; None: there is none."""
+    """The vehicle's own track during a phase; None: there is none."""
     if score.estimate is None:
         return None
     track = score.estimate.between(phase.start_us - _AROUND_US, phase.end_us + _AROUND_US)
@@ -83,7 +83,7 @@ def flown_track(score: "FlightScore", phase: Phase) -> "Track | None":
 
 
 def _largest_error_m(path_ned_m: Array, track: "Track") -> float:
-    """Of the positions that were received; a gap between two of them is followed along the line."""
+    """Largest error of the received positions; a gap between two of them is replaced by a straight line."""
     from missions.score import path_errors_m
 
     if not len(track.time_s):
@@ -100,7 +100,7 @@ def _largest_error_m(path_ned_m: Array, track: "Track") -> float:
 
 
 def waypoint_verdict(track: "Track", waypoints_ned_m: Array, near_m: float, *, cut_short: bool) -> str:
-    """Why not all waypoints were flown; "" if they were."""
+    """The reason why not all waypoints were flown; "" if they were."""
     missed = missed_places(track, waypoints_ned_m, near_m, cut_short=cut_short)
     if not missed:
         return ""
@@ -115,9 +115,9 @@ def waypoint_verdict(track: "Track", waypoints_ned_m: Array, near_m: float, *, c
 def missed_places(
     track: "Track", places_ned_m: Array, near_m: float, *, cut_short: bool
 ) -> list[tuple[int, float]]:
-    """Places (index, nearest approach) that a track did not pass in their order.
+    """Places (index, nearest approach) that a track did not pass in order.
 
-    Those that may have been passed while no position was received are left out, and with `cut_short` those
+    Places that may have been passed while no position was received are left out; with `cut_short`, also those
     after the last pass.
     """
     distances = [_distances_m(place, track.pos_ned_m) for place in places_ned_m]
@@ -154,9 +154,9 @@ def _stays(near: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _passed_in_order(stays: list[list[tuple[int, int]]]) -> dict[int, int]:
-    """A leg for as many places as possible, legs not decreasing, each within a stay at its place.
+    """Assign legs to as many places as possible, in non-decreasing order, each within a stay at its place.
 
-    The longest chain: `chains[n]` is the one of n + 1 places that ends at the earliest leg.
+    This is the longest chain: `chains[n]` is the chain of n + 1 places that ends at the earliest leg.
     """
     chains: list[_Pass] = []
     for k, own in enumerate(stays):
@@ -168,7 +168,7 @@ def _passed_in_order(stays: list[list[tuple[int, int]]]) -> dict[int, int]:
             if leg is not None and (n == len(chains) or leg < chains[n].leg):
                 longer[n : n + 1] = [_Pass(place=k, leg=leg, before=before)]
             if n and n == len(chains) and leg is not None and len(chains) == k:
-                break  # all places so far were passed: no shorter chain is of use
+                break  # all places so far were passed: a shorter chain is not needed
         chains = longer
     chosen: dict[int, int] = {}
     link = chains[-1] if chains else None
@@ -180,7 +180,7 @@ def _passed_in_order(stays: list[list[tuple[int, int]]]) -> dict[int, int]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Pass:
-    """The last place of a chain of passes, the leg of the track there, and the pass before."""
+    """The last place of a chain of passes, its leg of the track, and the previous pass."""
 
     place: int
     leg: int

@@ -1,4 +1,4 @@
-"""Which of the waypoints a track has passed, and how close."""
+"""Determines which waypoints a track has passed, and at what distance."""
 
 from bisect import bisect_right
 
@@ -11,15 +11,15 @@ Array = NDArray[np.float64]
 
 
 def waypoint_misses_m(commanded: CommandedPath, track_ned_m: Array) -> tuple[float, ...]:
-    """How close the track came to each waypoint; between two samples it is straight.
+    """Smallest distance of the track from each waypoint; between two samples the track is straight.
 
-    Waypoints count in their order: of all ways to assign passes (within the acceptance radius) to waypoints,
-    the one that has most of them. So a waypoint that was missed, and that the track happens to cross later,
-    spoils no other. One without a pass has its distance between its neighbours' passes.
+    Waypoints count in order: of all assignments of passes (within the acceptance radius) to waypoints, the
+    one with the most passes is used. A waypoint that was missed, and that the track crosses later, therefore
+    does not affect others. For a waypoint without a pass the distance is that between its neighbours' passes.
 
     Args:
-        commanded: waypoints and acceptance radius.
-        track_ned_m: (n, 3).
+        commanded: path with waypoints and acceptance radius.
+        track_ned_m: (n, 3) track.
     """
     points = track_ned_m
     if len(points) < 2:
@@ -48,7 +48,7 @@ def waypoint_misses_m(commanded: CommandedPath, track_ned_m: Array) -> tuple[flo
 
 
 def _passes(distance: Array, radius_m: float) -> list[int]:
-    """The track's leg of the closest approach of each pass, in their order."""
+    """The leg of the track with the closest approach of each pass, in order."""
     within = np.nonzero(distance <= radius_m)[0]
     if not len(within):
         return []
@@ -57,15 +57,16 @@ def _passes(distance: Array, radius_m: float) -> list[int]:
 
 
 def _passes_in_order(passes: list[list[int]]) -> dict[int, int]:
-    """A leg for as many waypoints as possible, legs not decreasing; the early ones where there is a choice.
+    """Assign legs to as many waypoints as possible, in non-decreasing order; early legs are preferred.
 
-    The longest chain by patience sorting: `last[n]` is the earliest leg at which a chain of n + 1 can end.
+    This is the longest chain, by patience sorting: `last[n]` is the earliest leg at which a chain of n + 1
+    can end.
     """
     last: list[int] = []
     ends: list[tuple[int, int]] = []
     before: dict[tuple[int, int], tuple[int, int] | None] = {}
     for k, legs in enumerate(passes):
-        for leg in reversed(legs):  # the latest first, so that no chain takes two of one waypoint
+        for leg in reversed(legs):  # the latest first, so that no chain takes two legs of one waypoint
             n = bisect_right(last, leg)
             before[k, leg] = ends[n - 1] if n else None
             last[n : n + 1] = [leg]

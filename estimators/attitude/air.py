@@ -1,4 +1,4 @@
-"""Airspeed as messages tell it: which of them, and true from equivalent airspeed."""
+"""Airspeed from messages: selection of the message, and true from equivalent airspeed."""
 
 from math import isfinite, sqrt
 from typing import Final
@@ -18,22 +18,25 @@ _HPA: Final = 100.0
 
 
 def pressure_pa(value: float) -> float | None:
-    """Static pressure of a field in hectopascal; PX4 fills HIGHRES_IMU's with pascal. None: no pressure."""
+    """Static pressure from a field in hectopascal. PX4 fills HIGHRES_IMU's field in pascal. None: no
+    pressure.
+    """
     pascal = value * _HPA if value <= _HECTOPASCAL_MAX else value
     return pascal if _LEAST_PA <= pascal <= 1.2 * SEA_LEVEL_PA else None
 
 
 def true_over_equivalent(static_pa: float) -> float:
-    """True by equivalent airspeed in the standard atmosphere."""
+    """Ratio of true to equivalent airspeed in the standard atmosphere."""
     return float((static_pa / SEA_LEVEL_PA) ** (-0.5 * _DENSITY_EXPONENT))
 
 
 class AirData:
-    """Picks the airspeed among the messages that tell one.
+    """Selects the airspeed among the messages that contain one.
 
     Args:
-        source: which; AUTO: the first, in the order of `AirspeedSource`, that was heard lately.
-        age_max_us: what "lately" is.
+        source: the source to use; AUTO: the first, in the order of `AirspeedSource`, that was received
+            recently.
+        age_max_us: longest age that counts as recent.
     """
 
     def __init__(self, source: AirspeedSource, age_max_us: int) -> None:
@@ -44,7 +47,7 @@ class AirData:
 
     @property
     def ratio(self) -> float:
-        """True by equivalent airspeed now."""
+        """Present ratio of true to equivalent airspeed."""
         return self._ratio
 
     def static_pressure(self, value: float) -> None:
@@ -54,7 +57,7 @@ class AirData:
             self._ratio = true_over_equivalent(pascal)
 
     def airspeed(self, time_us: int, source: AirspeedSource, equivalent_m_s: float) -> float | None:
-        """True airspeed, m/s; None when another source is used, or the value is none."""
+        """True airspeed, m/s; None when another source is used, or the value is invalid."""
         if not (isfinite(equivalent_m_s) and 0.0 < equivalent_m_s <= _AIRSPEED_MAX_M_S):
             return None
         self._heard_us[source] = time_us
@@ -65,7 +68,7 @@ class AirData:
         return equivalent_m_s * self._ratio
 
     def by_pressure(self, time_us: int, difference_hpa: float) -> float | None:
-        """The same from a differential pressure in hectopascal."""
+        """True airspeed, m/s, from a differential pressure in hectopascal; None as in `airspeed`."""
         if not (isfinite(difference_hpa) and difference_hpa > 0.0):
             return None
         equivalent = sqrt(2.0 * difference_hpa * _HPA / SEA_LEVEL_DENSITY_KG_M3)

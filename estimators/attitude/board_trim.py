@@ -1,8 +1,9 @@
-"""The board's trim against the vehicle: which way the autopilot's sensors are turned in it.
+"""The trim of the board: the rotation of the autopilot's sensors relative to the vehicle.
 
-ArduPilot's IMU messages and logs are in the frame of the board, and its attitude is the vehicle's: between
-them stand AHRS_TRIM_X and AHRS_TRIM_Y (4.6.3: `_rotation_autopilot_body_to_vehicle_body`). PX4 1.16.1
-corrects gyros and accelerometers by SENS_BOARD_*_OFF before it publishes them.
+ArduPilot's IMU messages and logs are in the frame of the board, and its attitude is that of the vehicle.
+AHRS_TRIM_X and AHRS_TRIM_Y are the rotation between the two (4.6.3:
+`_rotation_autopilot_body_to_vehicle_body`). PX4 1.16.1 corrects gyros and accelerometers by SENS_BOARD_*_OFF
+before it publishes them.
 """
 
 from math import cos, degrees, isfinite, sin
@@ -16,13 +17,13 @@ NAMES: Final = frozenset((_ROLL, _PITCH))
 
 
 class BoardTrim:
-    """Turns samples from the board's frame to the vehicle's.
+    """Rotates samples from the board's frame to the vehicle's.
 
     Args:
-        parameters: trims that were given count before those that the vehicle reports.
+        parameters: trims specified here have priority over those that the vehicle reports.
 
     Attributes:
-        active: whether there is a trim at all.
+        active: whether a trim is known and applied.
     """
 
     __slots__ = ("_given", "_rows", "_trim", "active")
@@ -35,7 +36,9 @@ class BoardTrim:
         self._update()
 
     def learn(self, name: str, value_rad: float) -> bool:
-        """Take a parameter of the vehicle; False where it is none of the trim, or impossible."""
+        """Process a parameter of the vehicle; returns False if it is not a trim parameter or its value is
+        impossible.
+        """
         if name not in NAMES or not isfinite(value_rad) or abs(value_rad) > TRIM_LIMIT_RAD:
             return False
         if self._given[name] is None:
@@ -58,7 +61,7 @@ class BoardTrim:
 
     @property
     def text(self) -> str:
-        """What is corrected, for people."""
+        """Description of the applied correction, for users."""
         roll, pitch = (degrees(self._trim[name]) for name in (_ROLL, _PITCH))
         given = all(value is not None for value in self._given.values())
         source = "as set" if given else f"{_ROLL}, {_PITCH} of the vehicle"

@@ -1,4 +1,4 @@
-"""What the attitude filter estimates."""
+"""The estimate of the attitude filter."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -8,16 +8,18 @@ __all__ = ["AttitudeEstimate"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttitudeEstimate:
-    """Roll and pitch, and what had to be estimated for them.
+    """Roll and pitch, and the other quantities that are estimated for them.
 
     Attributes:
         time_us: vehicle time of the inertial sample.
         subject: system id of the vehicle.
-        roll_rad, pitch_rad: of the body (FRD) against the local level frame; Euler angles, yaw is not known.
+        roll_rad, pitch_rad: attitude of the body (FRD) relative to the local level frame; Euler angles, yaw
+            is not known.
         roll_variance_rad2, pitch_variance_rad2: their variances.
-        gyro_bias_x_rad_s, gyro_bias_y_rad_s, gyro_bias_z_rad_s: what the gyro reads too much, FRD.
+        gyro_bias_x_rad_s, gyro_bias_y_rad_s, gyro_bias_z_rad_s: bias of the gyro (reading minus true rate),
+            FRD.
         alpha_rad, beta_rad: angle of attack and sideslip; NaN for a multirotor, and on the ground.
-        airspeed_m_s: length of the velocity against the air that was used; NaN: none.
+        airspeed_m_s: length of the velocity relative to the air that was used; NaN: none.
         weight: trust in the accelerometer at this sample, 0..1.
     """
 

@@ -41,7 +41,7 @@ _AIRSPEED_NAMES: Final = ("VFR_HUD", "AIRSPEED", "SCALED_PRESSURE")
 class AttitudeEstimator(Estimator[AttitudeParameters]):
     """Complementary filter for roll and pitch; docs/attitude.md has its equations.
 
-    Without a vehicle kind among the parameters it waits for the autopilot's HEARTBEAT. Yaw is not estimated.
+    If the parameters specify no vehicle kind, it waits for the autopilot's HEARTBEAT. Yaw is not estimated.
     """
 
     NAME: ClassVar[str] = "attitude"
@@ -56,7 +56,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._gap_max_us = round(p.gap_max_s * 1e6)
         self._guard = InputGuard(max_gap_us=self._gap_max_us)
         self._instance = p.imu_instance
-        self._trim = BoardTrim(p)  # a vehicle keeps its parameters when it boots anew
+        self._trim = BoardTrim(p)  # a vehicle keeps its parameters when it reboots
         self._airspeed_age_us = round(p.airspeed_age_max_s * 1e6)
         self._air = AirData(p.airspeed, self._airspeed_age_us)
         self._handlers: dict[str, Callable[[int, Message], Outcome]] = {
@@ -103,7 +103,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         return inertial, heartbeat, air, trim
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        # Others may have inertial sensors of their own.
+        # Other components may have their own inertial sensors.
         handler = self._handlers.get(message.name) if message.src_component == _AUTOPILOT else None
         return Outcome.IGNORED if handler is None else handler(time_us, message)
 
@@ -112,14 +112,14 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         self._air.reset()
         kind = self.parameters.vehicle
         self._form: int | None = FORM_OF_KIND.get(kind)
-        self._disarmed = False  # as long as nobody says so
+        self._disarmed = False  # assumed until a message reports disarmed
         self._subject = 0
         self._restart()
         self._imu_name = ""
         self._imu_heard_us: dict[str, int] = {}
 
     def _restart(self) -> None:
-        """Begin to filter anew; what is known of the vehicle and the air stays true."""
+        """Restart the filter; the knowledge of the vehicle and the air is kept."""
         start(self._state, self._coefficients)
         self._time_us: int | None = None
         self._airspeed_until_us = -1
@@ -152,7 +152,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         )
 
     def publish(self) -> Sequence[MAVLinkMessage]:
-        """ATTITUDE, with NaN for the yaw, which is not known."""
+        """ATTITUDE, with NaN as yaw, because yaw is not estimated."""
         if self._time_us is None:
             return ()
         (estimate,) = self.estimates
@@ -241,14 +241,14 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             self._airspeed_until_us = time_us + self._airspeed_age_us
 
     def _forget(self) -> None:
-        """Time went back: another boot. The guard has kept the message at hand."""
+        """Time went back: the vehicle has rebooted. The guard has already accepted the current message."""
         self._air.reset()
         self._restart()
 
     # Inertial messages
 
     def _highres_imu(self, time_us: int, message: Message) -> Outcome:
-        updated = message.fields_updated  # a sender that marks nothing is believed
+        updated = message.fields_updated  # a sender that marks no field as updated is assumed to update all
         if message.id != self._instance or (updated & INERTIAL_FIELDS != INERTIAL_FIELDS and updated):
             return Outcome.IGNORED
         if updated & DIFFERENTIAL_PRESSURE and message.diff_pressure > 0.0:
@@ -280,7 +280,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
             self._subject = message.src_system
         elif time_us <= before_us:
             return Outcome.LATE if time_us < before_us else Outcome.REPEATED
-        elif time_us - before_us > self._gap_max_us:  # what came since was of no use
+        elif time_us - before_us > self._gap_max_us:  # samples received since were not usable
             self._restart()
             refused, elapsed_s = Outcome.TIME_JUMP, 0.0
         else:
@@ -295,7 +295,7 @@ class AttitudeEstimator(Estimator[AttitudeParameters]):
         return Outcome.UPDATED if refused is None else refused
 
     def _chosen(self, time_us: int, name: str) -> bool:
-        """Whether to change to this message: a better one that is fast enough, or the one in use has gone."""
+        """Whether to change to this message: it is better and fast enough, or the one in use has stopped."""
         last_us = self._imu_heard_us.get(name)
         self._imu_heard_us[name] = time_us
         if self._imu_name and self._time_us is not None:

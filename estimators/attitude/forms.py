@@ -1,4 +1,4 @@
-"""Which form of the filter serves which vehicle."""
+"""The form of the filter that is used for each type of vehicle."""
 
 from types import MappingProxyType
 from typing import Final
@@ -12,7 +12,7 @@ __all__ = ["FORM_NAMES", "FORM_OF_KIND", "FORM_OF_TYPE"]
 _WINGED: Final = (
     "FIXED_WING",
     "FLAPPING_WING",
-    "VTOL_DUOROTOR",  # tail-sitters are not fixed wings while they hover; the airspeed tells
+    "VTOL_DUOROTOR",  # tail-sitters are not fixed wings while they hover; the airspeed shows the difference
     "VTOL_QUADROTOR",
     "VTOL_TILTROTOR",
     "VTOL_RESERVED2",
@@ -53,7 +53,7 @@ def _types(names: tuple[str, ...], form: int) -> dict[int, int]:
 FORM_OF_TYPE: Final = MappingProxyType(
     {**_types(_WINGED, at.WING), **_types(_ROTORS, at.ROTOR), **_types(_OTHERS, at.STILL)}
 )
-"""By MAV_TYPE; what is no vehicle (a ground station, a gimbal) is not there."""
+"""Form by MAV_TYPE. Types that are not vehicles (a ground station, a gimbal) are not in it."""
 
 FORM_OF_KIND: Final = MappingProxyType({VehicleKind.FIXED_WING: at.WING, VehicleKind.MULTIROTOR: at.ROTOR})
 FORM_NAMES: Final = MappingProxyType({at.STILL: "still", at.WING: "fixed wing", at.ROTOR: "multirotor"})

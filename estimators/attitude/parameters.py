@@ -1,4 +1,6 @@
-"""Parameters of the attitude filter. The defaults serve every vehicle and log; see docs/attitude.md."""
+"""Parameters of the attitude filter. The defaults are suitable for every vehicle and log; see
+docs/attitude.md.
+"""
 
 from dataclasses import dataclass, fields
 from enum import StrEnum
@@ -15,19 +17,19 @@ TRIM_LIMIT_RAD: Final = 0.3
 
 
 class VehicleKind(StrEnum):
-    """Which form of the filter runs."""
+    """The form of the filter that runs."""
 
     AUTO = "auto"
-    """By the type in the autopilot's HEARTBEAT."""
+    """From the type in the autopilot's HEARTBEAT."""
     FIXED_WING = "fixed_wing"
     MULTIROTOR = "multirotor"
 
 
 class ImuSource(StrEnum):
-    """Whose angular rate and specific force are used."""
+    """The message from which angular rate and specific force are taken."""
 
     AUTO = "auto"
-    """The first of the others, in their order, that comes fast enough."""
+    """The first of the others, in their order, whose rate is sufficient."""
     HIGHRES_IMU = "HIGHRES_IMU"
     RAW_IMU = "RAW_IMU"
     SCALED_IMU = "SCALED_IMU"
@@ -36,10 +38,10 @@ class ImuSource(StrEnum):
 
 
 class AirspeedSource(StrEnum):
-    """Whose airspeed is used."""
+    """The message from which the airspeed is taken."""
 
     AUTO = "auto"
-    """The first of the others, in their order, that has been heard lately."""
+    """The first of the others, in their order, that was received recently."""
     VFR_HUD = "VFR_HUD"
     AIRSPEED = "AIRSPEED"
     PRESSURE = "pressure"
@@ -51,46 +53,47 @@ class AttitudeParameters:
     """Gains, models and uncertainty of the attitude filter.
 
     Attributes:
-        vehicle: which form.
-        imu: which inertial message.
-        imu_instance: its `id`, where the message has one (HIGHRES_IMU, RAW_IMU).
-        airspeed: which airspeed.
-        gain_1_s: k_p, of the reference on attitude.
-        bias_gain_1_s2: k_I, of the accelerometer on the gyro bias.
-        rest_gain_1_s: in place of k_p while the vehicle is disarmed; k_I is a quarter of its square then.
-        rest_bias_time_s: of the longest mean by which the bias about the down axis is found at rest.
-        reference_tolerance_m_s2: by how much the reference's length may differ from g to count for half.
-        trim_roll_rad, trim_pitch_rad: of the board against the vehicle; None: the vehicle's parameters
-            AHRS_TRIM_X and AHRS_TRIM_Y where they are known (PX4 corrects its sensors itself).
-        gap_max_s: longer silence of the inertial sensor starts the filter anew.
+        vehicle: form of the filter.
+        imu: inertial message.
+        imu_instance: `id` of the inertial message, for messages that have one (HIGHRES_IMU, RAW_IMU).
+        airspeed: source of the airspeed.
+        gain_1_s: k_p, gain from the reference to the attitude.
+        bias_gain_1_s2: k_I, gain from the accelerometer to the gyro bias.
+        rest_gain_1_s: gain used instead of k_p while the vehicle is disarmed; k_I is then a quarter of its
+            square.
+        rest_bias_time_s: longest averaging time for the gyro bias about the down axis at rest.
+        reference_tolerance_m_s2: difference of the reference's length from g at which its weight is one half.
+        trim_roll_rad, trim_pitch_rad: rotation of the board relative to the vehicle; None: the vehicle's
+            parameters AHRS_TRIM_X and AHRS_TRIM_Y if they are known (PX4 corrects its sensors itself).
+        gap_max_s: a longer gap of the inertial messages restarts the filter.
         airspeed_age_max_s: an older airspeed is not used.
-        airspeed_min_m_s: below, there is no lift to speak of: angle of attack and sideslip are zero.
-        longitudinal: whether the change of airspeed is taken into account; Tolman et al. 2021
-            assume unaccelerated flight.
-        speed_gain_1_s: of the airspeed on its filter, which makes that change.
+        airspeed_min_m_s: below it lift is negligible, and angle of attack and sideslip are taken as zero.
+        longitudinal: whether the change of airspeed is taken into account (Tolman et al. 2021 assume
+            unaccelerated flight).
+        speed_gain_1_s: gain from the airspeed to the filter that provides its rate of change.
         attack: whether the angle of attack is estimated; otherwise it is zero.
         lift_1_m: k_L / m; None: learned in flight.
-        lift_slope_1_m_rad: lift slope over mass and square of airspeed; None: by the ratio below.
-        lift_slope_ratio_1_rad: of lift slope to k_L, where the slope is not given.
-        lift_time_s: of the mean by which k_L is learned.
-        climb_time_s: of the mean by which the rate of climb corrects the angle of attack; infinite: not
-            at all.
+        lift_slope_1_m_rad: lift slope over mass and square of airspeed; None: computed with the ratio below.
+        lift_slope_ratio_1_rad: ratio of lift slope to k_L, used when the slope is not specified.
+        lift_time_s: averaging time for learning k_L.
+        climb_time_s: averaging time with which the rate of climb corrects the angle of attack; infinite: no
+            correction.
         thrust_m_s2: k_M / m, thrust acceleration at full throttle.
         thrust_loss_1_m: k_T / m, its loss per square of airspeed.
-        throttle_trim: in place of the throttle where none is heard, 0..1.
-        side_force_ratio_1_rad: of side force per sideslip to mean lift; infinite: no sideslip.
-        side_force_time_s: smoothing of the side force.
-        drag_1_s: first guess of a multirotor's drag acceleration per speed.
-        drag_velocity_gain_1_s: of the velocity by drag on the velocity filter.
-        drag_learning_m_s: disagreement about the velocity at which a sample counts for half in learning the
-            drag; infinite: it is not learned.
+        throttle_trim: value used when no throttle is received, 0..1.
+        side_force_ratio_1_rad: ratio of side force per sideslip to mean lift; infinite: no sideslip.
+        side_force_time_s: time constant of the side force's smoothing.
+        drag_1_s: initial value of a multirotor's drag acceleration per speed.
+        drag_velocity_gain_1_s: gain from the velocity computed from drag to the velocity filter.
+        drag_learning_m_s: difference of the two velocities at which a sample has half weight in learning the
+            drag; infinite: the drag is not learned.
         gyro_noise_rad_rts: angular random walk, rad/s/sqrt(Hz).
         gyro_bias_walk_rad_s_rts: random walk of the gyro bias, rad/s per square root of a second.
-        gyro_bias_start_rad_s: its spread before anything is known.
+        gyro_bias_start_rad_s: standard deviation of the gyro bias at the start.
         rest_error_rad: standard error of the reference at rest.
-        flight_error_rad: the same in steady flight.
-        manoeuvre_error: the same per load that manoeuvres make (1 g: this many rad).
-        reference_time_s: how long errors of the reference last.
+        flight_error_rad: standard error of the reference in steady flight.
+        manoeuvre_error: standard error of the reference per manoeuvre load (rad at 1 g).
+        reference_time_s: correlation time of the reference's errors.
     """
 
     vehicle: VehicleKind = VehicleKind.AUTO
@@ -187,7 +190,7 @@ def _choice(kind: type[StrEnum], name: str, value: str) -> StrEnum:
         raise ValueError(f"{name} {value!r} is not one of {', '.join(kind)}") from None
 
 
-# Order of the coefficients as the compiled step takes them: every number among the parameters by its name.
+# Order of the coefficients for the compiled step: every numeric parameter, by its name.
 NUMBERS: Final = tuple(
     field.name
     for field in fields(AttitudeParameters)
@@ -196,7 +199,7 @@ NUMBERS: Final = tuple(
 
 
 def coefficients(parameters: AttitudeParameters) -> NDArray[np.float64]:
-    """The parameters as the compiled step takes them: in the order of `NUMBERS`, None as zero."""
+    """The parameters for the compiled step, in the order of `NUMBERS`; None becomes zero."""
     values = (getattr(parameters, name) for name in NUMBERS)
     return np.array([0.0 if value is None else float(value) for value in values])
 

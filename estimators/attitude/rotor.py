@@ -1,8 +1,9 @@
-"""Multirotor: where down is, from the drag of its rotors and body (compiled).
+"""Multirotor: the direction down from the drag of its rotors and body (compiled).
 
-The accelerometer of a multirotor that accelerates does not feel the tilt: thrust is along the body's down
-axis at any attitude. What it feels across that axis is drag, in proportion to the speed against the air: it
-is a speedometer, and its speed is held against the one integrated from attitude and force (docs/attitude.md).
+The accelerometer of a multirotor that accelerates does not measure the tilt, because thrust is along the
+body's down axis at any attitude. Across that axis it measures drag, which is proportional to the speed
+relative to the air. It thus measures speed, and this speed is compared with the one integrated from attitude
+and force (docs/attitude.md).
 """
 
 import math
@@ -23,14 +24,14 @@ _DRAG_MIN_1_S = 0.1
 _DRAG_MAX_1_S = 3.0
 _LEARN_TIME_S = 300.0
 _PRIOR_M2_S = 3.0
-"""Square of speed times time for which the first guess counts."""
+"""Weight of the initial value: square of speed times time."""
 _SPEED_MAX_M_S = 40.0
 _LEVEL_LEAST = 0.5
 
 
 @kernel
 def start(x: Array, p: Array) -> None:
-    """Nothing known but the first guess of the drag."""
+    """Initialise: nothing is known except the initial value of the drag."""
     x[at.DRAG] = p[par.DRAG]
     x[at.SPEED_SQUARE] = _PRIOR_M2_S
     x[at.FORCE_SQUARE] = _PRIOR_M2_S * p[par.DRAG] * p[par.DRAG]
@@ -40,7 +41,9 @@ def start(x: Array, p: Array) -> None:
 def reference(
     x: Array, p: Array, dt: float, wx: float, wy: float, wz: float, ax: float, ay: float, az: float
 ) -> None:
-    """Velocity against the air, and the reference for down; arguments as of the fixed wing's."""
+    """Compute the velocity relative to the air and the reference for down; arguments as in the fixed-wing
+    form.
+    """
     down_x, down_y, down_z = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
     vx, vy = x[at.VELOCITY], x[at.VELOCITY + 1]
     climb = 0.0 if math.isnan(x[at.CLIMB]) else x[at.CLIMB]
@@ -53,7 +56,7 @@ def reference(
     x[at.VELOCITY] = min(_SPEED_MAX_M_S, max(-_SPEED_MAX_M_S, vx))
     x[at.VELOCITY + 1] = min(_SPEED_MAX_M_S, max(-_SPEED_MAX_M_S, vy))
     x[at.VELOCITY + 2] = vz
-    # g down = v' + w x v - a with the filter's own v': what it predicts, and the pull of the drag.
+    # g down = v' + w x v - a with the filter's own v': its prediction, and the correction by the drag.
     x[at.REFERENCE] = GRAVITY_M_S2 * down_x + pull_x
     x[at.REFERENCE + 1] = GRAVITY_M_S2 * down_y + pull_y
     x[at.REFERENCE + 2] = GRAVITY_M_S2 * down_z
@@ -62,10 +65,10 @@ def reference(
 
 @kernel
 def _learn_drag(x: Array, p: Array, dt: float, ax: float, ay: float) -> None:
-    """Drag as the ratio of the mean squares of force and velocity.
+    """Learn the drag as the square root of the ratio of the mean squares of force and velocity.
 
-    Least squares of force by velocity makes the drag too small (the velocity has errors), of velocity by
-    force too great (gusts and vibration are in the force); this is the geometric mean of both.
+    Least squares of force by velocity makes the drag too small (the velocity has errors), and of velocity by
+    force too great (gusts and vibration are in the force). This is the geometric mean of both.
     """
     slow = min(1.0, dt / _SMOOTHING_S)
     x[at.SIDEWAYS] += slow * (ax - x[at.SIDEWAYS])

@@ -1,7 +1,8 @@
-"""Inertial messages in SI units, and their quirks.
+"""Inertial messages converted to SI units.
 
-RAW_IMU is what SCALED_IMU is on ArduPilot (milli-g, mrad/s); PX4 sends HIGHRES_IMU, in SI units, and none of
-the others by itself. ArduPilot sends SCALED_IMU3 with zeros where there is no third sensor: no sample at all.
+On ArduPilot RAW_IMU has the units of SCALED_IMU (milli-g, mrad/s). PX4 sends HIGHRES_IMU, in SI units, and
+none of the others by default. ArduPilot sends SCALED_IMU3 with zeros when there is no third sensor; these are
+not used as samples.
 """
 
 from collections.abc import Callable, Mapping
@@ -24,11 +25,11 @@ _MILLI: Final = 1e-3
 INERTIAL_FIELDS: Final = 0b111111
 """Rates and forces in HIGHRES_IMU.fields_updated."""
 DIFFERENTIAL_PRESSURE: Final = 1 << 10
-"""The same in it."""
+"""Bit of the differential pressure in HIGHRES_IMU.fields_updated."""
 
 
 def _fields(name: str) -> Callable[[Message], Sample]:
-    """The six values as they lie in a message, one behind the other: x, y, z of acc, then of gyro."""
+    """Reader of the six values of a message: x, y, z of the accelerometer, then of the gyro."""
     first = message_class(definition(name))._fields.index("xacc")
     return itemgetter(slice(first, first + 6))
 
@@ -50,4 +51,4 @@ SAMPLES: Final[Mapping[str, Callable[[Message], Sample]]] = MappingProxyType(
         if source is not ImuSource.AUTO
     }
 )
-"""Sample of a message by its name; best first."""
+"""Function that makes a sample of a message, by the message's name; best first."""

@@ -1,4 +1,4 @@
-"""One inertial sample through the filter (compiled)."""
+"""One step of the filter with one inertial sample (compiled)."""
 
 import math
 
@@ -21,7 +21,7 @@ _USUAL_AIRSPEED_M_S = 20.0
 
 @kernel
 def start(x: Array, p: Array) -> None:
-    """Nothing known."""
+    """Initialise the state: nothing is known."""
     x[:] = 0.0
     x[at.DOWN + 2] = 1.0
     x[at.RATE] = math.nan
@@ -34,14 +34,14 @@ def start(x: Array, p: Array) -> None:
 
 @kernel
 def step(x: Array, p: Array) -> bool:
-    """Take the sample that was written into the state.
+    """Process the sample that was written into the state.
 
     Args:
         x: state (`layout`).
         p: coefficients (`parameters.coefficients`).
 
     Returns:
-        False when no sensor gives such a sample; nothing has changed then.
+        False when the sample is impossible for a sensor; the state is then unchanged.
     """
     dt = x[at.ELAPSED]
     wx, wy, wz = x[at.SAMPLE_RATE], x[at.SAMPLE_RATE + 1], x[at.SAMPLE_RATE + 2]
@@ -54,7 +54,7 @@ def step(x: Array, p: Array) -> bool:
         _first(x, wx, wy, wz, ax, ay, az)
         return True
     bx, by, bz = x[at.GYRO_BIAS], x[at.GYRO_BIAS + 1], x[at.GYRO_BIAS + 2]
-    # The rate between two samples is taken as their mean.
+    # The rate between two samples is taken as the mean of both.
     tilt.rotate(
         x,
         dt,
@@ -67,14 +67,14 @@ def step(x: Array, p: Array) -> bool:
     if x[at.DISARMED] != 0.0:
         _still(x, ax, ay, az)
         tilt.rest(x, p, dt, wx, wy, wz)
-        # Arming is told once a second only: a take-off run may have begun.
+        # The armed state is reported only once a second: a take-off run may have begun.
         if tilt.agrees(x):
             k_p = p[par.REST_GAIN]
             k_i = 0.25 * k_p * k_p  # critically damped
     elif x[at.FORM] == at.WING and x[at.AIRSPEED] > 0.0:
         wing.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
     elif x[at.FORM] == at.ROTOR:
-        tolerance = math.inf  # the length of its reference is g by construction, and tells nothing
+        tolerance = math.inf  # the length of its reference is g by construction, and contains no information
         rotor.reference(x, p, dt, wx - bx, wy - by, wz - bz, ax, ay, az)
     else:
         _still(x, ax, ay, az)
@@ -99,7 +99,7 @@ def _first(x: Array, wx: float, wy: float, wz: float, ax: float, ay: float, az: 
 
 @kernel
 def _still(x: Array, ax: float, ay: float, az: float) -> None:
-    """No motion to speak of, or none that is known: the specific force points up."""
+    """No motion, or no known motion: the specific force is taken as the direction up."""
     x[at.SPEED] = math.nan
     x[at.VELOCITY] = x[at.VELOCITY + 1] = x[at.VELOCITY + 2] = 0.0
     x[at.REFERENCE], x[at.REFERENCE + 1], x[at.REFERENCE + 2] = -ax, -ay, -az
@@ -112,11 +112,13 @@ def _error(x: Array, p: Array, ax: float, ay: float, az: float) -> float:
         return p[par.REST_ERROR]
     steady = p[par.FLIGHT_ERROR]
     if x[at.FORM] == at.WING and not x[at.AIRSPEED] > 0.0:
-        # In a turn the force is along the wing's up at any bank: off by what a usual airspeed makes of it.
+        # In a turn the force is along the wing's up axis at any bank. Without an airspeed the resulting error
+        # is estimated with a typical airspeed.
         wx, wy, wz = x[at.SAMPLE_RATE], x[at.SAMPLE_RATE + 1], x[at.SAMPLE_RATE + 2]
         blind = min(_LOAD_MAX, math.sqrt(wx * wx + wy * wy + wz * wz) * _USUAL_AIRSPEED_M_S / GRAVITY_M_S2)
         return math.sqrt(steady * steady + blind * blind)
-    # What motion adds to the force scales with it, and so do the errors of airspeed, incidence and drag.
+    # The contribution of motion to the force scales with the motion, and so do the errors of airspeed,
+    # incidence and drag.
     if x[at.FORM] == at.WING:
         mx = x[at.REFERENCE] + ax
         my = x[at.REFERENCE + 1] + ay

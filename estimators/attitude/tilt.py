@@ -1,8 +1,8 @@
-"""Roll and pitch as the direction down in the body: its motion, its correction, and the gyro bias (compiled).
+"""Roll and pitch as the direction down in the body frame: motion, correction and gyro bias (compiled).
 
-The direction down, `d = R^T e_3`, is the rotation R from body to level of Tolman et al. 2021 without anything
-of yaw: with the projector of (3) and (11), `R' = R [(I - d d^T) w]x` moves d by `d' = -w x d`, for d x d = 0.
-So R is rebuilt from roll and pitch where it is needed, and no yaw creeps in.
+The direction down, `d = R^T e_3`, is the rotation R from body to level of Tolman et al. 2021 without yaw: with
+the projector of (3) and (11), `R' = R [(I - d d^T) w]x` moves d by `d' = -w x d`, for d x d = 0. R is
+therefore rebuilt from roll and pitch when it is needed, and yaw cannot accumulate in it.
 """
 
 import math
@@ -30,7 +30,7 @@ _BIAS_MAX_RAD_S = 0.2
 
 @kernel
 def rotate(x: Array, dt: float, wx: float, wy: float, wz: float) -> None:
-    """Turn the direction down by a constant rate over a time, exactly (Rodrigues).
+    """Rotate the direction down by a constant rate over a time, exactly (Rodrigues).
 
     Args:
         x: state.
@@ -51,18 +51,18 @@ def rotate(x: Array, dt: float, wx: float, wy: float, wz: float) -> None:
 
 @kernel
 def correct(x: Array, dt: float, k_p: float, k_i: float, tolerance: float) -> float:
-    """Pull the direction down towards the reference (11)-(13), and learn the gyro bias (12).
+    """Correct the direction down towards the reference (11)-(13), and estimate the gyro bias (12).
 
-    In the first seconds the gain is the one of a running mean, so that any start is forgotten.
+    In the first seconds the gain is that of a running mean, so that the initial value has no lasting effect.
 
     Args:
         x: state; its REFERENCE, m/s^2, FRD.
         dt: s.
         k_p, k_i: gains, 1/s and 1/s^2.
-        tolerance: difference of the reference's length from g at which it counts for half, m/s^2.
+        tolerance: difference of the reference's length from g at which its weight is one half, m/s^2.
 
     Returns:
-        How much of the innovation went into the attitude, 0..1.
+        The share of the innovation that was applied to the attitude, 0..1.
     """
     mx, my, mz = x[at.REFERENCE], x[at.REFERENCE + 1], x[at.REFERENCE + 2]
     length = math.sqrt(mx * mx + my * my + mz * mz)
@@ -70,7 +70,7 @@ def correct(x: Array, dt: float, k_p: float, k_i: float, tolerance: float) -> fl
         x[at.WEIGHT] = 0.0
         return 0.0
     dx, dy, dz = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
-    # Judged by its mean over a moment: vibration is no reason to trust it less.
+    # The length is averaged over a short time: vibration does not reduce the trust.
     x[at.LENGTH] += min(1.0, dt / _LENGTH_MEAN_S) * (length - x[at.LENGTH])
     off = (x[at.LENGTH] - GRAVITY_M_S2) / tolerance
     weight = 1.0 / (1.0 + off * off)
@@ -85,7 +85,7 @@ def correct(x: Array, dt: float, k_p: float, k_i: float, tolerance: float) -> fl
     dx += gain * (mx - along * dx)
     dy += gain * (my - along * dy)
     dz += gain * (mz - along * dz)
-    if along < -0.999:  # upside down: the innovation vanishes there, so step off the wrong pole
+    if along < -0.999:  # upside down: the innovation is zero there, so move away from the wrong pole
         dy += 0.01
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     x[at.DOWN] = dx / length
@@ -95,7 +95,7 @@ def correct(x: Array, dt: float, k_p: float, k_i: float, tolerance: float) -> fl
     x[at.SLOW_INNOVATION] += slow * (ex - x[at.SLOW_INNOVATION])
     x[at.SLOW_INNOVATION + 1] += slow * (ey - x[at.SLOW_INNOVATION + 1])
     x[at.SLOW_INNOVATION + 2] += slow * (ez - x[at.SLOW_INNOVATION + 2])
-    if gain <= k_p * dt:  # the mean of the start is over
+    if gain <= k_p * dt:  # the running mean of the start has ended
         bias = k_i * weight * dt
         x[at.GYRO_BIAS] = _within(x[at.GYRO_BIAS] - bias * ex, _BIAS_MAX_RAD_S)
         x[at.GYRO_BIAS + 1] = _within(x[at.GYRO_BIAS + 1] - bias * ey, _BIAS_MAX_RAD_S)
@@ -105,16 +105,19 @@ def correct(x: Array, dt: float, k_p: float, k_i: float, tolerance: float) -> fl
 
 @kernel
 def agrees(x: Array) -> bool:
-    """Whether the reference has agreed with the estimate of late, so that a vehicle thought at rest is."""
+    """Whether the reference has recently agreed with the estimate, which confirms that the vehicle is at
+    rest.
+    """
     ex, ey, ez = x[at.SLOW_INNOVATION], x[at.SLOW_INNOVATION + 1], x[at.SLOW_INNOVATION + 2]
     return ex * ex + ey * ey + ez * ez < _AGREEMENT_RAD * _AGREEMENT_RAD
 
 
 @kernel
 def rest(x: Array, p: Array, dt: float, wx: float, wy: float, wz: float) -> None:
-    """While a disarmed vehicle stands still, what the gyro reads about the down axis is its bias.
+    """While a disarmed vehicle stands still, the gyro's reading about the down axis is its bias.
 
-    The accelerometer tells nothing of that one. It does tell the others, also while wind rocks the vehicle.
+    The accelerometer gives no information about that bias. It determines the other two, even while wind moves
+    the vehicle.
 
     Args:
         x: state.
@@ -131,7 +134,7 @@ def rest(x: Array, p: Array, dt: float, wx: float, wy: float, wz: float) -> None
     x[at.REST_TIME] = x[at.REST_TIME] + dt if still else 0.0
     if x[at.REST_TIME] < _REST_AFTER_S:
         return
-    # The mean of all rest so far, zero counting for a moment of it.
+    # Mean over all rest so far; an initial value of zero has the weight of a short time.
     x[at.REST_SUM] = min(x[at.REST_SUM] + dt, p[par.REST_BIAS_TIME])
     dx, dy, dz = x[at.DOWN], x[at.DOWN + 1], x[at.DOWN + 2]
     bx, by, bz = x[at.GYRO_BIAS], x[at.GYRO_BIAS + 1], x[at.GYRO_BIAS + 2]

@@ -1,15 +1,15 @@
-"""How far off roll and pitch may be: covariance of the filter as it is, with its fixed gains (compiled).
+"""Uncertainty of roll and pitch: covariance of the filter with its fixed gains (compiled).
 
 About one axis the error is `(tilt, bias, reference)`: the tilt and gyro-bias errors, and the error of the
-reference direction, which lasts (first-order Gauss-Markov) because manoeuvres and gusts do. The filter moves
-it by
+reference direction, which is correlated in time (first-order Gauss-Markov) as manoeuvres and gusts are. The
+filter changes it by
 
     tilt'      = (1 - k) tilt - dt bias + k reference
     bias'      = bias + l (tilt - reference)
     reference' = f reference + noise
 
-and the covariance by the same matrix; there is no claim of optimality. Six places hold the upper triangle:
-tilt-tilt, tilt-bias, tilt-reference, bias-bias, bias-reference, reference-reference.
+and the covariance by the same matrix; the filter is not claimed to be optimal. Six places hold the upper
+triangle: tilt-tilt, tilt-bias, tilt-reference, bias-bias, bias-reference, reference-reference.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @kernel
 def start(x: Array, at: int, p: Array) -> None:
-    """Level to within the reference, bias unknown."""
+    """Initialise: level with the error of the reference; the bias is unknown."""
     error = p[par.FLIGHT_ERROR] ** 2
     x[at], x[at + 1], x[at + 2] = error, 0.0, error
     x[at + 3], x[at + 4], x[at + 5] = p[par.GYRO_BIAS_START] ** 2, 0.0, error
@@ -33,17 +33,17 @@ def start(x: Array, at: int, p: Array) -> None:
 def propagate(
     x: Array, at: int, p: Array, dt: float, gain: float, learn: float, fade: float, error: float
 ) -> None:
-    """One step.
+    """Propagate the covariance by one step.
 
     Args:
         x: state.
-        at: place of the six.
+        at: index of the first of the six places.
         p: coefficients.
         dt: s.
-        gain: k, of the reference on the tilt in this step.
-        learn: l, of the reference on the bias.
-        fade: f, part of the reference's error that is left after this step.
-        error: standard error of the reference now, rad.
+        gain: k, gain from the reference to the tilt in this step.
+        learn: l, gain from the reference to the bias.
+        fade: f, share of the reference's error that remains after this step.
+        error: present standard error of the reference, rad.
     """
     tt, tb, tr, bb, br, rr = x[at], x[at + 1], x[at + 2], x[at + 3], x[at + 4], x[at + 5]
     keep = 1.0 - gain

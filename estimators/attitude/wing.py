@@ -1,4 +1,4 @@
-"""Fixed wing: where down is, from specific force, airspeed, angle of attack and sideslip (compiled).
+"""Fixed wing: the direction down from specific force, airspeed, angle of attack and sideslip (compiled).
 
 Tolman et al. 2021, (9)-(19), as corrected and extended in docs/attitude.md.
 """
@@ -27,7 +27,7 @@ _CLIMB_PRIOR_S = 2.0
 def reference(
     x: Array, p: Array, dt: float, wx: float, wy: float, wz: float, ax: float, ay: float, az: float
 ) -> None:
-    """Velocity against the air, and the reference `v' + w x v - a`, which is g times down (9).
+    """Compute the velocity relative to the air and the reference `v' + w x v - a`, which is g times down (9).
 
     Args:
         x: state, with an airspeed.
@@ -53,7 +53,8 @@ def reference(
 
     change = 0.0
     if p[par.LONGITUDINAL] != 0.0:
-        # The speed is integrated from force and attitude and held to the measured one; the pull that this
+        # The speed is integrated from force and attitude and held to the measured one; the correction that
+        # this
         # takes is what the airspeed says of the attitude, smoothed as much as the airspeed needs.
         if x[at.AIRSPEED_FRESH] != 0.0:
             x[at.SPEED_ERROR] = airspeed - x[at.SPEED]
@@ -63,7 +64,7 @@ def reference(
         x[at.SPEED] += dt * change
         x[at.SPEED_ERROR] /= (
             1.0 + dt * p[par.SPEED_GAIN]
-        )  # until the next message, as if the pull had been right
+        )  # until the next message, as if the correction had been right
     else:
         x[at.SPEED] = airspeed
     x[at.AIRSPEED_FRESH] = 0.0
@@ -77,7 +78,7 @@ def reference(
 
 @kernel
 def lift_slope(x: Array, p: Array) -> float:
-    """Lift acceleration per square of airspeed and angle of attack, 1/m."""
+    """Lift acceleration per square of airspeed and per angle of attack, 1/m."""
     return p[par.LIFT_SLOPE_GIVEN] if p[par.LIFT_SLOPE_GIVEN] > 0.0 else p[par.LIFT_SLOPE_RATIO] * x[at.LIFT]
 
 
@@ -86,7 +87,8 @@ def _learn_lift(x: Array, p: Array, dt: float, up: float) -> None:
     if p[par.LIFT_GIVEN] > 0.0:
         x[at.LIFT] = p[par.LIFT_GIVEN]
         return
-    # Least squares of lift by the square of the airspeed, forgetting: what wheels carry weighs little.
+    # Least squares of lift by the square of the airspeed, with forgetting: samples with wheels on the ground
+    # have little weight.
     square = x[at.AIRSPEED] * x[at.AIRSPEED]
     fade = max(0.0, 1.0 - dt / p[par.LIFT_TIME])
     x[at.LIFT_SUM] = fade * x[at.LIFT_SUM] + dt * up * square
@@ -121,7 +123,7 @@ def _attack(x: Array, p: Array, dt: float, pitch_rate: float) -> None:
     if math.isnan(climb) or down_z < _LEVEL_ENOUGH or math.isinf(p[par.CLIMB_TIME]):
         return
     seen = -(down_x * math.cos(alpha) + down_y * x[at.BETA] + down_z * math.sin(alpha)) * airspeed
-    # A mean weighted by the square of the airspeed, forgetting.
+    # A mean weighted by the square of the airspeed, with forgetting.
     weight = dt * airspeed * airspeed
     x[at.CLIMB_WEIGHT] = max(0.0, 1.0 - dt / p[par.CLIMB_TIME]) * x[at.CLIMB_WEIGHT] + weight
     gain = weight / (x[at.CLIMB_WEIGHT] + _CLIMB_PRIOR_S * airspeed * airspeed)

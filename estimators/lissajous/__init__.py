@@ -1,4 +1,4 @@
-"""Motion of a vehicle along a Lissajous pattern whose frequencies are not quite known.
+"""Motion of a vehicle along a Lissajous pattern whose frequencies are uncertain.
 
 Source: Steckenrider, Leamy and Furukawa 2020, section III; docs/papers.md.
 """

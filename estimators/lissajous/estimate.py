@@ -1,4 +1,4 @@
-"""What the Lissajous estimator says of a vehicle."""
+"""The Lissajous estimator's estimate of a vehicle."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -10,18 +10,18 @@ __all__ = ["LissajousEstimate"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LissajousEstimate:
-    """Where a vehicle on a Lissajous pattern is, and where it goes.
+    """Position and velocity of a vehicle on a Lissajous pattern.
 
     Attributes:
-        time_us: vehicle time of the newest position in it.
+        time_us: vehicle time of the newest position used.
         subject: the vehicle's system id.
-        north_m, east_m: from the pattern's centre.
-        north_m_s, east_m_s: over ground.
+        north_m, east_m: position from the pattern's centre.
+        north_m_s, east_m_s: velocity over ground.
         course_rad, course_variance_rad2: direction of travel clockwise from north (equations 28, 29); the
             variance is infinite at rest.
         omega_x_rad_s, omega_y_rad_s: frequencies along the pattern's axes: nominal, or corrected.
-        omega_x_sigma_rad_s, omega_y_sigma_rad_s: their standard deviations, as far as they are believed in.
-        covariance: (4, 4) of (north, its rate, east, its rate).
+        omega_x_sigma_rad_s, omega_y_sigma_rad_s: their standard deviations.
+        covariance: (4, 4) covariance of (north, its rate, east, its rate).
     """
 
     COLUMNS: ClassVar[tuple[str, ...]] = (

@@ -54,7 +54,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
 
     @property
     def needs(self) -> tuple[Need, ...]:
-        """A position message, and where home is unless the pattern's centre is given."""
+        """A position message and, unless the pattern's centre is specified, the home position."""
         position = Need(
             messages=(self._reader.message,),
             rate_hz=_NEEDED_HZ,
@@ -65,7 +65,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         return (position, home)
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        """Take one message; only the autopilot's own count."""
+        """Process one message; only messages of the autopilot itself are used."""
         name = type(message).name
         if message.src_component != _AUTOPILOT or name not in (self._reader.message, "HOME_POSITION"):
             return Outcome.IGNORED
@@ -123,7 +123,7 @@ class LissajousEstimator(Estimator[LissajousParameters]):
             self._surest = self._estimates[0]
 
     def reset(self) -> None:
-        """Forget all but parameters and counters."""
+        """Discard everything except parameters and counters."""
         self._guard.reset()
         self._estimates = ()
         self._distance_sum, self._distance_count = 0.0, 0
@@ -142,7 +142,9 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         return None if pattern is None else pattern.frame.origin
 
     def publish(self) -> Sequence[MAVLinkMessage]:
-        """LOCAL_POSITION_NED_COV, from the pattern's centre; height and acceleration are not estimated."""
+        """LOCAL_POSITION_NED_COV, relative to the pattern's centre; height and acceleration are not
+        estimated.
+        """
         if not self._estimates:
             return ()
         e = self._estimates[0]
@@ -169,9 +171,9 @@ class LissajousEstimator(Estimator[LissajousParameters]):
         )
 
     def remarks(self) -> Mapping[str, float | str]:
-        """Mean squared normalised innovation (4 when the noise is as it is believed), the share of samples
-        that were off the pattern, and the frequencies when they were known best: at the end the vehicle has
-        left the pattern.
+        """Mean squared normalised innovation (4 when the noise is as assumed), the share of samples that were
+        off the pattern, and the frequencies at the time of their smallest uncertainty, because the vehicle
+        has left the pattern at the end.
         """
         best = self._surest
         omega_x, omega_y = (

@@ -1,9 +1,9 @@
 """The Lissajous motion model and its filter as kernels, for the live estimator and the study alike.
 
 Source: Steckenrider, Leamy, Furukawa 2020 (SSRR), section III. The state is (x, x', y, y') relative to the
-pattern's centre; with the frequencies in it, (x, x', y, y', w_x, w_y). Where the paper's equations have slips
-(17, 25a, 28, 29; docs/papers.md) the corrected form is the default, and the printed one is kept for the study
-to compare.
+pattern's centre; with the frequencies included, it is (x, x', y, y', w_x, w_y). For the paper's equations
+with errors (17, 25a, 28, 29; docs/papers.md) the corrected form is the default, and the printed form is kept for comparison
+in the study.
 """
 
 import math
@@ -22,7 +22,7 @@ VX: Final = 1
 Y: Final = 2
 VY: Final = 3
 MOTION: Final = 4
-"""Numbers of the motion alone; a state with the frequencies has two more."""
+"""Size of the motion state; a state with the frequencies has two more elements."""
 OMEGA_X: Final = 4
 OMEGA_Y: Final = 5
 AUGMENTED: Final = 6
@@ -62,7 +62,9 @@ _PRINTED: Final = int(Discretisation.PRINTED)
 
 @kernel
 def axis(discretisation: int, omega_rad_s: float, dt_s: float, out: Array) -> None:
-    """The step of one axis into `out` (AXIS,): equations 17 and 25 (17, 25a corrected but where asked)."""
+    """Write the step matrix of one axis into `out` (AXIS,): equations 17 and 25, corrected unless the printed
+    form is requested.
+    """
     w, t = omega_rad_s, dt_s
     if discretisation == _EXACT:
         cosine, sine = math.cos(w * t), math.sin(w * t)
@@ -90,7 +92,7 @@ def axis(discretisation: int, omega_rad_s: float, dt_s: float, out: Array) -> No
 
 @kernel
 def move(state: Array, axes: Array) -> None:
-    """One step of the motion (equation 20, without noise); `axes` is (2, AXIS)."""
+    """Apply one step of the motion (equation 20, without noise); `axes` is (2, AXIS)."""
     for i in range(2):
         position, velocity = state[2 * i], state[2 * i + 1]
         state[2 * i] = axes[i, C] * position + axes[i, S] * velocity
@@ -99,7 +101,9 @@ def move(state: Array, axes: Array) -> None:
 
 @kernel
 def frequency_jacobian(state: Array, axes: Array, out: Array) -> None:
-    """Derivatives (2, 2) of the predicted state by the frequency: x, y; position, velocity (24)."""
+    """Derivatives (2, 2) of the predicted state with respect to the frequency, equation 24: rows x, y;
+    columns position, velocity.
+    """
     for i in range(2):
         position, velocity = state[2 * i], state[2 * i + 1]
         out[i, 0] = axes[i, POSITION_BY_POSITION] * position + axes[i, POSITION_BY_VELOCITY] * velocity
@@ -132,14 +136,14 @@ def _columns(matrix: Array, axes: Array) -> None:
 def predict(
     state: Array, covariance: Array, axes: Array, process: Array, frequency_covariance: Array, jacobian: Array
 ) -> None:
-    """Prediction of the motion with uncertain frequencies, in place (equations 21, 22).
+    """Predict the motion with uncertain frequencies, in place (equations 21, 22).
 
     Args:
         state, covariance: (4,), (4, 4).
-        axes: (2, AXIS) of the nominal frequencies over the step.
-        process: (4, 4) of this step.
-        frequency_covariance: (2, 2), equation 23; zeros make it the plain Kalman prediction (3, 4).
-        jacobian: (2, 2), written.
+        axes: (2, AXIS) step matrices for the nominal frequencies.
+        process: (4, 4) process noise of this step.
+        frequency_covariance: (2, 2), equation 23; zeros give the plain Kalman prediction (3, 4).
+        jacobian: (2, 2), overwritten.
     """
     frequency_jacobian(state, axes, jacobian)
     move(state, axes)
@@ -165,15 +169,15 @@ def predict_augmented(
     frequency_process: float,
     jacobian: Array,
 ) -> None:
-    """Prediction with the frequencies as states, in place: the extended Kalman filter of what the paper
-    leaves to future work.
+    """Predict with the frequencies as states, in place: the extended Kalman filter that the paper names as
+    future work.
 
     Args:
         state, covariance: (6,), (6, 6).
-        axes: (2, AXIS) of the frequencies in the state.
-        process: (4, 4) of the motion in this step.
-        frequency_process: variance that each frequency gains in this step.
-        jacobian: (2, 2), written.
+        axes: (2, AXIS) step matrices for the frequencies in the state.
+        process: (4, 4) process noise of the motion in this step.
+        frequency_process: increase of each frequency's variance in this step.
+        jacobian: (2, 2), overwritten.
     """
     frequency_jacobian(state, axes, jacobian)
     move(state, axes)
@@ -203,7 +207,7 @@ def predict_augmented(
 
 @kernel
 def correct(state: Array, covariance: Array, measured: Array, noise: Array, work: Array) -> float:
-    """Correction by a measurement of the whole motion, in place (equations 26, 27, which are 6, 7 for C = I).
+    """Correct by a measurement of the whole motion, in place (equations 26, 27; equal to 6, 7 for C = I).
 
     Args:
         state, covariance: (n,), (n, n), n = 4 or 6.
@@ -211,8 +215,8 @@ def correct(state: Array, covariance: Array, measured: Array, noise: Array, work
         work: (4, 6 + n), overwritten.
 
     Returns:
-        Squared Mahalanobis distance of the measurement from the prediction; NaN, and nothing changed, when
-        the two covariances are no such.
+        Squared Mahalanobis distance of the measurement from the prediction; NaN when a covariance is invalid;
+        the state is then unchanged.
     """
     n = state.shape[0]
     # factor S = P + R = L L' in work[:, :4]; then L^-1 r in work[:, 4] and L^-1 P[:4, :] in the rest

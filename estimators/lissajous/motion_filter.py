@@ -1,4 +1,4 @@
-"""The motion of one vehicle along a Lissajous pattern: filter with a short memory, numbers only."""
+"""Filter of one vehicle's motion along a Lissajous pattern, with a short history, on plain numbers."""
 
 import math
 from bisect import bisect_right
@@ -25,11 +25,11 @@ __all__ = ["MotionFilter", "off_pattern_remarks"]
 _EXACT = int(Discretisation.EXACT)
 _UNKNOWN_VELOCITY_M_S = 1e3
 _TOO_OFTEN = 0.1
-_SLOWEST, _FASTEST = 0.2, 5.0  # share of the nominal frequency that a corrected one may have
+_SLOWEST, _FASTEST = 0.2, 5.0  # limits of a corrected frequency, as multiples of the nominal one
 
 
 def off_pattern_remarks(share: float) -> dict[str, float | str]:
-    """What the summary has of a filter's `off_pattern`: the share, and a warning where it is large."""
+    """Summary entries for a filter's `off_pattern`: the share, and a warning when it is large."""
     remarks: dict[str, float | str] = {"off_pattern": share}
     if share > _TOO_OFTEN:
         remarks["warning"] = (
@@ -40,17 +40,17 @@ def off_pattern_remarks(share: float) -> dict[str, float | str]:
 
 
 class MotionFilter:
-    """State (x, x', y, y') relative to the pattern's centre, along its axes, from irregular samples of it.
+    """State (x, x', y, y') relative to the pattern's centre, along its axes, from samples at irregular times.
 
     Args:
-        parameters: of the estimator.
+        parameters: parameters of the estimator.
 
     Attributes:
-        time_us: of the newest sample; None before the first.
+        time_us: time of the newest sample; None before the first.
         state, covariance: (4,), (4, 4), or with frequencies (6,), (6, 6).
         distance: squared Mahalanobis distance of the newest sample from its prediction.
-        samples: how many there were.
-        restarts: how often one lay so far off that the filter began anew.
+        samples: number of samples.
+        restarts: number of samples that were so far off that the filter restarted.
     """
 
     def __init__(self, parameters: LissajousParameters) -> None:
@@ -90,23 +90,23 @@ class MotionFilter:
 
     @property
     def off_pattern(self) -> float:
-        """Share of the samples that lay so far off that the filter began anew: 0 on the pattern, a few per
-        cent with the way there and back, and near 1 where the pattern is not as it was told.
+        """Share of the samples that were so far off that the filter restarted: 0 on the pattern, a few per
+        cent including the transit there and back, and near 1 when the specified pattern is wrong.
         """
         return self.restarts / self.samples if self.samples else 0.0
 
     @property
     def omega_rad_s(self) -> tuple[float, float]:
-        """The frequencies as they are believed now."""
+        """The present estimates of the frequencies."""
         if self.parameters.frequency and self.time_us is not None:
             return float(self.state[OMEGA_X]), float(self.state[OMEGA_Y])
         return self._nominal
 
     def take(self, time_us: int, x: float, vx: float, y: float, vy: float) -> None:
-        """Predict to a sample's time and correct by it. Velocities that are NaN were not measured.
+        """Predict to a sample's time and correct by the sample. NaN as velocity means not measured.
 
-        Times must not go back. After a silence longer than `max_gap_s` (a receiver that had lost its fix says
-        nothing here, though its messages come) the sample is the first of a new beginning.
+        Times must not go back. After a gap longer than `max_gap_s` the sample restarts the filter. Messages
+        of a receiver without a fix count as a gap.
         """
         if self.time_us is not None and time_us - self.time_us > self._max_gap_us:
             self.reset()
@@ -120,7 +120,7 @@ class MotionFilter:
             self._start(measured, noise)
         else:
             self._predict(self.state, self.covariance, 1e-6 * (time_us - self.time_us))
-            if noise is self._blind:  # what is predicted stands for what was not measured
+            if noise is self._blind:  # predictions replace values that were not measured
                 measured[1], measured[3] = self.state[1], self.state[3]
             self.distance = correct(self.state, self.covariance, measured, noise, self._work)
             if 0.0 < self.parameters.off_pattern_gate < self.distance:
@@ -132,23 +132,23 @@ class MotionFilter:
         self._remember(time_us)
 
     def move_origin(self, x: float, y: float) -> None:
-        """Put the origin at a place (x, y) of what was the frame until now."""
+        """Move the origin to the place (x, y) of the present frame."""
         for state in (self.state, *self._states):
             state[0] -= x
             state[2] -= y
 
     def covers(self, time_us: int) -> bool:
-        """Whether `at` this time needs no more samples: unfiltered ones are interpolated between two."""
+        """Whether `at` this time needs no more samples: unfiltered samples are interpolated between two."""
         if self.time_us is None:
             return False
         return self.parameters.form is not Form.MEASUREMENT or self.time_us >= time_us
 
     def at(self, time_us: int) -> tuple[Array, Array] | None:
-        """State and covariance at a time, from the samples up to then; None before the oldest that is kept,
-        and longer than `max_gap_s` after the newest.
+        """State and covariance at a time, from the samples up to then; None before the oldest kept sample,
+        and later than `max_gap_s` after the newest.
 
-        A filter predicts from the sample before. Unfiltered samples are interpolated, or where none has come
-        after, moved on at constant velocity.
+        A filter predicts from the previous sample. Unfiltered samples are interpolated or, after the last
+        one, extrapolated at constant velocity.
         """
         found = bisect_right(self._times, time_us) - 1
         if found < 0 or time_us - self._times[found] > self._max_gap_us:
@@ -190,7 +190,7 @@ class MotionFilter:
             predict(state, covariance, self._axes, process, self._frequency_covariance, self._jacobian)
 
     def _process_over(self, dt_s: float) -> Array:
-        """White acceleration over a step: covariance of position and velocity of both axes."""
+        """Covariance of position and velocity of both axes from white acceleration over a step."""
         q, process = self.parameters.acceleration_psd_m2_s3, self._process
         for i in (0, 2):
             process[i, i] = q * dt_s**3 / 3.0

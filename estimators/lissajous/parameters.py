@@ -1,4 +1,4 @@
-"""What the Lissajous estimator is told: the pattern, how far to trust it, and what is measured."""
+"""Parameters of the Lissajous estimator: the pattern, its uncertainty, and the measurement."""
 
 import math
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ class Form(StrEnum):
     """The three estimators of Steckenrider et al. 2020, Table IV."""
 
     MEASUREMENT = "measurement"
-    """What was measured, as it came (N)."""
+    """The measurement itself, unfiltered (N)."""
     KALMAN = "kalman"
-    """Kalman filter that takes the frequencies for certain (K)."""
+    """Kalman filter that takes the frequencies as exactly known (K)."""
     PROPOSED = "proposed"
-    """Kalman filter that allows for their uncertainty (P)."""
+    """Kalman filter that accounts for the uncertainty of the frequencies (P)."""
 
 
 class Source(StrEnum):
-    """Which message says where the vehicle is."""
+    """The message from which the vehicle's position is taken."""
 
     GPS = "gps"
-    """GPS_RAW_INT: the receiver's own fixes, which no filter has smoothed."""
+    """GPS_RAW_INT: the receiver's own fixes, which are not filtered by the autopilot."""
     GLOBAL = "global"
     """GLOBAL_POSITION_INT: the autopilot's estimate."""
     LOCAL = "local"
@@ -35,30 +35,32 @@ _SIGMAS: Final = {Source.GPS: (0.3, 0.1), Source.GLOBAL: (0.15, 0.08), Source.LO
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LissajousParameters:
-    """Parameters of `LissajousEstimator`; the frequencies are of `fly lissajous --pattern L3 --period 150`.
+    """Parameters of `LissajousEstimator`; the default frequencies are those of `fly lissajous --pattern L3
+    --period 150`.
 
     Attributes:
-        form: which of the paper's three estimators.
-        frequency: take the frequencies for states and correct them in flight (an extended Kalman filter of
-            six states; the paper's future work). Goes with `form=proposed` only.
-        source: the message that is the measurement.
+        form: one of the paper's three estimators.
+        frequency: use the frequencies as states and correct them in flight (an extended Kalman filter of six
+            states; the paper's future work). Only with `form=proposed`.
+        source: the message with the measurement.
         omega_x_rad_s, omega_y_rad_s: nominal frequencies along the pattern's axes.
         epsilon_rad_s: variance of a frequency over the frequency itself (the paper's epsilon), so the
             standard deviation is sqrt(epsilon omega).
-        orientation_rad: of the pattern's x axis, clockwise from north; its y axis is another right angle
-            clockwise. A quarter turn: x east, as `fly lissajous` means it.
-        centre_lat_deg, centre_lon_deg: of the pattern; None: the vehicle's home (HOME_POSITION).
-        centre_north_m, centre_east_m: of the pattern from that place.
-        position_sigma_m, velocity_sigma_m_s: one sigma per axis of the measurement; None: by the source,
-            0.3 m and 0.1 m/s for gps, 0.15 m and 0.08 m/s for the autopilot's estimates.
+        orientation_rad: direction of the pattern's x axis, clockwise from north; its y axis is 90 degrees
+            farther clockwise. At a quarter turn x is east, as in `fly lissajous`.
+        centre_lat_deg, centre_lon_deg: reference place of the pattern's centre; None: the vehicle's home
+            (HOME_POSITION).
+        centre_north_m, centre_east_m: the pattern's centre from that place.
+        position_sigma_m, velocity_sigma_m_s: one sigma per axis of the measurement; None: depends on the
+            source, 0.3 m and 0.1 m/s for gps, 0.15 m and 0.08 m/s for the autopilot's estimates.
         position_delay_s: age of a measurement at the time that it carries.
         acceleration_psd_m2_s3: spectral density of the acceleration that the motion model lacks.
-        frequency_walk_rad2_s3: variance that a frequency gains per second, where it is a state.
+        frequency_walk_rad2_s3: increase of a frequency's variance per second, when it is a state.
         off_pattern_gate: squared Mahalanobis distance (four degrees of freedom) above which a measurement
-            says that the vehicle does not fly the pattern, on its way there or home: the filter begins anew
-            from it. 0: never.
-        max_gap_s: a longer silence starts the estimator anew.
-        history_s: how far back states are kept, for what is known late.
+            shows that the vehicle is not on the pattern (in transit): the filter then restarts from it. 0:
+            never.
+        max_gap_s: a longer gap restarts the estimator.
+        history_s: time for which past states are kept, for delayed measurements.
     """
 
     form: Form = Form.PROPOSED
@@ -119,7 +121,7 @@ class LissajousParameters:
 
     @property
     def has_centre(self) -> bool:
-        """Whether the pattern's centre is given by its coordinates."""
+        """Whether the pattern's centre is specified by coordinates."""
         return self.centre_lat_deg is not None
 
 

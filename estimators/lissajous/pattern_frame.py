@@ -14,11 +14,11 @@ __all__ = ["PatternFrame", "Track"]
 
 
 class PatternFrame:
-    """Where the pattern is: its centre, and its axes against north.
+    """The pattern's frame: its centre, and its axes relative to north.
 
     Args:
-        parameters: of the estimator.
-        home: where the vehicle started, for a centre that is not given by its coordinates.
+        parameters: parameters of the estimator.
+        home: home of the vehicle, for a centre that is not specified by coordinates.
     """
 
     __slots__ = ("_cos", "_sin", "frame", "orientation_rad")
@@ -34,30 +34,30 @@ class PatternFrame:
         self._cos, self._sin = math.cos(p.orientation_rad), math.sin(p.orientation_rad)
 
     def along(self, north: float, east: float) -> tuple[float, float]:
-        """(x, y) of a vector in north and east."""
+        """(x, y) of a vector that is given in north and east."""
         return self._cos * north + self._sin * east, -self._sin * north + self._cos * east
 
     def north_east(self, x: float, y: float) -> tuple[float, float]:
-        """(north, east) of a vector along the pattern's axes."""
+        """(north, east) of a vector that is given along the pattern's axes."""
         return self._cos * x - self._sin * y, self._sin * x + self._cos * y
 
     def place(self, fix: Fix) -> tuple[float, float]:
-        """(x, y) of a place, m from the centre."""
+        """(x, y) of a fix, m from the centre."""
         north_m, east_m, _ = self.frame.ned_from_geodetic(fix.lat_deg, fix.lon_deg, fix.alt_m)
         return self.along(north_m, east_m)
 
     def velocity(self, fix: Fix) -> tuple[float, float]:
-        """(x, y) of a velocity, m/s."""
+        """(x, y) components of a fix's velocity, m/s."""
         return self.along(fix.north_m_s, fix.east_m_s)
 
     def origin_of(self, other: "PatternFrame") -> tuple[float, float]:
-        """(x, y) of another pattern's centre, of the same orientation."""
+        """(x, y) of the centre of another pattern with the same orientation."""
         o = other.frame.origin
         north_m, east_m, _ = self.frame.ned_from_geodetic(o.lat_deg, o.lon_deg, o.alt_m)
         return self.along(north_m, east_m)
 
     def geodetic(self, x: float, y: float) -> GeodeticPosition:
-        """A place on the pattern's level."""
+        """Geodetic position of a point (x, y) at the pattern's altitude."""
         lat_deg, lon_deg, alt_m = self.frame.geodetic_from_ned(*self.north_east(x, y), 0.0)
         return GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m)
 
@@ -69,10 +69,10 @@ class PatternFrame:
 
 
 class Track:
-    """One vehicle's filter in a pattern's frame that may be told again (home is set anew on arming).
+    """One vehicle's filter in a pattern's frame. The frame may change, because home is set again on arming.
 
     Attributes:
-        filter: its motion.
+        filter: filter of its motion.
         pattern: the frame; None before home or centre is known.
     """
 
@@ -85,13 +85,13 @@ class Track:
         self._delay_us = round(1e6 * parameters.position_delay_s)
 
     def place_pattern(self, pattern: PatternFrame) -> None:
-        """Say where the pattern is, or that it has moved: what is known is taken over into the new frame."""
+        """Set the pattern's frame. If it has moved, the present state is transformed to the new frame."""
         if self.pattern is not None:
             self.filter.move_origin(*self.pattern.origin_of(pattern))
         self.pattern = pattern
 
     def take(self, time_us: int, fix: Fix) -> bool:
-        """Use a position; False while the pattern's place is not known."""
+        """Process a position; returns False while the pattern's place is not known."""
         if self.pattern is None:
             return False
         x, y = self.pattern.place(fix)

@@ -1,4 +1,4 @@
-"""Where a vehicle is, from whichever message says it, in one form."""
+"""Positions of a vehicle from different messages in one form."""
 
 import math
 from dataclasses import dataclass
@@ -42,11 +42,11 @@ class PositionReader:
     """Reads the position messages of one vehicle.
 
     Args:
-        source: which message counts.
+        source: the message to use.
 
     Attributes:
-        message: its name.
-        home: by HOME_POSITION; None before it was heard.
+        message: name of this message.
+        home: home from HOME_POSITION; None before it was received.
     """
 
     __slots__ = ("_local", "home", "message", "source")
@@ -58,7 +58,7 @@ class PositionReader:
         self._local: LocalFrame | None = None
 
     def hear_home(self, message: Message) -> bool:
-        """Take a HOME_POSITION; False when it is no place."""
+        """Process a HOME_POSITION; returns False when its position is invalid."""
         if abs(message.latitude) > _MAX_LAT_E7 or abs(message.longitude) > _MAX_LON_E7:
             return False
         place = GeodeticPosition(
@@ -73,7 +73,7 @@ class PositionReader:
         return True
 
     def read(self, message: Message) -> Fix | None:
-        """The position in a message of the source; None when it has none (yet)."""
+        """The position in a message of the source; None when it contains no position (yet)."""
         if self.source is Source.LOCAL:
             return self._read_local(message)
         if abs(message.lat) > _MAX_LAT_E7 or abs(message.lon) > _MAX_LON_E7:
@@ -98,7 +98,7 @@ class PositionReader:
 
 
 def values_of(source: Source, message: Message) -> tuple[float, ...]:
-    """The numbers of a position message that are used, for the input guard."""
+    """The values of a position message that the estimator uses, for the input guard."""
     if source is Source.GPS:
         return (message.lat, message.lon, message.alt, message.vel, message.cog)
     if source is Source.GLOBAL:

@@ -1,4 +1,4 @@
-"""Flight logs as columns: `open_log`."""
+"""Flight logs as columns; `open_log` opens a log."""
 
 from estimators.logs.errors import LogError
 from estimators.logs.log import Boot, Key, Log

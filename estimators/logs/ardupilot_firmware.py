@@ -1,7 +1,7 @@
-"""Which ArduPilot firmware made a log, and the names of its flight modes.
+"""Identifies the ArduPilot firmware that wrote a log, and the names of its flight modes.
 
 Sources: the banners of Copter 2.9 to 4.6, Plane, Rover, Sub, AntennaTracker and Blimp; `defines.h` of Copter
-3.0 and 3.1 for modes whose numbers were used again; ArduPilot's frame classes and `VER.BU` build types.
+3.0 and 3.1 for modes whose numbers were reused; ArduPilot's frame classes and `VER.BU` build types.
 """
 
 import re
@@ -30,7 +30,7 @@ _TYPES: Final = MappingProxyType(
 _BUILDS: Final = MappingProxyType(
     {1: "rover", 2: "copter", 3: "plane", 4: "tracker", 7: "sub", 12: "blimp", 13: "heli"}
 )
-"""VER.BU."""
+"""Vehicle by VER.BU."""
 _FRAMES: Final = MappingProxyType(
     {
         "QUAD": dialect.MAV_TYPE_QUADROTOR,
@@ -48,7 +48,7 @@ _FRAMES: Final = MappingProxyType(
         "DODECAHEXA": dialect.MAV_TYPE_DODECAROTOR,
     }
 )
-"""By the word behind "Frame:" in the banner."""
+"""Vehicle by the word after "Frame:" in the banner."""
 _OWN_PARAMETERS: Final = (
     ("sub", ("JS_GAIN_DEFAULT", "SURFACE_DEPTH")),
     ("tracker", ("YAW2SRV_P", "SCAN_SPEED_YAW")),
@@ -57,9 +57,9 @@ _OWN_PARAMETERS: Final = (
     ("heli", ("H_COL_MIN", "H_SW_COL_DIR")),
     ("copter", ("RATE_RLL_P", "ATC_RAT_RLL_P", "PILOT_TKOFF_ALT", "STB_RLL_P")),
 )
-"""Parameters that only one firmware has, in the order in which they tell."""
+"""Parameters that only one firmware has, in the order in which they are checked."""
 _MODES_BEFORE: Final = (("copter", (3, 1), MappingProxyType({11: "TOY_A", 12: "TOY_M"})),)
-"""Modes whose number has another meaning since a version."""
+"""Modes whose number changed its meaning at the given version."""
 _COPTERS: Final = frozenset(
     (
         dialect.MAV_TYPE_QUADROTOR,
@@ -74,11 +74,11 @@ _COPTERS: Final = frozenset(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Firmware:
-    """What a log says of the firmware that made it.
+    """The firmware that wrote a log.
 
     Attributes:
-        text: its banner, "ArduCopter V3.3-dev (82481f30)"; "" where none was found.
-        vehicle: "copter", "heli", "plane", "rover", "sub", "tracker", "blimp"; "" where not known.
+        text: its banner, "ArduCopter V3.3-dev (82481f30)"; "" when none was found.
+        vehicle: "copter", "heli", "plane", "rover", "sub", "tracker", "blimp"; "" when not known.
         version: major and minor; None: not known.
         mav_type: MAV_TYPE.
     """
@@ -92,11 +92,12 @@ class Firmware:
 def firmware_of(
     texts: Iterable[str], parameters: Collection[str] = (), builds: Collection[int] = ()
 ) -> Firmware:
-    """The firmware by its banner among texts; without one by its build type, or by parameters of its own.
+    """Identify the firmware by its banner in the texts; without a banner by its build type, or by parameters
+    that only it has.
 
     Args:
         texts: messages to the ground station, in order.
-        parameters: names of the vehicle's.
+        parameters: names of the vehicle's parameters.
         builds: values of VER.BU.
     """
     text, vehicle, version, frame = "", "", None, None
@@ -122,13 +123,13 @@ def firmware_of(
 
 
 def mode_names(mav_type: int, version: tuple[int, int] | None = None) -> Mapping[int, str]:
-    """Names of a firmware's flight modes by number; empty for types that are none of ArduPilot's.
+    """Names of a firmware's flight modes by number; empty for types that ArduPilot does not use.
 
     Args:
         mav_type: MAV_TYPE.
-        version: of the firmware; None: today's.
+        version: version of the firmware; None: the newest.
     """
-    from pymavlink import mavutil  # here, for it takes its time
+    from pymavlink import mavutil  # imported here because it is slow
 
     names = dict(mavutil.mode_mapping_bynumber(mav_type) or {})
     for vehicle, since, before in _MODES_BEFORE:
@@ -138,7 +139,7 @@ def mode_names(mav_type: int, version: tuple[int, int] | None = None) -> Mapping
 
 
 def mode_number(mav_type: int, name: str) -> int | None:
-    """Number of a mode by its name, written as text logs have it ("AltHold", "STABILIZE"); None: unknown."""
+    """Number of a mode by its name, spelled as in text logs ("AltHold", "STABILIZE"); None: unknown."""
     wanted = _bare(name)
     return next((number for number, known in mode_names(mav_type).items() if _bare(known) == wanted), None)
 

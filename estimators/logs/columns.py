@@ -1,4 +1,4 @@
-"""Payloads as columns: many messages of one kind, decoded together, without an object per message."""
+"""Payloads as columns: many messages of one kind are decoded together, without an object per message."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -46,14 +46,14 @@ def record_dtype(definition: MessageDefinition) -> np.dtype[np.void]:
 def decode_columns(
     data: NDArray[np.uint8], starts: NDArray[np.uint32] | NDArray[np.int64], definition: MessageDefinition
 ) -> Columns:
-    """Columns of messages of one definition.
+    """Decode messages of one definition into columns.
 
-    Truncated payloads are filled with zeros, bytes of a newer definition are left out.
+    Truncated payloads are filled with zeros; additional bytes of a newer definition are ignored.
 
     Args:
         data: bytes of the log.
-        starts: where the frames begin.
-        definition: of the message that they hold.
+        starts: positions at which the frames begin.
+        definition: definition of their message.
     """
     count = len(starts)
     fields = definition.wire_fields
@@ -85,7 +85,7 @@ def _gather(
     scratch: NDArray[np.uint8],
     buffer: NDArray[np.uint8],
 ) -> None:
-    """Payloads into rows of `scratch`, and from there, while they are in the cache, into the columns."""
+    """Copy payloads to rows of `scratch` and, while they are in the cache, from there to the columns."""
     stride = size
     rows = _ROWS_AT_ONCE
     first = 0
@@ -125,7 +125,7 @@ def _gather(
         first += count
 
 
-# Loads before stores: only so can the compiler make one load and one store of them.
+# Loads come before stores: only then can the compiler merge them into one load and one store.
 @kernel
 def _copy_2(source: NDArray[np.uint8], at: int, target: NDArray[np.uint8], to: int) -> None:
     i = np.uint64(at)

@@ -1,7 +1,7 @@
 """Conditions on a log's messages: `GLOBAL_POSITION_INT.relative_alt > 20000 and HEARTBEAT.custom_mode == 4`.
 
-As with MAVProxy's and pymavlink's tools a condition names message fields in wire units, and the newest value
-before (or in) a message counts. It is parsed, never evaluated as Python.
+As in MAVProxy's and pymavlink's tools, a condition names message fields in wire units and uses the newest
+value before (or in) a message. It is parsed, never evaluated as Python.
 """
 
 import ast
@@ -50,11 +50,11 @@ _COMPARISONS: Final[Mapping[type[ast.cmpop], Callable[[Any, Any], Any]]] = Mappi
 
 
 class ConditionError(BridgeError, ValueError):
-    """A condition can't be read, or names what is no field; the message names it and what is accepted."""
+    """A condition can't be parsed, or names an unknown field; the message names it and what is accepted."""
 
 
 class _Table(Protocol):
-    """What is needed of a log's table; see `estimators.logs.log.Table`."""
+    """The part of a log's table that is needed here; see `estimators.logs.log.Table`."""
 
     @property
     def order(self) -> NDArray[np.int64]: ...
@@ -64,7 +64,7 @@ class _Table(Protocol):
 
 
 Find = Callable[[str], "list[_Table]"]
-"""All tables of a message name that count for the messages looked at."""
+"""Returns all tables of a message name that apply to the examined messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +89,8 @@ class Condition:
         text: at most 1000 characters.
 
     Attributes:
-        text: as given.
-        fields: what it names.
+        text: the text that was given.
+        fields: the fields that it names.
 
     Raises:
         ConditionError: it can't be read.
@@ -112,18 +112,18 @@ class Condition:
 
     @property
     def messages(self) -> frozenset[str]:
-        """Names of the messages that must be known to decide."""
+        """Names of the messages that are needed to evaluate the condition."""
         return frozenset(field.message for field in self.fields)
 
     def mask(self, order: NDArray[np.int64], find: Find) -> NDArray[np.bool_]:
-        """Where it holds.
+        """Evaluate the condition at the given positions.
 
         Args:
-            order: (n,) positions in the log of the messages to decide on, ascending.
-            find: tables of a message by name; their `order` tells what came before.
+            order: (n,) positions in the log of the examined messages, ascending.
+            find: tables of a message by name; their `order` gives the positions of the messages.
 
         Returns:
-            (n,) booleans. False as long as a message that is named has not come.
+            (n,) booleans, False before the first message of each named kind.
 
         Raises:
             ConditionError: a named message has no such field, or a text is compared with a number.
@@ -189,7 +189,7 @@ class Condition:
         return lambda values: values[field]
 
     def _chain(self, parts: list[Callable[[Any], Any]], ops: list[ast.cmpop]) -> Callable[[Any], Any]:
-        """`a < b < c`, as Python means it."""
+        """A chain such as `a < b < c`, with Python's meaning."""
 
         def compare(values: Any) -> Any:
             items = [part(values) for part in parts]
@@ -206,7 +206,7 @@ class Condition:
 def _newest(
     field: Field, order: NDArray[np.int64], tables: "list[_Table]", text: str
 ) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Value of a field at each position, and whether there was one yet."""
+    """Value of a field at each position, and whether a value existed by then."""
     parts = [(table.order, _column(field, table, text)) for table in tables]
     if not parts:
         return np.zeros(len(order)), np.zeros(len(order), dtype=np.bool_)
@@ -238,7 +238,7 @@ def _is_text(value: Any) -> bool:
 
 
 def _number(value: Any) -> Any:
-    """As 64-bit, so that small unsigned fields don't wrap around."""
+    """Convert to 64 bits, so that small unsigned fields don't wrap around."""
     array = np.asarray(value)
     if array.dtype.kind == "f":
         return array.astype(np.float64)

@@ -1,6 +1,7 @@
 """CRC-16/MCRF4XX, MAVLink's checksum, for compiled code.
 
-Eight bytes at a time by tables (Sarwate's method, sliced by eight); the guide calls it X.25.
+It processes eight bytes at a time with tables (Sarwate's method, sliced by eight). The MAVLink guide calls it
+X.25.
 """
 
 from typing import Any, Final
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from flightsim.kernels import kernel
 
 Int = int | np.integer[Any]
-"""A whole number, in compiled code or out of it."""
+"""An integer, in compiled code or outside it."""
 
 _POLYNOMIAL: Final = 0x8408  # 0x1021 with its bits reversed
 _SLICES: Final = 8
@@ -36,7 +37,7 @@ _T0, _T1, _T2, _T3, _T4, _T5, _T6, _T7 = (np.ascontiguousarray(table) for table 
 
 @kernel
 def checksum(data: NDArray[np.uint8], start: Int, stop: Int, extra: Int) -> np.uint32:
-    """Checksum of data[start:stop] and one byte more."""
+    """Checksum of data[start:stop] and one more byte."""
     crc = np.uint32(0xFFFF)
     at = np.uint64(start)
     end = np.uint64(stop)

@@ -1,7 +1,8 @@
-"""ArduPilot's onboard logs in binary form (.bin), and PX4's of before 2016: columns and MAVLink messages.
+"""ArduPilot's onboard logs in binary form (.bin), and PX4's logs from before 2016: columns and MAVLink
+messages.
 
-pymavlink's DFReader finds the messages and their formats; the columns are cut out of the mapped file in one
-piece each, with DFReader's multipliers. `dataflash_text` reads the text form.
+pymavlink's DFReader finds the messages and their formats; each column is copied from the mapped file in one
+step, with DFReader's multipliers. `dataflash_text` reads the text form.
 """
 
 import contextlib
@@ -21,20 +22,20 @@ from estimators.logs.sdlog2_mapping import map_sdlog2
 
 _HEADER: Final = 3
 META: Final = frozenset({"FMT", "FMTU", "UNIT", "MULT"})
-"""Formats that describe others."""
+"""Formats that describe other formats."""
 
 
 def open_dataflash(path: Path) -> MappedSource:
     """Open an ArduPilot .bin.
 
     Raises:
-        LogError: it can't be read, or holds no message.
+        LogError: it can't be read, or contains no message.
     """
     complaints = io.StringIO()
     try:
         with contextlib.redirect_stdout(complaints), contextlib.redirect_stderr(complaints):
             reader = DFReader.DFReader_binary(str(path))
-    except Exception as error:  # DFReader raises whatever a damaged file leads it to
+    except Exception as error:  # DFReader may raise any exception for a damaged file
         raise LogError(
             f"{path} can't be read as an ArduPilot .bin: {type(error).__name__} {error}; is it whole?"
         ) from error
@@ -76,13 +77,13 @@ def dataflash_source(
     remarks: Mapping[str, int | str],
     banner: str = "",
 ) -> MappedSource:
-    """Tables as they are in a file, with their times and the MAVLink messages that they give.
+    """Make a source from the tables of a file, with their times and the MAVLink messages derived from them.
 
     Args:
         path: the file.
-        raw: what it holds; not empty.
+        raw: its tables; not empty.
         bytes_by_kind, drops, remarks: figures for the report.
-        banner: what the file says of its firmware outside of its messages.
+        banner: text about the firmware that is in the file outside its messages.
     """
     times = stamp(raw)
     tables: dict[str, Records] = {}
@@ -109,7 +110,7 @@ def _columns(data: Array, starts: Array, layout: Any) -> dict[str, Array]:
         [(f"f{index}", _element(code)) for index, code in enumerate(layout.msg_fmts[: len(layout.columns)])]
     )
     size = min(dtype.itemsize, layout.len - _HEADER)
-    if not size or size < dtype.itemsize:  # no fields, or a format that says less bytes than its fields need
+    if not size or size < dtype.itemsize:  # no fields, or a format with fewer bytes than its fields need
         return {}
     rows = data[starts[:, None] + np.arange(_HEADER, _HEADER + dtype.itemsize)]
     records = np.ascontiguousarray(rows).view(dtype).reshape(-1)
@@ -118,7 +119,7 @@ def _columns(data: Array, starts: Array, layout: Any) -> dict[str, Array]:
         column = np.ascontiguousarray(records[f"f{index}"])
         multiplier = layout.msg_mults[index]
         if multiplier is not None:
-            column = column / (1.0 / multiplier)  # as DFReader does, for the last bit
+            column = column / (1.0 / multiplier)  # computed as in DFReader, for identical bits
         elif code == "g":
             column = column.astype(np.float32)
         if name and name.isidentifier() and not name.startswith("_"):
@@ -139,6 +140,6 @@ def _units(layout: Any) -> Mapping[str, str]:
 
 
 def _without_namesakes(own: list[Part], mapped: list[Part]) -> list[Part]:
-    """What has the name of a MAVLink message that was made (AHRS2, RPM, ...) yields to it."""
+    """Drop tables of the file that have the name of a derived MAVLink message (AHRS2, RPM, ...)."""
     names = {part.description.name for part in mapped}
     return [part for part in own if part.description.name not in names] + mapped

@@ -1,8 +1,8 @@
-"""ArduPilot's log messages as the MAVLink messages that estimators ask for.
+"""ArduPilot's log messages converted to the MAVLink messages that estimators need.
 
-Source: ArduPilot's log message documentation (ardupilot.org, "Onboard Message Log Messages", 4.x) and
-the formats that logs of 2013 to 2026 describe: angles in degrees, pressures in pascal, IMU in SI.
-`dataflash_state` has the modes and what events say.
+Source: ArduPilot's log message documentation (ardupilot.org, "Onboard Message Log Messages", 4.x) and the
+formats that logs of 2013 to 2026 describe: angles in degrees, pressures in pascal, IMU in SI.
+`dataflash_state` handles modes and events.
 """
 
 from collections.abc import Mapping
@@ -18,16 +18,16 @@ from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_pa
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
 _HOME: Final = 1  # ORGN.Type
 _FILTERS: Final = ("XKF1", "NKF1", "EKF1")
-"""Navigation filters' solutions, the newest first."""
+"""Solutions of the navigation filters, the newest filter first."""
 
 
 def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None, banner: str = "") -> list[Part]:
-    """MAVLink messages from what the log has.
+    """Convert the log's tables to MAVLink messages.
 
     Args:
-        tables: by name.
+        tables: tables by name.
         unix_offset_us: Unix time of vehicle time 0; None: not known.
-        banner: what a text log says of its firmware outside of its messages.
+        banner: text about the firmware that is in a text log outside its messages.
     """
     made_by = firmware(tables, banner)
     found = [
@@ -46,7 +46,7 @@ def map_messages(tables: Mapping[str, Records], unix_offset_us: int | None, bann
 
 
 def _imu(tables: Mapping[str, Records]) -> list[Part]:
-    """Instances of IMU; before 2019 each of them had a table of its own."""
+    """Instances of IMU; before 2019 each of them had its own table."""
     names = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
     found = []
     for number, name in enumerate(("IMU", "IMU2", "IMU3")):
@@ -152,7 +152,7 @@ def _air(tables: Mapping[str, Records], made_by: Firmware) -> list[Part]:
 
 
 def _speed(tables: Mapping[str, Records], made_by: Firmware) -> Records | None:
-    """Airspeed as VFR_HUD has it: measured, else estimated, else (not of fixed wings) over ground."""
+    """Airspeed as in VFR_HUD: measured, else estimated, else (except for fixed wings) ground speed."""
     airspeed = _first(tables.get("ARSP"))
     if airspeed is not None and airspeed.has("Airspeed") and len(airspeed.time_us):
         return Records(airspeed.time_us, {"speed": airspeed.columns["Airspeed"]})
@@ -167,7 +167,7 @@ def _speed(tables: Mapping[str, Records], made_by: Firmware) -> Records | None:
 
 
 def _climb(tables: Mapping[str, Records], times: Array) -> Array:
-    """Rate of climb, m/s: of the navigation filter, else of the altitude controller (cm/s)."""
+    """Rate of climb, m/s, from the navigation filter, else from the altitude controller (cm/s)."""
     ekf, tune = _filter(tables), tables.get("CTUN")
     if ekf is not None and ekf.has("VD"):
         return -value_at(ekf, "VD", times)
@@ -182,7 +182,7 @@ def _filter(tables: Mapping[str, Records]) -> Records | None:
 
 
 def _height(tables: Mapping[str, Records], times: Array, alt_m: Array) -> Array:
-    """Height above home, m: of the altitude controller, else above the first altitude."""
+    """Height above home, m, from the altitude controller, else relative to the first altitude."""
     tune = tables.get("CTUN")
     for name in ("BAlt", "BarAlt"):
         if tune is not None and name in tune.columns:
@@ -219,7 +219,7 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
                 hdg=100.0 * np.mod(value_at(tables.get("ATT"), "Yaw", times), 360.0),
             )
         )
-    elif (gps := _fixes(tables)) is not None:  # before 2015 the position was in no other message
+    elif (gps := _fixes(tables)) is not None:  # before 2015 no other message contained the position
         c, times = gps.columns, gps.time_us
         height = c.get("RelAlt", c.get("RAlt"))
         found.append(
@@ -240,7 +240,7 @@ def _positions(tables: Mapping[str, Records]) -> list[Part]:
 
 
 def _fixes(tables: Mapping[str, Records]) -> Records | None:
-    """GPS messages that hold a position."""
+    """GPS messages that contain a position."""
     gps = _first(tables.get("GPS"))
     if gps is None or not gps.has("Status", "Lat", "Lng", "Alt", "Spd", "GCrs"):
         return None
@@ -249,7 +249,7 @@ def _fixes(tables: Mapping[str, Records]) -> Records | None:
 
 
 def _home(tables: Mapping[str, Records]) -> list[Part]:
-    """Its place in the local frame is not reported."""
+    """HOME_POSITION; its coordinates in the local frame are not set."""
     places = tables.get("ORGN")
     if places is None or not places.has("Type", "Lat", "Lng", "Alt"):
         return []

@@ -1,7 +1,7 @@
 """The state of an ArduPilot vehicle from its onboard log: type, modes, armed, landed, parameters.
 
-No single message can be relied on. Logs that begin with arming hold the disarming only, logs of 2013 hold
-neither, and what is logged depends on the vehicle and LOG_BITMASK.
+No single message is reliable. Logs that begin with arming contain only the disarming, logs of 2013 contain
+neither, and the logged messages depend on the vehicle and LOG_BITMASK.
 """
 
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ _THROTTLE_CHANNEL: Final = 2
 
 
 def firmware(tables: Mapping[str, Records], banner: str = "") -> Firmware:
-    """What made the log; `banner`: text outside of the messages."""
+    """The firmware that wrote the log; `banner` is text outside the messages."""
     builds = tables["VER"].columns["BU"].tolist() if "VER" in tables and tables["VER"].has("BU") else ()
     return firmware_of([banner, *_texts(tables)], parameters(tables), builds)
 
@@ -42,13 +42,13 @@ def parameters(tables: Mapping[str, Records]) -> dict[str, float]:
 
 
 def throttle(tables: Mapping[str, Records], made_by: Firmware) -> Records | None:
-    """Throttle that goes to the motors, column `percent`; None where the log has none."""
+    """Throttle output to the motors, column `percent`; None when the log has none."""
     tune = tables.get("CTUN")
     name = None if tune is None else next((n for n in ("ThO", "ThrOut") if n in tune.columns), None)
     if tune is not None and name is not None:
         raw = tune.columns[name]
         factor = 1.0
-        if made_by.vehicle != "plane":  # since Copter 3.4 a fraction, before in thousandths
+        if made_by.vehicle != "plane":  # since Copter 3.4 a fraction, before that in thousandths
             factor = 100.0 if raw.dtype.kind == "f" and np.nanmax(np.abs(raw)) <= 2.0 else 0.1
         return Records(tune.time_us, {"percent": raw.astype(np.float64) * factor})
     return None
@@ -87,7 +87,7 @@ def _heartbeats(tables: Mapping[str, Records], made_by: Firmware) -> list[Part]:
     if not len(modes_us) and not len(armed_us) and not made_by.vehicle:
         return []
     times = np.union1d(each_second(tables.values()), np.concatenate((modes_us, armed_us)))
-    before = float(modes[0]) if len(modes) else 0.0  # the mode in which the log began is its first entry
+    before = float(modes[0]) if len(modes) else 0.0  # the mode at the beginning of the log is its first entry
     is_armed = newest(armed_us, armed, times).astype(bool)
     return [
         mavlink_part(
@@ -105,7 +105,7 @@ def _heartbeats(tables: Mapping[str, Records], made_by: Firmware) -> list[Part]:
 
 
 def _modes(tables: Mapping[str, Records], made_by: Firmware) -> tuple[Array, Array]:
-    """When which mode began."""
+    """Times at which modes began, and the modes."""
     nothing = np.empty(0, dtype=np.int64)
     mode = tables.get("MODE")
     if mode is None:
@@ -122,11 +122,11 @@ def _modes(tables: Mapping[str, Records], made_by: Firmware) -> tuple[Array, Arr
 
 
 def _armed(tables: Mapping[str, Records], made_by: Firmware) -> tuple[Array, Array]:
-    """When it was armed (1) and disarmed (0)."""
+    """Times of arming (1) and disarming (0), and these states."""
     times, states = _armed_events(tables)
     start_us = min(int(records.time_us.min()) for records in tables.values())
     if len(times):
-        if not states[0]:  # a log that begins with arming holds the disarming only
+        if not states[0]:  # a log that begins with arming contains only the disarming
             times, states = np.concatenate(([start_us], times)), np.concatenate(([1], states))
         return times, states
     running = _running_us(tables, made_by)
@@ -153,7 +153,7 @@ def _armed_events(tables: Mapping[str, Records]) -> tuple[Array, Array]:
 
 
 def _running_us(tables: Mapping[str, Records], made_by: Firmware) -> Array:
-    """Times at which motors ran or the vehicle moved: it was armed then."""
+    """Times at which motors ran or the vehicle moved, so that it must have been armed."""
     found = [np.empty(0, dtype=np.int64)]
     power = throttle(tables, made_by)
     if power is not None:
@@ -180,7 +180,7 @@ def _running_us(tables: Mapping[str, Records], made_by: Firmware) -> Array:
 
 
 def _landed(tables: Mapping[str, Records]) -> list[Part]:
-    """EXTENDED_SYS_STATE where the vehicle has logged what its land detector said."""
+    """EXTENDED_SYS_STATE, when the log contains the output of the land detector."""
     events = tables.get("EV")
     if events is None or not events.has("Id"):
         return []

@@ -14,13 +14,13 @@ from estimators.logs.mapped import Array, MappedSource
 
 _TEXT_CODES: Final = frozenset("nNZ")
 _NAMED_CODES: Final = frozenset("M")
-"""Flight modes: names in some logs, numbers in others."""
+"""Codes of flight modes: names in some logs, numbers in others."""
 _FMT: Final = "FMT"
 _FMT_FIELDS: Final = 6
 
 
 def looks_like_text(head: bytes) -> bool:
-    """Whether the beginning of a file is that of a text log: a line that describes a format."""
+    """Whether the beginning of a file is that of a text log, which has a line that describes a format."""
     return b"\0" not in head and any(line.startswith(b"FMT,") for line in head.splitlines())
 
 
@@ -28,7 +28,7 @@ def open_text(path: Path) -> MappedSource:
     """Open an ArduPilot log in text form.
 
     Raises:
-        LogError: it can't be read, or holds no message.
+        LogError: it can't be read, or contains no message.
     """
     try:
         data = path.read_bytes()
@@ -57,7 +57,7 @@ def open_text(path: Path) -> MappedSource:
         if len(fields) - 1 < wanted:
             short += 1
             continue
-        # A text may have commas in it; it is the last field.
+        # A text may contain commas; it is the last field.
         values = [*fields[1:wanted], ",".join(fields[wanted:])] if wanted else []
         rows.setdefault(name, []).append(values)
         positions.setdefault(name, []).append(start)
@@ -84,7 +84,7 @@ def open_text(path: Path) -> MappedSource:
 
 
 def _columns(rows: list[list[str]], codes: str, names: list[str]) -> dict[str, Array]:
-    """Fields of all messages of a format; text logs have the multipliers applied."""
+    """Fields of all messages of a format; in text logs the multipliers are already applied."""
     columns = {}
     for index, (name, code) in enumerate(zip(names, codes, strict=False)):
         if not name.isidentifier() or name.startswith("_"):

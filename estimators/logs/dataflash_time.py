@@ -1,8 +1,8 @@
-"""Times of the messages in an ArduPilot onboard log, for every way in which firmwares have written them.
+"""Times of the messages in an ArduPilot onboard log, for every format that the firmware has used.
 
 Source: the clocks of pymavlink's DFReader, and ArduPilot's own history of the format. Since 2015 (Copter 3.3)
-each message begins with `TimeUS`; before, most began with `TimeMS`, GPS gave the time since boot as `T`, and
-MODE, MSG, EV and CMD had no time; in 2013 only GPS had a time, that of the GPS week.
+each message begins with `TimeUS`; before that, most began with `TimeMS`, GPS gave the time since boot as `T`,
+and MODE, MSG, EV and CMD had no time; in 2013 only GPS had a time, which was the time of the GPS week.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,7 +16,7 @@ from estimators.logs.mapped import Array
 _OWN: Final = (("TimeUS", 1), ("TimeMS", 1000))
 _GPS: Final = frozenset({"GPS", "GPS2"})
 _WEEKS: Final = (("GWk", "GMS"), ("Week", "TimeMS"), ("Week", "Time"), ("Wk", "TWk"))
-"""Columns of the GPS week and of the milliseconds in it."""
+"""Columns of the GPS week and of the milliseconds in the week."""
 _GPS_EPOCH_S: Final = 315_964_800
 _LEAP_SECONDS: Final = 18
 _WEEK_S: Final = 7 * 86_400
@@ -25,7 +25,7 @@ _MAX_TIME_US: Final = 10**13
 _BLOCK: Final = 64
 _FAR_US: Final = 60_000_000
 _ASSUMED_US: Final = 20_000
-"""Between messages of the most frequent kind where a log has no time at all: 50 Hz, as DFReader assumes."""
+"""Assumed interval of the most frequent messages in a log without any time: 50 Hz, as in DFReader."""
 
 MICROSECONDS, MILLISECONDS, PX4_TIME, GPS_INTERPOLATED, NO_CLOCK = (
     "microseconds since boot",
@@ -41,11 +41,11 @@ class RawTable:
     """All messages of one format, as they are in the file.
 
     Attributes:
-        name: of the format.
-        number: of the format.
-        positions: (n,) where in the file each begins, rising.
+        name: name of the format.
+        number: number of the format.
+        positions: (n,) position in the file at which each begins, ascending.
         columns: fields by name, in the order of the format.
-        units: of the fields that have one.
+        units: units of the fields that have one.
     """
 
     name: str
@@ -61,9 +61,9 @@ class LogTimes:
 
     Attributes:
         time_us: (n,) for each table, microseconds since boot (or since the log began).
-        clock: what they are taken from.
+        clock: the source of the times.
         unix_offset_us: Unix time of time 0, by the first GPS time with a date; None: not known.
-        implausible: stamps that were replaced by the time of the message before.
+        implausible: number of stamps that were replaced by the time of the previous message.
     """
 
     time_us: Sequence[Array]
@@ -73,7 +73,7 @@ class LogTimes:
 
 
 def stamp(tables: Sequence[RawTable]) -> LogTimes:
-    """Times of all messages: a message without a time of its own has that of the message before it.
+    """Times of all messages. A message without its own time gets the time of the previous message.
 
     Args:
         tables: at least one, none of them empty.
@@ -101,7 +101,7 @@ def stamp(tables: Sequence[RawTable]) -> LogTimes:
         if times is None:
             made.append(before)
             continue
-        # A stamp of its own counts where it is among those that were found plausible.
+        # A message's own stamp is used if it was found plausible.
         counts = (
             (rows >= 0) & (known_at[np.maximum(rows, 0)] == table.positions) if len(known_at) else rows >= 0
         )
@@ -110,12 +110,12 @@ def stamp(tables: Sequence[RawTable]) -> LogTimes:
 
 
 def _own_us(table: RawTable) -> Array | None:
-    """Own time stamps of a format; None where it has none."""
+    """Time stamps of a format's messages; None when it has none."""
     if table.name in _GPS and "T" in table.columns and "TimeUS" not in table.columns:
         return _whole(table.columns["T"]) * 1000  # TimeMS is the time of the GPS week here
     first = next(iter(table.columns), "")
     for name, factor in _OWN:
-        # Where it isn't the first column, it is another clock's: that of a sensor's sample.
+        # In another column it comes from another clock: that of a sensor's sample.
         if name == first and table.columns[name].dtype.kind in "iuf":
             return _whole(table.columns[name]) * factor
     return None
@@ -128,7 +128,7 @@ def _whole(column: Array) -> Array:
 
 
 def _plausible(stamps: Array) -> Array:
-    """Which stamps, in the order of the file, fit to those around them: damage makes others."""
+    """Mask of the stamps, in the order of the file, that agree with their neighbours; others are damaged."""
     good = (stamps >= 0) & (stamps < _MAX_TIME_US)
     if np.count_nonzero(good) < 2 * _BLOCK:
         return good
@@ -151,13 +151,15 @@ def _plausible(stamps: Array) -> Array:
 
 
 def _px4_times(tables: Sequence[RawTable]) -> list[Array | None] | None:
-    """PX4's logs of before 2016 (sdlog2): TIME messages give the time of those behind them."""
+    """Times in PX4's logs from before 2016 (sdlog2): a TIME message gives the time of those after it."""
     time = next((t for t in tables if t.name == "TIME" and "StartTime" in t.columns), None)
     return None if time is None else [_whole(t.columns["StartTime"]) if t is time else None for t in tables]
 
 
 def _without_clock(tables: Sequence[RawTable]) -> LogTimes:
-    """Times where only GPS messages have one: linear in the file between its messages; else by counting."""
+    """Times when only GPS messages have one: linear in the file between them; without GPS, by counting
+    messages.
+    """
     known = _gps_seconds(tables)
     if known is None:
         busiest = max(tables, key=lambda table: len(table.positions))
@@ -173,7 +175,7 @@ def _without_clock(tables: Sequence[RawTable]) -> LogTimes:
 
 
 def _between(at: Array, positions: Array, times_us: Array) -> Array:
-    """Times at places in the file: linear between known ones, at the mean rate before and behind them."""
+    """Times at positions in the file: linear between known ones, at the mean rate before and after them."""
     found = np.interp(at, positions, times_us)
     if len(positions) > 1 and positions[-1] > positions[0]:
         rate = (times_us[-1] - times_us[0]) / (positions[-1] - positions[0])
@@ -184,7 +186,7 @@ def _between(at: Array, positions: Array, times_us: Array) -> Array:
 
 
 def _gps_seconds(tables: Sequence[RawTable]) -> tuple[Array, Array] | None:
-    """Places in the file and Unix times of the GPS messages whose time goes on."""
+    """Positions in the file and Unix times of the GPS messages whose time increases."""
     for table, week, milliseconds in _dated(tables):
         unix_us = _unix_us(week, milliseconds)
         rows = np.flatnonzero(milliseconds > 0)
@@ -213,12 +215,12 @@ def _dated(tables: Sequence[RawTable]) -> Iterable[tuple[RawTable, Array, Array]
                 yield table, _whole(table.columns[week]), _whole(table.columns[milliseconds])
                 break
         else:
-            if "Time" in table.columns:  # 2013: the time of the week alone
+            if "Time" in table.columns:  # 2013: only the time of the week
                 yield table, np.zeros(len(table.positions), dtype=np.int64), _whole(table.columns["Time"])
 
 
 def _unix_offset_us(tables: Sequence[RawTable], times_us: Sequence[Array]) -> int | None:
-    """Unix time of time 0, by the first GPS message with a date."""
+    """Unix time of time 0, from the first GPS message with a date."""
     of_table = {id(table): times for table, times in zip(tables, times_us, strict=True)}
     for table, week, milliseconds in _dated(tables):
         rows = np.flatnonzero(week > 0)

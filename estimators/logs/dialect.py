@@ -1,4 +1,4 @@
-"""Which messages a log may hold: a dialect of pymavlink's by name, or a user's own definition file."""
+"""The messages that a log may contain: a pymavlink dialect by name, or a user's own definition file."""
 
 import importlib
 import pkgutil
@@ -28,8 +28,8 @@ class Description:
 
     Attributes:
         definition: layout on the wire.
-        units: of the fields that have one, as in the definition files.
-        instance_field: the field that tells which of several like devices speaks; None for most messages.
+        units: units of the fields that have one, as in the definition files.
+        instance_field: the field that identifies one of several similar devices; None for most messages.
         made: class of its messages, see `estimators.messages`.
     """
 
@@ -63,7 +63,8 @@ class Dialect:
             LogError: the dialect has no such message.
         """
         wanted = name.strip()
-        for same in (wanted, wanted.upper()):  # tables of other formats have names in small letters
+        # tables of other formats have lower-case letters in their names
+        for same in (wanted, wanted.upper()):
             for item in self.messages.values():
                 if item.name == same:
                     return item
@@ -73,20 +74,20 @@ class Dialect:
 
 
 def dialect_names() -> tuple[str, ...]:
-    """Dialects that pymavlink has."""
+    """Names of pymavlink's dialects."""
     return tuple(sorted(item.name for item in pkgutil.iter_modules(pymavlink.dialects.v20.__path__)))
 
 
 def load_dialect(name: str | Path | None = None) -> Dialect:
-    """A dialect.
+    """Load a dialect.
 
     Args:
         name: one of `dialect_names`, or the path of an XML definition file, whose includes are read too (one
-            of `dialect_names`, such as common.xml, need not be there as a file); None: every message of
+            of `dialect_names`, such as common.xml, need not exist as a file); None: every message of
             MAVLink's public definitions.
 
     Raises:
-        LogError: there is no such dialect, or the file can't be read or is not a definition file.
+        LogError: the dialect does not exist, or the file can't be read or is not a definition file.
     """
     text = DEFAULT_DIALECT if name is None else str(name)
     if isinstance(name, Path) or re.search(r"[/\\]|\.xml$", text, re.IGNORECASE):
@@ -100,7 +101,7 @@ def load_dialect(name: str | Path | None = None) -> Dialect:
 
 
 def _of_file(path: Path) -> Mapping[int, Description]:
-    """Messages of a file; those of the file come before those of pymavlink's dialects that it includes."""
+    """Messages of a file; its own messages precede those of the pymavlink dialects that it includes."""
     messages, named = read_definitions(path, dialect_names())
     included = {number: item for name in named for number, item in _pymavlink_dialect(name).messages.items()}
     both = {**included, **_described(str(path), (_from_text(item) for item in messages))}
@@ -121,24 +122,24 @@ def _described(
     found = {}
     for made, units, instance_field in sorted(items, key=lambda item: item[0].message_id):
         known = DEFINITIONS.get(made.message_id)
-        # The same layout is the same message: one class of messages then serves links and logs.
+        # An identical layout is the same message, so that links and logs share one class of messages.
         same = known if known is not None and _layout(known) == _layout(made) else made
         try:
             message = message_class(same)
-        except ValueError as error:  # a name that can't be one of a field of a named tuple
+        except ValueError as error:  # a field name that a named tuple does not accept
             raise LogError(f"dialect {name}: message {made.name}: {error}; rename it") from error
         found[made.message_id] = Description(same, MappingProxyType(dict(units)), instance_field, message)
     return MappingProxyType(found)
 
 
 def describe(number: int, name: str, fields: Sequence[FieldText], units: Mapping[str, str]) -> Description:
-    """A message that is none of MAVLink's: a table of a log of another format.
+    """Description of a table of another log format, which is not a MAVLink message.
 
     Args:
-        number: instead of a message id; negative.
-        name: of the table.
+        number: a negative number in place of a message id.
+        name: name of the table.
         fields: in the order of the file.
-        units: of the fields that have one.
+        units: units of the fields that have one.
     """
     definition = define(
         message_id=number,

@@ -1,11 +1,11 @@
-"""The error of logs: a file that can't be read, or something asked of a log that is not in it."""
+"""Errors of logs: a file can't be read, or the requested data are not in the log."""
 
 from autopilot_bridge.errors import TlogError
 
 
 class LogError(TlogError):
-    """A log can't be opened, or does not hold what was asked for; the message names it and what to do."""
+    """A log can't be opened or lacks the requested data; the message names it and the next step."""
 
 
 class NothingThere(LogError):
-    """A log holds nothing in the part that is asked for; the message says what it holds."""
+    """The requested part of a log contains no data; the message names what the log contains."""

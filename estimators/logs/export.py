@@ -1,4 +1,4 @@
-"""Logs to the formats of other tools: Parquet, CSV, NumPy's npz, MCAP."""
+"""Exports logs to the formats of other tools: Parquet, CSV, NumPy's npz, MCAP."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -31,12 +31,12 @@ def export(
     Args:
         log: an open log.
         selections: from `Log.select`.
-        path: the folder (csv, parquet) or file (npz, mcap); nothing is overwritten.
+        path: the folder (csv, parquet) or file (npz, mcap); existing files are not overwritten.
         form: one of `FORMATS`.
         si: SI units and radians in place of wire values.
 
     Returns:
-        What was written.
+        The paths of the written files.
 
     Raises:
         LogError: nothing is selected, the format is not known, or a file exists or can't be written.
@@ -53,7 +53,8 @@ def table_columns(table: Table, *, si: bool) -> dict[str, np.ndarray[Any, Any]]:
     """A table's columns by name, times first; with `si`, in SI units and radians where a field has a unit."""
     columns: dict[str, np.ndarray[Any, Any]] = {"time_us": table.time_us, "log_time_us": table.log_time_us}
     for field in table.fields:
-        name = field if field not in columns else f"{field}_"  # a field of that name gives way
+        # a field with the name of a time column is renamed
+        name = field if field not in columns else f"{field}_"
         column = table[field]
         columns[name] = (
             table.si(field) if si and column.dtype.kind != "S" and field in table.units else column
@@ -98,7 +99,7 @@ def _arrow(table: Table, si: bool) -> Any:
 
 
 def _flat(columns: Mapping[str, np.ndarray[Any, Any]]) -> dict[str, np.ndarray[Any, Any]]:
-    """Arrays as one column for each element, for CSV: controls_0, controls_1, ..."""
+    """Arrays as one column per element, for CSV: controls_0, controls_1, ..."""
     flat: dict[str, np.ndarray[Any, Any]] = {}
     for name, column in columns.items():
         if column.ndim == 2:
@@ -229,12 +230,12 @@ def _log_times(log: Log, selections: Sequence[Selection]) -> list[int]:
 
 
 def _nanoseconds(time_us: int) -> int:
-    """As far as the format's 64 bits go: damaged time stamps can be anything."""
+    """Nanoseconds, limited to the format's 64 bits, because damaged time stamps can have any value."""
     return min(max(time_us, 0) * 1000, (1 << 64) - 1)
 
 
 def _json_type(code: str, length: int, unit: str, *, whole: bool) -> dict[str, Any]:
-    """Schema of a field; its unit is the description, as JSON schema has no word for it."""
+    """JSON schema of a field; its unit is the description, because JSON schema has no keyword for it."""
     if code == "s":
         return {"type": "string"}
     element: dict[str, Any] = {"type": "number" if code in "fd" or not whole else "integer"}
@@ -243,14 +244,14 @@ def _json_type(code: str, length: int, unit: str, *, whole: bool) -> dict[str, A
 
 
 def _scaled(value: Any, factor: float) -> Any:
-    """A value or the elements of an array in SI units; null stays null."""
+    """A value, or the elements of an array, in SI units; null is kept."""
     if isinstance(value, list):
         return [_scaled(item, factor) for item in value]
     return value * factor if isinstance(value, (int, float)) else value
 
 
 def _plain(value: Any) -> Any:
-    """JSON has no NaN and no infinity: null."""
+    """Replace NaN and infinity, which JSON does not have, by null."""
     if isinstance(value, float):
         return value if np.isfinite(value) else None
     return [_plain(item) for item in value] if isinstance(value, tuple) else value

@@ -1,7 +1,7 @@
-"""Faults for recorded logs: which fields of which messages, what happens to them, and when.
+"""Faults for recorded logs: the affected messages and fields, the kind of fault, and the time.
 
-The kinds are those of the simulator's sensors (MAVLink's FAILURE_TYPE and drift), and what only a link or a
-log can have: spikes, noise, drops.
+The kinds are those of the simulator's sensors (MAVLink's FAILURE_TYPE and drift), and faults that only a link
+or a log can have: spikes, noise, drops.
 """
 
 import math
@@ -44,34 +44,34 @@ UNITS: Final[Mapping[str, dict[str, tuple[str, ...]]]] = MappingProxyType(
         "battery": {"SYS_STATUS": ("voltage_battery",)},
     }
 )
-"""Sensors by the names of MAVLink's FAILURE_UNIT: which fields of which messages they speak in."""
+"""Sensors by the names of MAVLink's FAILURE_UNIT: the messages and fields that contain their values."""
 
 
 class FaultKind(StrEnum):
-    """What happens. Values are in SI units, and radians (GPS positions: metres)."""
+    """Kinds of faults. Values are in SI units and radians (GPS positions: metres)."""
 
     OFF = "off"
-    """The messages are gone; of a unit that is one of several in its message, the last values stay."""
+    """The messages are missing. A unit that is one of several in its message repeats its last values."""
     STUCK = "stuck"
-    """The value at the beginning stays."""
+    """The value at the beginning of the fault is repeated."""
     GARBAGE = "garbage"
-    """Anything the field can hold, up to VALUE."""
+    """Random values between -VALUE and VALUE."""
     WRONG = "wrong"
-    """VALUE more."""
+    """VALUE is added."""
     DRIFT = "drift"
-    """VALUE more with every second."""
+    """VALUE is added for every second since the beginning."""
     NOISE = "noise"
     """White noise with the standard deviation VALUE."""
     SPIKE = "spike"
-    """VALUE more in one message of a hundred."""
+    """VALUE is added in one of a hundred messages."""
     SLOW = "slow"
-    """One message of VALUE is left."""
+    """Only one of VALUE messages is kept."""
     DELAYED = "delayed"
-    """Messages arrive VALUE seconds later; their own time stamps stay."""
+    """Messages arrive VALUE seconds later; their own time stamps are not changed."""
     DROP = "drop"
-    """A share VALUE of the messages is lost."""
+    """The share VALUE of the messages is lost."""
     INTERMITTENT = "intermittent"
-    """Silent and heard in turn, for VALUE seconds each in the mean."""
+    """The messages are alternately missing and present, for VALUE seconds each on average."""
 
 
 DEFAULTS: Final = MappingProxyType(
@@ -82,7 +82,7 @@ DEFAULTS: Final = MappingProxyType(
         FaultKind.INTERMITTENT: 1.0,
     }
 )
-"""VALUE of kinds for which one does for all messages."""
+"""VALUE of the kinds that have one default for all messages."""
 
 _WITHOUT_VALUE: Final = frozenset({FaultKind.OFF, FaultKind.STUCK})
 _SYNTAX: Final = "WHAT:KIND[=VALUE][@FROM-TO], as in gps:off@60-120 or RAW_IMU.xgyro:noise=0.02"
@@ -95,9 +95,9 @@ class Fault:
 
     Attributes:
         fields: fields by message name; no fields: the whole message.
-        kind: what happens.
-        value: how much; None where the kind has none.
-        from_s, to_s: when, in seconds of the log's clock (`Log.clock`).
+        kind: kind of the fault.
+        value: size of the fault; None if the kind has none.
+        from_s, to_s: beginning and end, in seconds of the log's clock (`Log.clock`).
     """
 
     fields: MappingProxyType[str, tuple[str, ...]]
@@ -116,14 +116,14 @@ _MEANINGS: Final = {
 
 
 def parse_fault(text: str) -> Fault:
-    """A fault from text.
+    """Parse a fault from text.
 
     Args:
         text: `WHAT:KIND[=VALUE][@FROM-TO]`; WHAT is one of `UNITS`, a message, or MESSAGE.field; the times
-            are seconds since the first record, each of them may be left out.
+            are seconds since the first record, each of them may be omitted.
 
     Raises:
-        LogError: it can't be read; says what is accepted.
+        LogError: it can't be parsed; the message names what is accepted.
     """
     match = _SPEC.fullmatch(text.strip())
     if match is None:

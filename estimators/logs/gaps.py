@@ -1,8 +1,9 @@
-"""What lies between the valid frames of a log: every byte of it gets a reason.
+"""The bytes between the valid frames of a log; each byte is assigned a reason.
 
-A whole record (time stamp and something of the shape of a frame) that is followed by another, or by the end
-of the gap, is one reason: its message is unknown, its flags are unsupported, or its checksum is wrong. What
-is left is junk, or, behind the last whole record of a file, the torn record of a writer that was killed.
+A whole record (a time stamp and bytes in the form of a frame) that is followed by another record, or by the
+end of the gap, has one reason: its message is unknown, its flags are unsupported, or its checksum is wrong.
+The remaining bytes are junk or, after the last whole record of a file, the torn record of a writer that was
+killed.
 """
 
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, frame_end
 from flightsim.kernels import kernel
 
 _UNKNOWN, _UNSUPPORTED, _BAD_CRC = range(3)
-# Figures that the kernel counts.
+# Figures that the kernel counts, by index.
 (
     _N_UNKNOWN,
     _N_UNSUPPORTED,
@@ -36,15 +37,15 @@ _SAMPLE_FRAMES: Final = 16
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GapFigures:
-    """What the gaps hold.
+    """The contents of the gaps.
 
     Attributes:
         unknown, unsupported, bad_crc: records that are not valid, by reason.
-        unknown_bytes, unsupported_bytes, bad_crc_bytes: bytes of what has the shape of a frame in them.
-        stamp_bytes: time stamps, those of the valid frames behind the gaps included.
-        junk_bytes: what has no shape.
-        torn_bytes: the record that the file ends in.
-        unknown_starts: where the frames of unknown messages begin (int64).
+        unknown_bytes, unsupported_bytes, bad_crc_bytes: bytes of these records that have the form of a frame.
+        stamp_bytes: bytes of time stamps, including those of the valid frames after the gaps.
+        junk_bytes: bytes that do not have the form of a frame.
+        torn_bytes: bytes of the incomplete record at the end of the file.
+        unknown_starts: positions at which frames of unknown messages begin (int64).
     """
 
     unknown: int
@@ -60,9 +61,9 @@ class GapFigures:
 
 
 def find_lead(data: NDArray[np.uint8], table: MessageTable) -> int:
-    """Bytes before each frame: 8 where there are time stamps, 0 in captures without.
+    """Number of bytes before each frame: 8 with time stamps, 0 in captures without.
 
-    Whichever explains more of the beginning of the file.
+    The result is the number that explains more of the beginning of the file.
     """
     size = _SAMPLE_BYTES
     while True:
@@ -82,7 +83,7 @@ def _left_over(data: NDArray[np.uint8], index: FrameIndex, table: MessageTable) 
 
 
 def sort_gaps(data: NDArray[np.uint8], index: FrameIndex, table: MessageTable) -> GapFigures:
-    """Tell apart what lies between the frames of an index."""
+    """Classify the bytes between the frames of an index."""
     figures = np.zeros(_FIGURES, dtype=np.int64)
     starts = np.empty(0, dtype=np.int64)
     _sort_gaps(data, index.lead, index.gaps, table.pages, table.rows, figures, starts)
@@ -111,7 +112,9 @@ def sort_gaps(data: NDArray[np.uint8], index: FrameIndex, table: MessageTable) -
 def _shape(
     data: NDArray[np.uint8], at: Int, pages: NDArray[np.int16], rows: NDArray[np.int16]
 ) -> tuple[Int, Int]:
-    """End of what has the shape of a frame, and why it is none; end -1: no shape, -2: the file ends first."""
+    """End of the bytes that have the form of a frame, and why they are not valid; end -1: not the form of a
+    frame, -2: the file ends before.
+    """
     size = len(data)
     if at >= size:
         return -2, -1
@@ -143,7 +146,7 @@ def _sort_gaps(
         at = gaps[gap, 0]
         limit = gaps[gap, 1]
         if limit < size and limit - at >= lead:
-            limit -= lead  # the stamp of the valid frame behind the gap
+            limit -= lead  # the stamp of the valid frame after the gap
             figures[_B_STAMPS] += lead
         elif limit < size:
             figures[_B_JUNK] += limit - at

@@ -1,4 +1,4 @@
-"""A flight log as columns, whatever the format of its file."""
+"""A flight log as columns, for every format of the file."""
 
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ from estimators.vehicle_time import stamp_field
 _LONG_GAP_US: Final = 5_000_000
 _LONG_GAP_INTERVALS: Final = 10.0
 _LEAST_SPAN_US: Final = 1_000_000
-"""A rate is counted over this at least: 900 parameters within 30 ms are 900 in a second."""
+"""A rate is counted over at least this time: 900 parameters within 30 ms are 900 in a second."""
 _MAX_RATED_INSTANCES: Final = 32
 
 Ids = int | Collection[int] | None
@@ -35,13 +35,13 @@ class MessageCondition(Protocol):
     """A condition on messages; `estimators.logs.condition.Condition` is one."""
 
     def mask(self, order: NDArray[np.int64], find: Callable[[str], list[Any]]) -> NDArray[np.bool_]:
-        """Which of the messages at these positions it holds for; `find` gives tables by message name."""
+        """Mask of the messages at these positions for which it holds; `find` returns tables by message."""
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Key:
-    """A message of a component, and how often it is in the log."""
+    """A message of a component, and its number in the log."""
 
     name: str
     system_id: int
@@ -83,7 +83,7 @@ class Log:
         return f"Log({str(self.path)!r}, {self.format}, {len(self)} messages)"
 
     def __len__(self) -> int:
-        """Messages in all."""
+        """Number of messages."""
         return self.source.count
 
     @property
@@ -103,7 +103,7 @@ class Log:
 
     @cached_property
     def keys(self) -> tuple[Key, ...]:
-        """What there is, sorted by system, component and name."""
+        """The kinds of messages in the log, sorted by system, component and name."""
         found = (
             Key(name=s.name, system_id=s.system_id, component_id=s.component_id, count=len(s.order))
             for s in self.source.streams
@@ -112,7 +112,7 @@ class Log:
 
     @cached_property
     def systems(self) -> tuple[int, ...]:
-        """System ids heard, ascending."""
+        """System ids received, ascending."""
         return tuple(sorted({stream.system_id for stream in self.source.streams}))
 
     @cached_property
@@ -151,7 +151,7 @@ class Log:
 
     @cached_property
     def clock(self) -> LogClock:
-        """The clock of all times that are printed and given for the log."""
+        """The clock of all times that are printed and accepted for the log."""
         return make_clock(self.source)
 
     def inside(
@@ -162,16 +162,16 @@ class Log:
         to_s: float | None = None,
         boot: int | None = None,
     ) -> NDArray[np.bool_]:
-        """Which messages lie in a part of the log.
+        """Mask of the messages in a part of the log.
 
         Args:
             order: positions of messages.
-            from_s, to_s: seconds of `clock`; None: no limit. `to_s` itself is left out.
+            from_s, to_s: seconds of `clock`; None: no limit. `to_s` itself is excluded.
             boot: number of a boot of the clock's vehicle; None: that part of each boot.
 
         Raises:
-            LogError: a time is negative or no number, the end is before the beginning, nothing was recorded
-                then, or there is no such boot.
+            LogError: a time is negative or not a number, the end is before the beginning, nothing was
+                recorded in that time, or the boot does not exist.
         """
         clock = self.clock
         for option, value in (("--from", from_s), ("--to", to_s)):
@@ -194,7 +194,7 @@ class Log:
         return timed[order]
 
     def boots_at(self, from_s: float | None, to_s: float | None) -> list[int]:
-        """Boots that have something between two times of `clock`."""
+        """Boots with messages between two times of `clock`."""
         low = -math.inf if from_s is None else from_s * 1e6
         high = math.inf if to_s is None else to_s * 1e6
         times = self.clock.time_us
@@ -212,12 +212,12 @@ class Log:
 
     @property
     def start_unix_us(self) -> int | None:
-        """Unix time of the first record; None when the file does not say."""
+        """Unix time of the first record; None when it is not in the file."""
         return self._recorded_us[0] or None
 
     @property
     def duration_s(self) -> float:
-        """From the first record to the last; without record times, as long as the longest-heard system."""
+        """Time from the first record to the last; without record times, the longest time of a system."""
         first, last = self._recorded_us
         if last > first:
             return (last - first) * 1e-6
@@ -229,7 +229,7 @@ class Log:
     def has(
         self, name: str, *, system_id: Ids = None, component_id: Ids = None, boot: int | None = None
     ) -> bool:
-        """Whether there is a message of that name, from those asked for."""
+        """Whether there is a message of that name from the specified components."""
         return any(len(self._rows(stream, boot)) for stream in self._find((name,), system_id, component_id))
 
     def rate_hz(
@@ -237,7 +237,7 @@ class Log:
     ) -> float:
         """Mean rate of a message while it was sent, on vehicle time; gaps are left out.
 
-        Of several components that send it the highest; 0 when there is none, or one message only.
+        If several components send it, the highest rate; 0 when there is none, or only one message.
         """
         rates = (
             self.stream_rate_hz(stream, self._rows(stream, boot))
@@ -246,9 +246,9 @@ class Log:
         return max(rates, default=0.0)
 
     def stream_rate_hz(self, stream: Stream, rows: NDArray[np.int64] | slice = slice(None)) -> float:
-        """Mean rate of one stream while it was sent, counted over a second at least; 0: not known.
+        """Mean rate of one stream while it was sent, counted over at least one second; 0: not known.
 
-        Of a message with instances (two IMUs in HIGHRES_IMU) it is the rate of the fastest instance.
+        For a message with instances (two IMUs in HIGHRES_IMU) it is the rate of the fastest instance.
         """
         order = stream.order[rows]
         if len(order) < 2:
@@ -259,22 +259,22 @@ class Log:
             return _rate_hz(times)
         values = self.stream_table(stream)[field][rows]
         instances = np.unique(values)
-        if len(instances) > _MAX_RATED_INSTANCES:  # names of values, parameters
+        if len(instances) > _MAX_RATED_INSTANCES:  # names of values or parameters
             return _rate_hz(times)
         return max(_rate_hz(times[values == instance]) for instance in instances)
 
     def _rate_times_us(self, stream: Stream, order: Positions) -> NDArray[np.int64]:
-        """The clock on which a stream's rate is counted.
+        """The times from which a stream's rate is computed.
 
-        A message with a stamp of its own has that. The vehicle time of others goes on in steps with the
-        messages around them; when they were recorded is finer, where the record was made in real time.
+        A message with its own stamp uses that stamp. The vehicle time of other messages increases in steps
+        with the messages around them; the record times are finer, if the record was made in real time.
         """
         times = self.source.time_us[order]
         stamped = stamp_field(stream.name, stream.description.definition.field_names) is not None
         if stamped and times[0] != times[-1]:
             return times
         recorded = self.source.log_time_us(order)
-        if times[0] == times[-1]:  # no clock that runs: systems without an autopilot, stamps that are all 0
+        if times[0] == times[-1]:  # no running clock: systems without an autopilot, or stamps that are all 0
             if recorded[0] != recorded[-1]:
                 return recorded
             return np.maximum.accumulate(self.source.time_us)[order]
@@ -296,12 +296,12 @@ class Log:
 
         Args:
             name: "ATTITUDE", in any case.
-            system_id, component_id: who sent it; None will do if just one did.
+            system_id, component_id: ids of the sender; None is sufficient if only one component sent it.
             instance: value of the message's instance field (id of a battery, name of a value); None: all.
             boot: number of the system's boot; None: all.
 
         Raises:
-            LogError: there is no such message, or several components sent it.
+            LogError: the log has no such message, or several components sent it.
         """
         found = self._find((name,), system_id, component_id)
         if not found:
@@ -317,7 +317,7 @@ class Log:
     def tables(
         self, name: str, *, system_id: Ids = None, component_id: Ids = None, boot: int | None = None
     ) -> list[Table]:
-        """Tables of a message, one for each component that sent it; empty when none did."""
+        """Tables of a message, one for each component that sent it; empty when none sent it."""
         found = (
             self.stream_table(stream, boot=boot) for stream in self._find((name,), system_id, component_id)
         )
@@ -342,10 +342,10 @@ class Log:
         boot: int | None = None,
         condition: MessageCondition | Callable[[Table], NDArray[np.bool_]] | None = None,
     ) -> list[Selection]:
-        """Streams, and which rows of each, that `messages` would give.
+        """Streams, and the rows of each, that `messages` would return.
 
         Raises:
-            LogError: a name is none of the dialect.
+            LogError: a name is not in the dialect.
         """
         selections: list[Selection] = []
         for stream in self._find(_names(names), system_id, component_id):
@@ -373,14 +373,14 @@ class Log:
         """(vehicle time in microseconds, message) in the order of the file.
 
         Args:
-            names: of messages; None: all. Names that are not in the log give nothing.
-            system_id, component_id: who sent them; None: anyone.
+            names: names of messages; None: all. Names that are not in the log are ignored.
+            system_id, component_id: ids of the sender; None: any.
             boot: number of the system's boot; None: all.
-            condition: which of them, by their values: an object with `mask`, or a function that makes a mask
-                of a table.
+            condition: selects messages by their values: an object with `mask`, or a function that returns a
+                mask for a table.
 
         Raises:
-            LogError: a name is none of the dialect.
+            LogError: a name is not in the dialect.
         """
         selections = self.select(
             names, system_id=system_id, component_id=component_id, boot=boot, condition=condition
@@ -388,7 +388,7 @@ class Log:
         return messages_in_order(self.source, selections)
 
     def report(self) -> LogReport:
-        """What is in the log, and what is not: bytes by reason, loss, gaps, rates, modes, flights."""
+        """Contents and defects of the log: bytes by reason, loss, gaps, rates, modes, flights."""
         return make_report(self)
 
     def _find(self, names: Iterable[str] | None, system_id: Ids, component_id: Ids) -> list[Stream]:
@@ -402,7 +402,7 @@ class Log:
         ]
 
     def _tables_for(self, stream: Stream, name: str) -> list[Table]:
-        """What a condition on messages of a stream may read of its vehicle."""
+        """The tables of its vehicle that a condition on messages of a stream may use."""
         return [self.stream_table(found) for found in self._find((name,), stream.system_id, None)]
 
     def _rows(self, stream: Stream, boot: int | None) -> NDArray[np.int64]:
@@ -454,7 +454,7 @@ class Log:
 
 
 def _rate_hz(times_us: NDArray[np.int64]) -> float:
-    """Messages a second while they were sent; gaps are left out."""
+    """Messages per second while they were sent; gaps are left out."""
     steps = np.diff(times_us)
     steps = steps[steps >= 0]
     if not len(steps):

@@ -1,7 +1,7 @@
-"""The one clock of all times of a log: the time since boot of its first vehicle.
+"""The common clock of all times of a log: the time since boot of its first vehicle.
 
-Messages of other systems have the vehicle's newest time at their place in the file, so that one time is one
-moment for all of them. A log without a vehicle that reports its time is timed by its records.
+Messages of other systems get the vehicle's newest time at their place in the file, so that equal times mean
+the same moment. In a log without a vehicle that reports its time, the record times are used.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ class LogClock:
     """Times of all messages of a log.
 
     Attributes:
-        system_id: whose time since boot it is; None: seconds since the first record.
-        time_us: (count,) for each message, by its position.
+        system_id: the system whose time since boot is used; None: time since the first record.
+        time_us: (count,) time of each message, by its position.
         boot: (count,) number of that system's boot, from 0.
     """
 
@@ -32,14 +32,14 @@ class LogClock:
 
     @property
     def text(self) -> str:
-        """What it counts from, in words."""
+        """The origin of the clock, as text."""
         if self.system_id is None:
             return "seconds since the first record"
         return f"seconds since boot of vehicle {self.system_id}"
 
 
 def make_clock(source: LogSource) -> LogClock:
-    """The clock of a log: of the lowest system id whose autopilot reports its time."""
+    """The clock of a log, from the lowest system id whose autopilot reports its time."""
     times = source.time_us
     system_id = min(
         (

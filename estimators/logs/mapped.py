@@ -1,7 +1,7 @@
-"""Logs that are no MAVLink streams, as sources of MAVLink messages: what their openers make of them.
+"""Sources of MAVLink messages made from logs that are not MAVLink streams.
 
-Every table of the file stays readable under its own name. What estimators ask for is there as MAVLink
-messages too, in MAVLink's units.
+Every table of the file stays readable under its own name. The data that estimators need are also available as
+MAVLink messages, in MAVLink's units.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,7 +22,7 @@ from estimators.vehicle_time import AUTOPILOT
 Array = NDArray[Any]
 
 SYSTEM_ID: Final = 1
-"""A flight controller's own log is of one vehicle, which it does not number."""
+"""System id of a flight controller's own log, which contains one vehicle and no id."""
 
 _SECOND_US: Final = 1_000_000
 
@@ -47,7 +47,7 @@ class Part:
     """Messages of one kind, in the order of their times.
 
     Attributes:
-        description: of the message.
+        description: description of the message.
         time_us: (n,) vehicle time.
         columns: fields by name, with the types of the definition.
     """
@@ -70,39 +70,41 @@ class Records:
     columns: Mapping[str, Array]
 
     def has(self, *fields: str) -> bool:
-        """Whether there are these fields."""
+        """Whether all these fields exist."""
         return all(field in self.columns for field in fields)
 
     def where(self, rows: Array) -> "Records":
-        """Some of them."""
+        """The records of the given rows."""
         return Records(self.time_us[rows], {name: column[rows] for name, column in self.columns.items()})
 
     def instance(self, field: str, number: int) -> "Records":
-        """Those of one instance; all of them when there is no such field."""
+        """The records of one instance; all records when there is no such field."""
         return self.where(self.columns[field] == number) if field in self.columns else self
 
 
 def value_at(records: Records | None, field: str, at_us: Array, before: float = 0.0) -> Array:
-    """The newest value of a field at each time; `before` until the first, and without the field."""
+    """The newest value of a field at each time; `before` until the first value, and when the field does not
+    exist.
+    """
     if records is None or not records.has(field):
         return np.full(len(at_us), before)
     return newest(records.time_us, records.columns[field], at_us, before)
 
 
 def each_second(found: Iterable[Records]) -> Array:
-    """Times from the first message of all to the last, a second apart."""
+    """Times from the first message of all records to the last, in steps of a second."""
     spans = [(int(records.time_us.min()), int(records.time_us.max())) for records in found]
     return np.arange(min(first for first, _ in spans), max(last for _, last in spans) + 1, _SECOND_US)
 
 
 def mavlink_part(name: str, time_us: Array, **columns: Any) -> Part:
-    """A MAVLink message made from columns; fields that are not given are 0, as on the wire.
+    """Make MAVLink messages from columns; fields that are not specified are 0, as on the wire.
 
     Args:
-        name: of the message.
+        name: name of the message.
         time_us: (n,) vehicle time; the message's own time stamp is set from it.
-        columns: wire values by field, (n,), (n, length) for arrays, or one for all. Integers are rounded and
-            clipped to what the field can hold; NaN becomes 0 there.
+        columns: wire values by field, (n,), (n, length) for arrays, or one value for all messages. Integers
+            are rounded and clipped to the range of the field; NaN becomes 0 in integer fields.
     """
     described = load_dialect().find(name)
     times = np.ascontiguousarray(time_us, dtype=np.int64)
@@ -130,11 +132,11 @@ def own_part(
     """A table of the file under its own name.
 
     Args:
-        name: of the table.
-        number: negative, one for each table, so that it is no MAVLink message's.
+        name: name of the table.
+        number: negative and different for each table, so that it is not the id of a MAVLink message.
         time_us: (n,) vehicle time.
         columns: fields by name.
-        units: of the fields that have one.
+        units: units of the fields that have one.
     """
     fields = [_layout(field, column) for field, column in columns.items()]
     made = {field: np.ascontiguousarray(column) for field, column in columns.items()}
@@ -151,13 +153,13 @@ def newest(times_us: Array, values: Array, at_us: Array, before: float = 0.0) ->
 
 
 class MappedSource(LogSource):
-    """Messages of a flight controller's own log, put in the order of their times.
+    """Messages of a flight controller's own log, sorted by time.
 
     Args:
         path, size_bytes, format: the file.
-        parts: what was found; at least one message in all.
+        parts: the messages found; at least one in total.
         unix_offset_us: Unix time of vehicle time 0; None: not known.
-        bytes_by_kind: where every byte of the file went.
+        bytes_by_kind: the bytes of the file, by the use of each.
         drops, remarks: figures for the report.
     """
 
@@ -203,11 +205,11 @@ class MappedSource(LogSource):
 
     @property
     def boot_starts(self) -> Mapping[int, NDArray[np.int64]]:
-        """A flight controller begins a new file with each boot."""
+        """Empty: a flight controller begins a new file with each boot."""
         return {}
 
     def log_time_us(self, order: Positions) -> NDArray[np.int64]:
-        """Unix times, when a GPS has told the date; else 0."""
+        """Unix times, when a GPS has reported the date; otherwise 0."""
         if self._unix_offset_us is None:
             return np.zeros(len(order), dtype=np.int64)
         return self._time_us[order] + self._unix_offset_us
@@ -218,17 +220,17 @@ class MappedSource(LogSource):
 
     @property
     def bytes_by_kind(self) -> Mapping[str, int]:
-        """Where every byte went."""
+        """The bytes of the file, by the use of each."""
         return self._bytes_by_kind
 
     @property
     def drops(self) -> Mapping[str, int]:
-        """How often something was dropped, by reason."""
+        """Number of dropped items, by reason."""
         return self._drops
 
     @property
     def remarks(self) -> Mapping[str, int | str]:
-        """Further figures."""
+        """Additional figures."""
         return self._remarks
 
 

@@ -1,4 +1,6 @@
-"""A recorded log with faults put in: what would have been heard if a sensor or the link had failed."""
+"""A recorded log with inserted faults: the data that would have been received if a sensor or the link had
+failed.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -26,25 +28,25 @@ _GLOBAL: Final = frozenset({"lat", "lon"})
 Rows = NDArray[np.int64]
 
 _LONGEST_STEP: Final = 10.0
-"""Spells of an intermittent message that a pause of the log is worth at most."""
+"""Largest number of spells of an intermittent fault that a pause of the log can span."""
 _LAST_US: Final = np.iinfo(np.int64).max
 
 
 def mutated_records(
     log: Log, selections: Sequence[Selection], faults: Sequence[Fault], *, seed: int = 0
 ) -> Iterator[Record]:
-    """Records of a log with faults, in the order of their times.
+    """Iterate over the records of a log with faults, sorted by time.
 
-    Frames that are changed get a new checksum and lose their signature, if they had one.
+    Changed frames get a new checksum and lose their signature, if they had one.
 
     Args:
         log: an open telemetry log.
-        selections: what to keep, from `Log.select`.
-        faults: what happens to it.
-        seed: of all that is random.
+        selections: the messages to keep, from `Log.select`.
+        faults: the faults to insert.
+        seed: seed of the random numbers.
 
     Raises:
-        LogError: a fault touches nothing, or a field that a message does not have.
+        LogError: a fault affects no message, or a field that a message does not have.
     """
     clock_s: NDArray[np.float64] = (log.clock.time_us * 1e-6).astype(np.float64)
     gone: list[NDArray[np.int64]] = []
@@ -95,14 +97,14 @@ def mutated_records(
 
 
 def _is_alone(stream: Stream, fault: Fault) -> bool:
-    """Whether a message holds nothing but what fails: an IMU's goes on when its gyro alone is off."""
+    """Whether a message has only failing values; an IMU message is still sent when only its gyro is off."""
     fields = fault.fields[stream.name]
     others = {"xacc", "xgyro", "groundspeed", "press_abs", "load"}
     return not fields or not others & (set(stream.description.definition.field_names) - set(fields))
 
 
 def _lost(fault: Fault, times_s: NDArray[np.float64], rng: np.random.Generator) -> Rows | None:
-    """Which of the messages do not arrive; None: the kind loses none."""
+    """The messages that do not arrive; None: the kind of fault loses none."""
     count = len(times_s)
     match fault.kind:
         case FaultKind.OFF:
@@ -116,14 +118,15 @@ def _lost(fault: Fault, times_s: NDArray[np.float64], rng: np.random.Generator) 
             return np.flatnonzero((np.arange(count) + 1) % factor != 0)
         case FaultKind.INTERMITTENT:
             assert fault.value is not None
-            # Stamps may go back, or (damaged) far away: that takes no time, and no more than some spells.
+            # Stamps may go back or, if damaged, jump far: a step back takes no time, and a jump at most some
+            # spells.
             steps_s = np.clip(np.diff(times_s, prepend=times_s[0]), 0.0, _LONGEST_STEP * fault.value)
             elapsed_s = np.cumsum(steps_s)
             edges = [0.0]
             while edges[-1] <= elapsed_s[-1]:
                 edges.append(edges[-1] + max(1e-3, float(rng.exponential(fault.value))))
             spell = np.searchsorted(np.array(edges), elapsed_s, side="right") - 1
-            return np.flatnonzero(spell % 2 == 0)  # silent first
+            return np.flatnonzero(spell % 2 == 0)  # missing first
     return None
 
 
@@ -136,7 +139,7 @@ def _changed(
     rng: np.random.Generator,
     before: dict[int, bytes],
 ) -> dict[int, bytes]:
-    """New frames of these messages, by their position."""
+    """New frames of these messages, by position."""
     definition = stream.description.definition
     fields = fault.fields[stream.name] or tuple(
         field.name
@@ -175,7 +178,7 @@ def _changed(
 
 
 def _wire_per_metre(field: str, records: NDArray[np.void]) -> float:
-    """degE7 for a metre to the north or the east."""
+    """Wire value (degE7) of one metre to the north or the east."""
     per_metre = math.degrees(1.0 / _EARTH_RADIUS_M) * 1e7
     if field == "lon":
         per_metre /= max(0.01, math.cos(math.radians(float(records["lat"][0]) * 1e-7)))
@@ -189,11 +192,11 @@ def _spoiled(
     scale: float,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Wire values with the fault in them."""
+    """Wire values with the fault applied."""
     amount = 0.0 if fault.value is None else fault.value * scale
     shape = (len(values),) + (1,) * (values.ndim - 1)
     match fault.kind:
-        case FaultKind.STUCK | FaultKind.OFF:  # a driver goes on reading what nobody updates
+        case FaultKind.STUCK | FaultKind.OFF:  # a driver still reads values that are no longer updated
             return np.broadcast_to(values[:1], values.shape)
         case FaultKind.GARBAGE:
             return rng.uniform(-amount, amount, values.shape)
@@ -223,7 +226,7 @@ def _payload(frame: bytes, size: int) -> bytes:
 
 
 def _reframed(frame: bytes, payload: bytes, definition: MessageDefinition) -> bytes:
-    """The frame with another payload; MAVLink 2 leaves trailing zeros out (guide, "Payload truncation")."""
+    """The frame with another payload; MAVLink 2 omits trailing zeros (guide, "Payload truncation")."""
     if frame[0] == MAGIC_V2:
         body = payload.rstrip(b"\0") or b"\0"
         flags = frame[2] & ~INCOMPAT_SIGNED

@@ -1,4 +1,4 @@
-"""Files that are whole or not there: written under another name, renamed when done, over no other file."""
+"""Files that are complete or absent: written under another name, and renamed when complete."""
 
 import os
 from collections.abc import Iterator
@@ -10,7 +10,8 @@ from estimators.logs.errors import LogError
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """The path to write to; what is there when the block ends without an error becomes `path`.
+    """Context with a temporary path to write to. When the block ends without an error, that file becomes
+    `path`.
 
     Raises:
         LogError: `path` exists, or can't be written.
@@ -33,11 +34,13 @@ def new_file(path: Path) -> Iterator[Path]:
 
 
 def _put(part: Path, path: Path) -> None:
-    """Give a file its name; a FileExistsError when somebody else was faster, which a rename does not see."""
+    """Give a file its final name; raises FileExistsError when another process has created it, which a rename
+    would not detect.
+    """
     try:
         os.link(part, path)
     except FileExistsError:
         raise
-    except OSError:  # a file system without hard links, such as a memory card's: the name is taken first
+    except OSError:  # a file system without hard links, as on a memory card: the name is reserved first
         path.open("xb").close()
         part.replace(path)

@@ -1,4 +1,4 @@
-"""Opens logs, by their content."""
+"""Opens logs; the format is recognised by the content."""
 
 from pathlib import Path
 from typing import Final
@@ -12,7 +12,7 @@ from estimators.logs.tlog import open_tlog
 _ULG_MAGIC: Final = bytes.fromhex("554c6f67011235")
 _DATAFLASH_MAGIC: Final = bytes.fromhex("a395")
 _DATAFLASH_FMT: Final = bytes.fromhex("a395808059") + b"FMT"
-"""The message that describes the format of formats; some logs have junk before it."""
+"""The message that describes the format of formats; some logs have junk bytes before it."""
 _HEAD_BYTES: Final = 8192
 
 
@@ -21,12 +21,12 @@ def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
 
     Args:
         path: a telemetry log (.tlog), a capture of a MAVLink stream, an ArduPilot onboard log (.bin, or .log
-            in text form), or a PX4 .ulg; recognised by its content, whatever its name is.
-        dialect: of a telemetry log: a dialect of pymavlink's by name ("common"), or the path of an XML
+            in text form), or a PX4 .ulg; recognised by its content, independent of its name.
+        dialect: dialect of a telemetry log: a pymavlink dialect by name ("common"), or the path of an XML
             definition file; None: every message of MAVLink's public definitions.
 
     Raises:
-        LogError: the file can't be read or is no log, or there is no such dialect.
+        LogError: the file can't be read or is not a log, or the dialect does not exist.
     """
     path = Path(path)
     head = _read_head(path)
@@ -34,7 +34,7 @@ def open_log(path: Path | str, *, dialect: str | Path | None = None) -> Log:
 
 
 def _open_source(path: Path, head: bytes, dialect: str | Path | None) -> LogSource:
-    """The one place that knows the formats."""
+    """Select the reader by the content; all formats are known only here."""
     ulog = head.startswith(_ULG_MAGIC)
     binary = head.startswith(_DATAFLASH_MAGIC) or _DATAFLASH_FMT in head
     text = not ulog and not binary and b"FMT," in head
@@ -46,7 +46,7 @@ def _open_source(path: Path, head: bytes, dialect: str | Path | None) -> LogSour
         return open_tlog(path, load_dialect(dialect))
     if dialect is not None:
         raise LogError(f"{path} is no MAVLink stream; a dialect ({dialect}) has no effect, leave it out")
-    # Imported here, for the libraries behind them take their time.
+    # Imported here because the libraries behind them load slowly.
     if ulog:
         from estimators.logs.ulog import open_ulog
 

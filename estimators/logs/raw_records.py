@@ -1,4 +1,4 @@
-"""Records of a telemetry log as they are: time stamp and frame, to be cut out, changed, or played."""
+"""Raw records of a telemetry log (time stamp and frame), for copying, changing or playing."""
 
 import struct
 from collections.abc import Iterator, Sequence
@@ -22,10 +22,10 @@ _BATCH: Final = 4096
 
 
 def telemetry(log: Log) -> TlogSource:
-    """The source of a log that has frames.
+    """The source of a log that contains frames.
 
     Raises:
-        LogError: it is an onboard log, which has none.
+        LogError: it is an onboard log, which contains no frames.
     """
     if isinstance(log.source, TlogSource):
         return log.source
@@ -35,7 +35,7 @@ def telemetry(log: Log) -> TlogSource:
 
 
 def record_times_us(log: Log, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """When messages were recorded; vehicle time where the file has no times of its own."""
+    """Times at which messages were recorded; vehicle time when the file has no record times."""
     times = log.source.log_time_us(order)
     return times if np.any(times) else log.source.time_us[order]
 
@@ -47,7 +47,7 @@ def window(
     to_s: float | None,
     boot: int | None = None,
 ) -> list[Selection]:
-    """What of a selection lies in a part of the log; arguments and errors as of `Log.inside`."""
+    """The part of a selection that is in a part of the log; arguments and errors as in `Log.inside`."""
     found = []
     for stream, rows in selections:
         kept = rows[log.inside(stream.order[rows].astype(np.int64), from_s=from_s, to_s=to_s, boot=boot)]
@@ -57,14 +57,14 @@ def window(
 
 
 def positions(selections: Sequence[Selection]) -> NDArray[np.int64]:
-    """Positions in the log of what is selected, ascending."""
+    """Positions in the log of the selected messages, ascending."""
     if not selections:
         return np.empty(0, dtype=np.int64)
     return np.sort(np.concatenate([stream.order[rows].astype(np.int64) for stream, rows in selections]))
 
 
 def read_records(log: Log, order: NDArray[np.int64]) -> Iterator[Record]:
-    """Records at some positions, in that order."""
+    """Records at the given positions, in the given order."""
     source = telemetry(log)
     data = source.data.data
     for first in range(0, len(order), _BATCH):
@@ -76,13 +76,13 @@ def read_records(log: Log, order: NDArray[np.int64]) -> Iterator[Record]:
 
 
 def write_records(path: Path, records: Iterator[Record]) -> int:
-    """Write a new telemetry log, whole or not at all.
+    """Write a new telemetry log. After an error no file remains.
 
     Returns:
-        How many records were written.
+        The number of records written.
 
     Raises:
-        LogError: the file exists or can't be written, or there is nothing to write.
+        LogError: the file exists or can't be written, or there are no records to write.
     """
     count = 0
     with new_file(path) as part, open(part, "xb") as file:

@@ -1,4 +1,4 @@
-"""What a log holds and what it lacks, in figures."""
+"""The contents and defects of a log in figures."""
 
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from estimators.logs.log import Log
 
 GAP_US: Final = 2_000_000
-"""Silence of a system for longer than this is a gap."""
+"""A longer silence of a system is a gap."""
 
 _MAX_INSTANCES: Final = 32
 
@@ -23,10 +23,10 @@ class StreamReport:
     """One message of one component.
 
     Attributes:
-        name, system_id, component_id: which.
-        count: messages.
+        name, system_id, component_id: the message and its sender.
+        count: number of messages.
         rate_hz: mean rate while it was sent.
-        longest_gap_s: longest time from one to the next, on vehicle time, in one boot.
+        longest_gap_s: longest time between consecutive messages, in vehicle time, in one boot.
         instances: values of its instance field, at most 32; empty for messages without.
     """
 
@@ -41,12 +41,12 @@ class StreamReport:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gap:
-    """A time in which nothing was heard of a system with an autopilot, though its clock went on.
+    """A time in which no message of a system with an autopilot was received, although its clock advanced.
 
     Attributes:
         system_id: which system.
         boot: number of the boot of the log's clock.
-        start_us, end_us: on the log's clock, before and after.
+        start_us, end_us: times of the last message before and the first after it, on the log's clock.
     """
 
     system_id: int
@@ -57,7 +57,7 @@ class Gap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BootReport:
-    """One boot of a system: its number, and vehicle time of its first message and of the newest."""
+    """One boot of a system: its number, and vehicle time of its first and newest message."""
 
     system_id: int
     number: int
@@ -71,18 +71,18 @@ class LogReport:
 
     Attributes:
         path, format, size_bytes: the file.
-        dialect: in which its messages were looked up.
-        messages: valid ones.
+        dialect: dialect with which it was read.
+        messages: number of valid messages.
         duration_s, start_unix_us: as in `Log`.
-        bytes_by_kind: where every byte went; the sum is `size_bytes`.
-        drops: how often something was dropped, by reason.
-        remarks: figures that only this format has: versions of the wire, kind of time stamps.
-        losses: by sequence numbers, for each component.
+        bytes_by_kind: the bytes of the file, by the use of each; the sum is `size_bytes`.
+        drops: number of dropped items, by reason.
+        remarks: figures that only this format has: MAVLink versions, kind of time stamps.
+        losses: losses from sequence numbers, for each component.
         unknown: messages that the dialect does not know.
         boots, gaps: for each system.
-        vehicles: what they are, modes and flights.
+        vehicles: their types, modes and flights.
         streams: rates, by system, component and name.
-        clock: what times of gaps, modes and flights are counted from.
+        clock: origin of the times of gaps, modes and flights.
     """
 
     path: str
@@ -104,12 +104,12 @@ class LogReport:
     clock: str
 
     def to_dict(self) -> dict[str, Any]:
-        """The same for JSON: numbers, texts, lists and dictionaries."""
+        """The report for JSON: numbers, texts, lists and dictionaries."""
         return asdict(self)
 
 
 def make_report(log: "Log") -> LogReport:
-    """Figures of a log."""
+    """Make the report of a log."""
     source = log.source
     return LogReport(
         path=str(log.path),
@@ -166,7 +166,7 @@ def _streams(log: "Log") -> tuple[StreamReport, ...]:
 def _gaps(log: "Log") -> tuple[Gap, ...]:
     found = []
     clock = log.clock
-    # Who has no autopilot has no clock that goes on by itself.
+    # A system without an autopilot has no clock that advances by itself.
     clocked = {stream.system_id for stream in log.source.streams if stream.component_id == AUTOPILOT}
     for boot in log.boots:
         if boot.system_id not in clocked:

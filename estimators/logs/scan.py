@@ -1,11 +1,11 @@
-"""Where the frames of a telemetry log are: one compiled pass over the bytes.
+"""Positions of the frames in a telemetry log, found in one compiled pass over the bytes.
 
-A frame is valid when the dialect knows its message, it has no incompatibility flag but "signed", it lies in
-the file whole, and its checksum is right. Behind each frame the next is first looked for where it belongs,
-behind a time stamp of 8 bytes (`lead`; 0 in captures without stamps); if none is there, it is the first
-valid one that begins anywhere behind the last. So no damage hides a frame that begins outside of a valid
-one, and a stamp that happens to look like the beginning of a frame hides none either. What lies between is
-told apart afterwards (`gaps`).
+A frame is valid when the dialect contains its message, it has no incompatibility flag other than "signed",
+the whole frame is in the file, and its checksum is correct. After each frame the next one is first looked for
+at its expected place, after a time stamp of 8 bytes (`lead`; 0 in captures without stamps). If there is none,
+the next frame is the first valid one that begins anywhere after the last. Therefore no damage hides a frame
+that begins outside a valid one, and a stamp that looks like the beginning of a frame does not hide one
+either. The bytes between frames are classified afterwards (`gaps`).
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,12 @@ from estimators.logs.dialect import Dialect
 from flightsim.kernels import kernel
 
 STAMP_SIZE: Final = 8
-"""Bytes of the time before each frame."""
+"""Size of the time stamp before each frame, bytes."""
 
 MAX_LATE: Final = 16
-"""Frames: a larger step back in the sequence is a sender that started anew; as `FrameParser` has it."""
+"""A larger step back in the sequence, in frames, means that the sender restarted; same value as in
+`FrameParser`.
+"""
 
 _PAGE: Final = 256
 _CAPACITY: Final = 1 << 20
@@ -33,18 +35,18 @@ _SIGNATURE: Final = 13
 _HASH: Final = 0x9E3779B97F4A7C15  # Knuth's multiplicative hash
 # Columns of `sources`, one row per system and component.
 FRAMES, LOST, LATE, LAST = range(4)
-# What `progress` holds from call to call.
+# Contents of `progress`, which are kept from call to call.
 _AT, _FOUND, _GAPS, _STREAMS, _V1, _SIGNED, _UNSTAMPED, _FRAME_BYTES = range(8)
 
 
 @dataclass(frozen=True, slots=True)
 class MessageTable:
-    """The dialect for compiled code: messages are numbered in the order of their ids.
+    """Lookup table of a dialect for compiled code. Messages are numbered in the order of their ids.
 
     Attributes:
-        pages, rows: number of a message: rows[pages[id // 256], id % 256]; -1 when there is none.
-        extras: CRC_EXTRA of each.
-        ids: message id of each.
+        pages, rows: the number of a message is rows[pages[id // 256], id % 256]; -1 when there is none.
+        extras: CRC_EXTRA of each message.
+        ids: id of each message.
     """
 
     pages: NDArray[np.int16]
@@ -54,7 +56,7 @@ class MessageTable:
 
 
 def message_table(dialect: Dialect) -> MessageTable:
-    """Lookup of a dialect's messages."""
+    """Lookup table of a dialect's messages."""
     ids = np.array(sorted(dialect.messages), dtype=np.int64)
     used = np.unique(ids // _PAGE)
     pages = np.zeros((1 << 24) // _PAGE, dtype=np.int16)
@@ -75,16 +77,16 @@ class FrameIndex:
 
     Attributes:
         lead: bytes before each frame that belong to it: 8 (time stamp) or 0.
-        starts: where each frame begins; uint32, or int64 in files of 4 GiB and more.
-        streams: which stream each belongs to (int32): message, system and component.
+        starts: position at which each frame begins; uint32, or int64 in files of 4 GiB and more.
+        streams: number of each frame's stream (int32), which is a message, system and component.
         stream_keys: shape (streams, 3): message number of the `MessageTable`, system id, component id; in the
             order of their first frames.
-        gaps: shape (gaps, 2): from the end of a frame (or of nothing) to the beginning of the next (or the
-            end of the file), wherever these are not exactly `lead` bytes.
+        gaps: shape (gaps, 2): from the end of a frame (or the beginning of the file) to the beginning of the
+            next (or the end of the file), when these are not exactly `lead` bytes.
         sources: by system and component (row = system * 256 + component): frames, lost, late, last sequence.
-        frames_v1, frames_signed: how many are in MAVLink 1, and with a signature.
-        unstamped: frames with fewer than 8 bytes before them, though the log has stamps.
-        frame_bytes: bytes in frames.
+        frames_v1, frames_signed: number of frames in MAVLink 1, and with a signature.
+        unstamped: number of frames with fewer than 8 bytes before them, although the log has stamps.
+        frame_bytes: number of bytes in frames.
     """
 
     lead: int
@@ -149,7 +151,7 @@ def _joined(parts: list[NDArray[Any]], empty: NDArray[Any]) -> NDArray[Any]:
 
 
 def _grown(keys: NDArray[np.int64], used: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Twice the room for streams, the hash table made anew."""
+    """Arrays with twice the room for streams, and a rebuilt hash table."""
     larger = np.zeros((2 * len(keys), 3), dtype=np.int64)
     larger[:used] = keys[:used]
     slots = np.full(4 * len(larger), -1, dtype=np.int32)
@@ -174,7 +176,9 @@ def _insert(keys: NDArray[np.int64], slots: NDArray[np.int32], number: int) -> N
 
 @kernel
 def frame_end(data: NDArray[np.uint8], at: Int) -> Int:
-    """End of what begins at `at` as a frame does, by its length and flags; its head lies in the file."""
+    """End, from its length and flags, of the bytes at `at` that begin like a frame; their header is in the
+    file.
+    """
     length = np.int64(data[at + 1])
     if data[at] != MAGIC_V2:
         return at + _OVERHEAD_V1 + length
@@ -185,7 +189,7 @@ def frame_end(data: NDArray[np.uint8], at: Int) -> Int:
 def message_row(
     data: NDArray[np.uint8], at: Int, pages: NDArray[np.int16], rows: NDArray[np.int16]
 ) -> np.int64:
-    """Number of the message in the frame at `at`; below 0: the dialect does not know it."""
+    """Number of the message of the frame at `at`; negative: not in the dialect."""
     if data[at] == MAGIC_V2:
         page = np.int64(data[at + 8]) | np.int64(data[at + 9]) << 8
         return np.int64(rows[pages[page], data[at + 7]])
@@ -200,7 +204,7 @@ def valid_frame(
     rows: NDArray[np.int16],
     extras: NDArray[np.uint8],
 ) -> tuple[Int, Int]:
-    """End of the valid frame that begins at `at`, and the number of its message; (-1, -1) if none does."""
+    """End of the valid frame that begins at `at`, and the number of its message; (-1, -1) if none."""
     size = len(data)
     magic = data[at]
     if magic == MAGIC_V2:
@@ -241,7 +245,7 @@ def _scan_some(
     sources: NDArray[np.int64],
     progress: NDArray[np.int64],
 ) -> None:
-    """Go on from `progress` until the file ends, an array is full, or the table of streams is half full."""
+    """Continue from `progress` until the file ends, an array is full, or the stream table is half full."""
     size = len(data)
     at: Int = progress[_AT]
     found = 0

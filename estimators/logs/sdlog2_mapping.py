@@ -1,7 +1,8 @@
-"""PX4's onboard logs of before 2016 (sdlog2, .bin, .px4log) as the messages that estimators ask for.
+"""PX4's onboard logs from before 2016 (sdlog2, .bin, .px4log), converted to the messages that estimators
+need.
 
 Source: the messages of PX4's sdlog2 module (`sdlog2_messages.h`, 1.0 to 1.6): SI units, radians, PX4's body
-frame. `GPS` has degrees.
+frame. `GPS` is in degrees.
 """
 
 from collections.abc import Mapping
@@ -34,7 +35,7 @@ _CUSTOM_MODES: Final = {  # STAT.MainState (commander_state): PX4's main and sub
 
 
 def map_sdlog2(tables: Mapping[str, Records], unix_offset_us: int | None, banner: str = "") -> list[Part]:
-    """MAVLink messages from what the log has; arguments as of `dataflash_mapping.map_messages`."""
+    """Convert the log's tables to MAVLink messages; arguments as in `dataflash_mapping.map_messages`."""
     found = [*_imu(tables), *_attitude(tables), *_positions(tables), *_air(tables), *_state(tables)]
     if unix_offset_us is not None:
         times = each_second(tables.values())
@@ -48,7 +49,7 @@ def _imu(tables: Mapping[str, Records]) -> list[Part]:
         imu = tables.get(name)
         if imu is None or not imu.has("AccX", "AccY", "AccZ", "GyroX", "GyroY", "GyroZ"):
             continue
-        # The writer repeats the newest samples with every change of any other sensor.
+        # The writer repeats the newest samples whenever any other sensor changes.
         values = np.column_stack(
             [imu.columns[k] for k in ("AccX", "AccY", "AccZ", "GyroX", "GyroY", "GyroZ")]
         )

@@ -1,4 +1,4 @@
-"""What a file format must offer to be opened as a `Log`."""
+"""The interface that a file format must implement to be opened as a `Log`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -20,8 +20,8 @@ class Stream:
     """All messages of one kind from one component.
 
     Attributes:
-        description: of the message.
-        system_id, component_id: who sent it.
+        description: description of the message.
+        system_id, component_id: ids of the sender.
         order: positions of the messages in the log, ascending; int32 or int64.
     """
 
@@ -42,9 +42,9 @@ class UnknownMessage:
 
     Attributes:
         message_id: its number.
-        system_id, component_id: who sent it.
-        count: frames.
-        frame_bytes: bytes in them; their checksums can't be verified.
+        system_id, component_id: ids of the sender.
+        count: number of frames.
+        frame_bytes: number of bytes in them; their checksums can't be verified.
     """
 
     message_id: int
@@ -56,13 +56,13 @@ class UnknownMessage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLoss:
-    """What was heard from one component, by its sequence numbers.
+    """Received and lost frames of one component, from its sequence numbers.
 
     Attributes:
         system_id, component_id: the component.
-        frames: good frames.
-        lost: frames missing from the sequence, those that came late taken off.
-        late: frames that came after a later one, or twice.
+        frames: number of valid frames.
+        lost: frames missing from the sequence, without those that arrived late.
+        late: frames that arrived after a later one, or twice.
     """
 
     system_id: int
@@ -80,9 +80,9 @@ class LogSource(ABC):
         path: the file.
         size_bytes: its size.
         format: "tlog", "raw MAVLink", "bin", "ulg".
-        dialect: definitions of the messages, whose wire units the columns have.
-        streams: every kind of message of every component that has at least one, in the order of their first.
-        count: messages in all.
+        dialect: definitions of the messages; the columns are in their wire units.
+        streams: all streams with at least one message, in the order of their first message.
+        count: total number of messages.
     """
 
     path: Path
@@ -112,27 +112,27 @@ class LogSource(ABC):
 
         Args:
             stream: one of `streams`.
-            rows: which of its messages, by their number in the stream.
+            rows: numbers of its messages in the stream.
         """
 
     @property
     @abstractmethod
     def bytes_by_kind(self) -> Mapping[str, int]:
-        """Where every byte of the file went; the sum is `size_bytes`."""
+        """The bytes of the file, by the use of each; the sum is `size_bytes`."""
 
     @property
     def drops(self) -> Mapping[str, int]:
-        """How often something was dropped, by reason."""
+        """Number of dropped items, by reason."""
         return {}
 
     @property
     def remarks(self) -> Mapping[str, int | str]:
-        """Further figures for the report."""
+        """Additional figures for the report."""
         return {}
 
     @property
     def losses(self) -> Sequence[SourceLoss]:
-        """Loss by sequence numbers; empty for formats without."""
+        """Losses from sequence numbers; empty for formats without sequence numbers."""
         return ()
 
     @property

@@ -18,10 +18,10 @@ class Table:
     """Messages of one kind from one component, in the order of the file.
 
     Attributes:
-        name: of the message.
-        system_id, component_id: who sent them.
-        instance: value of the instance field that was asked for; None: all.
-        boot: number of the system's boot that was asked for, from 0; None: all.
+        name: name of the message.
+        system_id, component_id: ids of the sender.
+        instance: requested value of the instance field; None: all.
+        boot: requested number of the system's boot, from 0; None: all.
         description: definition, units and instance field.
     """
 
@@ -60,7 +60,7 @@ class Table:
 
     @property
     def units(self) -> Mapping[str, str]:
-        """Units of the wire values, of those fields that have one ("degE7")."""
+        """Units of the wire values, for fields that have one ("degE7")."""
         return self.description.units
 
     @cached_property
@@ -108,7 +108,7 @@ class Table:
         return converted
 
     def si_unit(self, field: str) -> str:
-        """Unit of `si`: "rad"; "" for plain numbers."""
+        """Unit of the values of `si`: "rad"; "" for plain numbers."""
         return to_si(self.units.get(field, ""))[1]
 
     def select(self, rows: Any) -> "Table":

@@ -38,12 +38,12 @@ _MILLISECOND_US: Final = 1000
 class TlogSource(LogSource):
     """A mapped telemetry log and the index of its frames.
 
-    The file must not be shortened while it is open; a log that is still being written is read up to where it
-    ended when it was opened.
+    The file must not be shortened while it is open; a log that is still being written is read up to its end
+    at the time of opening.
 
     Args:
         path: the file.
-        data: its bytes.
+        data: bytes of the file.
         dialect: messages to look for.
 
     Raises:
@@ -72,7 +72,7 @@ class TlogSource(LogSource):
         self._time_us, begins = self._find_times()
         systems = self.index.stream_keys[self.index.streams[begins], 1]
         self._boot_starts = {int(system): begins[systems == system] for system in np.unique(systems)}
-        # Not needed any more, and a tenth of the file's size in memory.
+        # They are no longer needed, and take a tenth of the file's size in memory.
         self.index = replace(self.index, streams=np.empty(0, dtype=np.int32))
 
     def _make_streams(self) -> tuple[Stream, ...]:
@@ -117,7 +117,7 @@ class TlogSource(LogSource):
         return self._boot_starts
 
     def log_time_us(self, order: Positions) -> NDArray[np.int64]:
-        """Times of the records; a frame without one of its own has that of the frame before."""
+        """Times of the records; a frame without its own time has that of the previous frame."""
         times = np.zeros(len(order), dtype=np.int64)
         if self.index.lead:
             _log_times(
@@ -127,7 +127,9 @@ class TlogSource(LogSource):
 
     @cached_property
     def _little_endian(self) -> bool:
-        """Old ground stations wrote their stamps that way; read as big-endian they lie far in the future."""
+        """Whether the stamps are little-endian, as old ground stations wrote them; read as big-endian they
+        are far in the future.
+        """
         sample = np.arange(min(self.count, _STAMP_SAMPLE))
         times = np.zeros(len(sample), dtype=np.int64)
         _log_times(self.data, self.index.starts, sample, False, times)
@@ -141,7 +143,9 @@ class TlogSource(LogSource):
         return decode_columns(self.data, self.index.starts[stream.order[rows]], stream.description.definition)
 
     def frame_spans(self, order: Positions) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """First byte, and the one behind the last, of frames in the file; the time stamp lies before them."""
+        """First byte, and the byte after the last, of frames in the file; the time stamp is before the first
+        byte.
+        """
         starts = self.index.starts[order].astype(np.int64)
         ends = np.empty_like(starts)
         _frame_ends(self.data, starts, ends)
@@ -154,12 +158,12 @@ class TlogSource(LogSource):
 
     @cached_property
     def gaps(self) -> GapFigures:
-        """What lies between the frames."""
+        """The bytes between the frames."""
         return sort_gaps(self.data, self.index, self._table)
 
     @property
     def bytes_by_kind(self) -> Mapping[str, int]:
-        """Where every byte went."""
+        """The bytes of the file, by the use of each."""
         gaps = self.gaps
         return {
             "frames": self.index.frame_bytes,
@@ -173,7 +177,7 @@ class TlogSource(LogSource):
 
     @property
     def drops(self) -> Mapping[str, int]:
-        """How often frames were dropped, by reason."""
+        """Number of dropped frames, by reason."""
         gaps = self.gaps
         return {
             "unknown_messages": gaps.unknown,
@@ -183,7 +187,7 @@ class TlogSource(LogSource):
 
     @property
     def remarks(self) -> Mapping[str, int | str]:
-        """Figures of the wire and of the time stamps."""
+        """Figures of the MAVLink versions and of the time stamps."""
         return {
             "frames_v1": self.index.frames_v1,
             "frames_v2": self.count - self.index.frames_v1,
@@ -201,7 +205,9 @@ class TlogSource(LogSource):
 
     @property
     def losses(self) -> Sequence[SourceLoss]:
-        """Loss by sequence numbers, by system and component; messages that are not known are not lost."""
+        """Losses from sequence numbers, by system and component; frames of unknown messages do not count as
+        lost.
+        """
         sources = self.index.sources
         unknown: dict[int, int] = {}
         for item in self.unknown:
@@ -229,7 +235,7 @@ class TlogSource(LogSource):
         system = np.where(v2, data[starts + np.where(v2, 5, 3)], data[starts + 3]).astype(np.int64)
         component = data[starts + np.where(v2, 6, 4)].astype(np.int64)
         number = data[starts + np.where(v2, 7, 5)].astype(np.int64)
-        # Bytes 8 and 9 are within the frame in MAVLink 2 only.
+        # In MAVLink 1, bytes 8 and 9 may be outside the frame.
         number += np.where(v2, data[starts + np.where(v2, 8, 0)].astype(np.int64) << 8, 0)
         number += np.where(v2, data[starts + np.where(v2, 9, 0)].astype(np.int64) << 16, 0)
         ends = np.empty_like(starts)
@@ -261,7 +267,7 @@ def open_tlog(path: Path, dialect: Dialect) -> TlogSource:
     """Map a telemetry log and find its frames.
 
     Raises:
-        LogError: it can't be read, or has no valid frame.
+        LogError: it can't be read, or contains no valid frame.
     """
     try:
         with open(path, "rb") as file:
@@ -278,7 +284,7 @@ def _message_id(raw: bytes) -> int:
 
 @kernel
 def _group(streams: NDArray[np.int32], places: NDArray[np.int64], grouped: Positions) -> None:
-    """Counting sort: positions by stream, in order within each."""
+    """Counting sort: positions by stream, in ascending order within each stream."""
     for position in range(len(streams)):
         stream = streams[position]
         grouped[places[stream]] = position

@@ -18,16 +18,16 @@ from estimators.logs.ulog_mapping import UlogFacts, board_rotation, map_topics
 
 _TIME: Final = "timestamp"
 _MOST_RETURNS: Final = 2000
-"""Steps back to where the reader was before, at most: looking for a sync mark takes a few."""
+"""Limit of steps back to a position that was already read: a search for a sync mark needs a few."""
 _MAX_TIME_US: Final = 10**13
 _ELEMENT: Final = re.compile(r"(.+)\[(\d+)\]")
 
 
 class _Onward(io.BufferedReader):
-    """A file in which nobody goes round in circles.
+    """A file that stops a reader from looping endlessly.
 
-    pyulog goes on one byte behind a message that it does not know. Where that is cut off by the end of the
-    file it steps back too far, and would do so for ever.
+    pyulog continues one byte after the start of an unknown message. If the end of the file cuts that message
+    off, it steps back too far and would repeat this forever.
     """
 
     def __init__(self, path: Path) -> None:
@@ -49,12 +49,12 @@ def open_ulog(path: Path) -> MappedSource:
     """Open a PX4 .ulg.
 
     Raises:
-        LogError: it can't be read, or holds no message.
+        LogError: it can't be read, or contains no message.
     """
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # it prints what it finds odd
+        with contextlib.redirect_stdout(io.StringIO()):  # pyulog prints warnings
             log = ULog(_Onward(path), disable_str_exceptions=True)
-    except Exception as error:  # pyulog raises whatever a damaged file leads it to
+    except Exception as error:  # pyulog may raise any exception for a damaged file
         raise LogError(
             f"{path} can't be read as a PX4 .ulg: {type(error).__name__} {error}; is it whole?"
         ) from error
@@ -71,7 +71,7 @@ def open_ulog(path: Path) -> MappedSource:
             continue
         topic = Records(times[good].astype(np.int64), columns)
         topics.setdefault((data.name, data.multi_id), topic)
-        # Instances of a topic are tables of their own: sensor_accel, sensor_accel_1, ...
+        # Each instance of a topic has its own table: sensor_accel, sensor_accel_1, ...
         name = data.name if not data.multi_id else f"{data.name}_{data.multi_id}"
         names_taken[name] = names_taken.get(name, 0) + 1
         if names_taken[name] == 1:
@@ -105,7 +105,7 @@ def open_ulog(path: Path) -> MappedSource:
 
 
 def board_remarks(parameters: Mapping[str, float]) -> dict[str, str]:
-    """What is said of the board's rotation and offset: where they are corrected."""
+    """Remarks about the board's rotation and offset: where they are corrected."""
     if board_rotation(parameters) is None:
         return {
             "board": "SENS_BOARD_ROT is not about the vertical: IMUs other than the voted one are left out"
@@ -120,7 +120,7 @@ def board_remarks(parameters: Mapping[str, float]) -> dict[str, str]:
 
 
 def _arrays(columns: dict[str, Array]) -> dict[str, Array]:
-    """Columns `q[0]`, `q[1]`, ... as one of shape (n, 4); names as Python takes them."""
+    """Merge columns `q[0]`, `q[1]`, ... to one of shape (n, 4); names become valid Python names."""
     single: dict[str, Array] = {}
     elements: dict[str, dict[int, Array]] = {}
     for name, column in columns.items():
@@ -141,7 +141,8 @@ def _arrays(columns: dict[str, Array]) -> dict[str, Array]:
 def _base_us(log: ULog) -> np.uint64:
     """Time of the file at vehicle time 0.
 
-    Simulated vehicles without lockstep count microseconds of the calendar: then it is the log's earliest.
+    Simulated vehicles without lockstep use Unix time in microseconds; then it is the earliest time of the
+    log.
     """
     if log.start_timestamp < _MAX_TIME_US:
         return np.uint64(0)
@@ -151,7 +152,7 @@ def _base_us(log: ULog) -> np.uint64:
 
 
 def _unix_offset_us(topics: dict[tuple[str, int], Records]) -> int | None:
-    """Unix time at boot, by the first time that the GPS told."""
+    """Unix time at boot, from the first time that the GPS reported."""
     for name in ("vehicle_gps_position", "sensor_gps"):
         topic = topics.get((name, 0))
         if topic is not None and "time_utc_usec" in topic.columns:

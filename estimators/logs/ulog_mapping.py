@@ -1,4 +1,4 @@
-"""PX4's uORB topics as the MAVLink messages that estimators ask for.
+"""PX4's uORB topics, converted to the MAVLink messages that estimators need.
 
 Source: PX4's message definitions (docs.px4.io, "uORB message reference", 1.12 to 1.16) and MAVLink streams.
 """
@@ -40,22 +40,22 @@ _CUSTOM_MODES: Final = {  # NAVIGATION_STATE of vehicle_status: PX4's main and s
     21: (_MAIN_POSITION, 1),
 }
 _LAST_YAW_ROTATION: Final = 7
-"""SENS_BOARD_ROT up to here: steps of 45 degrees about z."""
+"""Largest SENS_BOARD_ROT that is a rotation about z, in steps of 45 degrees."""
 _LANDED, _IN_AIR = dialect.MAV_LANDED_STATE_ON_GROUND, dialect.MAV_LANDED_STATE_IN_AIR
 
 
 Topics = Mapping[tuple[str, int], Records]
-"""By name and instance."""
+"""Topics by name and instance."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UlogFacts:
-    """What a log holds beside its topics.
+    """Data of a log besides its topics.
 
     Attributes:
         texts: pyulog's logged messages.
         base_us: time of the file at vehicle time 0.
-        parameters: of the vehicle, as the log began.
+        parameters: parameters of the vehicle at the beginning of the log.
         version: `ver_sw_release`; 0: not known.
     """
 
@@ -66,11 +66,11 @@ class UlogFacts:
 
 
 def map_topics(topics: Topics, facts: UlogFacts, unix_offset_us: int | None) -> list[Part]:
-    """MAVLink messages from what the log has.
+    """Convert the log's topics to MAVLink messages.
 
     Args:
-        topics: by name and instance.
-        facts: what it holds beside them.
+        topics: topics by name and instance.
+        facts: data of the log besides its topics.
         unix_offset_us: Unix time of vehicle time 0; None: not known.
     """
     found = [
@@ -92,15 +92,15 @@ def map_topics(topics: Topics, facts: UlogFacts, unix_offset_us: int | None) -> 
 
 
 def _find(topics: Topics, names: Iterable[str], *fields: str) -> Records | None:
-    """The first of these topics that there is, with these fields."""
+    """The first existing topic of the given ones that has these fields."""
     return next((t for name in names if (t := topics.get((name, 0))) is not None and t.has(*fields)), None)
 
 
 def board_rotation(parameters: Mapping[str, float]) -> Array | None:
-    """R_vehicle_from_board of SENS_BOARD_ROT and SENS_BOARD_*_OFF; None where the rotation is not about z.
+    """R_vehicle_from_board of SENS_BOARD_ROT and SENS_BOARD_*_OFF; None when the rotation is not about z.
 
-    PX4 1.16.1 (`sensor_calibration`): the offset's rotation times the board's. `sensor_combined` has it
-    already; the topics of single sensors have not.
+    PX4 1.16.1 (`sensor_calibration`): the offset's rotation times the board's. It is already applied in
+    `sensor_combined`, but not in the topics of single sensors.
     """
     steps = int(parameters.get("SENS_BOARD_ROT", 0.0))
     if not 0 <= steps <= _LAST_YAW_ROTATION:
@@ -119,7 +119,7 @@ def _about(axis: int, angle_rad: float) -> Array:
 
 
 def _vehicle(topics: Topics, facts: UlogFacts) -> list[Part]:
-    """AUTOPILOT_VERSION and PARAM_VALUE, as the log began."""
+    """AUTOPILOT_VERSION and PARAM_VALUE at the beginning of the log."""
     start = min(int(records.time_us.min()) for records in topics.values())
     found = []
     if facts.version:
@@ -141,7 +141,9 @@ def _vehicle(topics: Topics, facts: UlogFacts) -> list[Part]:
 
 
 def _imu(topics: Topics, parameters: Mapping[str, float]) -> list[Part]:
-    """The voted pair of sensors is number 0; the others follow by their instance, in the vehicle's frame."""
+    """IMU messages in the vehicle's frame. The voted pair of sensors is number 0; the others follow by
+    instance.
+    """
     samples: list[tuple[Array, Array, Array, int]] = []  # times, rates, specific forces, number
     combined = _find(topics, ("sensor_combined",), "gyro_rad", "accelerometer_m_s2")
     if combined is not None:
@@ -387,14 +389,14 @@ def _texts(texts: Iterable[Any], base_us: int) -> list[Part]:
 
 
 def _severity(log_level: Any) -> int:
-    """ULog has the levels of syslog as digits of ASCII."""
+    """Severity of a ULog message, whose log levels are syslog levels as ASCII digits."""
     number = ord(log_level) if isinstance(log_level, (str, bytes)) and len(log_level) == 1 else int(log_level)
     number = number - ord("0") if number >= ord("0") else number
     return min(max(number, 0), dialect.MAV_SEVERITY_DEBUG)
 
 
 def _mav_types(status: Records) -> Array:
-    """MAV_TYPE of each vehicle_status; of the class of the vehicle where an old log has no system_type."""
+    """MAV_TYPE of each vehicle_status; from the class of the vehicle when an old log has no system_type."""
     if "system_type" in status.columns:
         return status.columns["system_type"]
     classes = status.columns.get("vehicle_type", np.zeros(len(status.time_us), dtype=np.int64))

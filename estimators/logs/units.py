@@ -1,7 +1,7 @@
-"""SI from the units of MAVLink's definition files.
+"""Conversion of the units of MAVLink's definition files to SI.
 
-Temperatures stay in degrees Celsius, decibels and counts (pixels, bytes, bits) what they are; parts of a
-hundred become a fraction of one.
+Temperatures stay in degrees Celsius; decibels and counts (pixels, bytes, bits) are not changed; percent
+become a fraction of one.
 """
 
 import math
@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Final
 
 STANDARD_GRAVITY_M_S2: Final = 9.80665
-"""ISO 80000-3; what MAVLink's "mG" are thousandths of."""
+"""ISO 80000-3. MAVLink's "mG" are thousandths of it."""
 
 _DEGREE: Final = math.pi / 180.0
 
@@ -97,13 +97,13 @@ SI: Final = MappingProxyType(
         "MiB": (1048576.0, "bytes"),
     }
 )
-"""Unit of the definition files: factor, and unit of the product."""
+"""By unit of the definition files: factor, and unit of the product."""
 
 
 def to_si(unit: str) -> tuple[float, str]:
-    """Factor that takes a wire value to SI and the unit it then has; a unit that is not known stays.
+    """Factor that converts a wire value to SI, and the resulting unit; an unknown unit is kept.
 
     Args:
-        unit: as in the definition files, "degE7"; "" for numbers without one.
+        unit: unit as in the definition files, "degE7"; "" for numbers without one.
     """
     return SI.get(unit, (1.0, unit))

@@ -1,4 +1,4 @@
-"""Vehicles of a log: what they are, their modes, and when they were armed, all from HEARTBEAT."""
+"""Vehicles of a log: their type, their modes, and when they were armed, all from HEARTBEAT."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,11 +25,11 @@ _CUSTOM: Final = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ModeSpan:
-    """Time in one mode, from the first HEARTBEAT that tells it to the first that tells another (or to the
-    last one).
+    """Time in one mode, from the first HEARTBEAT that reports it to the first that reports another mode (or
+    to the last one).
 
     Attributes:
-        mode: name, as ground stations call it.
+        mode: name as in ground stations.
         custom_mode: number in HEARTBEAT.
         boot: number of the boot of the log's clock.
         start_us, end_us: on the log's clock.
@@ -44,7 +44,8 @@ class ModeSpan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flight:
-    """Time armed, from the first HEARTBEAT that says so to the first that does not (or to the last one).
+    """Time armed, from the first HEARTBEAT that reports armed to the first that does not (or to the last
+    one).
 
     Attributes:
         boot: number of the boot of the log's clock.
@@ -65,7 +66,7 @@ class VehicleReport:
         firmware: its name and version, "ArduCopter V3.3-dev (82481f30)", "PX4 1.16.1"; "": not known.
         autopilot, type: names of MAV_AUTOPILOT and MAV_TYPE without the prefix, "PX4", "QUADROTOR"; of the
             newest HEARTBEAT.
-        boots: how many boots of it are in the log.
+        boots: number of its boots in the log.
         modes, flights: in the order of the log.
     """
 
@@ -115,14 +116,14 @@ def mode_name(
     custom_mode: int,
     version: tuple[int, int] | None = None,
 ) -> str:
-    """Name of a mode as ground stations call it, from the fields of HEARTBEAT; "MODE 7" when it has none.
+    """Name of a mode as in ground stations, from the fields of HEARTBEAT; "MODE 7" when it has no name.
 
     Args:
         autopilot, vehicle_type, base_mode, custom_mode: of HEARTBEAT.
-        version: of an ArduPilot firmware, major and minor; None: not known.
+        version: version of an ArduPilot firmware, major and minor; None: not known.
     """
     if autopilot == dialect.MAV_AUTOPILOT_PX4:
-        from pymavlink import mavutil  # here, for it takes its time
+        from pymavlink import mavutil  # imported here because it is slow
 
         return str(mavutil.interpret_px4_mode(base_mode, custom_mode))
     names = mode_names(vehicle_type, version) if base_mode & _CUSTOM else {}
@@ -130,7 +131,7 @@ def mode_name(
 
 
 def _firmware(log: "Log", system_id: int, autopilot: int) -> tuple[str, tuple[int, int] | None]:
-    """What a vehicle says of its firmware, and its version: by its banner, else by AUTOPILOT_VERSION."""
+    """Name and version of a vehicle's firmware, from its banner, else from AUTOPILOT_VERSION."""
     for table in _of_autopilot(log, _STATUSTEXT, system_id):
         made_by = firmware_of(text.decode("ascii", "replace") for text in table["text"].tolist())
         if made_by.text:
@@ -160,7 +161,7 @@ def _modes(
     version: tuple[int, int] | None,
 ) -> tuple[ModeSpan, ...]:
     custom, base = table["custom_mode"], table["base_mode"]
-    # PX4's name of a mode depends on the base mode too, but not on whether it is armed; and other flags of it
+    # PX4's mode names depend on the base mode too, but not on the armed flag; and other flags of it
     # change in flight without another mode.
     pairs, which = np.unique(
         np.stack((custom.astype(np.int64), (base & ~np.uint8(_ARMED)).astype(np.int64)), axis=1),
@@ -194,7 +195,9 @@ def _flights(table: Table, times_us: NDArray[np.int64], boot_of: NDArray[np.int6
 def _spans(
     values: NDArray[Any], others: NDArray[Any], boot_of: NDArray[np.int64]
 ) -> tuple[Sequence[int], Sequence[int]]:
-    """First rows of runs of equal values, and rows that end them: the next run's first, in the same boot."""
+    """First rows of runs of equal values, and the rows that end them, which are the first of the next run in
+    the same boot.
+    """
     changes = (np.diff(values) != 0) | (np.diff(others) != 0) | (np.diff(boot_of) != 0)
     firsts = np.concatenate(([0], np.flatnonzero(changes) + 1))
     nexts = np.append(firsts[1:], len(values) - 1)

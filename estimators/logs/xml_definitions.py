@@ -1,7 +1,7 @@
-"""Definition files of MAVLink (XML): the messages, with what the wire needs of them.
+"""Definition files of MAVLink (XML): the messages, with all that is needed to decode them.
 
-Nothing in the file is executed and nothing generated; enumerations are passed over. Order on the wire and
-CRC_EXTRA as in the MAVLink guide, "Serialization" (field reordering, CRC_EXTRA calculation).
+No code is executed or generated from the file; enumerations are ignored. The order on the wire and CRC_EXTRA
+are computed as in the MAVLink guide, "Serialization" (field reordering, CRC_EXTRA calculation).
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -33,14 +33,14 @@ _MAX_ID: Final = 0xFFFFFF
 
 @dataclass(frozen=True, slots=True)
 class FieldText:
-    """A field as the file has it.
+    """A field as in the file.
 
     Attributes:
         name: field name.
         type: C type of one element.
         length: elements of the array; 0 for a scalar.
         units: "degE7", or "".
-        instance: it tells which of several like devices speaks.
+        instance: whether it identifies one of several similar devices.
     """
 
     name: str
@@ -52,12 +52,12 @@ class FieldText:
 
 @dataclass(frozen=True, slots=True)
 class MessageText:
-    """A message as the file has it.
+    """A message as in the file.
 
     Attributes:
         message_id, name: its number and name.
         fields: in the order of the file.
-        base_count: how many fields come before the extensions.
+        base_count: number of fields before the extensions.
     """
 
     message_id: int
@@ -67,7 +67,7 @@ class MessageText:
 
     @property
     def wire_order(self) -> tuple[FieldText, ...]:
-        """Fields as on the wire: base fields by falling size of an element, then the extensions."""
+        """Fields in the order on the wire: base fields by descending element size, then the extensions."""
         base = self.fields[: self.base_count]
         return (
             *sorted(base, key=lambda field: TYPE_SIZES[field.type], reverse=True),
@@ -76,7 +76,7 @@ class MessageText:
 
     @property
     def crc_extra(self) -> int:
-        """The byte that makes the checksum depend on the definition."""
+        """The byte by which the checksum depends on the definition."""
         text = bytearray(f"{self.name} ".encode())
         for field in self.wire_order[: self.base_count]:
             text += f"{field.type} {field.name} ".encode()
@@ -89,17 +89,17 @@ class MessageText:
 def read_definitions(
     path: Path, known: Collection[str] = ()
 ) -> tuple[tuple[MessageText, ...], tuple[str, ...]]:
-    """All messages of a definition file and of those that it includes.
+    """Read all messages of a definition file and of the files that it includes.
 
     Args:
         path: the file.
-        known: dialects that need not be there as files: "common".
+        known: names of dialects that need not exist as files: "common".
 
     Returns:
-        The messages, and which of the known dialects are included without being there as files.
+        The messages, and the known dialects that are included but do not exist as files.
 
     Raises:
-        LogError: a file can't be read, is no definition file, or two messages have one id or name.
+        LogError: a file can't be read or is not a definition file, or two messages have the same id or name.
     """
     messages: list[MessageText] = []
     seen: set[Path] = set()

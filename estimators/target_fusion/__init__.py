@@ -1,4 +1,4 @@
-"""A target's place, fused from what a team of drones sees of it.
+"""A target's place, fused from the detections of a team of drones.
 
 Source: Steckenrider, Leamy and Furukawa 2020, section III-C; docs/papers.md.
 """

@@ -1,8 +1,8 @@
-"""What is believed of one target: a Gaussian that fades, a gate, and a rival that may take its place.
+"""The belief about one target: a Gaussian with growing variance, a gate, and a rival that may replace it.
 
-Steckenrider et al. 2020 fuse what all drones see at one step (equation 35) and leave open a target that is
-not always in view. Here detections come one by one, at times of their own; between them the target may have
-walked.
+Steckenrider et al. 2020 fuse the detections of all drones at one step (equation 35), and do not treat a
+target that is not always in view. Here detections come one by one, at their own times; between them the
+target may have moved.
 """
 
 from typing import Final
@@ -22,16 +22,16 @@ class TargetBelief:
     """One target's place: (x, y, xx, xy, yy), mean and covariance, in the pattern's frame.
 
     Args:
-        walk_m2_s: variance per axis that it gains per second (random walk).
+        walk_m2_s: increase of the variance per axis and second (random walk).
         gate: largest squared Mahalanobis distance of a detection that belongs to it.
-        confirmations: detections that agree before a belief is told.
-        max_delay_us: detections older than the belief by more are left out.
+        confirmations: number of agreeing detections before a belief is reported.
+        max_delay_us: detections that are older than the belief by more than this are rejected.
 
     Attributes:
-        values: (5,) at `time_us`, of the belief, or while there is none, of its first candidate.
-        time_us: of the newest detection in it.
-        confirmed: whether there is a belief to tell.
-        gated: detections that belonged to no belief.
+        values: (5,) values at `time_us` of the belief or, while there is none, of its first candidate.
+        time_us: time of the newest detection in it.
+        confirmed: whether there is a belief to report.
+        gated: number of detections that belonged to no belief.
     """
 
     def __init__(self, *, walk_m2_s: float, gate: float, confirmations: int, max_delay_us: int) -> None:
@@ -53,11 +53,12 @@ class TargetBelief:
     def take(self, time_us: int, seen: Array) -> Outcome:
         """Fuse one detection, (x, y, xx, xy, yy) on the ground.
 
-        One that is older than the belief counts for the present with the variance that the target's walk has
-        added since.
+        A detection that is older than the belief is used for the present, with the variance that the target's
+        random walk has added since.
 
         Returns:
-            UPDATED; USED for one that confirms; IMPLAUSIBLE for one outside the gate; LATE.
+            UPDATED; USED for a detection that counts towards a confirmation; IMPLAUSIBLE for one outside the
+            gate; LATE.
         """
         if self.confirmed and self.time_us - time_us > self._max_delay_us:
             return Outcome.LATE
@@ -68,20 +69,20 @@ class TargetBelief:
         return self._confirm(time_us, seen)
 
     def at(self, time_us: int) -> Array:
-        """The belief (5,) at a later time: the same mean, with more variance."""
+        """The belief (5,) at a later time, with the same mean and a larger variance."""
         return self._faded(self.values, time_us - self.time_us)
 
     def move_origin(self, x: float, y: float) -> None:
-        """Put the origin at a place (x, y) of what was the frame until now."""
+        """Move the origin to the place (x, y) of the present frame."""
         for values in (self.values, self._rival):
             values[0] -= x
             values[1] -= y
 
     def _confirm(self, time_us: int, seen: Array) -> Outcome:
-        """A detection that is not the target's: a rival place gathers those that agree.
+        """Process a detection outside the gate: a rival place collects those that agree.
 
-        It takes over when it has enough of them and the target itself was not seen in between: false
-        detections are scattered, and a target that was lost comes back in one place.
+        The rival replaces the belief when it has enough detections and the target itself was not detected in
+        between. False detections are scattered, but a lost target reappears in one place.
         """
         rivals = self._rival_count > 0 and self._taken == self._rival_mark
         if rivals and self._fuse(self._rival, self._rival_us, time_us, seen):
@@ -101,7 +102,9 @@ class TargetBelief:
         return Outcome.UPDATED
 
     def _fuse(self, values: Array, values_us: int, time_us: int, seen: Array) -> bool:
-        """Fuse into `values` if the gate lets it; whichever is older fades first."""
+        """Fuse a detection into `values` if it passes the gate; the older of the two first gets its variance
+        increased. Returns whether it was fused.
+        """
         belief = self._faded(values, time_us - values_us)
         detected = self._faded(seen, values_us - time_us)
         xx, xy, yy = belief[2:] + detected[2:]

@@ -1,4 +1,4 @@
-"""One drone of the team: where it was, how it was turned, and what it saw and could not place yet."""
+"""One drone of the team: its positions, its attitudes, and its detections that could not be placed yet."""
 
 import math
 from collections import deque
@@ -30,17 +30,17 @@ _YAW_LOCK: Final = 16
 
 
 class Drone:
-    """What the base station knows of one drone.
+    """The base station's data of one drone.
 
     Args:
-        system_id: its own.
-        parameters: of the estimator.
+        system_id: system id of the drone.
+        parameters: parameters of the estimator.
 
     Attributes:
         track: its motion, in the pattern's frame.
         reader: its position messages.
         pending: detections that wait for newer positions or attitudes, oldest first.
-        newest_us: newest time of any message of it.
+        newest_us: newest time of its messages.
     """
 
     def __init__(self, system_id: int, parameters: TargetFusionParameters) -> None:
@@ -61,7 +61,7 @@ class Drone:
         self._belief: Array = np.zeros(5)
 
     def forget(self) -> None:
-        """Start anew: its time has jumped."""
+        """Restart, because its time has jumped."""
         self.track.filter.reset()
         self._attitudes.clear()
         self._gimbal.clear()
@@ -70,7 +70,7 @@ class Drone:
         self.newest_us = 0
 
     def hear_position(self, time_us: int, message: Message) -> Outcome:
-        """Take a position message."""
+        """Process a position message."""
         refused = self._admit(time_us, message, values_of(self.parameters.source, message), leads=True)
         if refused not in (None, Outcome.TIME_JUMP):
             return refused
@@ -82,11 +82,11 @@ class Drone:
         return refused or Outcome.USED
 
     def hear_home(self, message: Message) -> GeodeticPosition | None:
-        """Take a HOME_POSITION; None when it is no place."""
+        """Process a HOME_POSITION; returns None when its position is invalid."""
         return self.reader.home if self.reader.hear_home(message) else None
 
     def hear_attitude(self, time_us: int, message: Message) -> Outcome:
-        """Take an ATTITUDE."""
+        """Process an ATTITUDE."""
         angles = (message.roll, message.pitch, message.yaw)
         refused = self._admit(time_us, message, angles)
         if refused not in (None, Outcome.TIME_JUMP):
@@ -95,7 +95,9 @@ class Drone:
         return refused or Outcome.USED
 
     def hear_gimbal(self, time_us: int, message: Message) -> Outcome:
-        """Take a GIMBAL_DEVICE_ATTITUDE_STATUS: kept against the vehicle's nose, whichever way it is told."""
+        """Process a GIMBAL_DEVICE_ATTITUDE_STATUS. The attitude is stored relative to the vehicle's heading,
+        for both conventions of the message.
+        """
         refused = self._admit(time_us, message, tuple(message.q))
         if refused not in (None, Outcome.TIME_JUMP):
             return refused
@@ -114,14 +116,14 @@ class Drone:
         return refused or Outcome.USED
 
     def _nose(self, time_us: int, message: Message) -> float | None:
-        """Yaw of the vehicle as the gimbal knows it, else as the autopilot does."""
+        """Heading of the vehicle as reported by the gimbal, else by the autopilot."""
         if math.isfinite(message.delta_yaw) and message.delta_yaw != 0.0:
             return float(message.delta_yaw)
         attitude = self._attitudes.at(time_us)
         return None if attitude is None else yaw_of(attitude)
 
     def hear_detection(self, time_us: int, message: Message) -> Outcome:
-        """Take a LANDING_TARGET of the camera; it is placed when all that is needed has come."""
+        """Process a LANDING_TARGET of the camera; it is placed when all needed data have arrived."""
         values = (message.angle_x, message.angle_y, message.distance, message.size_x, message.size_y)
         if not math.isfinite(sum(values)):
             return Outcome.NOT_FINITE
@@ -151,7 +153,7 @@ class Drone:
     def _admit(
         self, time_us: int, message: Message, values: tuple[float, ...], leads: bool = False
     ) -> Outcome | None:
-        """The guard's word; a jump of time forgets what was."""
+        """The result of the input guard; after a time jump the past data are discarded."""
         refused = self.guard.check(time_us, type(message).name, values, leads=leads)
         if refused is Outcome.TIME_JUMP:
             self.forget()
@@ -162,10 +164,10 @@ class Drone:
     # placing
 
     def placed(self, detection: Detection) -> Array | None:
-        """A detection on the ground, (x, y, xx, xy, yy) in the pattern's frame (equations 31 to 34).
+        """Place a detection on the ground: (x, y, xx, xy, yy) in the pattern's frame (equations 31 to 34).
 
-        None when there was no position or attitude near its time, when its line of sight has no length, or
-        when the nose may point anywhere because the drone was too slow to have a course.
+        Returns None when there was no position or attitude near its time, when its range is not known, or
+        when the heading is not known because the drone was too slow to have a course.
         """
         p = self.parameters
         known = self.track.filter.at(detection.time_us)
@@ -205,7 +207,7 @@ class Drone:
         return self._belief
 
     def ready(self, detection: Detection) -> bool:
-        """Whether a detection can be placed as well as it ever will be, or has waited long enough."""
+        """Whether a detection can be placed with all the data it will get, or has waited long enough."""
         if self.newest_us - detection.time_us >= self._wait_us:
             return True
         t = detection.time_us
@@ -215,7 +217,7 @@ class Drone:
         return self.parameters.heading is Heading.COURSE or self._attitudes.covers(t)
 
     def _camera_at(self, time_us: int) -> Quaternion | None:
-        """The camera against the level frame along the nose."""
+        """Attitude of the camera relative to the level frame along the heading."""
         if self.parameters.mount is Mount.GIMBAL:
             return self._gimbal.at(time_us)
         attitude = self._attitudes.at(time_us)
@@ -225,5 +227,5 @@ class Drone:
 
 
 def _turned_back(q: Quaternion, yaw_rad: float) -> Quaternion:
-    """A rotation against north, against a nose that points to `yaw_rad`."""
+    """A rotation relative to north, converted to one relative to the heading `yaw_rad`."""
     return product((math.cos(0.5 * yaw_rad), 0.0, 0.0, -math.sin(0.5 * yaw_rad)), q)

@@ -1,4 +1,4 @@
-"""What the target fusion says of a target."""
+"""The target fusion's estimate of a target."""
 
 import math
 from dataclasses import dataclass
@@ -9,17 +9,17 @@ __all__ = ["TargetEstimate"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TargetEstimate:
-    """Where a target is.
+    """The position of a target.
 
     Attributes:
-        time_us: of the newest detection in it.
+        time_us: vehicle time of the newest detection in it.
         subject: 0, a target.
-        target: number on its tag; 255: none.
+        target: number of its tag; 255: no tag.
         vehicle: system id of the drone whose detection came last.
-        lat_deg, lon_deg: its place.
-        alt_m: of the ground it is taken to be on: home's, above mean sea level.
-        north_m, east_m: from the pattern's centre.
-        north_variance_m2, north_east_covariance_m2, east_variance_m2: of that.
+        lat_deg, lon_deg: its position.
+        alt_m: assumed altitude of its ground, which is that of home, above mean sea level.
+        north_m, east_m: position from the pattern's centre.
+        north_variance_m2, north_east_covariance_m2, east_variance_m2: covariance of that position.
     """
 
     COLUMNS: ClassVar[tuple[str, ...]] = (

@@ -1,4 +1,4 @@
-"""The estimator `target-fusion`: a target's place from what all drones of a team see of it.
+"""The estimator `target-fusion`: a target's place from the detections of all drones of a team.
 
 Source: Steckenrider, Leamy, Furukawa 2020 (SSRR), section III-C; docs/lissajous_estimation.md.
 """
@@ -31,11 +31,12 @@ _POSITION_KNOWN: Final = 1  # FOLLOW_TARGET.est_capabilities, bit 0
 
 
 class TargetFusionEstimator(Estimator[TargetFusionParameters]):
-    """The base station: hears all drones, keeps each one's motion, and fuses their detections.
+    """The base station: it receives the messages of all drones, tracks the motion of each, and fuses their
+    detections.
 
     Attributes:
-        drones: by system id.
-        beliefs: by the number on the target's tag; 255: all that have none.
+        drones: drones by system id.
+        beliefs: beliefs by the number of the target's tag; 255: all targets without a tag.
     """
 
     NAME: ClassVar[str] = "target-fusion"
@@ -60,7 +61,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
 
     @property
     def needs(self) -> tuple[Need, ...]:
-        """What every drone of the team must tell."""
+        """The messages that every drone of the team must send."""
         p = self.parameters
         gimbal = p.mount is Mount.GIMBAL
         found = [
@@ -94,7 +95,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         return tuple(found)
 
     def handle(self, time_us: int, message: Message) -> Outcome:
-        """Take one message of any drone."""
+        """Process one message of any drone."""
         name = type(message).name
         handler = self._handlers.get(name)
         if handler is None:
@@ -138,7 +139,9 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
             drone.track.place_pattern(pattern)
 
     def _place_pending(self, drone: Drone) -> tuple[dict[int, TargetEstimate], Outcome | None]:
-        """Fuse the detections whose time has come; estimates by target, and what became of the last."""
+        """Fuse the detections that are ready; returns estimates by target, and the outcome of the last
+        detection.
+        """
         updated: dict[int, TargetEstimate] = {}
         last = None
         while drone.pending and drone.ready(drone.pending[0]):
@@ -171,7 +174,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
 
     def _estimate(self, values: Array, time_us: int, target: int, vehicle: int) -> TargetEstimate:
         pattern = self._pattern
-        assert pattern is not None  # nothing is placed without
+        assert pattern is not None  # without a pattern no detection is placed
         x, y, xx, xy, yy = values.tolist()
         north_m, east_m = pattern.north_east(x, y)
         (c, s), (_, _) = pattern.north_east(1.0, 0.0), pattern.north_east(0.0, 1.0)
@@ -191,8 +194,8 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         )
 
     def target_at(self, time_us: int, target: int = 255) -> TargetEstimate | None:
-        """Where a target is believed to be at a time, with the variance that has grown since it was last
-        seen; None for one that was never seen.
+        """The believed place of a target at a time, with the variance that has grown since it was last
+        detected; None for a target that was never detected.
         """
         belief = self.beliefs.get(target)
         if belief is None or not belief.confirmed:
@@ -200,7 +203,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         return self._estimate(belief.at(time_us), max(time_us, belief.time_us), target, 0)
 
     def reset(self) -> None:
-        """Forget all but parameters and counters."""
+        """Discard everything except parameters and counters."""
         self.drones.clear()
         self.beliefs.clear()
         self._pattern = None
@@ -210,7 +213,7 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
 
     @property
     def estimates(self) -> Sequence[TargetEstimate]:
-        """The targets that the newest detections have moved."""
+        """The estimates of the targets that the newest detections have changed."""
         return self._estimates
 
     @property
@@ -219,7 +222,9 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         return None if self._pattern is None else self._pattern.frame.origin
 
     def publish(self) -> Sequence[MAVLinkMessage]:
-        """FOLLOW_TARGET for each: place, and in `position_cov` its one sigma, horizontal per axis."""
+        """FOLLOW_TARGET for each target: its position and, in `position_cov`, its horizontal standard
+        deviation per axis.
+        """
         messages = []
         for e in self._estimates:
             sigma_m = float(np.sqrt(0.5 * (e.north_variance_m2 + e.east_variance_m2)))
@@ -241,8 +246,8 @@ class TargetFusionEstimator(Estimator[TargetFusionParameters]):
         return messages
 
     def remarks(self) -> Mapping[str, float | str]:
-        """How many detections were fused, lay outside the gate, or could not be placed; of the drone that
-        was off the pattern most, in which share of its samples.
+        """The numbers of detections that were fused, were outside the gate, or could not be placed, and the
+        share of samples off the pattern of the drone with the largest share.
         """
         return {
             "form": self.parameters.form.value + ("+frequency" if self.parameters.frequency else ""),

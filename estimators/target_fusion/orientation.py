@@ -1,4 +1,4 @@
-"""Quaternions with their times, interpolated: attitude of a vehicle, and of its gimbal."""
+"""Quaternions with times, interpolated: attitude of a vehicle, and of its gimbal."""
 
 from bisect import bisect_left
 
@@ -8,11 +8,11 @@ __all__ = ["Orientations"]
 
 
 class Orientations:
-    """Orientations by time, for a few seconds back.
+    """Orientations of the last seconds, by time.
 
     Args:
-        history_us: how long they are kept.
-        reach_us: how far from the nearest one is still good enough.
+        history_us: time for which they are kept.
+        reach_us: largest time difference to the nearest orientation that may be used.
     """
 
     __slots__ = ("_history_us", "_quaternions", "_reach_us", "_times")
@@ -24,24 +24,26 @@ class Orientations:
         self._quaternions: list[Quaternion] = []
 
     def add(self, time_us: int, q: Quaternion) -> None:
-        """Keep one, newer than those before."""
+        """Store an orientation that is newer than those before."""
         self._times.append(time_us)
         self._quaternions.append(q)
         drop = bisect_left(self._times, time_us - self._history_us)
-        if drop > 16:  # in bunches: a list is cheap to cut, not to cut often
+        if drop > 16:  # removed in groups, because each removal moves the rest of the list
             del self._times[:drop], self._quaternions[:drop]
 
     def clear(self) -> None:
-        """Forget all."""
+        """Remove all orientations."""
         self._times.clear()
         self._quaternions.clear()
 
     def covers(self, time_us: int) -> bool:
-        """Whether one as new as that is there."""
+        """Whether there is an orientation at or after this time."""
         return bool(self._times) and self._times[-1] >= time_us
 
     def at(self, time_us: int) -> Quaternion | None:
-        """Between the two next to a time, or the nearest if it is near; None when none is."""
+        """Interpolate between the two neighbours of a time, or use the nearest if it is close; None when none
+        is close.
+        """
         after = bisect_left(self._times, time_us)
         if 0 < after < len(self._times):
             before_us, after_us = self._times[after - 1], self._times[after]

@@ -1,4 +1,6 @@
-"""What the target fusion is told beside the drones' own motion: camera, range, and the target's."""
+"""Parameters of the target fusion besides those of the drones' motion: camera, range, and the target's
+motion.
+"""
 
 import math
 from dataclasses import dataclass
@@ -10,62 +12,65 @@ __all__ = ["Heading", "Mount", "Range", "TargetFusionParameters"]
 
 
 class Heading(StrEnum):
-    """Which way a drone's nose points."""
+    """The source of a drone's heading."""
 
     COURSE = "course"
-    """Along its estimated velocity, with that velocity's uncertainty (Steckenrider et al. 2020): the nose
-    leads the way."""
+    """Along its estimated velocity, with that velocity's uncertainty (as in Steckenrider
+    et al. 2020)."""
     YAW = "yaw"
-    """As the autopilot's ATTITUDE says."""
+    """The yaw in the autopilot's ATTITUDE."""
 
 
 class Mount(StrEnum):
-    """How the camera is carried."""
+    """The mount of the camera."""
 
     GIMBAL = "gimbal"
-    """On a gimbal that tells its attitude (GIMBAL_DEVICE_ATTITUDE_STATUS)."""
+    """On a gimbal that reports its attitude (GIMBAL_DEVICE_ATTITUDE_STATUS)."""
     FIXED = "fixed"
-    """Fixed to the body; ATTITUDE tells roll and pitch."""
+    """Fixed to the body; roll and pitch come from ATTITUDE."""
 
 
 class Range(StrEnum):
-    """Where the distance of a target comes from."""
+    """The source of the distance to a target."""
 
     AUTO = "auto"
-    """LANDING_TARGET's distance, else by the size if that is known, else by the height."""
+    """LANDING_TARGET's distance, else from the size if it is known, else from the height."""
     MESSAGE = "message"
     SIZE = "size"
     """From the apparent size and `target_size_m`."""
     HEIGHT = "height"
-    """From the height above home and level ground."""
+    """From the height above home, assuming level ground."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TargetFusionParameters(LissajousParameters):
-    """Parameters of `TargetFusionEstimator`; those of `LissajousParameters` are for every drone.
+    """Parameters of `TargetFusionEstimator`; those of `LissajousParameters` apply to every drone.
 
     Attributes:
-        centre_vehicle: whose home the pattern's centre is counted from, unless it is given by coordinates.
-        heading: which way a drone's nose points.
-        min_speed_m_s: with `heading=course`, what a drone sees while it is slower is not placed: who hovers,
-            climbs or lands may point anywhere, and its course is noise.
-        mount: how the camera is carried.
-        mount_roll_rad, mount_pitch_rad, mount_yaw_rad: of a fixed camera against the body; -pi/2: down.
-        distance: where the range comes from.
+        centre_vehicle: system id of the vehicle whose home is the origin of the pattern's centre, unless the
+            centre is specified by coordinates.
+        heading: source of a drone's heading.
+        min_speed_m_s: with `heading=course`, detections of a slower drone are not placed: a drone that
+            hovers, climbs or lands may have any heading, and its course is noise.
+        mount: mount of the camera.
+        mount_roll_rad, mount_pitch_rad, mount_yaw_rad: attitude of a fixed camera relative to the body; pitch
+            -pi/2: down.
+        distance: source of the range.
         target_size_m: true size of the target, for `distance=size`; 0: not known.
         bearing_sigma_rad: one sigma of a direction across the line of sight, camera and gimbal together.
         tilt_sigma_rad: one sigma of the camera's pitch against the horizon.
-        size_sigma_rad: one sigma of an apparent size: what pixel noise makes of it.
-        range_sigma: one sigma of a distance that comes without an apparent size, as a share of it.
+        size_sigma_rad: one sigma of an apparent size, from pixel noise.
+        range_sigma: one sigma of a distance that comes without an apparent size, as a fraction of the
+            distance.
         height_sigma_m: one sigma of the height above the target.
         yaw_sigma_rad: one sigma of ATTITUDE's yaw, and with `heading=course` of the nose from the course.
         walk_m_sqrt_s: one sigma per axis that a target may wander in a second, growing with the square root
-            of time: what a stale estimate loses.
-        gate: largest squared Mahalanobis distance of a detection that belongs to the target; 13.8 lets
-            one good detection in a thousand go.
-        confirmations: detections that agree before there is a target, or another place for it.
-        wait_s: how long a detection waits for what is needed to place it.
-        max_delay_s: detections older than the estimate by more are left out.
+            of time; it is the uncertainty that an old estimate gains.
+        gate: largest squared Mahalanobis distance of a detection that belongs to the target; 13.8 rejects one
+            valid detection in a thousand.
+        confirmations: number of agreeing detections before a target is reported, or moved to another place.
+        wait_s: time for which a detection waits for the data needed to place it.
+        max_delay_s: detections that are older than the estimate by more than this are rejected.
     """
 
     centre_vehicle: int = 1

@@ -1,8 +1,8 @@
-"""A detection as a place beside the drone: direction, range, and how good both are.
+"""The place of a detection relative to the drone, from direction and range, with the uncertainty of both.
 
 Steckenrider et al. 2020 take the target's place in the drone's frame as measured (equation 30). A camera
-gives a direction; its length comes from the tag's apparent size (AprilTags, as in the paper), the message, or
-the height.
+measures a direction; the range comes from the tag's apparent size (AprilTags, as in the paper), the message, or the
+height.
 """
 
 import math
@@ -17,19 +17,19 @@ from estimators.target_fusion.parameters import Range, TargetFusionParameters
 __all__ = ["Detection", "Seen", "place_in_level_frame"]
 
 _MAX_RANGE_M = 20_000.0
-_STEEPEST = 1e-3  # sine of the flattest line of sight that meets the ground somewhere sensible
+_STEEPEST = 1e-3  # sine of the depression: below it the place on the ground is too far away to be useful
 
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """One thing in one picture (LANDING_TARGET).
+    """One detected object in one image (LANDING_TARGET).
 
     Attributes:
-        time_us: exposure, vehicle time.
+        time_us: vehicle time of the exposure.
         vehicle: system id.
-        target: number on its tag; 255: none.
-        angle_x_rad, angle_y_rad: off the optical axis, right and down, each in its own plane.
-        distance_m: as the message has it; 0: not known.
+        target: number of its tag; 255: no tag.
+        angle_x_rad, angle_y_rad: angles from the optical axis, right and down, each in its own plane.
+        distance_m: distance in the message; 0: not known.
         size_rad: apparent size; 0: not known.
     """
 
@@ -44,11 +44,11 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """A target beside the drone, in the level frame along its nose.
+    """A target's place relative to the drone, in the level frame along its heading.
 
     Attributes:
-        place_m: (2,) forward and right.
-        covariance_m2: (2, 2).
+        place_m: (2,) forward and right distance.
+        covariance_m2: (2, 2) covariance of the place.
     """
 
     place_m: Array
@@ -58,14 +58,14 @@ class Seen:
 def place_in_level_frame(
     detection: Detection, q_level_from_camera: Quaternion, height_m: float, p: TargetFusionParameters
 ) -> Seen | None:
-    """Where a detection is beside the drone; None when its line of sight has no known length.
+    """The place of a detection relative to the drone; None when its range is not known.
 
     Args:
-        detection: what was seen.
-        q_level_from_camera: turns vectors of the camera (x along the optical axis, y right, z down) into the
-            drone's level frame (x along its nose, z down).
-        height_m: of the drone above the target's ground; NaN: not known.
-        p: how good everything is.
+        detection: the detection.
+        q_level_from_camera: rotates vectors of the camera (x along the optical axis, y right, z down) into
+            the drone's level frame (x along its heading, z down).
+        height_m: height of the drone above the target's ground; NaN: not known.
+        p: parameters with the uncertainties.
     """
     x, y = math.tan(detection.angle_x_rad), math.tan(detection.angle_y_rad)
     norm = math.sqrt(1.0 + x * x + y * y)
@@ -76,7 +76,7 @@ def place_in_level_frame(
         return None
     range_m, sigma_m = measured
     if sigma_m is None:
-        # range = height / sine: what is off in height or tilt moves the place along the line on the ground
+        # range = height / sine: an error in height or tilt moves the place along the line on the ground
         along = (level / down * p.height_sigma_m) ** 2 + (height_m / down**2 * p.tilt_sigma_rad) ** 2
     else:
         along = (level * sigma_m) ** 2 + (range_m * down * p.tilt_sigma_rad) ** 2
@@ -97,7 +97,9 @@ def place_in_level_frame(
 def _range(
     detection: Detection, height_m: float, down: float, p: TargetFusionParameters
 ) -> tuple[float, float | None] | None:
-    """Range and its one sigma; None for the sigma of a range by height, None for no range."""
+    """Range and its standard deviation. The second is None for a range from the height; the result is None
+    without a range.
+    """
     if p.distance in (Range.AUTO, Range.MESSAGE) and 0.0 < detection.distance_m <= _MAX_RANGE_M:
         share = p.range_sigma
         if detection.size_rad > 0.0:

@@ -1,7 +1,7 @@
-"""From what a drone sees to where the target is, and the fusion over the team, as compiled kernels.
+"""The target's place from a drone's detection, and the fusion over the team, as compiled kernels.
 
 Source: Steckenrider, Leamy, Furukawa 2020 (SSRR), equations 31 to 35. The live estimator and the Monte Carlo
-study run these.
+study use them.
 """
 
 import math
@@ -36,13 +36,13 @@ def ground_target(
     seen_covariance: Array,
     out: Array,
 ) -> None:
-    """A target seen from a drone, in the ground frame with its covariance (equations 31 to 34).
+    """Transform a target seen from a drone to the ground frame, with its covariance (equations 31 to 34).
 
     Args:
         x, y, p_xx, p_xy, p_yy: the drone's place and its covariance.
-        heading_rad, heading_variance: of the frame that `seen` is in, from the x axis towards y.
-        seen, seen_covariance: (2,), (2, 2): forward and to the side of y.
-        out: (5,): x, y, then the covariance xx, xy, yy.
+        heading_rad, heading_variance: heading of the frame of `seen`, from the x axis towards y.
+        seen, seen_covariance: (2,), (2, 2): forward, and sideways in the direction of y.
+        out: (5,), overwritten: x, y, then the covariance xx, xy, yy.
     """
     c, s = math.cos(heading_rad), math.sin(heading_rad)
     forward, side = seen[0], seen[1]
@@ -60,7 +60,7 @@ def add_information(belief: Array, information: Array) -> bool:
     """Multiply a Gaussian (x, y, xx, xy, yy) into a belief in information form (equations 10, 35).
 
     Returns:
-        False, and nothing changed, for a covariance that is singular or not finite.
+        False for a covariance that is singular or not finite; the belief is then unchanged.
     """
     xx, xy, yy = belief[2], belief[3], belief[4]
     determinant = xx * yy - xy * xy
@@ -77,7 +77,7 @@ def add_information(belief: Array, information: Array) -> bool:
 
 @kernel
 def belief_of(information: Array, out: Array) -> bool:
-    """Mean and covariance (x, y, xx, xy, yy) of a belief in information form; False when it has none."""
+    """Mean and covariance (x, y, xx, xy, yy) of a belief in information form; False if it has none."""
     xx, xy, yy = information[I_XX], information[I_XY], information[I_YY]
     determinant = xx * yy - xy * xy
     if not (determinant > 0.0 and math.isfinite(determinant)):

@@ -1,4 +1,4 @@
-"""An embedded SITL for missions: the world in this process, on virtual time."""
+"""An embedded SITL for missions: the simulated world in this process, on virtual time."""
 
 from missions.embedded.sitl import (
     MAX_FLIGHT_S,

@@ -1,4 +1,4 @@
-"""Building the scenario of a mission into an embedded SITL: ground targets, payload, magnetic field."""
+"""Adds the scenario of a mission to an embedded SITL: ground targets, payload, magnetic field."""
 
 import math
 from dataclasses import replace
@@ -41,11 +41,11 @@ _MAP_SPACING_M = 50.0
 
 
 def equipped(world: SitlConfiguration, scenario: Scenario) -> SitlConfiguration:
-    """The world with what the scenario asks for.
+    """The configuration of the world with the scenario's targets, payload and field.
 
     Raises:
-        ValueError: an unusable map, or a target outside it.
-        MissionError: the disk does not take a map that is made.
+        ValueError: the map is unusable, or a target is outside it.
+        MissionError: a generated map cannot be written to the disk.
     """
     payload = payload_of(scenario)
     return replace(
@@ -59,7 +59,7 @@ def equipped(world: SitlConfiguration, scenario: Scenario) -> SitlConfiguration:
 
 
 def payload_of(scenario: Scenario) -> PayloadParameters:
-    """What every vehicle carries."""
+    """The payload of every vehicle."""
     return PayloadParameters(
         gimbal=GimbalParameters() if scenario.camera else None,
         camera=CameraParameters() if scenario.camera else None,
@@ -80,12 +80,12 @@ def targets_of(scenario: Scenario) -> tuple[GroundTargetParameters, ...]:
 def magnetic_field_of(
     scenario: Scenario, *, home: Home, seed: int, decimal_year: float
 ) -> MagneticField | None:
-    """The field that magnetometers measure; a survey of a field that is made is published where the
-    scenario says.
+    """The field that magnetometers measure; when the field is generated, its survey is written to the file
+    that the scenario names.
 
     Raises:
-        ValueError: an unusable map, or a target outside it.
-        MissionError: the disk does not take the map.
+        ValueError: the map is unusable, or a target is outside it.
+        MissionError: the map cannot be written to the disk.
     """
     survey = scenario.survey
     if survey is None:
@@ -133,7 +133,7 @@ def _publish(made: MagneticMap, path: Path) -> None:
 
 
 def _require_here(published: MagneticMap, path: Path, home: Home) -> None:
-    """Refuse a map of a place that no vehicle could reach from home."""
+    """Refuse a map of a place that is not near home."""
     frame = LocalFrame(
         GeodeticPosition(
             lat_deg=published.home.lat_deg, lon_deg=published.home.lon_deg, alt_m=published.home.alt_m

@@ -1,4 +1,4 @@
-"""An embedded SITL: the world in this process, on virtual time, one memory link per vehicle."""
+"""An embedded SITL: the simulated world in this process, on virtual time, one memory link per vehicle."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -24,24 +24,24 @@ MAX_FLIGHT_S = 24 * 3600.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EmbeddedConfiguration:
-    """A world for a mission to fly in.
+    """Configuration of the simulated world that a mission is flown in.
 
     Attributes:
-        vehicles: how many, with system ids 1, 2, ...
-        model: of all vehicles, or one for each: a name, or a path.
-        launch: how the aircraft among them get into the air; None: as their descriptions say.
+        vehicles: number of vehicles, with system ids 1, 2, ...
+        model: model of all vehicles, or one for each vehicle: a name, or a path.
+        launch: launch method of the aircraft; None: the method in each aircraft's description.
         flavour: "px4" or "ardupilot".
-        seed: one seed makes one flight.
+        seed: the same seed gives the same flight.
         physics_rate_hz: steps per second of vehicle time.
         speedup: simulated seconds per wall second at most; None: as fast as the machine can.
         wind_speed_m_s, wind_from_deg: mean wind, at 10 m above ground.
-        wind_profile: law of the wind over height, a `flightsim.wind_profile.WindLaw`.
+        wind_profile: law of wind speed over height, a `flightsim.wind_profile.WindLaw`.
         turbulence: "none", "light", "moderate" or "severe".
         parameters: autopilot parameters that differ from the flavour's defaults.
-        gps: receiver of all vehicles, "differential" or "standalone".
-        home: "lat,lon,alt[,heading]"; None: where the flavour's own SITL stands.
-        max_flight_s: vehicle time after which a run that has not ended fails.
-        scenario: targets, payload and magnetic map that the mission asks for.
+        gps: receiver class of all vehicles, "differential" or "standalone".
+        home: "lat,lon,alt[,heading]"; None: the default place of the flavour's own SITL.
+        max_flight_s: vehicle time, s, after which a run that has not ended fails.
+        scenario: targets, payload and magnetic map that the mission needs.
     """
 
     vehicles: int = 1
@@ -67,12 +67,12 @@ class EmbeddedConfiguration:
 
 
 class EmbeddedSitl:
-    """A world, the event loop whose time it is, and a link to each vehicle.
+    """A simulated world, the event loop that runs on its time, and a link to each vehicle.
 
     Attributes:
         sitl: the world.
         loop: run the mission on it (`autopilot_bridge.clock.run`).
-        links: the missions' ends, one per vehicle.
+        links: the mission's end of each vehicle's link.
     """
 
     def __init__(self, configuration: EmbeddedConfiguration) -> None:
@@ -121,13 +121,15 @@ class EmbeddedSitl:
         )
 
     def parameters(self, index: int, names: Sequence[str]) -> dict[str, float]:
-        """Parameters of a vehicle's autopilot, as it would tell them; those it doesn't have are left out."""
+        """Parameter values of a vehicle's autopilot, as it would send them; names it does not have are left
+        out.
+        """
         store = self.sitl.vehicles[index].autopilot.parameters
         return {name: store.get(name) for name in names if name in store}
 
     @property
     def home(self) -> GeodeticPosition:
-        """Where the vehicles stand."""
+        """The home of the vehicles."""
         place = self.sitl.configuration.place
         return GeodeticPosition(lat_deg=place.lat_deg, lon_deg=place.lon_deg, alt_m=place.alt_m)
 
@@ -137,7 +139,7 @@ class EmbeddedSitl:
         return self.sitl.time_us
 
     def on_truth(self, listener: TruthListener) -> None:
-        """Have frames of truth delivered at 50 Hz, for the log and the score."""
+        """Subscribe to frames of truth at 50 Hz, for the log and the score."""
         self.sitl.on_truth(listener)
 
     def close(self) -> None:
@@ -148,11 +150,11 @@ class EmbeddedSitl:
 
 
 def open_embedded(configuration: EmbeddedConfiguration) -> EmbeddedSitl:
-    """Build the world; nothing moves before the loop runs.
+    """Build the world. Simulated time does not advance before the loop runs.
 
     Raises:
-        ValueError: a value that the message names, with what is accepted.
-        MissionError: the disk does not take what the scenario publishes.
+        ValueError: a value is not accepted; the message names it and what is accepted.
+        MissionError: a file that the scenario publishes cannot be written.
     """
     return EmbeddedSitl(configuration)
 
@@ -161,6 +163,6 @@ def model_kind(model: str | Path) -> VehicleKind:
     """Class of vehicle of a model.
 
     Raises:
-        ValueError: no such model.
+        ValueError: the model does not exist.
     """
     return VehicleKind(load_airframe(model).kind.value)

@@ -1,1 +1,1 @@
-"""Estimators beside flights: tapped into one, in a process of their own, over logs; reports and pictures."""
+"""Estimators for flights: during a flight, in their own process, and over logs; reports and pictures."""

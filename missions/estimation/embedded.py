@@ -1,4 +1,4 @@
-"""Estimators in a flight: the same loop as in a process of their own, on the flight's vehicle time."""
+"""Estimators during a flight: the same loop as in a separate process, on the flight's vehicle time."""
 
 import asyncio
 from collections.abc import AsyncIterator, Mapping, Sequence
@@ -32,34 +32,34 @@ _HEARTBEAT_PERIOD_S: Final = 1.0
 
 
 class _Vehicle(Protocol):
-    """What is needed of `missions.vehicle.Vehicle`: its system id, 0 before it was heard."""
+    """What is needed of `missions.vehicle.Vehicle`: its system id, 0 before the vehicle was received."""
 
     @property
     def notes(self) -> FlightNotes: ...
 
 
 def heartbeat() -> Any:
-    """What a process on board says of itself."""
+    """The heartbeat of an onboard process."""
     return dialect.MAVLink_heartbeat_message(
         dialect.MAV_TYPE_ONBOARD_CONTROLLER, dialect.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
     )
 
 
 class FlightEstimators:
-    """The estimators of a flight, one per vehicle or one for the team: a recorder around the flight's own.
+    """The estimators of a flight, one per vehicle or one for the team. They wrap the flight's recorder.
 
     Args:
-        name: of the estimator, or the path of a user's file.
+        name: name of the estimator, or the path of a user's file.
         settings: its parameters as NAME=VALUE.
-        component_id: own.
-        known: parameters that follow from the mission, by name: for an estimator that has them, where
-            `settings` does not say otherwise.
+        component_id: component id of the estimator.
+        known: parameters that follow from the mission, by name. They apply to an estimator that has them,
+            unless `settings` gives another value.
 
     Attributes:
         fleet: their runners.
 
     Raises:
-        EstimatorError: no such estimator or parameter.
+        EstimatorError: the estimator or a parameter does not exist.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class FlightEstimators:
     ) -> None:
         found = estimator_class(name)
         has = {field.name for field in fields(found.PARAMETERS)}
-        # a setting that comes later counts
+        # a later setting replaces an earlier one
         settings = [*(f"{name}={value!r}" for name, value in known.items() if name in has), *settings]
         parameters = parameters_from(found, settings)
 
@@ -91,7 +91,7 @@ class FlightEstimators:
         self._clock: Clock | None = None
 
     def around(self, recorder: Recorder) -> EstimatorTap:
-        """What the connections, and the truth, are to be recorded by instead of this recorder."""
+        """A recorder that replaces this one for connections and truth, and also feeds the estimators."""
         self._tap = EstimatorTap(recorder, self.fleet, self._on_estimate)
         self._watch = RateWatch(self.fleet.needs, self._tap.heard)
         return self._tap
@@ -100,11 +100,11 @@ class FlightEstimators:
     async def on_board(
         self, vehicles: Sequence[_Vehicle], links: Sequence["Link"], clock: "Clock"
     ) -> AsyncIterator[None]:
-        """Publish, and ask the autopilots for the rates that are needed, while the block runs.
+        """Publish estimates, and request the needed rates from the autopilots, while the block runs.
 
         Args:
-            vehicles: of the flight.
-            links: to each of them.
+            vehicles: vehicles of the flight.
+            links: connection to each of them.
             clock: vehicle time.
         """
         self._vehicles, self._links, self._clock = vehicles, links, clock
@@ -117,9 +117,9 @@ class FlightEstimators:
             await asyncio.gather(server, return_exceptions=True)
 
     def report(self, folder: Path, *, picture: bool, wall_time_s: float) -> EstimationResult:
-        """Write the estimates and their picture beside the flight's log, which is closed.
+        """Write the estimates and their picture next to the flight's log, which must be closed.
 
-        The summary is for the flight's to take in.
+        The summary is returned for inclusion in the flight's summary.
         """
         return report(
             ReportRequest(
@@ -153,12 +153,14 @@ class FlightEstimators:
             await clock.sleep(_HEARTBEAT_PERIOD_S)
 
     def _on_estimate(self, runner: Runner, time_us: int) -> None:
-        # Estimates from too little are no news for anybody.
+        # Estimates from too few inputs are not sent.
         if self._links and self._watch is not None and self._watch.enough:
             self._publisher.on_estimate(runner, time_us)
 
     def _say(self, system_id: int, message: MAVLinkMessage) -> None:
-        """Over the link of a vehicle that the mission knows already; a team's go over the first."""
+        """Send over the link of a vehicle that the mission already knows; messages of a team go over the
+        first link.
+        """
         for vehicle, link in zip(self._vehicles, self._links, strict=False):
             if vehicle.notes.system_id and system_id in (0, vehicle.notes.system_id):
                 encoder = self._encoders.get(system_id)

@@ -1,4 +1,4 @@
-"""The estimators that a flight is asked to take along; what they need is imported only then."""
+"""The estimators that a flight runs if requested; their modules are imported only then."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
@@ -11,14 +11,14 @@ if TYPE_CHECKING:
 
 
 def estimators_of(request: RunRequest, known: Mapping[str, float]) -> "FlightEstimators | None":
-    """The estimators of a flight; None where none is asked for.
+    """The estimators of a flight; None when none is requested.
 
     Args:
-        request: of the flight.
+        request: request of the flight.
         known: parameters that follow from its mission.
 
     Raises:
-        PlanError: no such estimator or parameter.
+        PlanError: the estimator or a parameter does not exist.
     """
     if request.estimator is None:
         if request.estimator_settings:
@@ -29,7 +29,7 @@ def estimators_of(request: RunRequest, known: Mapping[str, float]) -> "FlightEst
     from estimators.errors import EstimatorError
     from missions.estimation.embedded import COMPONENT_ID, FlightEstimators
 
-    # A mission on board may have the first id of an onboard computer itself.
+    # A mission on board may itself use the first id of an onboard computer.
     component_id = COMPONENT_ID + (request.identity[1] == COMPONENT_ID)
     try:
         return FlightEstimators(

@@ -1,7 +1,7 @@
-"""An estimator in a process of its own, on a live link: hears, tells, logs.
+"""An estimator in its own process on a live link: it receives messages, sends estimates and writes a log.
 
-Everything that is heard and sent goes into the run folder's log, in the order in which the estimator heard
-it: the replay of that log gives the same estimates, bit for bit.
+Every frame that is received and sent goes into the run folder's log, in the order in which the estimator
+processed it: a replay of that log gives the same estimates, bit for bit.
 """
 
 import asyncio
@@ -42,19 +42,19 @@ _LOOK_S: Final = 0.25
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveRequest:
-    """What is asked of an estimator process.
+    """The settings of an estimator process.
 
     Attributes:
         estimator: its name, or the path of a user's file.
         connect: connection string of the link.
         settings: parameters as NAME=VALUE.
-        duration_s: vehicle time since the vehicle was heard (wall time of one that tells none); None: until
-            it is stopped.
-        system_id: of the vehicle; None: the first that is heard.
-        component_id: own.
-        publish: whether estimates are told on the link.
-        request_rates: whether the autopilot is asked for the rates that the estimator needs.
-        silence_s: wall time without a word from the vehicle after which the run ends.
+        duration_s: vehicle time since the vehicle was first received (wall time when the vehicle sends no
+            time); None: until it is stopped.
+        system_id: system id of the vehicle; None: the first vehicle received.
+        component_id: component id of the estimator.
+        publish: whether estimates are sent on the link.
+        request_rates: whether the message rates that the estimator needs are requested from the autopilot.
+        silence_s: wall time without a message from the vehicle after which the run ends.
         against: what the estimates are compared with afterwards: "autopilot", "truth" or "both".
         out: run folder; None: the next `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
@@ -92,12 +92,12 @@ class LiveRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveProgress:
-    """How it goes, for whoever shows it.
+    """Progress of the run, for display.
 
     Attributes:
-        time_s: vehicle time since the vehicle was first heard.
-        estimates: made so far.
-        lacking: what the link does not give, in words.
+        time_s: vehicle time since the vehicle was first received.
+        estimates: number of estimates so far.
+        lacking: description of the messages that the link does not provide.
     """
 
     time_s: float
@@ -133,17 +133,17 @@ class _Process:
         )
 
     def stop(self) -> None:
-        """End the run soon."""
+        """Request the end of the run."""
         self.stopped = True
         self._stop.set()
 
     @property
     def starvation(self) -> str:
-        """What the estimator had to do without for too long; "" if nothing."""
+        """Description of the inputs that the estimator lacked for too long; "" if none."""
         return self._watch.starvation
 
     def figures(self) -> dict[str, Any]:
-        """What became of the bytes of the link, and what was sent."""
+        """Figures about the bytes of the link and the sent messages."""
         return {
             "bytes_received": self._link.counters.bytes_in,
             "bytes_junk": self.connection.parsers.counters.bytes_junk,
@@ -151,11 +151,11 @@ class _Process:
         }
 
     async def run(self, on_progress: Callable[[LiveProgress], None] | None) -> None:
-        """Until the duration is over, the link is silent, the estimator fails, or somebody stops it."""
+        """Run until the duration is over, the link is silent, the estimator fails, or the user stops it."""
         request, clock, tap = self._request, self._clock, self._tap
         async with self.connection:
             heard, heard_wall_s = 0, wall_time_s()
-            first_us: int | None = None  # when the vehicle was first heard, or first told its time
+            first_us: int | None = None  # when the vehicle, or its time, was first received
             timed = False
             while not self.stopped:
                 wall_s = wall_time_s()
@@ -190,10 +190,11 @@ class _Process:
                 due_s = wall_time_s() + wait_s
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._stop.wait(), wait_s)
-                heard_wall_s += max(0.0, wall_time_s() - due_s)  # who sleeps late hears nothing meanwhile
+                # time in which this process was delayed is not silence
+                heard_wall_s += max(0.0, wall_time_s() - due_s)
 
     def _vehicles(self) -> tuple[int, ...]:
-        """System ids of the vehicles that count: the one asked for, the one it is for, or all of a team."""
+        """System ids of the vehicles to use: the one specified, the one received first, or all of a team."""
         heard = tuple(self._tap.autopilots)
         if self._fleet.team:
             return heard
@@ -202,16 +203,17 @@ class _Process:
         return tuple(self._fleet.runners) or heard[:1]
 
     def _meet(self) -> None:
-        """Speak as a part of the vehicle, once it is known which."""
+        """Use the vehicle's system id as sender id, once it is known."""
         vehicles = self._vehicles()
         if not self._met and vehicles and not self._fleet.team:
             self.connection.speak_as(vehicles[0], self._request.component_id)
         self._met = bool(self._fleet.runners)
 
     def _keep_time(self) -> None:
-        """Set the clock by whatever the vehicle stamps, where the connection finds nothing to set it by.
+        """Set the clock from any time stamp of the vehicle, when the connection finds no message to set it
+        by.
 
-        An autopilot may send no more than what it was asked for, such as HIGHRES_IMU.
+        An autopilot may send only the messages that were requested, such as HIGHRES_IMU.
         """
         if self._clock.vehicle_time_us is not None and not self._keeps_time:
             return
@@ -221,7 +223,7 @@ class _Process:
             self._clock.observe(time_us)
 
     def _look(self, now_us: int) -> None:
-        """Measure rates, and ask for more where they are too low."""
+        """Measure rates, and request higher ones if they are too low."""
         if now_us < self._look_us:
             return
         self._look_us = now_us + round(CHECK_PERIOD_S * 1e6)
@@ -247,7 +249,7 @@ class _Process:
         return LiveProgress(time_s=since_us * 1e-6, estimates=count, lacking=tuple(self._watch.lacking))
 
     def _on_estimate(self, runner: Runner, time_us: int) -> None:
-        # Estimates from too little are no news for anybody.
+        # Estimates from too few inputs are not sent.
         if self._watch.enough:
             self._publisher.on_estimate(runner, time_us)
 
@@ -261,10 +263,10 @@ def estimate(
 ) -> EstimationResult:
     """Run an estimator on a live link and write its run folder. Blocks until it is done.
 
-    Ctrl-C, SIGTERM and SIGHUP end it in good order, as the end of its duration does.
+    Ctrl-C, SIGTERM and SIGHUP end it normally, as the end of its duration does.
 
     Raises:
-        EstimatorError: no such estimator or parameter; nothing was opened.
+        EstimatorError: the estimator or a parameter does not exist; nothing was opened.
         PlanError: the run folder can't be made.
         BridgeError: the link can't be opened.
     """
@@ -295,7 +297,7 @@ def estimate(
             recorder.close()
     finally:
         link.close()
-    # A full disk may refuse no more than the last of the log.
+    # A full disk may show only when the last part of the log is written.
     reason = process.reason or recorder.failure or process.starvation
     interrupted = process.stopped and request.duration_s is not None
     return report(
@@ -316,6 +318,6 @@ def estimate(
 
 
 def _end_on_signals(loop: asyncio.AbstractEventLoop, stop: Callable[[], None]) -> None:
-    """Ctrl-C, SIGTERM and SIGHUP end the run in good order, until the loop is closed."""
+    """Make Ctrl-C, SIGTERM and SIGHUP end the run normally, until the loop is closed."""
     for number in end_signals(signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop)

@@ -1,4 +1,4 @@
-"""Logs through an estimator, with a run folder for each; the logs of a team together, with one."""
+"""Runs an estimator over logs, with a run folder for each log, or one for the logs of a team."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,17 +21,18 @@ __all__ = ["ReplayRequest", "replay_logs"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplayRequest:
-    """What is asked of a replay.
+    """The settings of a replay.
 
     Attributes:
         logs: files; for an estimator of a team all of them are one team's.
         estimator: its name, or the path of a user's file.
         settings: parameters as NAME=VALUE.
-        system_id: the one vehicle that counts; None: all in each log.
+        system_id: the only vehicle to use; None: all in each log.
         against: "autopilot", "truth" or "both".
-        from_s, to_s, boot: part of the logs to replay, as `Log.inside` takes them.
-        dialect: of telemetry logs; None: every message of MAVLink's public definitions.
-        out: run folder; with several logs the folder of theirs. None: the next `runs/<estimator>-<n>`.
+        from_s, to_s, boot: part of the logs to replay, with the meaning they have in `Log.inside`.
+        dialect: dialect of telemetry logs; None: every message of MAVLink's public definitions.
+        out: run folder; with several logs the folder that contains their run folders. None: the next
+            `runs/<estimator>-<n>`.
         picture: whether to draw `errors.png`.
         command: the command line, for the summaries.
     """
@@ -57,7 +58,7 @@ class ReplayRequest:
 
 
 Done = Callable[[str, EstimationResult | str], None]
-"""Called after each log with what it is called, and how it went: a result, or why it can't be read."""
+"""Called after each log with its name and the result, or the reason why it can't be read."""
 
 
 def replay_logs(
@@ -65,17 +66,17 @@ def replay_logs(
 ) -> list[tuple[str, EstimationResult | str]]:
     """Replay logs and write their run folders.
 
-    A log that can't be read doesn't keep the others from being replayed.
+    A log that can't be read does not prevent the replay of the others.
 
     Raises:
-        EstimatorError: no such estimator or parameter, or logs that are not of one team.
-        LogError: no such dialect.
+        EstimatorError: the estimator or a parameter does not exist, or the logs are not of one team.
+        LogError: the dialect does not exist.
         PlanError: a run folder can't be made.
     """
     found = estimator_class(request.estimator)
     parameters = parameters_from(found, request.settings)
     if request.dialect is not None:
-        load_dialect(request.dialect)  # a wrong one is wrong for every log
+        load_dialect(request.dialect)  # a wrong dialect is an error for every log
 
     def make() -> Estimator[Any]:
         return found(parameters)
@@ -134,7 +135,7 @@ def _replay_one(
 
 
 def _folder(request: ReplayRequest, log: Path, name: str, several: bool) -> Path:
-    """The folder of one log: named after it where there are several."""
+    """The run folder of one log, with the log's name if there are several."""
     if not several:
         return create_run_folder(request.out, name)
     if request.out is None:
@@ -147,10 +148,10 @@ def _folder(request: ReplayRequest, log: Path, name: str, several: bool) -> Path
 
 
 def check_out(request: ReplayRequest) -> None:
-    """Refuse a folder that holds something, before anything is replayed.
+    """Refuse a folder that is not empty, before anything is replayed.
 
     Raises:
-        PlanError: it does.
+        PlanError: the folder is not empty.
     """
     out = request.out
     if out is None:
@@ -162,5 +163,5 @@ def check_out(request: ReplayRequest) -> None:
 
 
 def failed(result: EstimationResult | str) -> bool:
-    """Whether a log gave less than was asked for."""
+    """Whether the result of a log is incomplete."""
     return isinstance(result, str) or result.outcome == FAILED

@@ -1,4 +1,4 @@
-"""The picture of an estimator's errors: each estimate beside its references, and the difference below."""
+"""The picture of an estimator's errors: each estimate with its references, and the difference below."""
 
 import math
 from collections.abc import Sequence
@@ -21,10 +21,10 @@ _INK: Final = "#1f2937"
 _ESTIMATE: Final = "#c2410c"
 _COLOURS: Final = {AUTOPILOT: "#1769aa", TRUTH: "#111827"}
 _IN_AIR: Final = "#f3f4f6"
-_MOST: Final = 6  # quantities in one picture
-_MOST_ALONE: Final = 9  # those without a reference
+_MOST: Final = 6  # largest number of quantities in one picture
+_MOST_ALONE: Final = 9  # largest number of quantities without a reference
 _NOT_DRAWN: Final = ("target",)
-_POINTS: Final = 6000  # more can't be told apart
+_POINTS: Final = 6000  # more cannot be distinguished in the picture
 _UNITS: Final = {"deg": "deg", "m": "m", "m_s": "m/s"}
 
 
@@ -33,7 +33,7 @@ def draw_errors(path: Path, title: str, compared: Sequence[Comparison]) -> None:
 
     Args:
         path: the file; it must not exist.
-        title: above the picture.
+        title: title above the picture.
         compared: vehicles or targets; the first quantities of all of them are shown, those with a reference
             before those without.
     """
@@ -106,7 +106,7 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
         _shade(axes, time_s, c.counted)
     thin = slice(None, None, max(1, len(time_s) // _POINTS))
     breaks = _breaks(time_s)
-    # Truth lies below the autopilot's line where both are there, and both below the estimate.
+    # The truth is drawn below the autopilot's line, and both below the estimate.
     for reference in sorted(c.references, key=lambda r: r != TRUTH):
         columns = c.references[reference]
         if column not in columns:
@@ -142,7 +142,7 @@ def _draw_quantity(above: Any, below: Any, c: Comparison, column: str, label: st
 
 
 def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
-    """A column that nothing is known to compare with."""
+    """Draw a column that has no reference to compare with."""
     name, unit, factor = quantity_of(column)
     time_s = _continuous_s(c)
     _shade(axes, time_s, c.counted)
@@ -154,18 +154,18 @@ def _draw_alone(axes: Any, c: Comparison, column: str, label: str) -> None:
 
 
 def _limit(axes: Any, c: Comparison, column: str, factor: float) -> None:
-    """Make room for the errors in the air; what happens on the ground may leave the picture."""
+    """Set the axis limits to the errors in the air; errors on the ground may be outside the picture."""
     largest = 0.0
     for reference, columns in c.references.items():
         if column in columns:
             error = np.abs(factor * c.errors(reference, column)[c.counted])
             largest = max(largest, float(np.nanmax(error, initial=0.0, where=np.isfinite(error))))
     if largest > 0.0:
-        axes.set_ylim(-1.2 * largest, 1.8 * largest)  # the figures stand above the line
+        axes.set_ylim(-1.2 * largest, 1.8 * largest)  # room for the figures above the line
 
 
 def _continuous_s(c: Comparison) -> NDArray[np.float64]:
-    """Time for the axis: boots one after the other."""
+    """Time for the axis, with the boots in sequence."""
     time_s = c.time_us * 1e-6
     offset = 0.0
     for number in np.unique(c.boot)[1:]:
@@ -176,12 +176,12 @@ def _continuous_s(c: Comparison) -> NDArray[np.float64]:
 
 
 def _breaks(time_s: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where a line must not go on: after more than a second without an estimate."""
+    """Mask of the points at which a line is interrupted: after more than a second without an estimate."""
     return np.append(np.diff(time_s) > 1.0, False) if len(time_s) else np.zeros(0, dtype=np.bool_)
 
 
 def _parted(values: NDArray[np.float64], breaks: NDArray[np.bool_], column: str) -> NDArray[np.float64]:
-    """Values with holes where the line is to be broken: gaps, and angles that wrap around."""
+    """Values with NaN where the line is interrupted: at gaps, and at angles that wrap around."""
     wrapped = values
     if column.endswith("_rad"):
         wrapped = np.remainder(values + math.pi, 2.0 * math.pi) - math.pi

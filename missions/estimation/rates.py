@@ -1,4 +1,4 @@
-"""Rates on a live link: what is heard, what of it is too slow, and asking the autopilot for more."""
+"""Message rates on a live link: measured rates, rates that are too low, and requests for higher ones."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -11,18 +11,18 @@ from estimators.needs import NOT_STREAMED, RATE_TOLERANCE, lacking, wanted_rate_
 __all__ = ["CHECK_PERIOD_S", "RateWatch", "interval_request"]
 
 CHECK_PERIOD_S: Final = 2.0
-"""Vehicle time over which rates are measured; an autopilot answers a request within it."""
+"""Interval of vehicle time over which rates are measured; an autopilot answers a request within it."""
 _MARGIN: Final = 1.25
-"""What would just do is asked for with so much to spare."""
+"""Requested rates are higher than the needed ones by this factor."""
 _STARVED_SHARE: Final = 0.1
 _STARVED_S: Final = 6.0
-"""Without what it needs for so long, and for a tenth of its time, an estimator has not done its work."""
+"""An estimator has failed when it lacked its inputs for this time and for a tenth of its total time."""
 _ROUNDS: Final = 3
-"""How often each alternative of what would only be nice to have is asked for."""
+"""Number of requests for each alternative of an optional rate."""
 
 
 def interval_request(system_id: int, name: str, rate_hz: float) -> Any:
-    """MAV_CMD_SET_MESSAGE_INTERVAL to an autopilot."""
+    """Message with MAV_CMD_SET_MESSAGE_INTERVAL for an autopilot."""
     return dialect.MAVLink_command_long_message(
         system_id,
         dialect.MAV_COMP_ID_AUTOPILOT1,
@@ -35,17 +35,17 @@ def interval_request(system_id: int, name: str, rate_hz: float) -> Any:
 
 
 class RateWatch:
-    """Measures rates between looks, and says what to ask for.
+    """Measures message rates between checks, and determines which rates to request.
 
     Args:
-        needs: of the estimator.
-        heard: frames by (system id, message id), counted by somebody else.
+        needs: messages and rates that the estimator needs.
+        heard: frame counts by (system id, message id); the caller updates them.
 
     Attributes:
-        lacking: what is missing at the newest look, in words.
-        enough: rates have been measured, and nothing is missing.
-        measured_s: vehicle time that was measured since there was enough for the first time.
-        starved_s: the part of it in which something was missing.
+        lacking: description of what was missing at the newest check.
+        enough: rates have been measured, and no message is missing or too slow.
+        measured_s: vehicle time measured since the rates were sufficient for the first time.
+        starved_s: the part of that time in which a message was missing or too slow.
     """
 
     def __init__(self, needs: Sequence[Need], heard: Mapping[tuple[int, int], int]) -> None:
@@ -62,27 +62,27 @@ class RateWatch:
 
     @property
     def starvation(self) -> str:
-        """Why the estimator could not do its work: messages that came, and then did not; "" if they came.
+        """Description of messages that came at first and then were missing; "" if none.
 
-        What never came in the needed rate is in the log, and is found there.
+        Messages that never came at the needed rate are not included; they are found from the log.
         """
         if self.starved_s < _STARVED_S or self.starved_s < _STARVED_SHARE * self.measured_s:
             return ""
         return f"starved for {self.starved_s:.0f} s of {self.measured_s:.0f} s: {self._missed}"
 
     def restart(self) -> None:
-        """Begin the measurement anew, where time has changed its base."""
+        """Restart the measurement, because the time base has changed."""
         self._before_us = None
 
     def look(self, time_us: int, system_ids: Iterable[int]) -> list[tuple[int, str, float]]:
-        """Measure since the last look.
+        """Measure the rates since the last call.
 
         Args:
             time_us: vehicle time.
-            system_ids: vehicles that count.
+            system_ids: vehicles to use.
 
         Returns:
-            (system id, message name, rate) to ask for; the first look only begins the measurement.
+            (system id, message name, rate) to request; the first call only begins the measurement.
         """
         before_us, before = self._before_us, self._before
         self._before_us, self._before = time_us, Counter(self._heard)
@@ -117,7 +117,7 @@ class RateWatch:
         def rate_hz(name: str) -> float:
             key = (system_id, definition(name).message_id)
             count = self._heard.get(key, 0)
-            # What may come at any rate need not come in this very period (a target out of sight).
+            # A message that may come at any rate may be absent in this period (a target out of sight).
             return (count - (0 if name in seldom else before.get(key, 0))) / elapsed_s
 
         return rate_hz
@@ -125,20 +125,20 @@ class RateWatch:
     def _to_ask(
         self, system_id: int, index: int, need: Need, rate_hz: Callable[[str], float]
     ) -> list[tuple[str, float]]:
-        """Messages and rates to ask for; none where one is fast enough, or asking was of no use."""
+        """Messages and rates to request; empty when one is fast enough, or requests had no effect."""
         heard_hz, best = max((rate_hz(name), -k) for k, name in enumerate(need.messages))
         wanted_hz = wanted_rate_hz(need)
         served = heard_hz > 0.0 and heard_hz >= RATE_TOLERANCE * need.rate_hz
         if served and (not need.rate_hz or heard_hz >= RATE_TOLERANCE * wanted_hz):
             return []
         times = self._asked[system_id, index]
-        if served:  # it would do; whether it can be faster is asked once
+        if served:  # sufficient; a higher rate is requested once
             self._asked[system_id, index] += 1
             return [] if times else [(need.messages[-best], wanted_hz)]
         if need.optional and times >= _ROUNDS * len(need.messages):
             return []
         self._asked[system_id, index] += 1
         name = need.messages[times % len(need.messages)]
-        # An autopilot that finds the second too fast has granted the first.
+        # An autopilot that refuses the second rate as too fast has already accepted the first.
         enough_hz = _MARGIN * need.rate_hz
         return [(name, rate) for rate in (enough_hz, wanted_hz) if 0.0 < rate <= wanted_hz]

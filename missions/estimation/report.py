@@ -1,4 +1,4 @@
-"""The run folder of an estimator: summary, estimates as columns and as text, the picture of its errors."""
+"""The run folder of an estimator: summary, estimates as columns and as text, and picture of its errors."""
 
 import csv
 import enum
@@ -50,21 +50,21 @@ _NOTHING: Final[Mapping[str, Any]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportRequest:
-    """What is to be reported.
+    """The inputs of a report.
 
     Attributes:
         folder: the run folder.
-        logs: that the estimators heard, open or the path of the run's own.
-        fleet: the estimators, done.
-        settings: parameters as they were given.
+        logs: logs that the estimators processed, open, or the path of the run's own log.
+        fleet: the estimators, finished.
+        settings: parameters as the user gave them.
         against: "autopilot", "truth" or "both".
         picture: whether to draw `errors.png`.
-        wall_time_s: how long it took.
-        failure: why there is not all that was asked for; "" if there is.
+        wall_time_s: wall time of the run.
+        failure: why the result is incomplete; "" if it is complete.
         interrupted: the user ended it early.
         command: the command line.
-        supplies, lacking: by system id, where known already; else taken from the log.
-        more: further entries of the summary.
+        supplies, lacking: by system id, when already known; otherwise read from the log.
+        more: additional entries of the summary.
     """
 
     folder: Path
@@ -83,14 +83,14 @@ class ReportRequest:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EstimationResult:
-    """How an estimator did.
+    """The result of an estimator's run.
 
     Attributes:
         outcome: "completed", "failed" or "interrupted".
         reason: why it failed; "" otherwise.
         folder: the run folder.
-        summary: what `summary.json` holds.
-        compared: estimates beside references, by vehicle or target.
+        summary: contents of `summary.json`.
+        compared: estimates with their references, by vehicle or target.
     """
 
     outcome: str
@@ -101,11 +101,11 @@ class EstimationResult:
 
 
 def report(request: ReportRequest, *, summary_file: bool = True) -> EstimationResult:
-    """Write what there is of a run: everything that was estimated, marked partial where it is not all.
+    """Write the results of a run: all estimates, marked as partial if the run is incomplete.
 
     Args:
         request: the run.
-        summary_file: whether to write `summary.json`; a flight has one of its own that takes the summary in.
+        summary_file: whether to write `summary.json`; a flight includes it in its own summary file.
     """
     fleet = request.fleet
     logs, reason = _opened(request.logs)
@@ -169,7 +169,7 @@ def _opened(logs: Sequence[Log] | Path) -> tuple[Sequence[Log], str]:
 
 
 def _told(lacking: Mapping[int, Sequence[str]], vehicles: int) -> str:
-    """What is missing, in one sentence."""
+    """The missing inputs in one sentence."""
     parts = [
         text if vehicles == 1 else f"vehicle {system}: {text}"
         for system, texts in lacking.items()
@@ -179,7 +179,7 @@ def _told(lacking: Mapping[int, Sequence[str]], vehicles: int) -> str:
 
 
 def _needs(supplies: Mapping[int, Sequence[Supply]]) -> list[dict[str, Any]]:
-    """Each need of each vehicle, and how it was served."""
+    """Each need of each vehicle, and the message that supplies it."""
     return [
         {
             "vehicle": system,
@@ -216,7 +216,7 @@ def _block(
 
 
 def warnings_of(summary: Mapping[str, Any]) -> list[str]:
-    """What the estimators of a summary warn of."""
+    """Warnings of the estimators in a summary."""
     found = []
     for block in summary["vehicles"]:
         if "warning" in block["remarks"]:
@@ -226,7 +226,9 @@ def warnings_of(summary: Mapping[str, Any]) -> list[str]:
 
 
 def notes_of(summary: Mapping[str, Any]) -> list[str]:
-    """What a reader should know: what the estimators corrected, and why something was not compared."""
+    """Notes for the reader: the corrections that the estimators applied, and reasons why something was not
+    compared.
+    """
     found = []
     for block in summary["vehicles"]:
         which = "" if block["system_id"] is None else f"vehicle {block['system_id']}: "
@@ -267,7 +269,7 @@ def _figures(compared: Comparison, reference: str) -> dict[str, float]:
 
 
 def _headline(block: Mapping[str, Any]) -> dict[str, Any]:
-    """What stands at the top of the summary: the first vehicle's, or the first target's."""
+    """The entries at the top of the summary: those of the first vehicle or the first target."""
     first = (
         block["subjects"][0]
         if block["subjects"]
@@ -278,7 +280,7 @@ def _headline(block: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it."""
+    """A value converted for JSON."""
     if is_dataclass(value) and not isinstance(value, type):
         return {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
     if isinstance(value, enum.Enum):
@@ -293,7 +295,7 @@ def _plain(value: Any) -> Any:
 def write_estimates(folder: Path, fleet: Fleet) -> list[Path]:
     """Write every table of estimates as .npz and as .csv; returns the files.
 
-    They are called `estimates`, and with several vehicles or kinds of estimates also after those.
+    Their name is `estimates`; with several vehicles or kinds of estimates these are added to it.
     """
     tables = [(runner, table) for runner in fleet.runners.values() for table in runner.tables.values()]
     kinds = {table.name for _, table in tables}
@@ -314,7 +316,7 @@ def _write_table(folder: Path, name: str, table: EstimateTable) -> list[Path]:
     columns |= dict(zip(table.columns, values.T, strict=True))
     arrays = folder / f"{name}.npz"
     with whole(arrays), arrays.open("xb") as file:
-        np.savez_compressed(file, **columns)  # type: ignore[arg-type]  # names of columns, not options
+        np.savez_compressed(file, **columns)  # type: ignore[arg-type]  # the names are columns, not options
     text = folder / f"{name}.csv"
     with whole(text), text.open("x", encoding="utf-8", newline="") as lines:
         writer = csv.writer(lines)
@@ -342,10 +344,10 @@ _UNITS: Final = {
 
 
 def table_lines(results: Sequence[tuple[str, EstimationResult]]) -> list[str]:
-    """One table of the errors of several runs.
+    """A table of the errors of several runs, as lines.
 
     Args:
-        results: what each run is called, and how it went.
+        results: name and result of each run.
     """
     rows: list[tuple[str, ...]] = []
     for label, result in results:
@@ -362,7 +364,7 @@ def table_lines(results: Sequence[tuple[str, EstimationResult]]) -> list[str]:
         return []
     lines = [("log", *_HEADINGS), *rows]
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
-    left = 4  # columns of text; the others are numbers
+    left = 4  # columns of text; the others contain numbers
     return [
         "  ".join(
             cell.ljust(width) if k < left else cell.rjust(width)

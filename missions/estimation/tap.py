@@ -1,7 +1,8 @@
-"""The tap: what a flight records is what its estimators hear, in the same order.
+"""The tap passes what a flight records to its estimators, in the same order.
 
-A log's replay reads the frames in the order in which they were recorded. So the estimators of a flight sit at
-the recorder: the flight and the replay of its own log give the same estimates, whatever the link was.
+A log's replay reads the frames in the order in which they were recorded. The estimators of a flight therefore
+receive their input from the recorder: the flight and the replay of its own log give the same estimates on any
+link.
 """
 
 import asyncio
@@ -19,26 +20,27 @@ from missions.connection import Recorder
 __all__ = ["PUBLISH_RATE_HZ", "EstimatorTap", "Publisher"]
 
 PUBLISH_RATE_HZ: Final = 10.0
-"""How often estimates are told at most; a telemetry radio carries that."""
+"""Highest rate at which estimates are sent, Hz; a telemetry radio can carry it."""
 
 TEAM_SYSTEM: Final = 255
-"""Who tells the estimates of a team: a process at the base station."""
+"""System id that sends the estimates of a team: a process at the base station."""
 
 _MAGIC_V2: Final = 0xFD
 
 
 class EstimatorTap:
-    """A recorder that hands what it records to estimators as well.
+    """A recorder that also passes the recorded frames to estimators.
 
     Args:
-        recorder: where the frames go.
+        recorder: the recorder that stores the frames.
         fleet: the estimators.
         on_estimate: called with a runner when its estimator has a new estimate.
 
     Attributes:
-        failure: what an estimator's own error said; it is given nothing more then. "" while all is well.
-        heard: frames by (system id, message id) of what estimators may hear, for rates.
-        autopilots: frames of autopilots, by system id.
+        failure: message of an error that an estimator raised; it receives no more frames after that. ""
+            without an error.
+        heard: number of frames by (system id, message id) that estimators may receive, for rates.
+        autopilots: number of frames of autopilots, by system id.
     """
 
     def __init__(
@@ -52,7 +54,7 @@ class EstimatorTap:
         self._on_estimate = on_estimate
 
     def record(self, frame: bytes, time_us: int) -> None:
-        """Record a good frame, and let the estimators hear it."""
+        """Record a valid frame, and pass it to the estimators."""
         self._record(frame, time_us)
         taken = _frame(frame)
         if taken.system_id < GROUND_SYSTEM and not why_unheard(taken.definition.name, taken.component_id):
@@ -69,29 +71,29 @@ class EstimatorTap:
             self.failure = str(failure)
 
     def record_truth(self, time_us: int, frame: bytes) -> None:
-        """Record a frame of truth: not for estimators, but it has its place in the order of the log."""
+        """Record a frame of truth. It is not passed to estimators, but is placed in the order of the log."""
         self.record(frame, time_us)
 
 
 def _frame(raw: bytes) -> Frame:
-    """A frame from bytes that a parser has checked already, or that an encoder has made."""
+    """A frame from bytes that a parser has already checked, or that an encoder has created."""
     if raw[0] == _MAGIC_V2:
         return Frame(raw, raw[7] | raw[8] << 8 | raw[9] << 16, raw[5], raw[6], raw[4], 2, bool(raw[2] & 1))
     return Frame(raw, raw[5], raw[3], raw[4], raw[2], 1)
 
 
 class Publisher:
-    """Tells estimates over the link of their vehicle, at most so often.
+    """Sends estimates over the link of their vehicle, at a limited rate.
 
-    Messages are sent when the event loop comes round, never from within the arrival of the message that the
-    estimate is made of: on a memory link the sender of that is still at it.
+    Messages are sent in a later iteration of the event loop, never inside the call that delivers the message
+    from which the estimate is made: on a memory link the sender has not yet returned from that call.
 
     Args:
         say: sends a message for a vehicle (system id; 0: of a team) from the estimator's own component.
-        rate_hz: how often at most, in vehicle time.
+        rate_hz: highest rate, in vehicle time.
 
     Attributes:
-        sent: messages so far.
+        sent: number of messages sent so far.
     """
 
     def __init__(
@@ -103,10 +105,10 @@ class Publisher:
         self.sent = 0
 
     def on_estimate(self, runner: Runner, time_us: int) -> None:
-        """A runner has a new estimate at a vehicle time.
+        """Send a runner's new estimate at a vehicle time, if the rate permits.
 
         Raises:
-            EstimatorFailure: the estimator raised an error, or what it gave is no message.
+            EstimatorFailure: the estimator raised an error, or returned something that is not a message.
         """
         system_id = runner.system_id or 0
         due_us = self._due_us.get(system_id)

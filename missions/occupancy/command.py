@@ -1,4 +1,4 @@
-"""The search with an occupancy map on the command line."""
+"""The command-line options of the search with an occupancy map."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

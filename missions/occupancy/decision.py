@@ -1,4 +1,4 @@
-"""Which neighbouring cell a searcher flies to next: the utility of Lum et al. 2005, equation 9."""
+"""Decides which neighbouring cell a searcher flies to next: the utility of Lum et al. 2005, equation 9."""
 
 import math
 from collections.abc import Collection
@@ -10,15 +10,16 @@ from missions.occupancy.occupancy_map import Cell, OccupancyMap
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecisionParameters:
-    """One searcher's habits.
+    """Parameters of one searcher's decisions.
 
     Attributes:
-        neighbourhood: how many cells in each direction are looked at; 1 is the paper's eight cells.
+        neighbourhood: number of cells considered in each direction; 1 gives the paper's eight cells.
         heading_penalty: alpha of equation 9, in mean prior scores of a cell for a turn by pi: large for
-            aircraft that turn badly, small for a helicopter; more than 0, for where scores are equal.
+            aircraft with wide turns, small for a helicopter; more than 0, so that equal scores can be
+            decided.
 
     Raises:
-        PlanError: a value out of its range.
+        PlanError: a value is out of its range.
     """
 
     neighbourhood: int = 1
@@ -35,10 +36,10 @@ class DecisionParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """Where to fly.
+    """The next cell to fly to.
 
     Attributes:
-        cell: the one chosen.
+        cell: the chosen cell.
         heading_rad: direction from the searcher to its centre, 0..2 pi.
         utility: J of equation 9, in mean prior scores.
     """
@@ -59,14 +60,15 @@ def decide(
 ) -> Decision:
     """The neighbouring cell of greatest utility J = B_i - alpha |psi - psi_i| (heading difference wrapped).
 
-    Off the map the neighbourhood is that of the nearest cell, which then is a choice itself. Equal utilities
-    are decided by the smaller cell number, so that a flight can be repeated.
+    When the searcher is off the map, the neighbourhood is that of the nearest cell, and that cell can be
+    chosen too. Of cells with equal utility the one with the smallest number is chosen, so that a flight can
+    be repeated.
 
     Args:
         occupancy: the shared map.
-        north_m, east_m, heading_rad: the searcher.
-        parameters: its habits.
-        taken: cells that others are on their way to; chosen only when there is nothing else.
+        north_m, east_m, heading_rad: position and heading of the searcher.
+        parameters: parameters of its decisions.
+        taken: cells that other searchers fly to; chosen only when there is no other cell.
     """
     layout = occupancy.layout
     here = layout.cell_at(north_m, east_m)

@@ -1,7 +1,8 @@
-"""When a magnetometer reading is an anomaly, and how likely a passing searcher is to see one.
+"""Detection of anomalies in magnetometer readings, and the probability that a passing searcher detects a
+target.
 
-Source: Lum, Rysdyk and Pongpunwattana 2005, sections III-C (an anomaly is what exceeds the noise) and IV-B
-(detection model); docs/papers.md.
+Source: Lum, Rysdyk and Pongpunwattana 2005, sections III-C (an anomaly is a value that exceeds the noise)
+and IV-B (detection model); docs/papers.md.
 """
 
 import math
@@ -19,9 +20,10 @@ Array = NDArray[np.float64]
 
 _SQRT_2PI: Final = math.sqrt(2.0 * math.pi)
 _QUADRATURE: Final = np.polynomial.legendre.leggauss(8)
-_ENDS_AT: Final = 0.5  # of the threshold: noise about the threshold doesn't cut an anomaly in two
-_SIGMAS: Final = 3.0  # of map and noise together, below which no reading is beyond the threshold
-_POINT_M: Final = 10.0  # of track, over which readings are averaged for the test of a pass
+# of the threshold: an anomaly ends below it, so that noise near the threshold does not divide it
+_ENDS_AT: Final = 0.5
+_SIGMAS: Final = 3.0  # standard deviations of map and noise together; the threshold is never lower
+_POINT_M: Final = 10.0  # length of track over which readings are averaged for the test of a pass
 _PASS_POINTS: Final = 80
 
 
@@ -30,14 +32,15 @@ class DetectionModel:
     """Probability of detecting a target while flying by, p(D | searcher, target) of equation 10.
 
     Detection is a hazard along the track that falls off with distance as a Gaussian, so that a pass may be
-    cut into stretches of any length: their probabilities of missing multiply to that of the whole.
+    divided into stretches of any length: the product of their probabilities of a miss is that of the whole
+    pass.
 
     Attributes:
-        probability_overhead: of detecting a target by one straight pass right over it, 0..1.
+        probability_overhead: probability to detect a target in one straight pass directly over it, 0..1.
         range_m: standard deviation of the fall-off with distance.
 
     Raises:
-        PlanError: a value out of its range.
+        PlanError: a value is out of its range.
     """
 
     probability_overhead: float = 0.95
@@ -55,18 +58,18 @@ class DetectionModel:
         """Probability of detecting targets from a straight stretch of track.
 
         Args:
-            north_m, east_m: of the targets; shapes that broadcast.
+            north_m, east_m: positions of the targets; their shapes must broadcast.
             start_ne_m, end_ne_m: ends of the stretch.
 
         Returns:
-            Probabilities, of the broadcast shape.
+            Probabilities, in the broadcast shape.
         """
         along_n, along_e = end_ne_m[0] - start_ne_m[0], end_ne_m[1] - start_ne_m[1]
         length_m = math.hypot(along_n, along_e)
         exposure = np.zeros(np.broadcast_shapes(np.shape(north_m), np.shape(east_m)))
         if length_m == 0.0:
             return exposure
-        # pieces no longer than the fall-off, each integrated by Gauss and Legendre's rule
+        # pieces no longer than the fall-off, each integrated with the Gauss-Legendre rule
         pieces = max(1, math.ceil(length_m / (2.0 * self.range_m)))
         for piece in range(pieces):
             for node, weight in zip(*_QUADRATURE, strict=True):
@@ -81,11 +84,11 @@ class DetectionModel:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MapError:
-    """What a published map states of its error.
+    """The error that a published map states.
 
     Attributes:
-        sigma_nt: standard deviation; 0: the map is taken for the truth.
-        correlation_m: distance over which it is alike.
+        sigma_nt: standard deviation; 0: the map is assumed to be exact.
+        correlation_m: correlation distance of the error.
     """
 
     sigma_nt: float = 0.0
@@ -104,10 +107,11 @@ class Anomaly:
 
     Attributes:
         time_us: vehicle time of the greatest difference.
-        north_m, east_m: where that was.
+        north_m, east_m: place of that difference.
         peak_nt: the difference there, with its sign.
-        samples: how many readings were beyond the threshold.
-        profile: (north m, east m, difference nT) of each reading from the first to the last beyond it.
+        samples: number of readings beyond the threshold.
+        profile: (north m, east m, difference nT) of each reading from the first to the last beyond the
+            threshold.
     """
 
     time_us: int
@@ -119,20 +123,21 @@ class Anomaly:
 
 
 class AnomalyDetector:
-    """Threshold on the differential measurement, reading less map, and a test of the whole pass.
+    """Detects anomalies by a threshold on the differential measurement (reading minus map) and a test of the
+    whole pass.
 
-    An anomaly begins beyond the threshold, or beyond what map and noise explain, if that is more, and ends
+    An anomaly begins beyond the threshold, or beyond the error of map and noise if that is larger, and ends
     below half of it. Then all readings of the pass must show a bump that the map's error doesn't explain
-    (`significance`). What differs slowly (bias of the
-    sensor, daily variation, a map that is off) is followed by a running level, which stands still
-    meanwhile. What goes on for too long is no target but a level that is off: it is begun anew. Readings
-    that aren't finite, or come late, are dropped and counted.
+    (`significance`). Slow differences (bias of the sensor, daily variation, offset of the map) are tracked by
+    a running level, which is not updated during an anomaly. An anomaly that lasts too long is not a target
+    but a wrong level, and the level is restarted. Readings that aren't finite, or that come late, are dropped
+    and counted.
 
     Attributes:
         residual_nt: newest differential measurement, level removed; NaN before the first.
-        anomalous: an anomaly is going on.
-        dropped: readings that were no use.
-        insignificant: anomalies that may be errors of the map.
+        anomalous: whether an anomaly is in progress.
+        dropped: number of unusable readings.
+        insignificant: number of anomalies that may be errors of the map.
     """
 
     def __init__(
@@ -145,18 +150,19 @@ class AnomalyDetector:
         level_time_s: float = 20.0,
         longest_s: float = 40.0,
     ) -> None:
-        """Begin.
+        """Initialise the detector.
 
         Args:
-            threshold_nt: what counts as an anomaly; several standard deviations of the noise.
+            threshold_nt: smallest difference of an anomaly; several standard deviations of the noise.
             noise_nt: standard deviation of a reading.
-            map_error: of the map; None: none.
-            least_samples: readings beyond the threshold that make one; a single outlier is none.
+            map_error: error of the map; None: no error.
+            least_samples: smallest number of readings beyond the threshold in an anomaly, so that a single
+                outlier is not one.
             level_time_s: time constant of the running level.
-            longest_s: a target is passed in less.
+            longest_s: longest duration of an anomaly; a target is passed in less time.
 
         Raises:
-            PlanError: a value out of its range.
+            PlanError: a value is out of its range.
         """
         if not (math.isfinite(threshold_nt) and threshold_nt > 0.0):
             raise PlanError(f"--threshold {threshold_nt:g} nT is not possible; ask for more than 0")
@@ -186,7 +192,7 @@ class AnomalyDetector:
     def update(
         self, time_us: int, reading_nt: float, map_nt: float, north_m: float, east_m: float
     ) -> Anomaly | None:
-        """Take one reading and what the map says there.
+        """Process one reading and the map's value at its place.
 
         Returns:
             The anomaly that just ended, or None.
@@ -223,7 +229,7 @@ class AnomalyDetector:
         return replace(ended, profile=tuple(self._profile))
 
     def _add_point(self, north_m: float, east_m: float, difference_nt: float) -> None:
-        """Take a reading into the pass: into its newest point, or a new one."""
+        """Add a reading to the pass, in its newest point or in a new one."""
         if self._points:
             newest = self._points[-1]
             if math.hypot(north_m - newest[0] / newest[3], east_m - newest[1] / newest[3]) < _POINT_M:
@@ -233,7 +239,7 @@ class AnomalyDetector:
         self._points.append([north_m, east_m, difference_nt, 1.0])
 
     def _significant(self) -> bool:
-        """Whether the pass shows more than the map's error."""
+        """Whether the pass shows more than the map's error explains."""
         error = self._map_error
         if error.sigma_nt == 0.0:
             return True
@@ -250,7 +256,7 @@ class AnomalyDetector:
         return ratio >= LEAST_RATIO
 
     def _grown(self, time_us: int, residual_nt: float, north_m: float, east_m: float) -> Anomaly:
-        """The anomaly that goes on, with one more reading."""
+        """The present anomaly with one more reading."""
         peak = self._peak
         beyond = int(abs(residual_nt) > self._threshold_nt)
         if peak is None or abs(residual_nt) > abs(peak.peak_nt):

@@ -1,7 +1,7 @@
-"""Readings of a survey magnetometer, matched with the place they were taken at, and compared with the map.
+"""Assigns places to the readings of a survey magnetometer, and compares the readings with the map.
 
-Position and reading are messages of different components at times of their own; both carry vehicle time, and
-the place of a reading is interpolated between the two positions around it.
+Positions and readings come in messages of different components at different times. Both carry vehicle time,
+and the place of a reading is interpolated between the two positions around it.
 """
 
 from collections import deque
@@ -19,17 +19,17 @@ from missions.telemetry import Position, position
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
-_WAITING: Final = 100  # readings: ten seconds of an ordinary magnetometer
-_GAP_US: Final = 2_000_000  # between two positions; across more nothing is interpolated
+_WAITING: Final = 100  # largest number of waiting readings: ten seconds of an ordinary magnetometer
+_GAP_US: Final = 2_000_000  # longest time between two positions; longer gaps are not interpolated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedReading:
-    """A reading and where it was taken, in the map's frame.
+    """A reading with its place in the map's frame.
 
     Attributes:
         time_us: vehicle time.
-        north_m, east_m, height_m: from the map's home.
+        north_m, east_m, height_m: place from the map's home.
         total_nt: total field.
     """
 
@@ -41,17 +41,17 @@ class PlacedReading:
 
 
 class ReadingPlacer:
-    """Gives readings their places; no I/O.
+    """Assigns places to readings; no I/O.
 
     Attributes:
-        dropped: readings for which there was no position.
+        dropped: number of readings without a position.
     """
 
     def __init__(self, frame: LocalFrame) -> None:
-        """Begin.
+        """Initialise the placer.
 
         Args:
-            frame: of the map.
+            frame: local frame of the map.
         """
         self.dropped = 0
         self._frame = frame
@@ -59,14 +59,14 @@ class ReadingPlacer:
         self._last: tuple[int, float, float, float] | None = None
 
     def add_reading(self, time_us: int, total_nt: float) -> None:
-        """Take a reading; it waits for the next position."""
+        """Add a reading; it waits for the next position."""
         if len(self._waiting) >= _WAITING:
             self._waiting.popleft()
             self.dropped += 1
         self._waiting.append((time_us, total_nt))
 
     def add_position(self, place: Position) -> list[PlacedReading]:
-        """Take a position; the readings up to its time, in their places."""
+        """Add a position; returns the readings up to its time, with their places."""
         north_m, east_m, down_m = self._frame.ned_from_geodetic(place.lat_deg, place.lon_deg, place.alt_m)
         last, new = self._last, (place.time_us, north_m, east_m, -down_m)
         if last is not None and place.time_us <= last[0]:
@@ -91,12 +91,12 @@ SampleListener = Callable[[PlacedReading, bool], None]
 
 
 class FieldWatch:
-    """Listens to one vehicle's magnetometer and position, and tells what the detector makes of them.
+    """Passes one vehicle's magnetometer readings and positions to the detector, and reports its anomalies.
 
     Attributes:
-        detector: threshold on reading less map.
-        placer: of the readings.
-        samples: readings compared with the map.
+        detector: threshold on the reading minus the map.
+        placer: gives each reading a position.
+        samples: number of readings compared with the map.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class FieldWatch:
         on_sample: SampleListener,
         on_anomaly: Callable[[Anomaly], None],
     ) -> None:
-        """Prepare; nothing is listened to before `start`."""
+        """Store the arguments; no message is processed before `start`."""
         self.detector = detector
         self.placer = ReadingPlacer(survey_map.frame())
         self.samples = 0
@@ -119,7 +119,7 @@ class FieldWatch:
         self._stops: list[Callable[[], None]] = []
 
     def start(self) -> None:
-        """Listen from now on."""
+        """Start to process messages."""
         vehicle = self._vehicle
         self._stops = [
             vehicle.payload.on_total_field(self.placer.add_reading),
@@ -127,7 +127,7 @@ class FieldWatch:
         ]
 
     def stop(self) -> None:
-        """Listen no more."""
+        """Stop processing messages."""
         for stop in self._stops:
             stop()
         self._stops = []

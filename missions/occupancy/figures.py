@@ -1,4 +1,4 @@
-"""What `summary.json` says of a search."""
+"""The entries of `summary.json` about a search."""
 
 import math
 from collections.abc import Mapping
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 def search_figures(
     team: "SearchTeam", debriefing: "Debriefing", target_ne_m: tuple[float, float] | None
 ) -> Mapping[str, Any]:
-    """Figures of a search that is over.
+    """Figures of a finished search.
 
     Args:
-        team: as it ended.
-        debriefing: of the run.
-        target_ne_m: where the target truly is; None: not known.
+        team: the team at the end of the search.
+        debriefing: debriefing of the run.
+        target_ne_m: true place of the target; None: not known.
     """
     search = team.search
     found = search.found
@@ -58,15 +58,15 @@ def search_figures(
 
 
 HEADING_BOUND_RAD: Final = math.radians(30.0)
-"""Bound of the heading's error after each turn, which 95 % of a searcher's flight must keep."""
-_LEAST_S: Final = 30.0  # of a search that is judged
+"""Bound of the heading error after each turn; a searcher must be within it for 95 % of its flight."""
+_LEAST_S: Final = 30.0  # shortest search that is judged, s
 
 
 def search_verdict(team: "SearchTeam", debriefing: "Debriefing") -> str:
-    """Why a search was not flown, by what the vehicles reported; "" if it was."""
+    """The reason, from the vehicles' reports, why a search was not flown; "" if it was."""
     for searcher, (notes, score) in zip(team.searchers, debriefing.flights, strict=False):
         if searcher.ended_us - searcher.began_us < _LEAST_S * 1e6:
-            continue  # the others had found the target
+            continue  # the other searchers had found the target
         if searcher.watch is None or not searcher.watch.samples:
             return f"vehicle {notes.system_id} searched without any reading of the magnetic field"
         track = score.estimate

@@ -1,4 +1,4 @@
-"""How well commanded headings were held, once the turn to each was over."""
+"""Score of how well commanded headings were held, after the turn to each was finished."""
 
 import math
 from collections.abc import Sequence
@@ -15,17 +15,17 @@ Array = NDArray[np.float64]
 SETTLING_S: Final = 5.0
 TURN_RATE_RAD_S: Final = math.radians(15.0)
 SAME_RAD: Final = math.radians(5.0)
-"""A command that differs by less from the one before is no turn; its whole error counts at once."""
+"""A command that differs by less from the previous one is not a turn; its whole error counts immediately."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadingScore:
-    """Nose against command, settled. NaN where nothing settled.
+    """Heading error: yaw against commanded heading, after each command has settled. NaN when none settled.
 
     Attributes:
-        rms_rad, p95_rad, largest_rad: of the size of the error.
-        settled_s: for how long commands were settled.
-        commands: how many there were.
+        rms_rad, p95_rad, largest_rad: root mean square, 95th percentile and maximum of the absolute error.
+        settled_s: time for which commands were settled.
+        commands: number of commands.
     """
 
     rms_rad: float
@@ -41,12 +41,12 @@ def settled_errors(
     """Times and errors (n,), rad, of the samples at which the newest command was settled.
 
     A command is settled 5 s after the time its turn takes at 15 deg/s. Small changes, as when the next cell
-    lies straight ahead, don't begin a turn.
+    is straight ahead, do not count as a turn.
 
     Args:
-        commands: in time.
-        time_s, yaw_rad: (m,) where the nose pointed, in time.
-        end_s: of the search.
+        commands: commands in the order of time.
+        time_s, yaw_rad: (m,) measured yaw, in the order of time.
+        end_s: end of the search.
     """
     times: list[Array] = []
     errors: list[Array] = []
@@ -54,13 +54,13 @@ def settled_errors(
     for k, command in enumerate(commands):
         start_s = command.time_us * 1e-6
         stop_s = commands[k + 1].time_us * 1e-6 if k + 1 < len(commands) else end_s
-        change_rad = math.pi  # the first: from wherever the nose was
+        change_rad = math.pi  # the first command: the initial heading is not known
         if k:
             before_rad = commands[k - 1].heading_rad
             change_rad = abs(math.remainder(command.heading_rad - before_rad, math.tau))
         if change_rad > SAME_RAD:
             turned_s = start_s + SETTLING_S + change_rad / TURN_RATE_RAD_S
-            # a turn that is not over yet goes on
+            # a turn that is not finished yet continues
             settled_from_s = (
                 turned_s if settled_from_s <= start_s or k == 0 else max(settled_from_s, turned_s)
             )

@@ -1,8 +1,8 @@
-"""Where a target is, from the readings of several passes by it.
+"""Place of a target from the readings of several passes.
 
-A Gaussian's logarithm is a parabola: ln z = c - k (n^2 + e^2) + 2 k (n0 n + e0 e). So amplitude, width and
-centre of a round one come from one linear fit. A single straight pass leaves the centre's distance from the
-track open, which the covariance of the fit shows.
+A Gaussian's logarithm is a parabola: ln z = c - k (n^2 + e^2) + 2 k (n0 n + e0 e). Amplitude, width and
+centre of a round Gaussian therefore come from one linear fit. A single straight pass does not determine the
+centre's distance from the track, which the covariance of the fit shows.
 """
 
 import math
@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_SHAPE_ERROR: Final = 0.15  # of a reading: a target isn't quite round, and the level isn't quite right
-_LARGEST_SIGMA_M: Final = 60.0  # of the centre; beyond, the fit tells nothing
+# relative error of a reading, because a target is not exactly round, and the level is not exact
+_SHAPE_ERROR: Final = 0.15
+_LARGEST_SIGMA_M: Final = 60.0  # standard deviation of the centre; a fit with a larger one is not used
 _LEAST_READINGS: Final = 6
 
 
@@ -24,12 +25,12 @@ def gaussian_centre(
     """Centre of the round Gaussian that fits readings best, by weighted least squares of their logarithms.
 
     Args:
-        north_m, east_m: (n,) places.
+        north_m, east_m: (n,) positions of the readings.
         residual_nt: (n,) readings less map; those of the sign of the largest are used.
-        noise_nt: standard deviation of one.
+        noise_nt: standard deviation of one reading.
 
     Returns:
-        (north m, east m); None where the readings don't tell.
+        (north m, east m); None when the readings do not determine it.
     """
     if len(residual_nt) == 0:
         return None
@@ -55,7 +56,8 @@ def gaussian_centre(
     if not curvature > 0.0:
         return None
     centre_n, centre_e = float(solution[1]) / (2.0 * curvature), float(solution[2]) / (2.0 * curvature)
-    # d(centre) = d(c) / 2k - centre dk / k; readings in a row share their error, so none is gained by many
+    # d(centre) = d(c) / 2k - centre dk / k; consecutive readings have the same error, so more of them do not
+    # reduce it
     covariance = np.linalg.inv(normal) * len(size) / 4.0
     jacobian = np.array(
         [

@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 
 MAP_NAME: Final = "magnetic_map.npz"
 
-_MARGIN_CELLS: Final = 2.0  # of a map that is made, around the area
-_INSIDE: Final = 0.9  # of the area: where a target is drawn
+_MARGIN_CELLS: Final = 2.0  # cells around the area in a generated map
+_INSIDE: Final = 0.9  # share of the area in which a target is drawn
 _TARGET_STREAM: Final = 0x7A67
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _World:
-    """The embedded world of the next flight, as it was asked for.
+    """The requested embedded world of the next flight.
 
     Attributes:
-        map_path: where its published map is.
-        target_ne_m: where its target truly is; for the score, never for the vehicles.
+        map_path: path of its published map.
+        target_ne_m: true place of its target; for the score, never for the vehicles.
     """
 
     map_path: Path
@@ -46,9 +46,9 @@ class _Flown:
     """The newest flight, for its debriefing.
 
     Attributes:
-        first_notes: of its first vehicle; they tell flights apart.
-        team: as it ended.
-        target_ne_m: where the target is; None: nobody knows.
+        first_notes: notes of the first vehicle; they identify the flight.
+        team: the team at the end of the flight.
+        target_ne_m: where the target is; None: not known.
     """
 
     first_notes: "FlightNotes"
@@ -82,11 +82,11 @@ class OccupancyMission(Mission[OccupancyOptions]):
             )
 
     def check_place(self, options: OccupancyOptions, limits: Limits, home: GeodeticPosition) -> None:
-        if options.map_file is not None:  # one that is made is made around home
+        if options.map_file is not None:  # a generated map is centred on home
             check_reach(options, limits, load_survey_map(Path(options.map_file)).frame(), home)
 
     def scenario(self, options: OccupancyOptions, setting: Setting) -> Scenario:
-        """A magnetic map with a target in it; both from the seed where nobody gave them."""
+        """A magnetic map with a target in it. Both are drawn from the seed unless the user specified them."""
         target_ne_m, orientation_rad = drawn_target(options, setting.seed)
         given = None if options.map_file is None else Path(options.map_file)
         made = setting.folder / MAP_NAME
@@ -169,7 +169,8 @@ class OccupancyMission(Mission[OccupancyOptions]):
 
 
 def drawn_target(options: OccupancyOptions, seed: int) -> tuple[tuple[float, float], float]:
-    """Where the target of an embedded world is, and how its signature lies: given, or drawn from the seed.
+    """Place of the target of an embedded world and orientation of its signature: specified, or drawn from the
+    seed.
 
     Returns:
         ((north m, east m) of the map's home, orientation in rad).

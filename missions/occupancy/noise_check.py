@@ -1,4 +1,4 @@
-"""Whether a magnetometer is quiet enough for a threshold, found out on the ground."""
+"""Checks on the ground whether a magnetometer is quiet enough for a threshold."""
 
 import asyncio
 import math
@@ -17,7 +17,7 @@ _LONGEST_S: Final = 15.0
 
 
 def white_noise_nt(readings_nt: list[float]) -> float:
-    """Standard deviation of what differs from one reading to the next; what drifts slowly doesn't count.
+    """Standard deviation of the noise between consecutive readings; slow drift does not count.
 
     Allan deviation at one interval: the root of half the mean square of the differences.
     """
@@ -27,14 +27,14 @@ def white_noise_nt(readings_nt: list[float]) -> float:
 
 
 async def require_quiet(vehicle: "Vehicle", *, threshold_nt: float) -> float:
-    """Measure the noise of a vehicle's survey magnetometer, and refuse a threshold within it.
+    """Measure the noise of a vehicle's survey magnetometer, and refuse a threshold that is within the noise.
 
     Returns:
         Standard deviation of one reading, nT.
 
     Raises:
-        VehicleTimeout: too few readings.
-        PlanError: noise alone would make anomalies.
+        VehicleTimeout: too few readings were received.
+        PlanError: the noise alone would exceed the threshold.
     """
     readings_nt: list[float] = []
     enough = asyncio.Event()

@@ -1,4 +1,4 @@
-"""The occupancy map of a search: scores of cells, lowered by searching, raised around what was identified.
+"""The occupancy map of a search: scores of cells that searching lowers and that identified anomalies raise.
 
 Source: Lum, Rysdyk and Pongpunwattana 2005, section IV-B, equations 10 and 11; docs/papers.md. North and east
 are metres from home; arrays have rows to the north and columns to the east.
@@ -28,10 +28,10 @@ class GridLayout:
     Attributes:
         south_m, west_m: corner of the rectangle, north and east of home.
         cell_m: side of a cell.
-        rows, columns: how many.
+        rows, columns: number of rows and columns.
 
     Raises:
-        PlanError: a size that makes no map.
+        PlanError: the size gives no map.
     """
 
     south_m: float
@@ -58,7 +58,7 @@ class GridLayout:
     def over(
         cls, *, width_m: float, height_m: float, cell_m: float, centre_ne_m: tuple[float, float]
     ) -> "GridLayout":
-        """Cells over `width_m` (east) by `height_m` (north) around a centre; parts of cells are left out."""
+        """Cells over `width_m` (east) by `height_m` (north) around a centre; partial cells are left out."""
         if not (math.isfinite(cell_m) and cell_m > 0.0):
             raise PlanError(f"--cell {cell_m:g} m is not possible; ask for more than 0")
         rows, columns = math.floor(height_m / cell_m + 1e-9), math.floor(width_m / cell_m + 1e-9)
@@ -72,12 +72,12 @@ class GridLayout:
 
     @property
     def north_m(self) -> float:
-        """Northern edge."""
+        """Northern edge, m from home."""
         return self.south_m + self.rows * self.cell_m
 
     @property
     def east_m(self) -> float:
-        """Eastern edge."""
+        """Eastern edge, m from home."""
         return self.west_m + self.columns * self.cell_m
 
     def contains(self, north_m: float, east_m: float) -> bool:
@@ -85,7 +85,7 @@ class GridLayout:
         return self.south_m <= north_m < self.north_m and self.west_m <= east_m < self.east_m
 
     def cell_at(self, north_m: float, east_m: float) -> Cell:
-        """The cell a place is in; for places off the map the nearest one."""
+        """The cell that contains a place; for places off the map the nearest cell."""
         row = math.floor((north_m - self.south_m) / self.cell_m)
         column = math.floor((east_m - self.west_m) / self.cell_m)
         return min(max(row, 0), self.rows - 1), min(max(column, 0), self.columns - 1)
@@ -104,27 +104,27 @@ class GridLayout:
 class OccupancyMap:
     """Scores of the cells, shared by every searcher, and the probability of detection so far.
 
-    Scores start as the prior probability that the target is in a cell. They are scores from then on, not
+    The initial scores are the prior probability that the target is in a cell. Later they are no longer
     probabilities: equation 11 isn't normalised, and raising adds belief.
 
     Attributes:
         layout: the cells.
-        scores: (rows, columns), what decisions look at.
+        scores: (rows, columns), used for decisions.
         remaining: (rows, columns), prior probability times the probability of having missed the target there
-            so far. It knows nothing of what was identified, so that one less its sum is the cumulative
+            so far. It does not change when a target is identified, so 1 minus its sum is the cumulative
             probability of detection (Bourgault et al. 2003).
     """
 
     def __init__(self, layout: GridLayout, prior: Array | None = None) -> None:
-        """Begin a search.
+        """Initialise the map.
 
         Args:
             layout: the cells.
             prior: (rows, columns), relative probability of each cell, finite and not negative; None: all
-                alike.
+                equal.
 
         Raises:
-            PlanError: a prior of another shape, or without any probability.
+            PlanError: the prior has another shape, or no probability above zero.
         """
         shape = (layout.rows, layout.columns)
         start = np.ones(shape) if prior is None else np.array(prior, dtype=np.float64)
@@ -138,7 +138,7 @@ class OccupancyMap:
 
     @property
     def probability_of_detection(self) -> float:
-        """Probability that a target on the map would have been detected by now."""
+        """Probability that a target on the map would have been detected so far."""
         return 1.0 - float(self.remaining.sum())
 
     def search(
@@ -154,9 +154,9 @@ class OccupancyMap:
         """Raise the scores around an identified target by a Gaussian, so that other searchers converge.
 
         Args:
-            north_m, east_m: of the target.
-            radius_m: beyond it nothing changes; two standard deviations of the Gaussian.
-            height: of its peak, in multiples of the prior's mean score.
+            north_m, east_m: position of the target.
+            radius_m: scores farther away do not change; it is two standard deviations of the Gaussian.
+            height: height of the Gaussian's peak, in multiples of the prior's mean score.
         """
         north, east = self.layout.centres()
         distance2 = (north - north_m) ** 2 + (east - east_m) ** 2

@@ -1,4 +1,4 @@
-"""What a person can choose about an occupancy-map search."""
+"""Options of an occupancy-map search."""
 
 import math
 from dataclasses import dataclass, replace
@@ -16,12 +16,12 @@ from missions.planning.limits import FixedWingLimits, Limits
 
 LARGEST_SIDE_M: Final = 50_000.0
 LEAST_SIGMAS: Final = 3.0
-"""Threshold over noise: below, noise alone makes anomalies."""
+"""Smallest ratio of threshold to noise; below it, noise alone exceeds the threshold."""
 
 LARGEST_DEPTH_M: Final = 1000.0
-_USUAL_ERROR_NT: Final = 1.0  # of a map that states none
+_USUAL_ERROR_NT: Final = 1.0  # error of a map that states none
 _USUAL_LINES_M: Final = 200.0
-_SHARE_OF_LINES: Final = 0.5  # of their distance: over it the error of a map is alike
+_SHARE_OF_LINES: Final = 0.5  # of the line spacing: correlation distance of a map's error
 _PENALTY_OF_WINGS: Final = 0.2
 _PENALTY_OF_MULTICOPTERS: Final = 0.05
 _MULTICOPTER_M_S: Final = 10.0
@@ -33,27 +33,27 @@ class OccupancyOptions(MissionOptions):
     """One vehicle's part in a search with a shared occupancy map. Places are metres from the map's home.
 
     Attributes:
-        width_m, height_m: of the searched area, east and north.
-        area_ne_m: its centre.
+        width_m, height_m: size of the searched area, east and north.
+        area_ne_m: centre of the searched area.
         cell_m: side of a cell.
-        neighbourhood: cells in each direction that a decision looks at.
-        heading_penalty: alpha of equation 9; None: by the kind of vehicle, small for a multicopter.
-        detection_probability: of a target by a pass right over it.
+        neighbourhood: number of cells in each direction that a decision considers.
+        heading_penalty: alpha of equation 9; None: depends on the kind of vehicle, small for a multicopter.
+        detection_probability: probability to detect a target in a pass directly over it.
         detection_range_m: standard deviation of the fall-off with distance.
-        threshold_nt: of the differential measurement; what is beyond is an anomaly.
+        threshold_nt: threshold of the differential measurement; a larger value is an anomaly.
         noise_nt: standard deviation of the differential measurement where there is no target.
-        map_error_nt: standard deviation of the published map; None: what the map states, and 1 nT where it
-            states nothing.
-        confirmations: passes that must see an anomaly at one place.
+        map_error_nt: standard deviation of the published map; None: the value in the map file, or 1 nT when
+            the file has none.
+        confirmations: number of passes that must detect an anomaly at one place.
         raise_radius_m: scores are raised within this distance of an anomaly.
         search_time_s: the search is given up after this time.
-        speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: by the vehicle.
+        speed_m_s: airspeed of an aircraft, ground speed of a multicopter; None: the vehicle's default.
         map_file: published magnetic map; None: the embedded world makes one from its seed.
-        target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle what
-            the result is compared with.
-        amplitude_nt, sigma_along_m, sigma_across_m: of the embedded world's target, a Gaussian.
-        moment_a_m2, depth_m: of the embedded world's target as a dipole, magnetised along the Earth's
-            field, and its depth below home; None: it is a Gaussian.
+        target_ne_m: where the embedded world's target is; None: drawn from the seed. On a real vehicle: the
+            place that the result is compared with.
+        amplitude_nt, sigma_along_m, sigma_across_m: Gaussian field of the embedded world's target.
+        moment_a_m2, depth_m: moment of the embedded world's target as a dipole that is magnetised along the
+            Earth's field, and its depth below home; None: the target is a Gaussian.
     """
 
     altitude_m: float = 80.0
@@ -124,7 +124,7 @@ class OccupancyOptions(MissionOptions):
             raise PlanError(
                 f"--depth {self.depth_m:g} m of the target is not within {LARGEST_DEPTH_M:g} m of home"
             )
-        layout = self.layout  # these refuse what makes no search
+        layout = self.layout  # these constructors refuse impossible values
         _ = self.search_parameters, self.decision_parameters
         if self.target_ne_m is not None and not layout.contains(*self.target_ne_m):
             raise PlanError(
@@ -142,7 +142,7 @@ class OccupancyOptions(MissionOptions):
 
     @property
     def search_parameters(self) -> SearchParameters:
-        """How the team searches."""
+        """Parameters of the team's search."""
         return SearchParameters(
             detection=DetectionModel(
                 probability_overhead=self.detection_probability, range_m=self.detection_range_m
@@ -153,7 +153,9 @@ class OccupancyOptions(MissionOptions):
         )
 
     def map_error(self, survey_map: SurveyMap) -> MapError:
-        """Error of a published map: what was chosen, else what the map states, else a careful survey's."""
+        """Error of a published map: specified by the user, else stated by the map, else that of a careful
+        survey.
+        """
         stated_nt = survey_map.error_nt if self.map_error_nt is None else self.map_error_nt
         spacing_m = survey_map.line_spacing_m or _USUAL_LINES_M
         return MapError(
@@ -163,12 +165,14 @@ class OccupancyOptions(MissionOptions):
 
     @property
     def decision_parameters(self) -> DecisionParameters:
-        """This vehicle's habits."""
+        """Parameters of this vehicle's decisions."""
         penalty = _PENALTY_OF_WINGS if self.heading_penalty is None else self.heading_penalty
         return DecisionParameters(neighbourhood=self.neighbourhood, heading_penalty=penalty)
 
     def for_vehicle(self, limits: Limits) -> "OccupancyOptions":
-        """The same options with the habits and the speed of a kind of vehicle, where nobody chose them."""
+        """The same options; those that were not specified get the decision parameters and the speed of the
+        kind of vehicle.
+        """
         if isinstance(limits, FixedWingLimits):
             penalty, speed_m_s = _PENALTY_OF_WINGS, limits.airspeed_trim_m_s
         else:
@@ -185,11 +189,11 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
     """Refuse what one vehicle of the team can't fly.
 
     Args:
-        options: adapted to the vehicle.
-        limits: of the vehicle, in the wind to plan for.
+        options: options adapted to the vehicle.
+        limits: limits of the vehicle, with the wind to plan for.
 
     Raises:
-        PlanError: it names the option to change.
+        PlanError: names the option to change.
     """
     limits.check_separation(options.separation_m, options.vehicles)
     limits.check_altitude(options.own_altitude_m)
@@ -219,16 +223,16 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
 
 
 def check_reach(options: OccupancyOptions, limits: Limits, frame: LocalFrame, home: GeodeticPosition) -> None:
-    """Refuse an area too far from where a vehicle stands.
+    """Refuse an area that is too far from the vehicle's home.
 
     Args:
-        options: of the vehicle.
-        limits: of the vehicle.
-        frame: of the map.
-        home: of the vehicle.
+        options: options of the vehicle.
+        limits: limits of the vehicle.
+        frame: local frame of the map.
+        home: home of the vehicle.
 
     Raises:
-        PlanError: says how far it is, and what to change.
+        PlanError: names the distance and what to change.
     """
     north_m, east_m, _ = frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
     layout = options.layout

@@ -1,6 +1,4 @@
-"""The picture of a search: the occupancy map at four times, as figure 8 of Lum et al. 2005, and what it
-brought.
-"""
+"""The picture of a search: the occupancy map at four times, as figure 8 of Lum et al. 2005, and its result."""
 
 import math
 from pathlib import Path
@@ -26,9 +24,10 @@ _BEFORE_US: Final = 2_000_000
 
 
 def four_moments(search: "Search", end_us: int) -> list["Snapshot"]:
-    """The start; before the target was first seen; after its scores were raised; the end.
+    """Snapshots at four times: the start, before the target was first detected, after its scores were raised,
+    and the end.
 
-    Where no target was found, four moments evenly spread.
+    If no target was found, the four times are evenly spaced.
     """
     snapshots = search.snapshots
     start_us = snapshots[0].time_us
@@ -52,10 +51,10 @@ def draw_search(
 
     Args:
         path: the file; it must not exist.
-        title: above the picture.
-        team: as it ended.
-        debriefing: of the run.
-        target_ne_m: where the target truly is; None: not known.
+        title: title above the picture.
+        team: the team at the end of the search.
+        debriefing: debriefing of the run.
+        target_ne_m: true place of the target; None: not known.
     """
     search = team.search
     end_us = max([search.snapshots[-1].time_us] + [s.track[-1][0] for s in team.searchers if s.track])

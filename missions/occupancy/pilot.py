@@ -1,4 +1,4 @@
-"""One searcher's flying: which cell next, when it is reached, the heading that leads there. No I/O."""
+"""The flight of one searcher: its next cell, the check whether that is reached, and the heading to it."""
 
 import math
 from dataclasses import dataclass
@@ -6,22 +6,23 @@ from typing import Final
 
 from missions.occupancy.search import Search
 
-_REACHED: Final = 0.35  # of a cell: this near to its centre it counts as reached
-_SLOWEST_M_S: Final = 3.0  # over ground; below, the nose is the course
-_WIND_SHARE: Final = 0.9  # of the airspeed; a cross wind beyond can't be held
-_PATIENCE_S: Final = 12.0  # for the turn, in the time a leg may take
+_REACHED: Final = 0.35  # of a cell: within this distance of its centre it counts as reached
+_SLOWEST_M_S: Final = 3.0  # ground speed, below which the yaw is used as the course
+_WIND_SHARE: Final = 0.9  # of the airspeed; a stronger cross wind cannot be compensated
+_PATIENCE_S: Final = 12.0  # time for the turn, added to the time limit of a leg
 
 
 def heading_for_course(course_rad: float, airspeed_m_s: float, wind_ne_m_s: tuple[float, float]) -> float:
-    """The heading whose track over ground has a course: the wind triangle.
+    """The heading that gives a course over ground in wind (wind triangle).
 
     Args:
-        course_rad: wanted, clockwise from north.
+        course_rad: desired course, clockwise from north.
         airspeed_m_s: true airspeed.
-        wind_ne_m_s: where the air moves to.
+        wind_ne_m_s: velocity of the air, north and east.
 
     Returns:
-        Heading, 0..2 pi. In more cross wind than can be held, the largest correction.
+        Heading, 0..2 pi. When the cross wind is too strong to hold the course, the largest correction is
+        used.
     """
     across_m_s = wind_ne_m_s[1] * math.cos(course_rad) - wind_ne_m_s[0] * math.sin(course_rad)
     share = across_m_s / airspeed_m_s if airspeed_m_s > 0.0 else 0.0
@@ -30,15 +31,15 @@ def heading_for_course(course_rad: float, airspeed_m_s: float, wind_ne_m_s: tupl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Motion:
-    """What a searcher's telemetry says, in the frame of the search.
+    """A searcher's motion from its telemetry, in the frame of the search.
 
     Attributes:
         time_us: vehicle time of the position.
-        north_m, east_m: place.
-        vel_ne_m_s: over ground.
-        yaw_rad: where the nose points.
+        north_m, east_m: position.
+        vel_ne_m_s: velocity over ground.
+        yaw_rad: yaw, clockwise from north.
         airspeed_m_s: true airspeed; 0: not known.
-        wind_ne_m_s: where the air moves to; zeros: not known.
+        wind_ne_m_s: velocity of the air, north and east; zeros: not known.
     """
 
     time_us: int
@@ -51,12 +52,12 @@ class Motion:
 
     @property
     def ground_speed_m_s(self) -> float:
-        """Speed over ground."""
+        """Ground speed."""
         return math.hypot(*self.vel_ne_m_s)
 
     @property
     def course_rad(self) -> float:
-        """Direction over ground; when nearly at rest, where the nose points."""
+        """Course over ground; when nearly at rest, the yaw."""
         if self.ground_speed_m_s < _SLOWEST_M_S:
             return self.yaw_rad
         return math.atan2(self.vel_ne_m_s[1], self.vel_ne_m_s[0])
@@ -64,12 +65,12 @@ class Motion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeadingCommand:
-    """One heading a searcher was told.
+    """One heading command that was sent to a searcher.
 
     Attributes:
         time_us: vehicle time.
         heading_rad: 0..2 pi.
-        goal_ne_m: where it leads to.
+        goal_ne_m: the goal of the command.
     """
 
     time_us: int
@@ -81,16 +82,16 @@ class Pilot:
     """Flies one searcher: to its start, then from cell to cell.
 
     Attributes:
-        commands: every heading commanded, in time.
+        commands: all commanded headings, in the order of time.
     """
 
     def __init__(self, search: Search, searcher: int, *, start_ne_m: tuple[float, float]) -> None:
-        """Begin.
+        """Initialise the pilot.
 
         Args:
-            search: of the team.
-            searcher: which of it.
-            start_ne_m: where its part of the search begins.
+            search: the team's search.
+            searcher: number of the searcher in the team.
+            start_ne_m: place at which its part of the search begins.
         """
         self.commands: list[HeadingCommand] = []
         self._search = search
@@ -101,7 +102,7 @@ class Pilot:
         self._deadline_us = 0
 
     def update(self, motion: Motion) -> HeadingCommand | None:
-        """Take the newest telemetry; a command when the next leg begins, else None."""
+        """Process the newest telemetry; returns a command when the next leg begins, else None."""
         if self._goal_ne_m is None:
             return self._fly_to(self._start_ne_m, motion)
         if not self._done(self._goal_ne_m, motion):
@@ -112,7 +113,7 @@ class Pilot:
         return self._fly_to(self._search.map.layout.centre_of(decision.cell), motion)
 
     def _done(self, goal_ne_m: tuple[float, float], motion: Motion) -> bool:
-        """Whether a goal is reached, abeam, or out of time."""
+        """Whether a goal is reached or abeam, or its time limit has passed."""
         to_n, to_e = goal_ne_m[0] - motion.north_m, goal_ne_m[1] - motion.east_m
         leg_n, leg_e = goal_ne_m[0] - self._from_ne_m[0], goal_ne_m[1] - self._from_ne_m[1]
         reached = math.hypot(to_n, to_e) <= _REACHED * self._search.map.layout.cell_m

@@ -1,4 +1,6 @@
-"""The search of a team: one shared map, what was found, who flies where. No I/O; vehicles report to it."""
+"""The search of a team: the shared map, the anomalies found, and each searcher's goal. Without I/O; vehicles
+report to it.
+"""
 
 import math
 from collections.abc import Sequence
@@ -16,27 +18,28 @@ from missions.occupancy.occupancy_map import Cell, GridLayout, OccupancyMap
 
 Array = NDArray[np.float64]
 
-_FAR_M: Final = 250.0  # from the peaks: no centre of theirs
-_STEP_M: Final = 5.0  # least stretch of track that is worth an update
-_KEPT_SCORES: Final = 10_000_000  # in snapshots: 80 MB
+_FAR_M: Final = 250.0  # largest distance of a centre from the peaks
+_STEP_M: Final = 5.0  # shortest stretch of track for an update
+_KEPT_SCORES: Final = 10_000_000  # numbers kept in snapshots: 80 MB
 _LEAST_SNAPSHOTS: Final = 16
 _EVENTS_KEPT: Final = 32
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SearchParameters:
-    """How a team searches.
+    """Parameters of a team's search.
 
     Attributes:
-        detection: of a target by a pass.
+        detection: model of the detection of a target in a pass.
         raise_radius_m: scores are raised within this distance of an anomaly.
-        raise_height: by how much at its centre, in mean prior scores.
-        confirmations: passes that must see an anomaly at one place before it counts as the target.
-        same_place_m: anomalies within this distance are one.
-        noise_nt: standard deviation of a reading; how much the fit of a target's place believes it.
+        raise_height: increase of the scores at its centre, in mean prior scores.
+        confirmations: number of passes that must detect an anomaly at one place before it counts as the
+            target.
+        same_place_m: anomalies within this distance count as one.
+        noise_nt: standard deviation of a reading, for the fit of a target's place.
 
     Raises:
-        PlanError: a value out of its range.
+        PlanError: a value is out of its range.
     """
 
     detection: DetectionModel = field(default_factory=DetectionModel)
@@ -58,10 +61,10 @@ class SearchParameters:
 
 @dataclass(slots=True, kw_only=True)
 class Candidate:
-    """A place where anomalies were seen.
+    """A place at which anomalies were detected.
 
     Attributes:
-        anomalies: (searcher, anomaly), in time.
+        anomalies: (searcher, anomaly), in the order of time.
         noise_nt: standard deviation of a reading.
     """
 
@@ -70,12 +73,14 @@ class Candidate:
 
     @property
     def passes(self) -> int:
-        """How often it was seen."""
+        """Number of passes that detected it."""
         return len(self.anomalies)
 
     @property
     def place_ne_m(self) -> tuple[float, float]:
-        """Centre of a Gaussian through the readings; where they don't tell, weighted mean of the peaks."""
+        """Centre of a Gaussian fitted to the readings; when they do not determine it, the weighted mean of
+        the peaks.
+        """
         weights = np.array([abs(anomaly.peak_nt) for _, anomaly in self.anomalies])
         places = np.array([(anomaly.north_m, anomaly.east_m) for _, anomaly in self.anomalies])
         north_m, east_m = (weights @ places / weights.sum()).tolist()
@@ -94,8 +99,8 @@ class Snapshot:
     Attributes:
         time_us: vehicle time.
         scores: (rows, columns).
-        places_ne_m: of each searcher; NaN: not heard of yet.
-        event: it was kept for an anomaly that was just reported.
+        places_ne_m: position of each searcher; NaN: not yet received.
+        event: the snapshot was stored because an anomaly was reported.
     """
 
     time_us: int
@@ -109,11 +114,12 @@ class Search:
 
     Attributes:
         map: the occupancy map.
-        candidates: places where anomalies were seen.
+        candidates: places at which anomalies were detected.
         found: the candidate that is the target; None while searching.
-        found_us: when it became that.
+        found_us: time at which it was found.
         detection_curve: (time, cumulative probability of detection), one entry per update.
-        snapshots: the map at even intervals, which grow when there are too many to keep, and after anomalies.
+        snapshots: the map after anomalies and at even intervals, which are increased when there are too many
+            snapshots.
     """
 
     def __init__(
@@ -129,10 +135,10 @@ class Search:
 
         Args:
             layout: the cells.
-            parameters: of the team.
-            decisions: of each searcher.
+            parameters: parameters of the team's search.
+            decisions: parameters of each searcher's decisions.
             prior: see `OccupancyMap`.
-            snapshot_interval_s: between the maps that are kept for pictures.
+            snapshot_interval_s: interval between the maps that are kept for pictures.
         """
         self.map = OccupancyMap(layout, prior)
         self.parameters = parameters
@@ -150,7 +156,9 @@ class Search:
     def report_place(
         self, searcher: int, time_us: int, north_m: float, east_m: float, *, anomalous: bool = False
     ) -> None:
-        """A searcher is there: lower the scores along its way (eq. 11), unless it sees something there."""
+        """Update a searcher's place: lower the scores along its track (eq. 11), unless it is detecting an
+        anomaly.
+        """
         place = (north_m, east_m)
         self._places[searcher] = place
         last = self._searched[searcher]
@@ -164,14 +172,15 @@ class Search:
             self._keep_snapshot(time_us, event=False)
 
     def report_anomaly(self, searcher: int, anomaly: Anomaly, time_us: int | None = None) -> None:
-        """A searcher has seen an anomaly: raise the scores around it, and see whether it is the target.
+        """A searcher has detected an anomaly: raise the scores around it, and check whether it is the target.
 
-        An anomaly off the map is no candidate: it belongs to what isn't searched.
+        An anomaly off the map is not a candidate, because it is outside the searched area.
 
         Args:
-            searcher: who.
-            anomaly: what and where.
-            time_us: when it was over and could be told; None: when it was largest.
+            searcher: number of the searcher.
+            anomaly: the anomaly, with its place.
+            time_us: vehicle time at which the anomaly ended and could be reported; None: the time of its
+                peak.
         """
         parameters = self.parameters
         if not self.map.layout.contains(anomaly.north_m, anomaly.east_m):
@@ -189,11 +198,11 @@ class Search:
             self._keep_snapshot(anomaly.time_us if time_us is None else time_us, event=True)
 
     def begin(self, time_us: int) -> None:
-        """Keep the map as it is before the search."""
+        """Store the map at the start of the search."""
         self._keep_snapshot(time_us, event=False)
 
     def next_cell(self, searcher: int, north_m: float, east_m: float, heading_rad: float) -> Decision:
-        """Where a searcher flies next (eq. 9); what others are on their way to is left to them."""
+        """Decide where a searcher flies next (eq. 9); cells that are other searchers' goals are avoided."""
         taken = {cell for index, cell in enumerate(self._targets) if index != searcher and cell is not None}
         decision = decide(
             self.map,
@@ -207,7 +216,7 @@ class Search:
         return decision
 
     def leave(self, searcher: int) -> None:
-        """A searcher is on its way home, or lost: its cell is free again."""
+        """Release the cell of a searcher that flies home or is lost."""
         self._targets[searcher] = None
 
     def _keep_snapshot(self, time_us: int, *, event: bool) -> None:

@@ -1,4 +1,4 @@
-"""How near the vehicles of a team came to each other in the air, from the truth in the log."""
+"""Smallest distance between the vehicles of a team in the air, from the truth in the log."""
 
 from typing import TYPE_CHECKING, Final
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _STEP_S: Final = 0.1
-_AIRBORNE_M: Final = 10.0  # above where it stood; beside each other on the ground is no danger
+_AIRBORNE_M: Final = 10.0  # height above the start; vehicles next to each other on the ground are not counted
 
 
 def least_separation_m(records: "FlightRecords", system_ids: list[int]) -> float | None:
-    """Least distance of any two vehicles while both were more than 10 m up; None: never, or no truth."""
+    """Smallest distance of two vehicles while both were above 10 m; None: never, or no truth in the log."""
     tracks: list[tuple[Array, Array]] = []
     origin: GeodeticPosition | None = None
     for system_id in system_ids:

@@ -1,12 +1,12 @@
-"""Whether the readings of a pass are a target, or no more than the error of the map they are compared with.
+"""Decides whether the readings of a pass show a target or only the error of the map they are compared with.
 
-A published map has an error that is the same on every pass: stripes of its survey's lines, and what lies
-between them. It is correlated over about half the distance of the lines, as wide as a target, so single
-readings beyond a threshold say little, however many they are. What a target adds has the shape of a bump. Its
-amplitude is estimated from all readings of the pass by generalised least squares, with the covariance of
-map error, noise and an unknown level; amplitude over its standard deviation is the signal-to-noise ratio of
-the matched filter (Kay, Fundamentals of Statistical Signal Processing II, section 4.4). The largest over
-places and widths of a bump counts.
+A published map has an error that is the same on every pass: stripes along the survey lines, and the
+interpolation between them. It is correlated over about half the distance of the lines, which is as wide as a
+target. Single readings beyond a threshold are therefore weak evidence, however many there are. A target adds
+a bump to the readings. Its amplitude is estimated from all readings of the pass by generalised least squares,
+with the covariance of map error, noise and an unknown level; amplitude over its standard deviation is the
+signal-to-noise ratio of the matched filter (Kay, Fundamentals of Statistical Signal Processing II, section
+4.4). The result is the largest ratio over places and widths of the bump.
 """
 
 from typing import Final
@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 LEAST_RATIO: Final = 4.0
-"""Signal-to-noise ratio that makes an anomaly; the bank of bumps is some 150 templates, partly alike."""
+"""Smallest signal-to-noise ratio of an anomaly; the bank of bumps has about 150 templates, some of them
+similar.
+"""
 
 _WIDTHS_M: Final = (
     90.0,
@@ -25,7 +27,7 @@ _WIDTHS_M: Final = (
     180.0,
 )  # bumps (1 + r^2 / w^2)^(-5/2): a dipole's decay, or a Gaussian of w / sqrt(5)
 _OFFSETS_M: Final = np.linspace(-120.0, 120.0, 7)
-_UNKNOWN_LEVEL: Final = 10.0  # standard deviation of the level, in errors of a reading
+_UNKNOWN_LEVEL: Final = 10.0  # standard deviation of the level, in multiples of a reading's error
 
 
 def signal_to_noise(
@@ -41,10 +43,10 @@ def signal_to_noise(
 
     Args:
         north_m, east_m: (n,) places of the readings, some 10 m apart.
-        difference_nt: (n,) readings less map, with any level.
+        difference_nt: (n,) readings minus map, with any level.
         noise_nt: standard deviation of a reading, white.
         map_error_nt: standard deviation of the map.
-        correlation_m: distance over which the map's error is alike (exponential).
+        correlation_m: correlation distance of the map's error (exponential).
     """
     apart_m = np.hypot(north_m[:, None] - north_m, east_m[:, None] - east_m)
     level_nt = _UNKNOWN_LEVEL * np.hypot(noise_nt, map_error_nt)

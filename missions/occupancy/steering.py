@@ -1,4 +1,4 @@
-"""Flying commanded headings: an aircraft by its heading flight, a multicopter along a moving course."""
+"""Flight along commanded headings: an aircraft by its heading flight, a multicopter along a moving point."""
 
 import asyncio
 import math
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
 _LONGEST_STEP_S: Final = 0.5
-_YAW_SHARE: Final = 0.7  # of the yaw rate, so that the nose follows
+_YAW_SHARE: Final = 0.7  # of the yaw rate, so that the yaw can follow
 
 
 class Steering(Protocol):
-    """A vehicle in flight that takes headings."""
+    """A vehicle in flight that accepts heading commands."""
 
     async def turn_to(self, heading_rad: float) -> None:
-        """Fly a heading from now on, the short way round."""
+        """Turn to a heading, the short way round, and hold it."""
         ...
 
 
 class CourseReference:
-    """A point that moves over ground at one speed and height, along a heading that turns no faster than a
+    """A point that moves over ground at constant speed and height. Its heading changes no faster than a
     multicopter can follow. No I/O.
     """
 
@@ -41,13 +41,13 @@ class CourseReference:
         speed_m_s: float,
         limits: MulticopterLimits,
     ) -> None:
-        """Begin at rest.
+        """Initialise the point at rest.
 
         Args:
-            place_ned_m: from home; its height is kept.
-            heading_rad: where the nose points.
-            speed_m_s: to fly at.
-            limits: of the vehicle.
+            place_ned_m: position from home; its height is kept.
+            heading_rad: initial heading.
+            speed_m_s: speed of the flight.
+            limits: limits of the vehicle.
         """
         limits.check_speed(speed_m_s)
         self.heading_rad = heading_rad
@@ -59,21 +59,21 @@ class CourseReference:
         self._time_s = 0.0
 
     def turn_to(self, heading_rad: float) -> None:
-        """Turn to a heading."""
+        """Set the heading to turn to."""
         self._wanted_rad = heading_rad
 
     def stop(self) -> None:
-        """Come to rest straight ahead."""
+        """Slow down to rest, straight ahead."""
         self._wanted_m_s = 0.0
         self._wanted_rad = self.heading_rad
 
     @property
     def at_rest(self) -> bool:
-        """It was stopped, and stands."""
+        """Whether it was stopped and is at rest."""
         return self._wanted_m_s == 0.0 and self._speed_m_s == 0.0
 
     def at(self, time_s: float) -> Setpoint:
-        """The setpoint of a time; times must not fall."""
+        """The setpoint at a time; times must not decrease."""
         dt_s = min(_LONGEST_STEP_S, max(0.0, time_s - self._time_s))
         self._time_s = time_s
         limits = self._limits
@@ -99,7 +99,7 @@ class CourseReference:
 
 
 class _CourseFlight:
-    """A multicopter that flies headings."""
+    """A multicopter that flies commanded headings."""
 
     def __init__(self, reference: CourseReference) -> None:
         self._reference = reference
@@ -114,10 +114,10 @@ async def steering(
 ) -> AsyncIterator[Steering]:
     """Fly headings at a height: `async with steering(...) as flight: await flight.turn_to(...)`.
 
-    The vehicle is in the air. At the end it holds.
+    The vehicle must be in the air. At the end it holds its position.
 
     Args:
-        altitude_m: above home.
+        altitude_m: height above home.
         speed_m_s: airspeed of an aircraft, ground speed of a multicopter.
         rate_hz: setpoints per vehicle second.
     """

@@ -1,11 +1,11 @@
-"""The magnetic map a survey has published, as a mission reads it from a file.
+"""The published magnetic map of a survey, which a mission reads from a file.
 
 The file is a numpy `.npz` archive, in the format "flightstack-magnetic-map-1": grid lines `north_m` (rows,)
-and `east_m` (columns,) from the map's home, `total_field_nt` (rows, columns) with NaN where there is no
-data, `height_m` above home that the map is valid at, its home (`home_lat_deg`, `home_lon_deg`,
-`home_alt_m`), and, where they are known, `vertical_gradient_nt_m` (rows, columns), the change with height,
-`error_nt`, the standard deviation of the field as the survey states it, and `line_spacing_m`, the distance
-of its lines.
+and `east_m` (columns,) from the map's home, `total_field_nt` (rows, columns) with NaN where there is no data,
+`height_m`, the height above home at which the map is valid, its home (`home_lat_deg`, `home_lon_deg`,
+`home_alt_m`), and, if they are known, `vertical_gradient_nt_m` (rows, columns), the change with height,
+`error_nt`, the standard deviation of the field stated by the survey, and `line_spacing_m`, the distance
+between its lines.
 """
 
 import math
@@ -25,7 +25,8 @@ from missions.errors import PlanError
 Array = NDArray[np.float64]
 
 FORMAT: Final = "flightstack-magnetic-map-1"
-_UNREADABLE: Final = (  # what zipfile, zlib and numpy's reader of array headers raise for spoiled bytes
+# errors that zipfile, zlib and numpy's reader of array headers raise for damaged files
+_UNREADABLE: Final = (
     *(EOFError, zipfile.BadZipFile, zlib.error, RuntimeError, MemoryError),
     *(ValueError, TypeError, SyntaxError, tokenize.TokenError),
 )
@@ -47,13 +48,13 @@ class SurveyMap:
     """Total field on a grid.
 
     Attributes:
-        north_m, east_m: (rows,), (columns,) grid lines from the map's home, rising.
+        north_m, east_m: (rows,), (columns,) grid lines from the map's home, ascending.
         total_field_nt: (rows, columns); NaN where there is no data.
-        vertical_gradient_nt_m: (rows, columns), upwards; zeros where it isn't known.
-        height_m: above home, what the map is valid at.
+        vertical_gradient_nt_m: (rows, columns), upwards; zeros if it is not known.
+        height_m: height above home at which the map is valid.
         home: origin of the map's frame.
-        error_nt: standard deviation that the survey states; None: it states none.
-        line_spacing_m: of the survey; None: not stated.
+        error_nt: standard deviation stated by the survey; None: not stated.
+        line_spacing_m: distance between the survey's lines; None: not stated.
     """
 
     north_m: Array
@@ -86,10 +87,10 @@ class SurveyMap:
     def require_data(
         self, *, south_m: float, north_m: float, west_m: float, east_m: float, what: str
     ) -> None:
-        """Refuse an area that the map doesn't cover whole.
+        """Refuse an area that the map doesn't cover completely.
 
         Raises:
-            PlanError: it names what the map covers.
+            PlanError: names the area that the map covers.
         """
         inside = (
             self.north_m[0] <= south_m
@@ -125,10 +126,10 @@ def load_survey_map(path: Path) -> SurveyMap:
     """Read a published map.
 
     Raises:
-        PlanError: no such file, not such a file, or a map without data.
+        PlanError: the file does not exist or is not a map, or the map has no data.
     """
     try:
-        # not np.load, which takes for a pickle what is no archive, and advises to trust it
+        # not np.load, which treats a file that is not an archive as a pickle, and advises to trust it
         with zipfile.ZipFile(path) as archive:
             found = {}
             for name in archive.namelist():
@@ -188,14 +189,14 @@ def load_survey_map(path: Path) -> SurveyMap:
 
 
 def _numbers(path: Path, name: str, values: Array) -> Array:
-    """An array of the file as real numbers."""
+    """Read an array of the file as real numbers."""
     if values.dtype.kind not in "iuf":
         raise PlanError(f"--map {path}: {name} holds {values.dtype} and no real numbers")
     return values.astype(np.float64)
 
 
 def _number(path: Path, name: str, values: Array) -> float:
-    """A single number of the file."""
+    """Read a single number of the file."""
     if values.size != 1:
         raise PlanError(f"--map {path}: {name} has the shape {values.shape}; it is to be one number")
     return float(_numbers(path, name, values).reshape(()))

@@ -1,4 +1,4 @@
-"""One flight of a team that searches together: every vehicle from the ground back to the ground."""
+"""One flight of a team that searches together, including takeoff and landing of every vehicle."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
 SEARCH: Final = "search"
 """Name of the phase in which a vehicle searches."""
 
-_TAKEOFF_S: Final = 300.0  # the longest a vehicle may take, for those that wait on it
+_TAKEOFF_S: Final = 300.0  # longest time of one vehicle's takeoff, for the vehicles that wait for it
 _LANDING_S: Final = 900.0
-_MODE_AGE_US: Final = 2_500_000  # heartbeats tell of a change of mode by then
-_RING: Final = 0.25  # of the area: where the searchers of a team start, around its centre
+_MODE_AGE_US: Final = 2_500_000  # within this time heartbeats report a change of mode
+_RING: Final = 0.25  # of the area: distance from its centre at which the searchers of a team start
 
 
 @dataclass(slots=True, kw_only=True)
 class Searcher:
-    """One vehicle's part.
+    """One vehicle's part in the search.
 
     Attributes:
         pilot: its legs and heading commands.
         track: (team time us, north m, east m) of each placed reading of the search, by the vehicle's own
             estimate.
-        anomalies: what it saw, at team times.
-        watch: its magnetometer.
-        began_us, ended_us: vehicle time of its search; -1: not yet.
+        anomalies: detected anomalies, at team times.
+        watch: processing of its magnetometer.
+        began_us, ended_us: begin and end of its search, vehicle time; -1: not yet.
     """
 
     pilot: Pilot
@@ -55,22 +55,22 @@ class Searcher:
 
 
 class SearchTeam:
-    """The vehicles of one flight and what they share.
+    """The vehicles of one flight and their shared data.
 
     Attributes:
-        search: the shared map, and what was found.
+        search: the shared map and the found anomalies.
         searchers: one per vehicle.
-        began_us: team time when the first began to search; -1: none has.
+        began_us: team time at which the first vehicle began to search; -1: none has.
     """
 
     def __init__(
         self, vehicles: "Sequence[Vehicle]", options: Sequence[OccupancyOptions], survey_map: SurveyMap
     ) -> None:
-        """Prepare; nothing is sent.
+        """Store the arguments; no message is sent.
 
         Args:
-            vehicles: each ready to arm.
-            options: of each, adapted to it.
+            vehicles: the vehicles, each ready to arm.
+            options: options of each vehicle, adapted to it.
             survey_map: the published map.
 
         Raises:
@@ -96,25 +96,25 @@ class SearchTeam:
         self._map = survey_map
         self._frame = survey_map.frame()
         self._traffic = Traffic([own.own_altitude_m for own in options])
-        # vehicles elsewhere booted at different times: the first one's clock is the team's
+        # vehicles that are not embedded boot at different times: the first one's clock is the team's
         now_us = self._vehicles[0].clock.time_us
         self._offsets_us = [now_us - vehicle.clock.stamp_us for vehicle in self._vehicles]
 
     @property
     def map_error(self) -> MapError:
-        """Error of the published map that the team goes by."""
+        """Error of the published map that the team uses."""
         return self._options[0].map_error(self._map)
 
     @property
     def over(self) -> bool:
-        """The target is found, or time is up."""
+        """Whether the target is found, or the search time is over."""
         if self.search.found is not None:
             return True
         limit_us = self.began_us + round(self._options[0].search_time_s * 1e6)
         return self.began_us >= 0 and self._vehicles[0].clock.time_us >= limit_us
 
     async def fly(self) -> None:
-        """Fly all of them."""
+        """Fly all vehicles."""
         await together([self._fly_one(index) for index in range(len(self._vehicles))])
 
     async def _fly_one(self, index: int) -> None:
@@ -153,7 +153,7 @@ class SearchTeam:
         notes.end(clock.stamp_us)
 
     async def _check(self, vehicle: "Vehicle", own: OccupancyOptions) -> None:
-        """What can only be refused when the vehicle is heard, and still stands on the ground."""
+        """Check what needs a received vehicle, while the vehicle still stands on the ground."""
         limits = await vehicle.limits(own.own_altitude_m)
         check_vehicle(own, limits)
         check_reach(own, limits, self._frame, vehicle.home)
@@ -171,7 +171,7 @@ class SearchTeam:
         *,
         flying: bool = False,
     ) -> None:
-        """Wait for the others, a share of time for each of them."""
+        """Wait for the other vehicles; the time limit grows with their number."""
 
         def look() -> bool:
             if flying and not vehicle.armed:
@@ -261,7 +261,7 @@ class SearchTeam:
 
 
 def start_place(options: OccupancyOptions) -> tuple[float, float]:
-    """Where a vehicle's search begins: those of a team on an ellipse around the area's centre."""
+    """Start of a vehicle's search; those of a team are on an ellipse around the area's centre."""
     north_m, east_m = options.area_ne_m
     angle_rad = math.tau * options.index / options.vehicles
     return (

@@ -1,6 +1,7 @@
-"""Where the attitude of the aircraft comes from.
+"""Source of the aircraft's attitude.
 
-The autopilot's own estimate here; what has the same method can stand in its place (`filter_attitude`).
+This module uses the autopilot's own estimate; any object with the same method can replace it
+(`filter_attitude`).
 """
 
 import math
@@ -15,7 +16,7 @@ _STALE_US: Final = 500_000
 
 
 class AttitudeSource(Protocol):
-    """Attitude against time."""
+    """Attitude as a function of time."""
 
     def at(self, time_us: int) -> Quaternion | None:
         """`q_ned_from_frd` at a vehicle time; None when it is not known for that time."""
@@ -25,14 +26,14 @@ class AttitudeSource(Protocol):
 class AutopilotAttitude:
     """The autopilot's attitude (ATTITUDE), interpolated between its messages.
 
-    Before the oldest kept message, or half a second after the newest, nothing is known.
+    There is no attitude before the oldest kept message or later than half a second after the newest.
     """
 
     def __init__(self) -> None:
         self._kept: deque[tuple[int, Quaternion]] = deque(maxlen=_KEPT)
 
     def add(self, attitude: Attitude) -> bool:
-        """Take one message; False when it is older than the newest, a copy, or no attitude."""
+        """Add one message; returns False when it is not newer than the newest, or not a valid attitude."""
         if self._kept and attitude.time_us <= self._kept[-1][0]:
             return False
         if not math.isfinite(attitude.roll_rad + attitude.pitch_rad + attitude.yaw_rad):

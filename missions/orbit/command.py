@@ -1,4 +1,4 @@
-"""The orbit on the command line."""
+"""The command-line options of the orbit."""
 
 import math
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
-"""Attitude by a filter of ours: roll and pitch from inertial messages and airspeed, yaw from the autopilot.
+"""Attitude from our own filter: roll and pitch from inertial messages and airspeed, yaw from the autopilot.
 
-The filter is the self-pose estimation of Tolman et al. 2021 (docs/attitude.md); it knows no yaw.
+The filter is the self-pose estimation of Tolman et al. 2021 (docs/attitude.md); it does not estimate yaw.
 """
 
 import math
@@ -26,14 +26,14 @@ _ATTITUDE: Final = "ATTITUDE"
 
 
 class FilterAttitude:
-    """Attitude of one aircraft against time (an `AttitudeSource`).
+    """Attitude of one aircraft as a function of time (an `AttitudeSource`).
 
     Args:
-        system_id: of the aircraft.
-        parameters: of the filter; None: its defaults, for a fixed wing.
+        system_id: system id of the aircraft.
+        parameters: parameters of the filter; None: its defaults, for a fixed wing.
 
     Attributes:
-        names: messages that it must be given.
+        names: names of the messages that must be passed to it.
     """
 
     def __init__(self, system_id: int, parameters: AttitudeParameters | None = None) -> None:
@@ -50,12 +50,12 @@ class FilterAttitude:
         return self._kept[-1] if self._kept else None
 
     def roll_rad(self, time_us: int) -> float | None:
-        """The newest roll; None when that is old at a vehicle time."""
+        """The newest roll; None when it is too old at a vehicle time."""
         newest = self.newest
         return None if newest is None or time_us - newest.time_us > _STALE_US else newest.roll_rad
 
     def hear(self, frame: Frame) -> None:
-        """Take a frame. Those of other vehicles, of simulators and of estimators are left out."""
+        """Process a frame. Frames of other vehicles, of simulators and of estimators are ignored."""
         left_out = frame.component_id == TRUTH_COMPONENT or frame.component_id in ESTIMATOR_COMPONENTS
         if frame.system_id != self._system_id or left_out:
             return
@@ -73,7 +73,7 @@ class FilterAttitude:
             self._kept.extend(self._filter.estimates)
 
     def at(self, time_us: int) -> Quaternion | None:
-        """`q_ned_from_frd` at a vehicle time; None when filter or autopilot know nothing of it."""
+        """`q_ned_from_frd` at a vehicle time; None when filter or autopilot have no attitude for it."""
         heading = self._yaw.at(time_us)
         if heading is None:
             return None

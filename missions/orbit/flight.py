@@ -1,4 +1,4 @@
-"""One aircraft's flight of the orbit: out to the target with GPS, around it without, and home."""
+"""One aircraft's flight of the orbit: to the target with GPS, around it without GPS, and home."""
 
 import asyncio
 import math
@@ -23,7 +23,7 @@ from missions.vehicle.vehicle import Vehicle
 
 _GIMBAL_HZ: Final = 25.0
 _ENTRY_RAD: Final = math.radians(10.0)
-_CAPTURED: Final = 0.05  # of the radius
+_CAPTURED: Final = 0.05  # of the radius: below this error the circle counts as captured
 _CAPTURED_RAD: Final = math.radians(10.0)
 _CAPTURED_FOR_S: Final = 5.0
 _CAPTURE_LIMIT_S: Final = 240.0
@@ -57,18 +57,18 @@ class OrbitFlight:
 
     @property
     def _stamp_us(self) -> int:
-        """Now, as images and attitudes are stamped: the tracker's time."""
+        """The present time in the base of image and attitude stamps, which is the tracker's time."""
         return self._vehicle.clock.stamp_us
 
     def _begin(self, phase: str) -> None:
         self._vehicle.notes.begin(phase, self._stamp_us)
 
     async def fly(self) -> None:
-        """From the ground back to the ground.
+        """Fly the mission, including takeoff and landing.
 
         Raises:
-            PlanError: the target would be outside what the camera can look at.
-            MissionError: the flight went wrong.
+            PlanError: the target would be outside the camera's range.
+            MissionError: the flight failed.
         """
         vehicle, options = self._vehicle, self._options
         self._begin("preparation")
@@ -105,7 +105,9 @@ class OrbitFlight:
     # the flight
 
     async def _fly_to_entry(self, looking: "asyncio.Task[None]") -> None:
-        """Circle so that the circle leads through the entry, along its heading; until it does."""
+        """Fly a circle that passes through the entry point along its heading, and wait until the aircraft is
+        there.
+        """
         vehicle, options = self._vehicle, self._options
         course = options.entry_course_rad
         radius_m = max(80.0, self._limits.turn_radius_m(options.airspeed(self._limits)))
@@ -140,7 +142,7 @@ class OrbitFlight:
                     f"{vehicle.heard()}"
                 )
             elif options.target_speed_m_s and (self._now_us - placed_us) % 20_000_000 < 100_000:
-                await self._circle_for_entry(home, course, radius_m)  # it has moved on
+                await self._circle_for_entry(home, course, radius_m)  # the aircraft has moved on
 
     async def _circle_for_entry(self, home: GeodeticPosition, course: float, radius_m: float) -> None:
         options = self._options
@@ -171,7 +173,7 @@ class OrbitFlight:
         try:
             await self._lose_gps()
             self._look_out.with_gps = False
-            self._tracker.count_anew()  # on the way here the target may well have been out of sight
+            self._tracker.count_anew()  # the target may have been out of sight on the way here
             async with vehicle.guided(TICK_HZ) as guided:
                 entered_us = self._now_us
                 begun = not vehicle.adapter.roll_alone
@@ -195,12 +197,12 @@ class OrbitFlight:
                 await guided.follow(lambda _t: self._fly_on(entered_us) if self._now_us < back_us else None)
         except BaseException:
             if not self._look_out.with_gps:
-                with suppress(MissionError):  # the first error is the one that is reported
+                with suppress(MissionError):  # the first error is reported
                     await self._regain_gps()
             raise
 
     def _require_air_data(self) -> None:
-        """Without GPS the airspeed is the only speed there is."""
+        """Check that airspeed is reported, because without GPS it is the only speed available."""
         assert self._pilot is not None
         airspeed_m_s = self._pilot.airspeed_true_m_s
         if not airspeed_m_s > 0.5 * self._limits.airspeed_min_m_s:
@@ -211,7 +213,7 @@ class OrbitFlight:
             )
 
     async def _give_altitude(self, following: "asyncio.Future[None]") -> None:
-        """An autopilot that holds altitude and airspeed itself is told them in its guided mode."""
+        """Send altitude and airspeed, in guided mode, to an autopilot that holds them itself."""
         from missions.vehicle.adapter import Mode
 
         vehicle = self._vehicle
@@ -226,7 +228,7 @@ class OrbitFlight:
             await self._pilot.begin()
 
     def _fly_on(self, entered_us: int) -> AttitudeSetpoint:
-        """The command of now, and what it says of the flight."""
+        """Compute the current command, and note the state of the flight."""
         now_us, options, tracker = self._now_us, self._options, self._tracker
         attitude = self._told_attitude()
         assert self._pilot is not None
@@ -235,7 +237,8 @@ class OrbitFlight:
         if min(unseen_s, (now_us - entered_us) * 1e-6) > options.lost_limit_s:
             seen = "never seen" if math.isinf(unseen_s) else f"lost {unseen_s:.0f} s ago"
             raise MissionError(f"the target was {seen}; {self._vehicle.heard()}")
-        # Without inertial messages nothing is seen either, and the flight ends by `lost_limit_s`; until then
+        # Without inertial messages no target is seen either, and the flight ends by `lost_limit_s`; until
+        # then
         # the autopilot's roll is better than an old one.
         own = self._look_out.filter
         filtered_rad = None if own is None else own.roll_rad(stamp_us)
@@ -286,7 +289,7 @@ class OrbitFlight:
             self._vehicle.notes.marks["gps_lost_at_s"] = self._stamp_us * 1e-6
 
     async def _regain_gps(self) -> None:
-        """GPS on, and wait for a fix (which it may have had all the time)."""
+        """Switch GPS on and wait for a fix (which the receiver may have had all the time)."""
         vehicle, self._look_out.with_gps = self._vehicle, True
         notes = vehicle.notes
         if self._radii:
@@ -303,7 +306,7 @@ class OrbitFlight:
 
 
 def _raise_if_ended(task: "asyncio.Task[None]") -> None:
-    """A task that should run on: what has ended it."""
+    """Raise the reason why a task that should continue has ended."""
     if task.done():
         task.result()
         raise MissionError("the mission's own look-out has ended")

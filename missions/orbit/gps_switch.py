@@ -1,4 +1,6 @@
-"""Switching a vehicle's GPS off and on again, by what its firmware offers; found out before the takeoff."""
+"""Switches a vehicle's GPS off and on again by the means of its firmware, which are determined before
+takeoff.
+"""
 
 from contextlib import suppress
 from typing import Final
@@ -16,16 +18,16 @@ _FUSION: Final = {
     "ardupilot": ({"EK3_SRC1_POSXY": 0.0, "EK3_SRC1_VELXY": 0.0},),
     "px4": ({"EKF2_GPS_CTRL": 0.0},),
 }
-"""Parameters of a filter that then leaves GPS out, on real vehicles too."""
+"""Parameters that make the navigation filter ignore GPS, on real vehicles too."""
 
 
 class GpsSwitch:
-    """Takes GPS from one vehicle, and gives it back.
+    """Switches the GPS of one vehicle off and on again.
 
     Args:
-        vehicle: whose.
-        values: parameters that switch it off; none: by MAV_CMD_INJECT_FAILURE.
-        before: their values with GPS.
+        vehicle: the vehicle.
+        values: parameters that switch it off; empty: MAV_CMD_INJECT_FAILURE is used.
+        before: values of these parameters while GPS is on.
     """
 
     def __init__(self, vehicle: Vehicle, values: dict[str, float], before: dict[str, float]) -> None:
@@ -35,10 +37,10 @@ class GpsSwitch:
 
     @classmethod
     async def find(cls, vehicle: Vehicle, way: GpsOff) -> "GpsSwitch":
-        """The way that this vehicle takes; GPS stays on.
+        """Find the way that this vehicle supports; GPS stays on.
 
         Raises:
-            MissionError: there is none; the message says what to ask for instead.
+            MissionError: there is none; the message names the alternative.
         """
         answer = ""
         if way is not GpsOff.PARAMETER:
@@ -55,7 +57,7 @@ class GpsSwitch:
             try:
                 before = {name: await vehicle.parameter(name) for name in values}
             except VehicleTimeout:
-                continue  # it has no such parameter
+                continue  # the vehicle has no such parameter
             return cls(vehicle, values, before)
         names = ", ".join(name for values in _FUSION[firmware] for name in values)
         by_parameter = (
@@ -79,15 +81,15 @@ class GpsSwitch:
                 await self._vehicle.command(_INJECT, float(_GPS), float(dialect.FAILURE_TYPE_OFF), 0.0)
             await self._vehicle.set_parameters(self._values)
         except MissionError:
-            with suppress(MissionError):  # the first error is the one that is reported
+            with suppress(MissionError):  # the first error is reported
                 await self.on()
             raise
 
     async def on(self) -> None:
-        """Switch GPS on again; parameters get their values from before.
+        """Switch GPS on again; parameters get their previous values.
 
         Raises:
-            MissionError: the vehicle refused. Parameters that it did not take are in the notes.
+            MissionError: the vehicle refused. Parameters that it did not accept are in the notes.
         """
         vehicle = self._vehicle
         if not self._values:
@@ -107,7 +109,9 @@ class GpsSwitch:
 
 
 async def _refusal(vehicle: Vehicle) -> str:
-    """How the vehicle refuses to inject failures, in words; "" when it does not. It asks for a sound GPS."""
+    """The reason why the vehicle refuses to inject failures; "" when it accepts. The request uses failure
+    type OK.
+    """
     try:
         result = await vehicle.try_command(_INJECT, float(_GPS), float(dialect.FAILURE_TYPE_OK), 0.0)
     except VehicleTimeout:

@@ -6,16 +6,17 @@ right (the paper's formula for it, with norms, loses the sign). Equation 35 asks
 
     chi_d = lambda (pi/2 - atan(k_o (rho - rho_d))),
 
-straight for the target from far away, abeam on the circle. The paper commands phi = phi_ff + k_p e + k_d
-de/dt, e = chi - chi_d, with phi_ff of the circle. Here the same terms are written as a turn rate of v:
+so far away the aircraft flies straight to the target, and on the circle the target is abeam. The paper
+commands phi = phi_ff + k_p e + k_d de/dt, e = chi - chi_d, with phi_ff of the circle. Here the same terms are
+written as a turn rate of v:
 
     omega = d(bearing)/dt - d(chi_d)/dt + k e,
 
-whose feed-forward is that of the circle on the circle, and right elsewhere too, so that de/dt = -k e from
-everywhere; the derivative terms come from the estimated velocity, not from differences of noisy angles.
-Bank makes the turn: v omega = g tan(phi) cos(crab), with the angle between heading and v, since lift pulls
-across the heading and not across v. In wind v changes along the circle, and the bank with it: v^2 / (g rho)
-where the paper prints v / (g rho). docs/papers.md lists these corrections.
+whose feed-forward equals the circle's on the circle and is also correct elsewhere, so that de/dt = -k e
+everywhere; the derivative terms come from the estimated velocity, not from differences of noisy angles. Bank
+makes the turn: v omega = g tan(phi) cos(crab). Crab is the angle between heading and v, since lift acts
+across the heading and not across v. In wind v changes along the circle, and the bank changes with it. The
+bank contains v^2 / (g rho) where the paper prints v / (g rho). docs/papers.md lists these corrections.
 """
 
 import math
@@ -34,12 +35,12 @@ class OrbitParameters:
     """The circle and the gains.
 
     Attributes:
-        radius_m: horizontal, around the target.
+        radius_m: horizontal radius around the target.
         direction: +1 clockwise seen from above, -1 counter-clockwise (the paper's lambda).
-        approach_gain: k_o times the radius: how steeply an error of the radius is steered away.
+        approach_gain: k_o times the radius; a larger gain corrects an error of the radius more steeply.
         turn_gain_per_s: k, 1/s.
-        bank_max_rad: of the command.
-        bank_rate_max_rad_s: of the command.
+        bank_max_rad: largest commanded bank.
+        bank_rate_max_rad_s: largest rate of the commanded bank.
     """
 
     radius_m: float
@@ -63,12 +64,12 @@ class OrbitParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitCommand:
-    """What the guidance made of an estimate.
+    """The guidance's command for an estimate.
 
     Attributes:
-        roll_rad: the command.
+        roll_rad: commanded roll.
         radius_m: estimated distance to the target.
-        radius_error_m: more than the radius asked for is positive.
+        radius_error_m: positive outside the commanded radius.
         chi_error_rad: e.
     """
 
@@ -79,13 +80,13 @@ class OrbitCommand:
 
 
 def bearing_off_velocity_rad(velocity_ne_m_s: tuple[float, float], offset_ne_m: tuple[float, float]) -> float:
-    """chi: from the velocity to the target, positive to the right, -pi..pi."""
+    """chi: angle from the velocity to the direction of the target, positive to the right, -pi..pi."""
     (vn, ve), (pn, pe) = velocity_ne_m_s, offset_ne_m
     return math.atan2(vn * pe - ve * pn, vn * pn + ve * pe)
 
 
 class OrbitGuidance:
-    """From relative state to roll command.
+    """Computes roll commands from relative states.
 
     Args:
         parameters: circle and gains.
@@ -97,12 +98,12 @@ class OrbitGuidance:
         self._time_us = 0
 
     def command(self, state: RelativeState, heading_rad: float, roll_rad: float) -> OrbitCommand:
-        """The roll command for a moment.
+        """The roll command for the present state.
 
         Args:
-            state: of the target against the aircraft.
-            heading_rad: of the nose.
-            roll_rad: present bank; where the command starts from.
+            state: state of the target relative to the aircraft.
+            heading_rad: heading of the aircraft.
+            roll_rad: present bank, from which the command starts.
         """
         p = self.parameters
         velocity = (-state.offset_rate_ne_m_s[0], -state.offset_rate_ne_m_s[1])
@@ -113,7 +114,7 @@ class OrbitGuidance:
         excess = k_o * (rho - p.radius_m)
         chi_d = p.direction * (0.5 * math.pi - math.atan(excess))
         error = math.remainder(chi - chi_d, math.tau)
-        # inside, the bearing turns fast: no faster than on a circle of half the radius
+        # inside the circle the bearing turns fast: limited to the rate on a circle of half the radius
         bearing_rate = speed * math.sin(chi) / max(rho, 0.5 * p.radius_m)
         closing = speed * math.cos(chi)
         chi_d_rate = p.direction * k_o * closing / (1.0 + excess * excess)

@@ -1,4 +1,4 @@
-"""From a place in the image to a direction over ground and back.
+"""Conversion of a place in the image to a direction over ground and back.
 
 Source: Tolman et al. 2021, equations 36 to 40.
 
@@ -19,8 +19,8 @@ class LineOfSight:
     """A direction from the aircraft.
 
     Attributes:
-        bearing_rad: clockwise from north.
-        depression_rad: below the horizon, positive down.
+        bearing_rad: bearing, clockwise from north.
+        depression_rad: angle below the horizon, positive down.
     """
 
     bearing_rad: float
@@ -28,7 +28,7 @@ class LineOfSight:
 
     @classmethod
     def along(cls, ned: Vector) -> "LineOfSight":
-        """Of a vector in NED."""
+        """The direction of a vector in NED."""
         return cls(
             bearing_rad=math.atan2(ned[1], ned[0]), depression_rad=math.atan2(ned[2], math.hypot(*ned[:2]))
         )
@@ -51,15 +51,15 @@ def gimbal_angles(line_frd: Vector) -> tuple[float, float]:
 def line_of_sight_of_gimbal(
     image_x: float, image_y: float, gimbal: GimbalAttitude, q_ned_from_frd: Quaternion
 ) -> LineOfSight:
-    """Direction of a detection (equation 37) from a gimbal that tells its own attitude against the horizon,
-    as MAVLink has it.
+    """Direction of a detection (equation 37) from a gimbal that reports its own attitude against the horizon,
+    as defined in MAVLink.
 
-    Its quaternion is the first two rotations of the equation in one. The heading is the aircraft's.
+    Its quaternion combines the first two rotations of the equation. The heading is the aircraft's.
 
     Args:
         image_x, image_y: normalized image coordinates.
-        gimbal: where it looked when the image was taken.
-        q_ned_from_frd: attitude of the aircraft then.
+        gimbal: attitude of the gimbal when the image was taken.
+        q_ned_from_frd: attitude of the aircraft at that time.
     """
     line = rotate(gimbal.q, gimbal_from_camera(image_x, image_y))
     if not gimbal.from_north:
@@ -68,5 +68,5 @@ def line_of_sight_of_gimbal(
 
 
 def pointing_angles(offset_ned_m: Vector, q_ned_from_frd: Quaternion) -> tuple[float, float]:
-    """(azimuth, elevation), rad, of the gimbal that looks at a place `offset_ned_m` from the aircraft."""
+    """(azimuth, elevation), rad, of a gimbal that points at a place `offset_ned_m` from the aircraft."""
     return gimbal_angles(rotate(conjugate(q_ned_from_frd), offset_ned_m))

@@ -1,4 +1,4 @@
-"""The look-out of an orbit: attitude and images go to the tracker, and the gimbal stays on the target."""
+"""Observation of the target: attitude and images for the tracker, and pointing of the gimbal."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ from missions.vehicle.vehicle import Vehicle
 
 TICK_HZ: Final = 25.0
 _GIMBAL_LEAD_S: Final = 0.15
-_BELIEVED_TO_M: Final = 20.0  # how well a place from somebody else is known (paper: 20 m)
+_BELIEVED_TO_M: Final = 20.0  # standard deviation of a place from another source (paper: 20 m)
 _DRIFT_STD_M_S: Final = 2.0
 _OLD_US: Final = 1_000_000
 _INERTIAL: Final = ("HIGHRES_IMU", "RAW_IMU")
@@ -26,12 +26,12 @@ _FILTER_START_S: Final = 5.0
 
 
 class LookOut:
-    """Watches the target from one vehicle.
+    """Observes the target from one vehicle.
 
     Attributes:
-        tracker: where the target is.
-        filter: our own attitude filter; None where the autopilot's attitude is used.
-        with_gps: the vehicle knows where it is, and so about where the target must be.
+        tracker: estimates the target's position.
+        filter: our own attitude filter; None when the autopilot's attitude is used.
+        with_gps: whether the vehicle knows its position, and so the approximate direction of the target.
     """
 
     def __init__(self, vehicle: Vehicle, options: OrbitOptions) -> None:
@@ -44,12 +44,12 @@ class LookOut:
         self.with_gps = True
 
     def listen_to_payload(self) -> list[Callable[[], None]]:
-        """Detections and where the gimbal points go to the tracker; what ends that."""
+        """Pass detections and gimbal attitudes to the tracker; returns functions that end this."""
         payload, tracker = self._vehicle.payload, self.tracker
         return [payload.on_gimbal_attitude(tracker.gimbal), payload.on_detection(tracker.detect)]
 
     def listen_to_attitude(self) -> list[Callable[[], None]]:
-        """The attitude that is used is kept up to date; what ends that."""
+        """Keep the attitude source up to date; returns functions that end this."""
         listen, own = self._vehicle.connection.listen, self._vehicle.system_id
         if self.filter is not None:
             return [listen(name, self.filter.hear) for name in sorted(self.filter.names)]
@@ -63,12 +63,15 @@ class LookOut:
         return [listen("ATTITUDE", on_attitude)]
 
     async def start_filter(self) -> None:
-        """Have our filter fed, where it is to be used: on the ground still, where it finds its biases."""
+        """Start our filter, if it is used, while the aircraft is still on the ground, where it estimates its
+        biases.
+        """
         if self.filter is None:
             return
         vehicle = self._vehicle
         for name in _INERTIAL:
-            for rate_hz in _INERTIAL_HZ:  # an autopilot that finds the second too fast has granted the first
+            # an autopilot that refuses the second as too fast has already accepted the first
+            for rate_hz in _INERTIAL_HZ:
                 await vehicle.set_message_rate(name, rate_hz)
             await vehicle.clock.sleep(_FILTER_START_S)
             if self.filter.newest is not None:
@@ -79,7 +82,7 @@ class LookOut:
         )
 
     async def keep_looking(self, pilot: AttitudePilot) -> None:
-        """Step the tracker, and keep the gimbal on the target, all the time."""
+        """Continuously step the tracker and keep the gimbal pointed at the target."""
         clock = self._vehicle.clock
         period_us = round(1e6 / TICK_HZ)
         due_us = clock.time_us
@@ -103,7 +106,7 @@ class LookOut:
             vehicle.payload.point_gimbal(pitch_rad=angles[1], yaw_rad=angles[0])
 
     def _believe(self, now_us: int, airspeed_m_s: float) -> None:
-        """While there is GPS and the target was not seen: where it is said to be, against the aircraft."""
+        """While there is GPS and the target was not seen: use its believed place relative to the aircraft."""
         p = self._vehicle.latest(telemetry.Position)
         attitude = self._vehicle.latest(telemetry.Attitude)
         if p is None or attitude is None or not self.informed:
@@ -123,15 +126,15 @@ class LookOut:
 
     @property
     def informed(self) -> bool:
-        """Whether the vehicle's position and attitude are news; a line that was out has old ones."""
+        """Whether the vehicle's position and attitude are recent; after a link loss they are old."""
         told = (self._vehicle.latest(telemetry.Position), self._vehicle.latest(telemetry.Attitude))
         now_us = self._vehicle.clock.stamp_us
         return all(t is not None and now_us - t.time_us < _OLD_US for t in told)
 
     def target_ne(self, time_us: int) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Place and velocity of the target as it is believed to move, from home."""
+        """Believed position and velocity of the target, from home."""
         o = self._options
-        if o.wandering:  # somewhere around there
+        if o.wandering:  # its place is known only approximately
             return o.target_ne_m, (0.0, 0.0)
         velocity = (
             o.target_speed_m_s * math.cos(o.target_heading_rad),

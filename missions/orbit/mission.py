@@ -1,4 +1,4 @@
-"""The mission: a target is circled without GPS, by roll commands alone."""
+"""The mission `orbit`: the aircraft circles a target without GPS, by roll commands only."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ class OrbitMission(Mission[OrbitOptions]):
 
     def scenario(self, options: OrbitOptions, setting: Setting) -> Scenario:
         north_m, east_m = options.target_ne_m
-        if options.motion is TargetMotion.CIRCLE:  # begins in the north of its circle
+        if options.motion is TargetMotion.CIRCLE:  # it starts in the north of its circle
             north_m -= WANDERING_M
         return Scenario(
             targets=(

@@ -1,4 +1,4 @@
-"""What a person can choose about an orbit."""
+"""Options of an orbit."""
 
 import math
 from dataclasses import dataclass
@@ -12,28 +12,28 @@ from missions.planning.limits import FixedWingLimits, Limits
 from missions.scenario import TargetMotion
 
 WANDERING_M: Final = 100.0
-"""How far a target that wanders goes from its place: radius of its circle, half the side of its area."""
+"""Largest distance of a wandering target from its place: radius of its circle, half the side of its area."""
 
 
 class AttitudeFrom(StrEnum):
-    """Whose roll and pitch the orbit is flown with."""
+    """The source of roll and pitch for the orbit."""
 
     AUTOPILOT = "autopilot"
     FILTER = "filter"
     """Our own filter, fed with the aircraft's inertial sensors and airspeed."""
 
 
-_TAG_PX: Final = 24.0  # as seen from above; half the tags of 11 pixels are read
-_FORESHORTENING: Final = 0.742  # size that counts: times the sine of the depression to this power
-_FOCAL_PX: Final = 1108.5  # of the embedded camera, 1280 pixels over 60 degrees
+_TAG_PX: Final = 24.0  # size seen from above; half of the tags with 11 pixels are read
+_FORESHORTENING: Final = 0.742  # effective size: times the sine of the depression to this power
+_FOCAL_PX: Final = 1108.5  # focal length of the embedded camera, 1280 pixels over 60 degrees
 _LEAST_TAG_M: Final = 4.0
 
 
 class GpsOff(StrEnum):
-    """How GPS is switched off for the orbit."""
+    """The way in which GPS is switched off for the orbit."""
 
     AUTO = "auto"
-    """By the command; of a simulator that does not know it, by its parameter."""
+    """By the command or, for a simulator that does not support it, by its parameter."""
     FAILURE = "failure"
     """By MAV_CMD_INJECT_FAILURE."""
     PARAMETER = "parameter"
@@ -45,23 +45,23 @@ class OrbitOptions(MissionOptions):
     """A circle around a target on the ground.
 
     Attributes:
-        altitude_m: above home, and so above the target's ground when that is level.
-        radius_m: horizontal.
+        altitude_m: height above home, and so above the target's ground when the ground is level.
+        radius_m: horizontal radius.
         direction: +1 clockwise seen from above, -1 counter-clockwise.
-        duration_s: on the circle.
-        airspeed_m_s: equivalent; None: the aircraft's own.
-        target_ne_m: where the target is believed to be when the vehicle is first heard, from home.
-        target_speed_m_s, target_heading_rad: how it is believed to move, straight on.
-        target_motion: how it moves; None: straight on with a speed, else not. One that wanders (a circle, a
-            random walk) is believed to be within 100 m of its place.
-        target_ground_m: of the ground it is on, above home.
-        entry_bearing_rad: from the target to where GPS is lost.
-        entry_distance_m: between the two.
-        entry_heading_rad: of the nose there; None: towards the target.
+        duration_s: time on the circle.
+        airspeed_m_s: equivalent airspeed; None: the aircraft's default.
+        target_ne_m: believed position of the target from home, when the vehicle is first received.
+        target_speed_m_s, target_heading_rad: believed motion of the target, along a straight line.
+        target_motion: motion of the target; None: straight if it has a speed, else static. A target on a
+            circle or a random walk is believed to be within 100 m of its place.
+        target_ground_m: height of the ground at the target, above home.
+        entry_bearing_rad: bearing from the target to the place where GPS is lost.
+        entry_distance_m: distance between the two.
+        entry_heading_rad: heading of the aircraft at that place; None: towards the target.
         gps_fault: GPS is switched off for the orbit.
-        gps_off: how.
-        lost_limit_s: the mission ends when the target was not seen for so long.
-        attitude: whose roll and pitch it is flown with; the yaw is the autopilot's.
+        gps_off: how GPS is switched off.
+        lost_limit_s: the mission ends when the target was not seen for this time.
+        attitude: source of roll and pitch; the yaw is the autopilot's.
     """
 
     altitude_m: float = 100.0
@@ -111,25 +111,25 @@ class OrbitOptions(MissionOptions):
 
     @property
     def motion(self) -> TargetMotion:
-        """How the target moves in an embedded world."""
+        """Motion of the target in an embedded world."""
         if self.target_motion is not None:
             return self.target_motion
         return TargetMotion.STRAIGHT if self.target_speed_m_s > 0.0 else TargetMotion.STATIC
 
     @property
     def wandering(self) -> bool:
-        """Whether it is not known where the target goes, only that it stays near."""
+        """Whether the target's path is not known, only that it stays near its place."""
         return self.target_motion in (TargetMotion.CIRCLE, TargetMotion.RANDOM_WALK)
 
     @property
     def height_over_target_m(self) -> float:
-        """Of this vehicle."""
+        """Height of this vehicle over the target."""
         return self.own_altitude_m - self.target_ground_m
 
     @property
     def tag_size_m(self) -> float:
-        """Side of the embedded world's tag: one that its camera reads from the orbit, and from somewhat
-        farther.
+        """Side of the embedded world's tag, so large that its camera reads the tag from the orbit and from
+        somewhat farther away.
         """
         height_m = self.height_over_target_m
         range_m = math.hypot(height_m, self.radius_m)
@@ -138,7 +138,7 @@ class OrbitOptions(MissionOptions):
 
     @property
     def entry_course_rad(self) -> float:
-        """Heading where GPS is lost."""
+        """Heading at the place where GPS is lost."""
         if self.entry_heading_rad is not None:
             return self.entry_heading_rad
         return math.remainder(self.entry_bearing_rad + math.pi, math.tau)
@@ -151,7 +151,7 @@ class OrbitOptions(MissionOptions):
         """Refuse an orbit that the aircraft can't hold, or from which the target can't be seen.
 
         Raises:
-            PlanError: says why, and what to change.
+            PlanError: names the reason and what to change.
         """
         if not isinstance(limits, FixedWingLimits):
             raise PlanError("orbit is flown by aircraft with wings; choose --model aerosonde, or another one")
@@ -194,10 +194,10 @@ class OrbitOptions(MissionOptions):
             )
 
     def check_camera(self, limits: FixedWingLimits, pitch_min_rad: float, pitch_max_rad: float) -> None:
-        """Refuse an orbit on which the target would be outside what the gimbal can look at.
+        """Refuse an orbit on which the target would be outside the gimbal's range.
 
-        On the circle the target is abeam: the bank lifts the horizon on its side, so that against the body
-        it is (depression - bank) down.
+        On the circle the target is abeam: the bank lifts the horizon on its side, so that relative to the
+        body the target is (depression - bank) down.
         """
         true_m_s = limits.true_airspeed_m_s(self.airspeed(limits))
         depression = math.atan2(self.height_over_target_m, self.radius_m)

@@ -1,4 +1,4 @@
-"""The picture of an orbit: over ground, around the target, and distance and height against time."""
+"""The picture of an orbit: over ground, around the target, and distance and height over time."""
 
 from pathlib import Path
 from typing import Any, Final
@@ -21,7 +21,8 @@ _GPS_LOST: Final = "#fee2e2"
 
 
 def draw_orbit(path: Path, title: str, debriefing: Debriefing) -> None:
-    """Draw `track.png`. Without truth (a vehicle elsewhere) the picture of any flight is drawn.
+    """Draw `track.png`. Without truth (a vehicle that is not embedded) the standard picture of a flight is
+    drawn.
 
     Args:
         path: the file; it must not exist.

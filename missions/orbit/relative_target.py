@@ -1,16 +1,18 @@
-"""Where the target is, and how it moves, against an aircraft that has no position of its own.
+"""Position and velocity of the target relative to an aircraft that does not know its own position.
 
-A Kalman filter on what a camera, a compass, a pitot tube and a barometer tell. Its state is the horizontal
-offset p from the aircraft to the target and the velocity u of the target against the air, in NED axes:
+A Kalman filter on measurements of a camera, a compass, a pitot tube and a barometer. Its state is the
+horizontal offset p from the aircraft to the target and the velocity u of the target against the air, in NED
+axes:
 
     dp/dt = u - v_air,    u = v_target - v_wind
 
-Wind and target motion enter the relative motion as one: u. So a still target in wind, and a moving one in
-still air, are the same to the filter, and neither GPS nor the wind's own value is needed. (Tolman
+Wind and target motion enter the relative motion only as their difference u. To the filter a static target in
+wind is the same as a moving one in still air, and neither GPS nor the wind is needed. (Tolman
 et al. 2021 take the relative velocity to be that of the aircraft, equation 34, and fly in still air.)
 
-Measured are bearing and depression of the line of sight; equation 40, offset = height / tan(depression), is
-in the measurement model, so that a flat line of sight from far away weighs as little as it should.
+The measurements are bearing and depression of the line of sight. Equation 40, offset = height /
+tan(depression), is in the measurement model, so that a flat line of sight from far away has a correspondingly
+small weight.
 """
 
 import math
@@ -63,8 +65,8 @@ class RelativeState:
 
     Attributes:
         time_us: vehicle time.
-        offset_ne_m: from the aircraft to the target.
-        offset_rate_ne_m_s: its rate: velocity of the target against the aircraft.
+        offset_ne_m: offset from the aircraft to the target.
+        offset_rate_ne_m_s: rate of the offset: velocity of the target relative to the aircraft.
         offset_std_m: standard deviation of the offset, the larger axis.
     """
 
@@ -75,10 +77,11 @@ class RelativeState:
 
 
 class RelativeTarget:
-    """The filter. Air velocities come in time order (`move`); a line of sight may be up to a second late.
+    """The filter. Air velocities must come in the order of time (`move`); a line of sight may be up to a
+    second late.
 
     Args:
-        parameters: noise.
+        parameters: noise parameters.
     """
 
     def __init__(self, parameters: RelativeTargetParameters | None = None) -> None:
@@ -99,7 +102,7 @@ class RelativeTarget:
 
     @property
     def drift_ne_m_s(self) -> tuple[float, float]:
-        """Velocity of the target against the air."""
+        """Velocity of the target relative to the air."""
         return float(self._x[2]), float(self._x[3])
 
     def start(
@@ -111,9 +114,9 @@ class RelativeTarget:
         drift_ne_m_s: tuple[float, float],
         drift_std_m_s: float,
     ) -> None:
-        """Begin (again) from what somebody else says of the target (equation 33).
+        """Start (again) from a target position of another source (equation 33).
 
-        The way through the air so far is kept: images on their way show the target from there.
+        The past track through the air is kept, because images that have not yet arrived were taken from it.
         """
         if self._known and time_us >= self._time_us:
             self.move(time_us, self._air)
@@ -126,7 +129,7 @@ class RelativeTarget:
         self._known = True
 
     def move(self, time_us: int, air_velocity_ne_m_s: tuple[float, float]) -> None:
-        """Go on to a time, at which the aircraft moves through the air like this."""
+        """Advance to a time, with the aircraft's velocity through the air."""
         if not self._known or time_us <= self._time_us:
             self._air = air_velocity_ne_m_s
             return
@@ -148,12 +151,12 @@ class RelativeTarget:
         self._path.append((time_us, n0 + north, e0 + east))
 
     def see(self, time_us: int, line: LineOfSight, height_m: float) -> bool:
-        """Take a line of sight at the time of its image; False when it is not of this target.
+        """Fuse a line of sight at the time of its image; returns False when it is not of this target.
 
         Args:
-            time_us: of the image.
-            line: where it was.
-            height_m: of the aircraft over the target's ground.
+            time_us: time of the image.
+            line: measured line of sight.
+            height_m: height of the aircraft over the target's ground.
         """
         found = self._innovation(time_us, line, height_m)
         if found is None:
@@ -171,7 +174,7 @@ class RelativeTarget:
         return True
 
     def distance_squared(self, time_us: int, line: LineOfSight, height_m: float) -> float:
-        """Normalized innovation squared of a line of sight: how far it is from what is expected."""
+        """Normalized innovation squared of a line of sight."""
         found = self._innovation(time_us, line, height_m)
         return math.inf if found is None else float(found[0] @ found[3] @ found[0])
 
@@ -184,7 +187,7 @@ class RelativeTarget:
         if flown is None:
             return None
         late_s = (self._time_us - time_us) * 1e-6
-        # the offset when the image was taken: what has been flown since is undone
+        # the offset at the time of the image: the distance flown since is subtracted
         north = self._x[0] - late_s * self._x[2] + flown[0]
         east = self._x[1] - late_s * self._x[3] + flown[1]
         rho = max(_LEAST_OFFSET_M, math.hypot(north, east))
@@ -205,14 +208,14 @@ class RelativeTarget:
         h[:, OFFSET] = to_offset
         h[:, DRIFT] = -late_s * to_offset
         sigma2 = self.parameters.angle_rad**2
-        # near the vertical a bearing means little
+        # near the vertical the bearing is not meaningful
         noise = np.diag((sigma2 * slant2 / rho**2, sigma2))
         s = h @ self._p @ h.T + noise
         inverse: Array = np.asarray(np.linalg.inv(s), dtype=np.float64)
         return innovation, h, s, inverse
 
     def _flown_since(self, time_us: int) -> tuple[float, float] | None:
-        """Way through the air from a time to now, (north, east) m; None when it is too long ago."""
+        """Distance flown through the air since a time, (north, east) m; None when that is too long ago."""
         last = self._path[-1]
         if time_us >= last[0]:
             dt = (time_us - last[0]) * 1e-6
@@ -229,7 +232,7 @@ class RelativeTarget:
         return None
 
     def state(self, time_us: int) -> RelativeState:
-        """The estimate at a time from now on, at the present velocity through the air."""
+        """The estimate at the present or a later time, at the present velocity through the air."""
         ahead_s = (time_us - self._time_us) * 1e-6
         rate = (float(self._x[2]) - self._air[0], float(self._x[3]) - self._air[1])
         return RelativeState(

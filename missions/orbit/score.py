@@ -1,4 +1,4 @@
-"""How well the orbit was held: figures from the truth in the records."""
+"""Score of how well the orbit was held, from the truth in the records."""
 
 import math
 from collections.abc import Mapping
@@ -19,18 +19,18 @@ Array = NDArray[np.float64]
 ORBIT: Final = "orbit"
 """Name of the phase that is scored."""
 TARGET_SYSTEM: Final = 251
-"""MAVLink system of the simulated targets' truth; the first is component 1."""
+"""MAVLink system id of the simulated targets' truth; the first target is component 1."""
 
 _TRUTH: Final = "HIL_STATE_QUATERNION"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OrbitTruth:
-    """Aircraft and target in truth, at the aircraft's times.
+    """True positions of aircraft and target, at the aircraft's times.
 
     Attributes:
         time_s: (n,) vehicle time.
-        aircraft_ned_m, target_ned_m: (n, 3) from where the aircraft stood at first.
+        aircraft_ned_m, target_ned_m: (n, 3) from the initial position of the aircraft.
         radius_m: (n,) horizontal distance.
     """
 
@@ -40,7 +40,7 @@ class OrbitTruth:
     radius_m: Array
 
     def during(self, start_us: int, end_us: int) -> "OrbitTruth":
-        """The part between two times."""
+        """The part between two vehicle times."""
         kept = (self.time_s >= start_us * 1e-6) & (self.time_s <= end_us * 1e-6)
         return OrbitTruth(
             time_s=self.time_s[kept],
@@ -51,7 +51,7 @@ class OrbitTruth:
 
 
 def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
-    """From the truth frames of a vehicle and of the first target; None without them."""
+    """The true orbit from the truth frames of a vehicle and of the first target; None without them."""
     own = records.table(_TRUTH, system_id)
     target = records.table(_TRUTH, TARGET_SYSTEM, 1)
     if len(own) < 2 or len(target) < 2:
@@ -72,7 +72,7 @@ def orbit_truth(records: FlightRecords, system_id: int) -> OrbitTruth | None:
 
 
 def _ned(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
-    """Positions of a table; flat within some kilometres to a few centimetres."""
+    """Positions of a table in a local frame; within some kilometres the error is a few centimetres."""
     per_lat, per_lon = LocalFrame(origin).metres_per_degree
     return np.column_stack(
         (
@@ -84,16 +84,16 @@ def _ned(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
 
 
 def orbit_figures(debriefing: Debriefing) -> Mapping[str, Any]:
-    """The figures of the first vehicle's orbit; those that were not measured are None.
+    """The figures of the first vehicle's orbit; figures that were not measured are None.
 
-    radius_mean_error_percent: of the mean distance to the target over the orbit.
-    radius_std_m: standard deviation of that distance.
-    radius_max_error_m: largest difference from the radius asked for.
-    altitude_error_m: largest difference of the true height above the start from the altitude asked for.
-    orbit_s: how long.
-    radius_estimate_..., altitude_estimate_error_m: the same as the mission believed in flight, by its filter
-        and by pressure.
-    target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
+    * radius_mean_error_percent: error of the mean distance to the target over the orbit.
+    * radius_std_m: standard deviation of that distance.
+    * radius_max_error_m: largest difference from the commanded radius.
+    * altitude_error_m: largest difference of the true height above the start from the commanded altitude.
+    * orbit_s: duration of the orbit.
+    * radius_estimate_..., altitude_estimate_error_m: the same figures from the mission's estimates in flight,
+      by its filter and by pressure.
+    * target_losses, detections_used, detections_rejected: since the entry, where GPS was lost.
     """
     if not debriefing.flights or not isinstance(debriefing.options, OrbitOptions):
         return {}

@@ -1,7 +1,7 @@
-"""From what the aircraft's components say to where the target is, without I/O.
+"""From the messages of the aircraft's components to the target's position, without I/O.
 
-Attitudes, airspeeds, heights, gimbal attitudes and detections go in as they come; the relative target, and
-where the gimbal has to look, come out.
+Inputs are attitudes, airspeeds, heights, gimbal attitudes and detections in the order of their arrival.
+Outputs are the relative target and the direction in which the gimbal must point.
 """
 
 import math
@@ -23,23 +23,24 @@ _LEAST_HEIGHT_M: Final = 2.0
 
 
 class TargetStatus(StrEnum):
-    """What is known of the target."""
+    """State of the knowledge about the target."""
 
-    EXPECTED = "expected"  # not acquired yet: known from another source only
-    SEEN = "seen"  # acquired by detections that follow one another
-    LOST = "lost"  # was acquired; for a while now there was no detection
+    EXPECTED = "expected"  # not acquired yet: known only from another source
+    SEEN = "seen"  # acquired by consecutive detections
+    LOST = "lost"  # was acquired, but has not been detected for some time
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackerParameters:
-    """What the tracker goes by.
+    """Parameters of the tracker.
 
     Attributes:
-        target: the filter's.
-        acquired_after: so many accepted detections, none `lost_after_s` after the one before it, make the
-            target acquired. Beyond the range of its detector a camera still reads a tag now and then; one
-            such detection is no acquisition, and silence after it is no loss.
-        lost_after_s: without an accepted detection an acquired target counts as lost.
+        target: parameters of the filter.
+        acquired_after: number of accepted detections, each less than `lost_after_s` after the previous one,
+            with which the target counts as acquired. Beyond the range of its detector a camera still reads a
+            tag occasionally; such a single detection is not an acquisition, and no detection after it is not
+            a loss.
+        lost_after_s: time without an accepted detection after which an acquired target counts as lost.
     """
 
     target: RelativeTargetParameters = field(default_factory=RelativeTargetParameters)
@@ -57,12 +58,12 @@ class TargetTracker:
     """Follows one target by line of sight.
 
     Args:
-        attitude: of the aircraft.
+        attitude: attitude of the aircraft.
         parameters: noise and times.
 
     Attributes:
         target: the filter.
-        losses: how often an acquired target was lost.
+        losses: number of times that an acquired target was lost.
     """
 
     def __init__(self, attitude: AttitudeSource, parameters: TrackerParameters | None = None) -> None:
@@ -77,7 +78,7 @@ class TargetTracker:
         self._sightings_us: deque[int] = deque(maxlen=self.parameters.acquired_after)
         self._status = TargetStatus.EXPECTED
 
-    # what comes in
+    # inputs
 
     def start(
         self,
@@ -88,8 +89,8 @@ class TargetTracker:
         drift_ne_m_s: tuple[float, float],
         drift_std_m_s: float,
     ) -> None:
-        """Begin with what another source says of the target (equation 33); detections so far still count
-        towards its acquisition.
+        """Start with a target position of another source (equation 33). Earlier detections still count
+        towards the target's acquisition.
         """
         self._seen_us = None
         self._status = TargetStatus.EXPECTED
@@ -102,32 +103,33 @@ class TargetTracker:
         )
 
     def count_anew(self) -> None:
-        """Begin the counts of losses and detections at nothing."""
+        """Reset the counts of losses and detections to zero."""
         self.losses = 0
         self.target.accepted = self.target.rejected = 0
 
     def height(self, height_m: float) -> None:
-        """Height of the aircraft over the target's ground."""
+        """Set the height of the aircraft over the target's ground."""
         self._height_m = height_m
 
     def gimbal(self, attitude: GimbalAttitude) -> None:
-        """Where the gimbal looks; in time order."""
+        """Add a gimbal attitude; they must come in the order of time."""
         if not self._gimbals or attitude.time_us > self._gimbals[-1].time_us:
             self._gimbals.append(attitude)
 
     def detect(self, detection: Detection) -> None:
-        """One object of one image; it is looked at with the next `step`."""
+        """Add one detected object of an image; it is processed in the next `step`."""
         self._images.setdefault(detection.time_us, []).append(detection)
 
-    # what comes out
+    # outputs
 
     def step(self, time_us: int, airspeed_true_m_s: float, climb_m_s: float = 0.0) -> None:
-        """Go on to a time; then look at the images that have come. Nothing without attitude and airspeed.
+        """Advance to a time, then process the images that have arrived. Does nothing without attitude and
+        airspeed.
 
         Args:
-            time_us: now.
-            airspeed_true_m_s: along the nose.
-            climb_m_s: of which so much goes upwards.
+            time_us: present time.
+            airspeed_true_m_s: true airspeed, along the nose.
+            climb_m_s: upward part of it.
         """
         q = self._attitude.at(time_us)
         if q is None or not math.isfinite(airspeed_true_m_s + climb_m_s):
@@ -181,7 +183,7 @@ class TargetTracker:
 
     @property
     def status(self) -> TargetStatus:
-        """What is known of the target."""
+        """State of the knowledge about the target."""
         return self._status
 
     @property
@@ -189,19 +191,20 @@ class TargetTracker:
         return self.parameters.lost_after_s * 1e6
 
     def unseen_s(self, time_us: int) -> float:
-        """How long it was not seen; infinite if it never was."""
+        """Time since the target was last seen; infinite if it never was."""
         return math.inf if self._seen_us is None else (time_us - self._seen_us) * 1e-6
 
     def state(self, time_us: int) -> RelativeState:
-        """The target against the aircraft, from now on."""
+        """The state of the target relative to the aircraft, at the present or a later time."""
         return self.target.state(time_us)
 
     def pointing(self, time_us: int, ahead_s: float) -> tuple[float, float] | None:
-        """(azimuth, elevation), rad against the body, of a gimbal that is to look at the target.
+        """(azimuth, elevation), rad relative to the body, of a gimbal that points at the target; None when
+        they are not known.
 
         Args:
-            time_us: now.
-            ahead_s: how far the way of the target is foreseen, for the time a gimbal takes.
+            time_us: present time.
+            ahead_s: time by which the target's motion is predicted, to allow for the gimbal's delay.
         """
         q = self._attitude.at(time_us)
         if q is None or not self.target.known or not math.isfinite(self._height_m):

@@ -1,4 +1,6 @@
-"""Whether a target was orbited, as the mission measured it in flight: by camera and pressure height."""
+"""Decides whether a target was orbited, from the mission's measurements in flight: camera and pressure
+height.
+"""
 
 from typing import Final
 
@@ -7,13 +9,13 @@ from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
 
 RADIUS_SHARE: Final = 0.1
-"""Of the radius: bound of the mean radius's error, and of its standard deviation."""
+"""Bound of the mean radius's error and of its standard deviation, as a share of the radius."""
 ALTITUDE_BOUND_M: Final = 20.0
 _DURATION_SHARE: Final = 0.95
 
 
 def orbit_verdict(notes: FlightNotes) -> str:
-    """Why the orbit was not flown; "" if it was."""
+    """The reason why the orbit was not flown; "" if it was."""
     options, marks, phase = notes.options, notes.marks, notes.phase(ORBIT)
     if not isinstance(options, OrbitOptions):
         return ""

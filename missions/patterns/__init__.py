@@ -1,4 +1,4 @@
-"""Search patterns as plane curves: pure geometry, no I/O, no time, no vehicle.
+"""Search patterns as plane curves: pure geometry without I/O, time or vehicle.
 
 A pattern is a `Curve` around its centre, in metres (north, east): `Lissajous`, and the IAMSAR patterns as
 `Polyline` with rounded corners for flight (`Polyline.rounded`).

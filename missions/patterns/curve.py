@@ -1,4 +1,4 @@
-"""What every pattern is: a plane curve, and its arc length."""
+"""The interface of all patterns: a plane curve, and its arc length."""
 
 import itertools
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 
 _CUSP_SPEED: Final = 1e-9
 _FINE_TURN_RAD: Final = 0.1
-_REFINEMENTS: Final = 3  # each by four: knots from 0.25 m to 4 mm apart
-_SHARPEST_RAD: Final = 0.6  # of turn between two knots; more is a corner for a vehicle, however round it is
-_MAX_CURVATURE_PER_M: Final = 1e3  # a cusp or a sharp corner: a turn on the spot for any vehicle
+_REFINEMENTS: Final = 3  # each divides by four: knots from 0.25 m to 4 mm apart
+_SHARPEST_RAD: Final = 0.6  # turn between two knots; a larger one counts as a corner, even if it is round
+_MAX_CURVATURE_PER_M: Final = 1e3  # larger at a cusp or a sharp corner, where any vehicle turns on the spot
 
 
 class Curve(Protocol):
@@ -30,7 +30,7 @@ class Curve(Protocol):
 
     @property
     def closed(self) -> bool:
-        """Whether the curve ends where, and as, it began, so that it can be flown round and round."""
+        """Whether the curve ends at its start in the same direction, so that it can be flown repeatedly."""
         ...
 
     def points(self, u: Array) -> Array:
@@ -42,8 +42,8 @@ class Curve(Protocol):
         ...
 
     def knots(self, spacing_m: float) -> Array:
-        """Increasing parameters from 0 to end, at most about `spacing_m` of path apart, with every
-        joint in it.
+        """Increasing parameters from 0 to end, at most about `spacing_m` of path apart, including every
+        joint.
         """
         ...
 
@@ -60,9 +60,7 @@ def curvature_per_m(first: Array, second: Array) -> Array:
 
 
 def knots_by_length(curve: Curve, spacing_m: float, pieces: Array) -> Array:
-    """Knots of a curve whose smooth pieces are bounded by the parameters `pieces`: equal parts in
-    each piece.
-    """
+    """Knots of a curve with smooth pieces between the parameters `pieces`: equal parts in each piece."""
     parts = [pieces[:1]]
     for start, stop in itertools.pairwise(pieces):
         coarse = curve.points(np.linspace(start, stop, 17))
@@ -74,7 +72,7 @@ def knots_by_length(curve: Curve, spacing_m: float, pieces: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArcLengthTable:
-    """A curve against the distance flown along it, on a fine grid.
+    """A curve as a function of the distance along it, on a fine grid.
 
     Attributes:
         u: parameters (n,).
@@ -97,7 +95,7 @@ class ArcLengthTable:
 
     @classmethod
     def of(cls, curve: Curve, spacing_m: float = 0.25) -> "ArcLengthTable":
-        """Table of a whole curve, `spacing_m` apart; lengths by Simpson's rule on each interval."""
+        """Table of a whole curve with knots `spacing_m` apart; lengths by Simpson's rule on each interval."""
         u = _refined(curve, curve.knots(spacing_m))
         first, second = curve.derivatives(u)
         middle_first, _ = curve.derivatives(0.5 * (u[:-1] + u[1:]))
@@ -111,7 +109,7 @@ class ArcLengthTable:
             raise PlanError("the pattern has no length: give it a size above zero")
         course = np.arctan2(first[:, 1], first[:, 0])
         slow = speed < 1e-6
-        if slow.any():  # at a cusp the direction of travel is the second derivative's
+        if slow.any():  # at a cusp the direction of travel is that of the second derivative
             course[slow] = np.arctan2(second[slow, 1], second[slow, 0])
         course = np.unwrap(course[keep])
         curvature = curvature_per_m(first, second)[keep]
@@ -136,7 +134,7 @@ class ArcLengthTable:
 
 
 def _refined(curve: Curve, u: Array) -> Array:
-    """Knots with more of them where the curve turns by more than 0.1 rad between two, as in a hairpin."""
+    """Knots with additional ones where the curve turns by more than 0.1 rad between two, as in a hairpin."""
     for _ in range(_REFINEMENTS):
         first, _second = curve.derivatives(u)
         course = np.arctan2(first[:, 1], first[:, 0])
@@ -158,12 +156,12 @@ def _stops(course: Array, curvature: Array, arc: Array) -> tuple[int, ...]:
     jumps = np.nonzero((turn > 3.0 * explained + 0.05) | (turn > _SHARPEST_RAD))[0] + 1
     cusps = np.nonzero(np.abs(curvature) >= _MAX_CURVATURE_PER_M)[0]
     inner = set(jumps.tolist()) | set(cusps.tolist())
-    # a cusp shows in both intervals beside it: keep the first of neighbouring ones
+    # a cusp appears in both intervals next to it: keep the first of neighbouring ones
     return tuple(k for k in sorted(inner) if k - 1 not in inner and 0 < k < len(course) - 1)
 
 
 def _inner_edges(curve: Curve, u: Array) -> Array:
-    """Derivatives just inside both edges of every interval (2, 2, n-1): joints have two different ones."""
+    """Derivatives just inside both ends of every interval (2, 2, n-1); at joints they differ."""
     nudge = 1e-9 * np.diff(u)
     start, _ = curve.derivatives(u[:-1] + nudge)
     stop, _ = curve.derivatives(u[1:] - nudge)
@@ -172,12 +170,12 @@ def _inner_edges(curve: Curve, u: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lap:
-    """A closed curve flown several times, and from a chosen place: still a curve.
+    """A closed curve flown several times from a given place; it is itself a curve.
 
     Attributes:
         curve: the closed curve.
-        laps: how many times round, > 0.
-        start: where to begin, as a fraction of the parameter, 0..1 (a team's phase offset).
+        laps: number of laps, > 0.
+        start: start of the flight, as a fraction of the parameter, 0..1 (a team's phase offset).
     """
 
     curve: Curve

@@ -1,4 +1,5 @@
-"""The search patterns of the IAMSAR Manual (volume II, chapter 5): what the Lissajous paper compares with.
+"""The search patterns of the IAMSAR Manual (volume II, chapter 5): the patterns with which the Lissajous
+paper compares.
 
 All are centred on the datum. Turns are to starboard (right), and the first leg heads along `heading_rad`.
 """
@@ -16,10 +17,11 @@ def _checked(name: str, value_m: float) -> float:
 
 
 def sector(*, radius_m: float, heading_rad: float = 0.0, passes: int = 1) -> Polyline:
-    """Sector search (VS): six sectors, all turns 120 degrees, each pass three times through the datum.
+    """Sector search (VS): six sectors, all turns are 120 degrees, and each pass crosses the datum three
+    times.
 
-    From the datum out along `heading_rad`, across, back through the datum and so on: legs of r, r, 2r, r,
-    2r, r, r. Each further pass is turned 30 degrees to starboard, as the manual has it.
+    From the datum out along `heading_rad`, across, back through the datum and so on: legs of r, r, 2r, r, 2r,
+    r, r. Each further pass is turned 30 degrees to starboard, as in the manual.
     """
     r = _checked("sector search radius", radius_m)
     if passes < 1:
@@ -41,9 +43,9 @@ def parallel_sweep(
 ) -> Polyline:
     """Parallel sweep (PS) of a rectangle: legs along its longer side, `spacing_m` apart.
 
-    It begins half a spacing inside one corner, and the legs keep half a spacing from all sides, so that
-    every point is within half a spacing of a leg. The spacing is reduced to a whole number of legs. Each
-    further pass flies back the same legs.
+    It begins half a spacing inside one corner, and the legs are half a spacing from all sides, so that every
+    point is within half a spacing of a leg. The spacing is reduced to a whole number of legs. Each further
+    pass flies back the same legs.
 
     Args:
         width_m: side across `heading_rad` (east for 0).
@@ -78,7 +80,7 @@ def parallel_sweep(
 def expanding_square(
     *, size_m: float, spacing_m: float, heading_rad: float = 0.0, passes: int = 1
 ) -> Polyline:
-    """Expanding square search (SS): from the datum outwards, all turns 90 degrees to starboard.
+    """Expanding square search (SS): from the datum outwards; all turns are 90 degrees to starboard.
 
     Legs of s, s, 2s, 2s, 3s, 3s, ... as long as they fit in the square `size_m`, then one last leg to
     close the outermost square. Each further pass starts at the datum again, turned 45 degrees.

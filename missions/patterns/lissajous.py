@@ -3,7 +3,7 @@
     x(t) = A_x sin(w_x t + p_x),   y(t) = A_y sin(w_y t + p_y)
 
 with x to the east and y to the north, as on a map. Only the ratio of the frequencies and the phases shape the
-curve, so the curve's parameter is the fundamental phase, and time is the planner's business.
+curve, so the curve's parameter is the fundamental phase, and the planner determines the time.
 """
 
 import math
@@ -18,7 +18,8 @@ import numpy as np
 from missions.errors import PlanError
 from missions.patterns.curve import Array, knots_by_length
 
-_LARGEST_TERM: Final = 64  # frequencies like 1.4 are 7:5; what needs larger whole numbers is treated as open
+# frequencies like 1.4 are 7:5; ratios with larger integers are treated as open curves
+_LARGEST_TERM: Final = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,8 +28,8 @@ class Lissajous:
 
     Attributes:
         amplitude_x_m, amplitude_y_m: half the width (east) and half the height (north).
-        ratio_x, ratio_y: the frequencies in units of the fundamental. Whole numbers without common divisor
-            for a closed curve, which then closes at u = 2 pi; otherwise the curve is open, and 0..end is
+        ratio_x, ratio_y: the frequencies in units of the fundamental. Integers without a common divisor for a
+            closed curve, which then closes at u = 2 pi; otherwise the curve is open, and 0..end is
             `open_turns` turns of the slower axis.
         phase_x_rad, phase_y_rad: p_x and p_y.
         open_turns: length of an open curve; not used for a closed one.
@@ -67,8 +68,8 @@ class Lissajous:
         phase_x_rad: float = 0.0,
         phase_y_rad: float = 0.0,
     ) -> "Lissajous":
-        """From the paper's w_x and w_y (rad/s). A ratio of small whole numbers (to 64) is found and closes
-        the curve.
+        """From the paper's w_x and w_y (rad/s). A ratio of small integers (up to 64) is detected and gives a
+        closed curve.
 
         The time for 0..2 pi of the parameter is then `natural_period_s(frequency_x_rad_s)`.
         """
@@ -88,7 +89,7 @@ class Lissajous:
 
     @property
     def closed(self) -> bool:
-        """True when the ratio is one of whole numbers."""
+        """Whether the ratio is one of integers."""
         return float(self.ratio_x).is_integer() and float(self.ratio_y).is_integer()
 
     @property
@@ -99,8 +100,8 @@ class Lissajous:
 
     @property
     def retraced(self) -> bool:
-        """True for a closed curve that runs into two cusps and back over itself (both axes at rest at
-        once).
+        """Whether a closed curve reverses at two cusps and follows itself back (both axes at rest at the same
+        time).
         """
         if not self.closed:
             return False
@@ -131,8 +132,8 @@ class Lissajous:
 
 
 def reduced_ratio(x: float, y: float) -> tuple[float, float]:
-    """x : y as whole numbers without common divisor when they are such a ratio (to 64, 1e-6),
-    otherwise (x/y, 1).
+    """x : y as integers without a common divisor if such a ratio exists (up to 64, tolerance 1e-6), otherwise
+    (x/y, 1).
     """
     fraction = Fraction(x / y).limit_denominator(_LARGEST_TERM)
     if 0 < fraction.numerator <= _LARGEST_TERM and abs(float(fraction) - x / y) <= 1e-6 * x / y:
@@ -158,12 +159,11 @@ NAMED_PATTERNS: Final[Mapping[str, NamedPattern]] = MappingProxyType(
         "L4": NamedPattern(ratio_x=5, ratio_y=6, phase_x_rad=0.0),
     }
 )
-"""The patterns of the paper's Table I. L1 is the circle (section IV-A); the parameters of L2 to L4 stand
-only in its
-figure 2, which is not in the text, so they are chosen: the lemniscate (named in section II-C), then ratios
-    n : n+1 of
-growing order. With one odd and one even term and no phase the curves start in the centre, where the paper's
-drone starts, and never run back over themselves."""
+"""The patterns of the paper's Table I. L1 is the circle (section IV-A). The parameters of L2 to L4 are only
+in the paper's figure 2, and not in its text, so they are chosen here: the lemniscate (named in section II-C),
+then ratios n : n+1 of growing order. With one odd and one even term and no phase the curves start in the
+centre, where the paper's drone starts, and never run back over themselves.
+"""
 
 
 def named_lissajous(name: str, *, width_m: float, height_m: float) -> Lissajous:

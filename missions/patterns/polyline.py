@@ -1,4 +1,4 @@
-"""Patterns of straight legs, and the same with rounded corners for a vehicle that doesn't stop at each."""
+"""Patterns of straight legs, and their form with rounded corners for a vehicle that doesn't stop at each."""
 
 import math
 from dataclasses import dataclass, field
@@ -106,7 +106,7 @@ class Polyline:
         return knots_by_length(self, spacing_m, np.arange(self._pieces.count + 1.0))
 
     def then(self, other: "Polyline") -> "Polyline":
-        """This polyline and then the other, joined by a leg if they don't touch."""
+        """This polyline followed by the other; a leg joins them if they don't touch."""
         first = (
             other.vertices_m[1:]
             if math.dist(self.vertices_m[-1], other.vertices_m[0]) < 1e-6
@@ -115,16 +115,16 @@ class Polyline:
         return Polyline(self.vertices_m + first)
 
     def reversed(self) -> "Polyline":
-        """The same legs flown backwards."""
+        """The same legs in reverse order."""
         return Polyline(self.vertices_m[::-1])
 
     def rotated(self, angle_rad: float) -> "Polyline":
-        """Turned to the right (north towards east) around the centre."""
+        """The polyline turned to the right (north towards east) around the centre."""
         c, s = math.cos(angle_rad), math.sin(angle_rad)
         return Polyline(tuple((n * c - e * s, n * s + e * c) for n, e in self.vertices_m))
 
     def rounded(self, corner_m: float) -> "RoundedPolyline":
-        """With every corner cut by at most `corner_m` (distance from the corner to the path)."""
+        """The polyline with every corner rounded; the path is at most `corner_m` from the corner."""
         return RoundedPolyline(self, corner_m)
 
 
@@ -152,7 +152,7 @@ class RoundedPolyline:
 
     @property
     def closed(self) -> bool:
-        """False even where the ends meet: there the path has a corner, or a stop."""
+        """False even if the ends meet, because the path has a corner or a stop there."""
         return False
 
     def points(self, u: Array) -> Array:
@@ -178,8 +178,8 @@ def _rounded_pieces(polyline: Polyline, corner_m: float) -> list[Array]:
         before, after = directions[k - 1], directions[k]
         half_turn = 0.5 * math.atan2(abs(before[0] * after[1] - before[1] * after[0]), float(before @ after))
         if half_turn < 1e-6:
-            continue  # straight on
-        if math.pi / 2 - half_turn < 1e-3:  # straight back: nothing to round, the vehicle stops and turns
+            continue  # no turn
+        if math.pi / 2 - half_turn < 1e-3:  # reversal: it cannot be rounded; the vehicle stops and turns
             pieces.append(_line(start, vertices[k]))
             start = vertices[k]
             continue

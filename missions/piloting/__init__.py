@@ -1,6 +1,7 @@
-"""Flying an aircraft by attitude from a mission: what an autopilot leaves to whoever commands the roll.
+"""Attitude control of an aircraft from a mission: the loops that an autopilot leaves to a client that
+commands roll.
 
-Sans-IO: numbers in, commands out.
+Sans-IO: the functions compute commands from numbers.
 """
 
 from missions.piloting.energy import EnergyController, EnergyParameters

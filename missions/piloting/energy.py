@@ -1,9 +1,10 @@
-"""Altitude and airspeed by pitch and throttle, for autopilots that want both with a commanded roll (PX4).
+"""Control of altitude and airspeed by pitch and throttle, for autopilots that need both with a commanded roll
+(PX4).
 
-Total energy control (Lambregts, AIAA 83-2239): throttle makes the sum of the rates of potential and kinetic
-energy, pitch their difference. Rates are written as climb rates: V dV/dt / g is the climb that an
-acceleration is worth. It runs at the far end of a telemetry link, so it is slow: the time constants are
-those of PX4's own TECS or longer.
+Total energy control (Lambregts, AIAA 83-2239): throttle controls the sum of the rates of potential and
+kinetic energy, pitch controls their difference. Rates are expressed as climb rates: V dV/dt / g is the climb
+rate that is equivalent to an acceleration. The controller runs at the end of a telemetry link, so it is slow:
+its time constants are those of PX4's own TECS or longer.
 """
 
 import math
@@ -17,20 +18,22 @@ _ACCELERATION_FILTER_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnergyParameters:
-    """Trims, limits, gains.
+    """Trims, limits and gains.
 
     Attributes:
-        throttle_trim, throttle_min, throttle_max: 0..1; the first holds level flight.
-        pitch_trim_rad: of the body in level flight.
-        pitch_min_rad, pitch_max_rad: of the command.
-        climb_full_throttle_m_s: at `throttle_max`.
-        sink_idle_m_s: at `throttle_min`, positive.
-        climb_max_m_s, sink_max_m_s: that are asked for.
-        height_time_constant_s, airspeed_time_constant_s: of the approach to what is commanded.
-        angle_of_attack_rad: of the wing's zero-lift line in level flight: what a bank must add grows with it.
-        bank_climb_m_s: climb rate that the drag of one more load factor costs.
-        balance_gain, balance_integral_per_s: on the error of the energy balance.
-        total_gain, total_integral_per_s: on the error of the total rate.
+        throttle_trim, throttle_min, throttle_max: 0..1; `throttle_trim` holds level flight.
+        pitch_trim_rad: pitch of the body in level flight.
+        pitch_min_rad, pitch_max_rad: limits of the commanded pitch.
+        climb_full_throttle_m_s: climb rate at `throttle_max`.
+        sink_idle_m_s: sink rate at `throttle_min`, positive.
+        climb_max_m_s, sink_max_m_s: largest commanded climb and sink rates.
+        height_time_constant_s, airspeed_time_constant_s: time constants of the first-order response to a
+            command.
+        angle_of_attack_rad: angle of the wing's zero-lift line in level flight; the pitch added in a bank
+            grows with it.
+        bank_climb_m_s: loss of climb rate by the drag of one additional load factor.
+        balance_gain, balance_integral_per_s: gains for the error of the energy balance.
+        total_gain, total_integral_per_s: gains for the error of the total rate.
     """
 
     throttle_trim: float = 0.5
@@ -79,12 +82,12 @@ class EnergyParameters:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnergyState:
-    """What is measured.
+    """The measurements.
 
     Attributes:
-        height_m: over the same ground as the height asked for.
-        climb_m_s: up.
-        airspeed_m_s: of the same kind as the airspeed asked for.
+        height_m: height over the same ground as the commanded height.
+        climb_m_s: climb rate, positive upwards.
+        airspeed_m_s: airspeed of the same kind as the commanded airspeed.
         roll_rad: bank angle.
     """
 
@@ -95,10 +98,10 @@ class EnergyState:
 
 
 class EnergyController:
-    """The loop. Call it at an even rate of some 10 Hz or more.
+    """The control loop. Call it at a constant rate of about 10 Hz or more.
 
     Args:
-        parameters: trims, limits, gains.
+        parameters: trims, limits and gains.
     """
 
     def __init__(self, parameters: EnergyParameters) -> None:
@@ -111,7 +114,7 @@ class EnergyController:
     def step(
         self, dt_s: float, state: EnergyState, *, height_m: float, airspeed_m_s: float
     ) -> tuple[float, float]:
-        """(pitch rad, throttle 0..1) for the height and the airspeed asked for."""
+        """(pitch rad, throttle 0..1) for the commanded height and airspeed."""
         p = self.parameters
         speed = max(3.0, state.airspeed_m_s)
         self._differentiate(dt_s, state.airspeed_m_s)
@@ -141,7 +144,7 @@ class EnergyController:
         return pitch, throttle
 
     def _differentiate(self, dt_s: float, airspeed_m_s: float) -> None:
-        """Acceleration along the path: difference of the airspeed, low-passed."""
+        """Acceleration along the path: low-passed difference of the airspeed."""
         if math.isnan(self._airspeed_m_s):
             self._airspeed_m_s = airspeed_m_s
         share = dt_s / (_ACCELERATION_FILTER_S + dt_s)

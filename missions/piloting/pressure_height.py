@@ -1,4 +1,4 @@
-"""Height from static pressure: what is left of the height when GPS is gone."""
+"""Height from static pressure, for flight without GPS."""
 
 import math
 from typing import Final
@@ -9,10 +9,10 @@ _FILTER_S: Final = 0.3
 
 
 class PressureHeight:
-    """Height over the place where the pressure was taken first, from pressure and climb rate.
+    """Height over the place of the ground pressure, from pressure and climb rate.
 
-    The difference of two pressure altitudes; a day warmer than the standard atmosphere by 10 K makes it 3.5 %
-    too small. Between the samples, and against their noise, the climb rate carries it on.
+    It is the difference of two pressure altitudes; on a day that is 10 K warmer than the standard atmosphere
+    it is 3.5 % too small. The climb rate is used between the samples, and to reduce their noise.
 
     Args:
         ground_pa: pressure on the ground.
@@ -28,11 +28,11 @@ class PressureHeight:
 
     @property
     def height_m(self) -> float:
-        """NaN before the first sample."""
+        """Height, m; NaN before the first sample."""
         return self._height_m
 
     def add(self, time_us: int, static_pa: float, climb_m_s: float) -> float:
-        """Take a sample; gives the height."""
+        """Add a sample; returns the height."""
         if not 10_000.0 < static_pa < 120_000.0:
             return self._height_m
         measured = pressure_altitude_m(static_pa) - self._ground_m

@@ -1,4 +1,4 @@
-"""A mission file of a ground station on the command line."""
+"""The command-line options of a ground station's mission file."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

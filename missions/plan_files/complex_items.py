@@ -1,4 +1,5 @@
-"""QGroundControl's complex items as plain ones: what the file stores expanded, and its landing pattern.
+"""Converts QGroundControl's complex items to simple ones: items that the file stores expanded, and the
+landing pattern.
 
 Surveys and corridor scans are stored with the items they expand to (`TransectStyleComplexItem.Items`). A
 fixed-wing landing pattern is stored by its two points and radius; its items are those that the ground
@@ -27,7 +28,7 @@ _STOP_VIDEO: Final = 2501
 def simple_items(
     entry: Mapping[str, Any], where: str, refuse: Refuse
 ) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """The simple items that a complex one has stored in it, and where each stands."""
+    """The simple items that are stored in a complex item, and the place of each in the file."""
     inner = entry.get("TransectStyleComplexItem", entry)
     if not isinstance(inner, Mapping) or "Items" not in inner:
         raise refuse(
@@ -40,7 +41,9 @@ def simple_items(
 
 
 def landing_items(entry: Mapping[str, Any], where: str, refuse: Refuse) -> list[MissionItem]:
-    """A fixed-wing landing pattern: DO_LAND_START, the circle (or point) it descends to, and the landing."""
+    """Items of a fixed-wing landing pattern: DO_LAND_START, the circle (or point) of the descent, and the
+    landing.
+    """
     frame = _RELATIVE if flag(entry, "altitudesAreRelative", True, where, refuse) else _ABSOLUTE
     approach_name = next(
         (n for n in ("landingApproachCoordinate", "loiterCoordinate") if n in entry),
@@ -56,7 +59,7 @@ def landing_items(entry: Mapping[str, Any], where: str, refuse: Refuse) -> list[
             MissionItem(
                 command=NAV_LOITER_TO_ALT,
                 frame=frame,
-                param1=1.0,  # leave it in the direction of the landing only
+                param1=1.0,  # leave the circle only in the direction of the landing
                 param2=radius_m if clockwise else -radius_m,
                 param4=1.0,  # the line to the landing begins where the circle is left
                 x=approach[0],

@@ -1,4 +1,4 @@
-"""A mission file as data, whatever its format."""
+"""A mission file as data, independent of its format."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,10 +36,10 @@ FLOWN_TO: Final = frozenset(
         NAV_SPLINE_WAYPOINT,
     }
 )
-"""Commands that name a place to fly to."""
+"""Commands that contain a place to fly to."""
 
 INT_FRAMES: Final = {0: 5, 3: 6, 10: 11}
-"""Global frames as files have them -> the same, counted in whole numbers, as items have them."""
+"""Global frames in files -> the same frames with integer coordinates, as in items."""
 PLAIN_FRAMES: Final = {whole: plain for plain, whole in INT_FRAMES.items()}
 
 LOITERS: Final = frozenset({NAV_LOITER_UNLIM, NAV_LOITER_TURNS, NAV_LOITER_TIME, NAV_LOITER_TO_ALT})
@@ -47,16 +47,17 @@ LOITERS: Final = frozenset({NAV_LOITER_UNLIM, NAV_LOITER_TURNS, NAV_LOITER_TIME,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionDocument:
-    """What a mission file holds.
+    """The contents of a mission file.
 
     Attributes:
-        path: of the file.
+        path: path of the file.
         items: the mission, without a home item; DO_JUMP names its target by the index in this tuple.
-        fence, rally: items of the other two mission types.
-        home: where the plan begins; None: the file doesn't say.
-        kind: class of vehicle it is for; None: the file doesn't say.
-        firmware: "px4" or "ardupilot"; None: the file doesn't say, or means any.
-        cruise_speed_m_s, hover_speed_m_s: what the planner reckoned with, by wings and by rotors.
+        fence, rally: items of the geofence and of the rally points.
+        home: planned home; None: not in the file.
+        kind: class of vehicle that the plan is for; None: not in the file.
+        firmware: "px4" or "ardupilot"; None: not in the file, or any firmware.
+        cruise_speed_m_s, hover_speed_m_s: speeds that the planner assumed in fixed-wing and in hovering
+            flight.
     """
 
     path: Path
@@ -70,20 +71,20 @@ class MissionDocument:
     hover_speed_m_s: float | None = None
 
     def item_name(self, index: int) -> str:
-        """An item as ground stations number it: "item 3 (NAV_WAYPOINT)"."""
+        """Name of an item with the number that ground stations use: "item 3 (NAV_WAYPOINT)"."""
         return item_name(index, self.items[index].command)
 
     def refuse(self, index: int, why: str) -> PlanError:
-        """The error that names an item."""
+        """An error that names an item."""
         return PlanError(f"{self.path}: {self.item_name(index)}: {why}")
 
     @property
     def lands(self) -> bool:
-        """Whether the mission itself brings the vehicle down: a landing, or the return as its last word."""
+        """Whether the mission itself lands the vehicle: by a landing, or by a return as its last item."""
         commands = [item.command for item in self.items]
         return NAV_LAND in commands or NAV_RETURN_TO_LAUNCH in commands
 
 
 def item_name(index: int, command: int) -> str:
-    """An item by its place in the mission (from 0), numbered from 1 as ground stations do."""
+    """Name of an item from its index in the mission (from 0), numbered from 1 as in ground stations."""
     return f"item {index + 1} ({command_name(command)})"

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 
 def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
-    """Write what a mission would upload to its vehicle; gives the number of items.
+    """Write the plan that a mission would upload to its vehicle; returns the number of items.
 
-    The vehicle, embedded or elsewhere, is asked for its home and its limits, and nothing else: one that flies
-    flies on.
+    Only the home and the limits are requested from the vehicle, embedded or elsewhere. A vehicle in flight is
+    not affected.
 
     Raises:
-        PlanError: the mission uploads none, can't be flown, or the file can't be written; or parameters are
-            to be set on a vehicle elsewhere.
-        MissionError: the vehicle is not heard, or not ready.
-        KeyboardInterrupt: it was interrupted.
+        PlanError: the mission uploads no plan or can't be flown, the file can't be written, or parameters are
+            to be set on a vehicle that is not embedded.
+        MissionError: no message is received from the vehicle, or it is not ready.
+        KeyboardInterrupt: the user interrupted it.
     """
     from missions.session import COMPLETED, INTERRUPTED, fly
 
@@ -61,7 +61,7 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
 
 
 class _Exported(Mission[MissionOptions]):
-    """A mission whose flight is the writing of its plan."""
+    """A mission that writes its plan to a file instead of flying."""
 
     commands = False
 

@@ -13,7 +13,7 @@ from missions.plan_files.validation import validated
 
 
 def read_mission_file(path: Path) -> MissionDocument:
-    """A mission file that some vehicle can fly.
+    """Read a mission file that some vehicle can fly.
 
     Raises:
         PlanError: names the file, the item, the value and what is accepted.
@@ -24,7 +24,7 @@ def read_mission_file(path: Path) -> MissionDocument:
 
 
 def check_suffix(path: Path) -> None:
-    """Refuse a name that no mission file has, that a file has already, or in a folder that is not there."""
+    """Refuse a name with the wrong suffix, of an existing file, or in a folder that does not exist."""
     if path.suffix.lower() not in SUFFIXES:
         raise PlanError(f"mission file {path}: suffix {path.suffix!r}; accepted: {', '.join(SUFFIXES)}")
     if path.exists():
@@ -42,12 +42,13 @@ def write_mission_file(
     kind: VehicleKind,
     speed_m_s: float,
 ) -> None:
-    """Write a mission in the format that the suffix names, whole or not at all.
+    """Write a mission in the format of the suffix. After an error no file remains.
 
     Raises:
-        PlanError: the suffix names none, the file is there already, or can't be written.
+        PlanError: the suffix is unknown, or the file exists or can't be written.
     """
-    from estimators.logs.errors import LogError  # what logs need is imported for writing only
+    # imported only for writing, because the modules of logs are slow to load
+    from estimators.logs.errors import LogError
     from estimators.logs.new_file import new_file
 
     check_suffix(path)

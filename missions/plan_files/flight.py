@@ -1,4 +1,4 @@
-"""Flying a mission file: uploaded as it is, and watched to its end."""
+"""Flies a mission file: uploads it unchanged and monitors it to its end."""
 
 import math
 from typing import Final
@@ -16,14 +16,14 @@ from missions.plan_files.route import Route, Stop, path_ned_m, placed, route_of,
 from missions.vehicle.vehicle import Vehicle
 
 FARTHEST_M: Final = 10_000.0
-"""From home to the nearest place of a mission; beyond, the file is of another place."""
+"""Largest distance from home to the nearest place of a mission; a file beyond it belongs to another place."""
 
-_SLOW: Final = 0.5  # of the planned speed, for a deadline
+_SLOW: Final = 0.5  # share of the planned speed, for deadlines
 _LANDING_S: Final = 600.0
 
 
 def check_distance(route: Route, path: object, home: object) -> None:
-    """Refuse, with a PlanError, a mission that lies elsewhere than its vehicle."""
+    """Raise PlanError if a mission is far away from its vehicle."""
     if not route.stops:
         return
     nearest_m = min(math.hypot(*stop.position_ned_m[:2]) for stop in route.stops)
@@ -35,18 +35,18 @@ def check_distance(route: Route, path: object, home: object) -> None:
 
 
 def own_speed_m_s(document: MissionDocument, kind: VehicleKind) -> float:
-    """Speed that the plan reckons with for a class of vehicle."""
+    """Speed that the plan assumes for a class of vehicle."""
     if kind is VehicleKind.FIXED_WING:
         return document.cruise_speed_m_s or 15.0
     return document.hover_speed_m_s or 5.0
 
 
 async def fly_document(vehicle: Vehicle, options: FileOptions, document: MissionDocument) -> None:
-    """Upload the document and fly it from the ground back to the ground.
+    """Upload the document and fly it, including takeoff and landing.
 
     Raises:
-        PlanError: it lies elsewhere, or an aircraft could not come down.
-        MissionError: the vehicle refused it, or the flight went wrong.
+        PlanError: the mission is too far away, or gives an aircraft no way to land.
+        MissionError: the vehicle refused the mission, or the flight failed.
     """
     notes, clock, home = vehicle.notes, vehicle.clock, vehicle.home
     wings = vehicle.kind is VehicleKind.FIXED_WING
@@ -98,7 +98,7 @@ async def fly_document(vehicle: Vehicle, options: FileOptions, document: Mission
 
 
 async def _acceptance_m(vehicle: Vehicle, document: MissionDocument, stops: tuple[Stop, ...]) -> float:
-    """The largest radius within which the mission's places count as reached."""
+    """The largest radius within which places of the mission count as reached."""
     asked = {
         document.items[stop.index].param2
         for stop in stops

@@ -1,34 +1,34 @@
-"""Values of a JSON file that somebody else wrote, with errors that say where they stand."""
+"""Values of a JSON file from another program. Errors name the place in the file."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 Refuse = Callable[[str, str], Exception]
-"""Where it stands and what is wrong -> the error to raise."""
+"""(place in the file, what is wrong) -> the error to raise."""
 
 
 def mapping(value: Any, where: str, refuse: Refuse) -> Mapping[str, Any]:
-    """A JSON object."""
+    """Check that a value is a JSON object, and return it."""
     if not isinstance(value, Mapping):
         raise refuse(where, f"{_shown(value)} is not a JSON object")
     return value
 
 
 def entries(value: Any, where: str, refuse: Refuse) -> Sequence[Any]:
-    """A JSON array."""
+    """Check that a value is a JSON array, and return it."""
     if not isinstance(value, list):
         raise refuse(where, f"{_shown(value)} is not a JSON array")
     return value
 
 
 def is_number(value: Any) -> bool:
-    """A JSON number; JSON's true and false are none."""
+    """Whether a value is a JSON number; true and false are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def number(entry: Mapping[str, Any], name: str, where: str, refuse: Refuse) -> float:
-    """A number that must be there."""
+    """A required number."""
     value = entry.get(name)
     if not is_number(value):
         raise refuse(where, f"{name} = {_shown(value)} is not a number")
@@ -36,7 +36,7 @@ def number(entry: Mapping[str, Any], name: str, where: str, refuse: Refuse) -> f
 
 
 def whole(entry: Mapping[str, Any], name: str, where: str, refuse: Refuse) -> int:
-    """A whole number that must be there, and is not negative."""
+    """A required integer that is not negative."""
     value: Any = entry.get(name)
     if not is_number(value) or (isinstance(value, float) and not math.isfinite(value)) or value != int(value):
         raise refuse(where, f"{name} = {_shown(value)} is not a whole number")
@@ -54,7 +54,7 @@ def flag(entry: Mapping[str, Any], name: str, default: bool, where: str, refuse:
 
 
 def numbers(value: Any, count: int, where: str, refuse: Refuse) -> list[float]:
-    """An array of so many numbers."""
+    """An array of exactly `count` numbers."""
     if not (isinstance(value, list) and len(value) == count and all(is_number(v) for v in value)):
         raise refuse(where, f"{_shown(value)} is not an array of {count} numbers")
     return [_finite_float(v, where, refuse) for v in value]

@@ -1,4 +1,4 @@
-"""The mission that a file describes."""
+"""The mission from a mission file."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -33,13 +33,13 @@ _MODELS: Final = {VehicleKind.MULTICOPTER: "iris", VehicleKind.FIXED_WING: "aero
 
 
 class FileMission(Mission[FileOptions]):
-    """A mission file, flown as it is.
+    """A mission file, flown unchanged.
 
     Attributes:
-        document: what the file holds.
+        document: contents of the file.
 
     Raises:
-        PlanError: the file can't be read, or what it says can't be flown.
+        PlanError: the file can't be read, or its contents can't be flown.
     """
 
     def __init__(self, path: Path) -> None:
@@ -110,7 +110,7 @@ class FileMission(Mission[FileOptions]):
         return verdict_of_all(debriefing, lambda notes, score: self._verdict(notes, score, max_error_m))
 
     def _verdict(self, notes: "FlightNotes", score: "FlightScore", max_error_m: float | None) -> str:
-        """Every waypoint was passed, in their order; the way between them is the autopilot's own."""
+        """Check that every waypoint was passed in order; the path between them is chosen by the autopilot."""
         from missions.verdict import NO_TRACK, WAYPOINT_SLACK_M, flown_track, waypoint_verdict
 
         commanded = notes.commanded
@@ -161,7 +161,7 @@ class FileMission(Mission[FileOptions]):
         return {"mission_file": block}
 
     def _legs(self, notes: "FlightNotes", score: "FlightScore") -> Sequence[Mapping[str, Any]]:
-        """Distance of the track from each straight leg, between the moments of its ends."""
+        """Distance of the track from each straight leg, between the times of the leg's ends."""
         track = score.truth if score.truth is not None else score.estimate
         if track is None or notes.commanded is None:
             return ()
@@ -174,7 +174,7 @@ class FileMission(Mission[FileOptions]):
             start = next((k for k in range(place, len(times)) if times[k][0] == a.index), None)
             if start is None:
                 continue
-            place = start  # messages of items between the two places (speed, camera) may lie between theirs
+            place = start  # items without a place (speed, camera) may be between the two places
             stop = next((k for k in range(start + 1, len(times)) if times[k][0] == b.index), None)
             if stop is None or not straight(a, b):
                 continue
@@ -201,7 +201,7 @@ class FileMission(Mission[FileOptions]):
 
 
 def _cross_track(a: Stop, b: Stop, flown: np.ndarray[Any, Any]) -> dict[str, float]:
-    """Horizontal distance from the leg's line."""
+    """Horizontal distance from the line of the leg."""
     start, stop = np.array(a.position_ned_m[:2]), np.array(b.position_ned_m[:2])
     along = stop - start
     length = float(np.linalg.norm(along))
@@ -217,7 +217,7 @@ def _cross_track(a: Stop, b: Stop, flown: np.ndarray[Any, Any]) -> dict[str, flo
 
 
 def _home_text(document: MissionDocument) -> str | None:
-    """The file's home for an embedded world, which faces the mission's first place."""
+    """The file's home for an embedded world, with the heading to the mission's first place."""
     home = document.home
     if home is None:
         return None

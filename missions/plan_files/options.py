@@ -1,4 +1,4 @@
-"""What a mission file is flown with."""
+"""Options of the flight of a mission file."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -8,7 +8,7 @@ from missions.options import MAX_SEARCH_TIME_S, MissionOptions, check_positive
 
 
 class Then(StrEnum):
-    """What comes after a mission that does not land by itself."""
+    """Action after a mission that does not land by itself."""
 
     RETURN = "return"
     LAND = "land"
@@ -16,12 +16,13 @@ class Then(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileOptions(MissionOptions):
-    """How a mission file is flown.
+    """Options with which a mission file is flown.
 
     Attributes:
-        then: after a mission that doesn't land; None: a multicopter returns, an aircraft's is refused.
-        time_limit_s: ends a mission that takes longer, with `then`; None: twice what it should take, and it
-            has failed.
+        then: action after a mission that doesn't land; None: a multicopter returns, and the mission of a
+            fixed wing is refused.
+        time_limit_s: a longer mission is ended with `then`; None: a mission that takes more than twice the
+            planned time has failed.
     """
 
     then: Then | None = None

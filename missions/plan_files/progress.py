@@ -1,4 +1,4 @@
-"""How far a vehicle has come in an uploaded mission file, and when the mission is over."""
+"""Progress of a vehicle in an uploaded mission file, and detection of the mission's end."""
 
 from typing import Any, Final
 
@@ -12,19 +12,19 @@ from missions.vehicle.item_tracker import FlownOrder, ItemTracker, MissionModeWa
 from missions.vehicle.vehicle import Vehicle
 
 CURVED: Final = "mission"
-"""Name of the phase of a mission whose way is not only straight lines, and so is not scored."""
+"""Name of the phase of a mission whose path is not only straight lines. Such a phase is not scored."""
 
 _NAMES: Final = ("MISSION_ITEM_REACHED", "MISSION_CURRENT", "HEARTBEAT", "GLOBAL_POSITION_INT")
 
 
 class MissionWatch:
-    """Follows a mission from its start to its end; notes which items were reached, and the phases.
+    """Follows a mission from its start to its end, and notes the reached items and the phases.
 
     Args:
-        vehicle: flies it.
-        document: what is flown.
-        scored: the places a track is compared with.
-        first: number of the mission's first item on the wire.
+        vehicle: the vehicle that flies it.
+        document: the flown mission file.
+        scored: places with which the track is compared.
+        first: sequence number of the mission's first item on the link.
         acceptance_m: radius within which a waypoint counts as reached.
     """
 
@@ -53,11 +53,11 @@ class MissionWatch:
         return self._tracker.lands
 
     async def until_the_end(self, limit_s: float) -> None:
-        """Wait until all is flown: the last place, or the ground where the mission lands.
+        """Wait for the end of the mission: the last place or, if the mission lands, the ground.
 
         Raises:
             MissionError: the vehicle left the mission.
-            VehicleTimeout: it took too long.
+            VehicleTimeout: the mission took too long.
         """
         vehicle = self._vehicle
         with vehicle.messages(*_NAMES) as stream:
@@ -83,7 +83,7 @@ class MissionWatch:
         return self._tracker.coming_down if self.lands else self._tracker.over
 
     def _take(self, message: Any) -> bool:
-        """Take one message; True at the end of the mission."""
+        """Process one message; returns True at the end of the mission."""
         if message.get_type() == "HEARTBEAT":
             return self._heartbeat(message)
         self._tracker.on_message(message, self._vehicle.clock.stamp_us)
@@ -111,7 +111,7 @@ class MissionWatch:
         if message.custom_mode == modes[Mode.RETURN] and self._flown and self.lands:
             return True  # the mission's own return
         if self._flown and self.lands and vehicle.landed_state == dialect.MAV_LANDED_STATE_ON_GROUND:
-            return False  # PX4 holds from the touch-down on, and disarms after that
+            return False  # PX4 holds after the touch-down, and disarms later
         if not self._mode.left(message.custom_mode):
             return False
         # After the last item PX4 holds and ArduPilot's plane returns; a return may be the last item.

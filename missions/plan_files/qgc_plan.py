@@ -29,10 +29,10 @@ _RALLY: Final = 5100  # NAV_RALLY_POINT
 
 
 def read_plan(path: Path) -> MissionDocument:
-    """A plan file.
+    """Read a plan file.
 
     Raises:
-        PlanError: it can't be read, or is none; says where.
+        PlanError: the file can't be read or is not a plan; the message names the place in the file.
     """
 
     def refuse(where: str, why: str) -> PlanError:
@@ -130,7 +130,7 @@ def _note_id(entry: Mapping[str, Any], index: int, index_of_id: dict[int, int]) 
 
 
 def _with_index(item: MissionItem, index_of_id: Mapping[int, int], index: int, refuse: Refuse) -> MissionItem:
-    """A jump with its target as an index instead of a doJumpId."""
+    """A jump whose target is an index instead of a doJumpId."""
     if item.command != DO_JUMP:
         return item
     target = index_of_id.get(int(item.param1)) if math.isfinite(item.param1) else None

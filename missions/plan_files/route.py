@@ -1,4 +1,4 @@
-"""The way that a mission's items mean: places in the order in which they are flown."""
+"""The route of a mission's items: places in the order in which they are flown."""
 
 import math
 from collections.abc import Sequence
@@ -37,11 +37,11 @@ class Stop:
     """One place of the route.
 
     Attributes:
-        index: of the mission item.
-        command: its MAV_CMD.
-        position_ned_m: from home.
-        speed_m_s: commanded for the way to it; None: the vehicle's own.
-        stay_s: time spent there, as far as the item tells.
+        index: index of the mission item.
+        command: MAV_CMD of the item.
+        position_ned_m: position from home.
+        speed_m_s: speed commanded for the leg to it; None: the vehicle's default.
+        stay_s: time spent there, as far as the item specifies it.
     """
 
     index: int
@@ -53,11 +53,11 @@ class Stop:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Route:
-    """All places in their order.
+    """All places in the flown order.
 
     Attributes:
-        stops: in the order in which they are flown, as often as jumps lead there.
-        endless: a jump repeats for ever (or more often than is looked at).
+        stops: places in the flown order; jumps repeat them.
+        endless: whether a jump repeats forever (or more often than is followed).
     """
 
     stops: tuple[Stop, ...]
@@ -65,7 +65,7 @@ class Route:
 
     @property
     def length_m(self) -> float:
-        """From the first place to the last."""
+        """Length from the first place to the last."""
         return sum(math.dist(a.position_ned_m, b.position_ned_m) for a, b in pairwise(self.stops))
 
     def duration_s(self, own_speed_m_s: float) -> float:
@@ -78,7 +78,7 @@ class Route:
 
 
 def placed(items: Sequence[MissionItem], home: GeodeticPosition, unset: float) -> list[MissionItem]:
-    """The items as a vehicle gets them: "here" is a place, and what is not set is `unset`."""
+    """The items as sent to a vehicle: "here" is replaced by a place, and unset values by `unset`."""
     given: list[MissionItem] = []
     last = (home.lat_deg, home.lon_deg)
     for item in items:
@@ -96,7 +96,7 @@ def placed(items: Sequence[MissionItem], home: GeodeticPosition, unset: float) -
 
 
 def route_of(document: MissionDocument, home: GeodeticPosition) -> Route:
-    """Where the mission leads from a home; jumps are followed as often as they say."""
+    """The route of the mission from a home. Jumps are followed as often as they specify."""
     items = placed(document.items, home, 0.0)
     frame = LocalFrame(home)
     order = FlownOrder.of(items)
@@ -133,18 +133,18 @@ def _stay_s(item: MissionItem, speed_m_s: float | None) -> float:
 
 
 def scored_stops(route: Route, *, with_takeoff: bool) -> tuple[Stop, ...]:
-    """What a track is compared with: no landings, and no takeoffs that go along a runway."""
+    """Places with which a track is compared: without landings, and without takeoffs along a runway."""
     left_out = {NAV_LAND} if with_takeoff else {NAV_LAND, NAV_TAKEOFF}
     return tuple(stop for stop in route.stops if stop.command not in left_out)
 
 
 def straight(a: Stop, b: Stop) -> bool:
-    """Whether the way from one place to the next is a line, not a circle or a spline."""
+    """Whether the path from one place to the next is a line, not a circle or a spline."""
     return not {a.command, b.command} & LOITERS and b.command != NAV_SPLINE_WAYPOINT
 
 
 def has_curves(stops: Sequence[Stop]) -> bool:
-    """Whether somewhere between the first and the last place the way is a circle or a spline, not a line."""
+    """Whether the path between the first and the last place contains a circle or a spline."""
     splines = any(stop.command == NAV_SPLINE_WAYPOINT for stop in stops[1:])
     return splines or any(stop.command in LOITERS for stop in stops[:-1])
 

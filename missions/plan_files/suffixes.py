@@ -1,4 +1,4 @@
-"""What mission files are called; apart from their readers, so that a command line is quick to look."""
+"""Suffixes of mission files, separate from the readers, so that the command line loads quickly."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""What no vehicle could fly of a mission file, found before anything is started."""
+"""Finds the parts of a mission file that no vehicle could fly, before anything is started."""
 
 import math
 from typing import Final
@@ -16,7 +16,7 @@ from missions.errors import PlanError
 from missions.plan_files.document import DO_JUMP, FLOWN_TO, NAV_LAND, NAV_TAKEOFF, MissionDocument
 
 MAX_ITEMS: Final = 5000
-"""More than any flight controller stores."""
+"""More items than any flight controller stores."""
 
 _HIGHEST_M: Final = 50_000.0
 _HERE_IF_UNSET: Final = frozenset({NAV_TAKEOFF, NAV_LAND})
@@ -24,9 +24,9 @@ _VTOL: Final = frozenset({84, 85, 3000})
 
 
 def validated(document: MissionDocument) -> MissionDocument:
-    """The document, when it can be flown by some vehicle.
+    """Return the document if some vehicle can fly it.
 
-    What one autopilot takes and another does not, the autopilot says when it is uploaded.
+    An item that only some autopilots accept is not refused here: the autopilot answers at the upload.
 
     Raises:
         PlanError: names the file, the item, the value and what is accepted.

@@ -22,10 +22,11 @@ HEADER: Final = "QGC WPL 110"
 
 
 def read_wpl(path: Path) -> MissionDocument:
-    """A waypoint file. Its first row is home when it is an absolute waypoint, as ArduPilot's tools write it.
+    """Read a waypoint file. If the first row is an absolute waypoint, as ArduPilot's tools write it, it is
+    the home.
 
     Raises:
-        PlanError: it can't be read; says which item.
+        PlanError: the file can't be read; the message names the item.
     """
     from pymavlink import mavwp
 
@@ -82,7 +83,9 @@ def _item(row: Any, first: int) -> MissionItem:
 
 
 def format_wpl(items: Iterable[MissionItem], home: GeodeticPosition) -> str:
-    """A mission as the text of a waypoint file: home in the first row, "not set" (NaN) as 0."""
+    """A mission as the text of a waypoint file: home is the first row, and values that are not set (NaN) are
+    0.
+    """
     marker = MissionItem(command=NAV_WAYPOINT, frame=0, x=home.lat_deg, y=home.lon_deg, z=home.alt_m)
     lines = [HEADER]
     for index, item in enumerate((marker, *items)):

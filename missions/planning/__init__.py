@@ -1,4 +1,4 @@
-"""From a pattern to something a vehicle can fly: a trajectory in time, or waypoints."""
+"""Converts a pattern to something that a vehicle can fly: a trajectory in time, or waypoints."""
 
 from missions.planning.limits import MulticopterLimits
 from missions.planning.natural import natural_trajectory

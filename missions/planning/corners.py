@@ -1,8 +1,8 @@
-"""Turning a corner as an aircraft does: it rolls into the turn, circles, and rolls out.
+"""The path of an aircraft in a corner: it rolls into the turn, circles, and rolls out.
 
-The curvature of the path rises evenly while the aircraft rolls in, so that bank and path agree (a clothoid),
-stays at 1/R, and falls evenly again. A corner too slight for the full curvature has the two ramps alone, and
-less of it.
+The curvature of the path rises linearly while the aircraft rolls in, so that bank and path agree (a
+clothoid), stays at 1/R, and falls linearly again. A corner too small for the full curvature consists of the
+two ramps only, with a smaller curvature.
 """
 
 import math
@@ -22,11 +22,11 @@ class Corner:
     """A turn to the right that begins at the origin, heading along the first axis.
 
     Attributes:
-        reach_m: from the corner of the two legs back to where the turn begins; the same on from it.
+        reach_m: distance from the corner of the two legs to the begin of the turn, and equally to its end.
         arc_m: (n,) distance flown.
-        points_m: (n, 2) along the first leg, and to its right.
-        course_rad: (n,) turned so far.
-        curvature_per_m: (n,).
+        points_m: (n, 2) coordinates along the first leg, and to its right.
+        course_rad: (n,) change of course so far.
+        curvature_per_m: (n,) curvature.
     """
 
     reach_m: float
@@ -47,7 +47,7 @@ class Corner:
         peak = 1.0 / radius_m
         ramp = ramp_m
         plateau = turn_rad * radius_m - ramp
-        if plateau < 0.0:  # the same rate of roll, broken off at half the turn
+        if plateau < 0.0:  # the same rate of roll, reversed at half the turn
             ramp = math.sqrt(turn_rad * radius_m * ramp_m)
             peak = turn_rad / ramp
             plateau = 0.0
@@ -57,7 +57,7 @@ class Corner:
         rise = max(ramp, 1e-9)
         curvature = peak * np.clip(np.minimum(arc, length - arc) / rise, 0.0, 1.0)
         course = _turned(arc, peak, rise, plateau)
-        # Simpson's rule on each step: the course is known between the points too
+        # Simpson's rule on each step, because the course is also known between the points
         middle = _turned(0.5 * (arc[1:] + arc[:-1]), peak, rise, plateau)
         step = length / count / 6.0
         north = step * (np.cos(course[:-1]) + 4.0 * np.cos(middle) + np.cos(course[1:]))
@@ -74,7 +74,7 @@ class Corner:
 
 
 def corner_reach_m(turn_rad: float, radius_m: float, ramp_m: float) -> float:
-    """How much of each of its legs a corner takes."""
+    """Length of each leg that a corner uses."""
     return Corner.of(turn_rad, radius_m, ramp_m).reach_m if turn_rad > 1e-6 else 0.0
 
 

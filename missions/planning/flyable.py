@@ -1,5 +1,5 @@
-"""A pattern as an aircraft can follow it: corners turned with its own radius, sampled finely, with course and
-curvature.
+"""A pattern as a path that an aircraft can follow: corners have the aircraft's radius; the path is sampled
+finely, with course and curvature.
 """
 
 import math
@@ -23,7 +23,7 @@ class FlyablePath:
 
     Attributes:
         points_m: (n, 2) north, east.
-        arc_m: (n,) distance flown from the pattern's start, increasing; less than 0 on the way to it.
+        arc_m: (n,) distance flown from the pattern's start, increasing; negative before the start.
         course_rad: (n,) direction, unwrapped.
         curvature_per_m: (n,) positive turning right.
     """
@@ -40,11 +40,11 @@ class FlyablePath:
 
     @property
     def reach_m(self) -> float:
-        """Farthest from the origin."""
+        """Largest distance from the origin."""
         return float(np.hypot(*self.points_m.T).max())
 
     def until(self, length_m: float) -> "FlyablePath":
-        """The first part of it."""
+        """The first part of the path, up to a length."""
         count = max(2, int(np.searchsorted(self.arc_m, length_m)) + 1)
         return FlyablePath(
             points_m=self.points_m[:count],
@@ -54,7 +54,7 @@ class FlyablePath:
         )
 
     def moved(self, north_m: float, east_m: float) -> "FlyablePath":
-        """The same somewhere else."""
+        """The path moved by an offset."""
         return FlyablePath(
             points_m=self.points_m + np.array((north_m, east_m)),
             arc_m=self.arc_m,
@@ -63,7 +63,9 @@ class FlyablePath:
         )
 
     def with_leads(self, before_m: float, after_m: float) -> "FlyablePath":
-        """With straight flight before and after, in its direction there. Its start stays at distance 0."""
+        """The path with straight flight added before and after it, in its direction there. Its start stays at
+        distance 0.
+        """
         first, last = self._straight(0, -before_m), self._straight(-1, after_m)
         return FlyablePath(
             points_m=np.concatenate((first[0], self.points_m, last[0])),
@@ -73,7 +75,7 @@ class FlyablePath:
         )
 
     def _straight(self, end: int, distance_m: float) -> tuple[Array, Array, Array, Array]:
-        """Points off one end, in the order of flight; those of distances 0 are left out."""
+        """Points of the straight extension at one end, in the order of flight; a distance of 0 gives none."""
         count = max(1, math.ceil(abs(distance_m) / _STEP_M))
         along = np.linspace(0.0, distance_m, count + 1)[1:]
         course = float(self.course_rad[end])
@@ -90,7 +92,9 @@ class FlyablePath:
         return (north, east), course, float(np.interp(arc_m, self.arc_m, self.curvature_per_m))
 
     def nearest(self, north_m: float, east_m: float, *, from_arc_m: float, ahead_m: float) -> float:
-        """Distance along the path of its place nearest to another; looked for from 20 m before one."""
+        """Distance along the path of the point nearest to a place; the search begins 20 m before
+        `from_arc_m`.
+        """
         low = int(np.searchsorted(self.arc_m, from_arc_m - _BACK_M))
         low = min(low, len(self.arc_m) - 2)
         high = max(low + 2, int(np.searchsorted(self.arc_m, from_arc_m + ahead_m)))
@@ -116,7 +120,8 @@ class FlyablePath:
 
 
 def flyable_path(curve: Curve, radius_m: float, ramp_m: float) -> FlyablePath:
-    """The path of a curve; a polyline gets corners of a radius (the legs are long enough: `check_turns`).
+    """The path of a curve; a polyline gets corners with the given radius (`check_turns` ensures that the legs
+    are long enough).
 
     Args:
         ramp_m: distance over which a corner's curvature rises.

@@ -1,4 +1,4 @@
-"""What a vehicle can do, as a planner needs it, and refusing what it can't."""
+"""Limits of a vehicle for a planner, and checks against them."""
 
 import math
 from dataclasses import dataclass, fields
@@ -8,9 +8,9 @@ from missions.atmosphere import GRAVITY_M_S2, true_over_equivalent_airspeed
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 
-TURN_MARGIN: Final = 1.2  # of the radius, for gusts and for the time a bank takes
+TURN_MARGIN: Final = 1.2  # factor of the radius, for gusts and for the time of the roll into a bank
 FORECAST_WIND_M_S: Final = 5.0
-"""Wind that turns are planned for when nobody has given a forecast: a fresh day."""
+"""Wind that turns are planned for when no forecast was specified: a breezy day."""
 
 
 _MAY_BE_ZERO: Final = frozenset({"wind_m_s", "guidance_s", "waypoint_lead_s"})
@@ -18,13 +18,14 @@ _MAY_BE_ZERO: Final = frozenset({"wind_m_s", "guidance_s", "waypoint_lead_s"})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Limits:
-    """What every vehicle is bound by.
+    """Limits that apply to every vehicle.
 
     Attributes:
-        altitude_min_m, altitude_max_m: above home. 120 m is the ceiling of the open category (EU 2019/947).
-        reach_m: farthest from home a pattern may go.
-        separation_min_m: least between the layers of a team: both keep their height with an error, and a
-            multicopter's wake is worst right below it.
+        altitude_min_m, altitude_max_m: heights above home. 120 m is the ceiling of the open category (EU
+            2019/947).
+        reach_m: largest distance of a pattern from home.
+        separation_min_m: smallest distance between the layers of a team: both vehicles have a height error,
+            and a multicopter's wake is strongest directly below it.
     """
 
     altitude_min_m: float = 1.5
@@ -53,7 +54,7 @@ class _Limits:
             )
 
     def check_separation(self, separation_m: float, vehicles: int) -> None:
-        """Refuse layers of a team that are too thin for its vehicles."""
+        """Refuse layers of a team that are too close for its vehicles."""
         if vehicles > 1 and not separation_m >= self.separation_min_m:
             raise PlanError(
                 f"layers of {separation_m:.3g} m are too thin for a team of {vehicles} with such a vehicle; "
@@ -61,7 +62,7 @@ class _Limits:
             )
 
     def check_reach(self, distance_m: float) -> None:
-        """Refuse a pattern that leads too far from home."""
+        """Refuse a pattern that extends too far from home."""
         if not distance_m <= self.reach_m:
             raise PlanError(
                 f"the pattern reaches {distance_m:.0f} m from home, more than {self.reach_m:g} m; "
@@ -76,7 +77,7 @@ class MulticopterLimits(_Limits):
     Attributes:
         speed_m_s: largest ground speed (PX4 MPC_XY_VEL_MAX 12; ArduCopter WPNAV_SPEED 10).
         acceleration_m_s2: largest horizontal acceleration (PX4 MPC_ACC_HOR 3; ArduCopter WPNAV_ACCEL 2.5).
-        yaw_rate_rad_s: how fast the nose may turn (PX4 MPC_YAWRAUTO_MAX 60 deg/s).
+        yaw_rate_rad_s: largest yaw rate (PX4 MPC_YAWRAUTO_MAX 60 deg/s).
         smoothing_s: time over which an acceleration builds up; jerk stays below 2 acceleration / smoothing.
     """
 
@@ -91,14 +92,14 @@ class MulticopterLimits(_Limits):
 
     @property
     def lateral_m_s2(self) -> float:
-        """Share of the acceleration for turning; with `tangential_m_s2` at once it makes the whole
-        (0.8, 0.6, 1).
+        """Share of the acceleration for turning; combined with `tangential_m_s2` it gives the whole (0.8,
+        0.6, 1).
         """
         return 0.8 * self.acceleration_m_s2
 
     @property
     def tangential_m_s2(self) -> float:
-        """Share of the acceleration for gaining and losing speed."""
+        """Share of the acceleration for changes of speed."""
         return 0.6 * self.acceleration_m_s2
 
     def check_speed(self, speed_m_s: float) -> None:
@@ -116,21 +117,22 @@ class FixedWingLimits(_Limits):
 
     Attributes:
         airspeed_min_m_s, airspeed_trim_m_s, airspeed_max_m_s: equivalent airspeed.
-        bank_max_rad: steepest bank of its autopilot.
-        bank_parameter: what that is called there, for messages.
-        wind_m_s: steady wind to plan turns for: a forecast.
-        air_altitude_m: above mean sea level, where it flies: in thin air it flies faster and turns wider.
+        bank_max_rad: largest bank that its autopilot commands.
+        bank_parameter: name of the autopilot's parameter for it, for messages.
+        wind_m_s: forecast of the steady wind that turns are planned for.
+        air_altitude_m: altitude of the flight above mean sea level: in thinner air it flies faster and turns
+            wider.
         guidance_s: time in which its path guidance converges on a line: period times damping over pi. The
-            reference length of L1 guidance (S. Park et al., AIAA 2004-4900) is what it flies in this time.
-            0: not known, and no limit.
-        guidance_parameter: what sets it, for messages.
-        waypoint_lead_s: how long before a bend the next leg has to begin where a waypoint's own radius
-            decides that. 0: the autopilot decides it by itself.
+            reference length of L1 guidance (S. Park et al., AIAA 2004-4900) is the distance flown in this
+            time. 0: not known, and no limit.
+        guidance_parameter: name of the parameter that sets it, for messages.
+        waypoint_lead_s: time before a bend at which the next leg must begin, if a waypoint's own radius
+            determines it. 0: the autopilot determines it by itself.
     """
 
     altitude_min_m: float = 20.0
     reach_m: float = 20_000.0
-    separation_min_m: float = 10.0  # a height is held to some 4 m in gusts
+    separation_min_m: float = 10.0  # in gusts the height is held to about 4 m
     airspeed_min_m_s: float = 10.0
     airspeed_trim_m_s: float = 15.0
     airspeed_max_m_s: float = 20.0
@@ -161,31 +163,32 @@ class FixedWingLimits(_Limits):
             )
 
     def true_airspeed_m_s(self, airspeed_m_s: float) -> float:
-        """True airspeed, where it flies, of an equivalent airspeed."""
+        """True airspeed at the altitude of the flight, for an equivalent airspeed."""
         return airspeed_m_s * true_over_equivalent_airspeed(self.air_altitude_m)
 
     def turn_radius_m(self, airspeed_m_s: float, *, drift_m_s: float = 0.0) -> float:
-        """Tightest circle over ground that can be held all the way round, with margin.
+        """Radius of the tightest circle over ground that can be held all the way round, with a margin.
 
-        The wind blows along somewhere on the circle: (V + w)^2 / (g tan(bank)), times 1.2, with the true
+        Somewhere on the circle the wind is a tail wind: (V + w)^2 / (g tan(bank)), times 1.2, with the true
         airspeed V.
 
         Args:
             airspeed_m_s: equivalent airspeed.
-            drift_m_s: speed of what the circle is around, against the ground.
+            drift_m_s: ground speed of the circle's centre.
         """
         fastest = self.true_airspeed_m_s(airspeed_m_s) + self.wind_m_s + drift_m_s
         return TURN_MARGIN * fastest**2 / (GRAVITY_M_S2 * math.tan(self.bank_max_rad))
 
     def guided_radius_m(self, airspeed_m_s: float) -> float:
-        """Tightest bend over ground that the autopilot's own path guidance still follows closely.
+        """Radius of the tightest bend over ground that the autopilot's own path guidance still follows
+        closely.
 
-        A bend much tighter than the guidance's reference length is over before the guidance has reacted.
+        A bend much tighter than the guidance's reference length ends before the guidance has reacted.
         """
         return (self.true_airspeed_m_s(airspeed_m_s) + self.wind_m_s) * self.guidance_s
 
     def path_radius_m(self, airspeed_m_s: float) -> float:
-        """Tightest bend of a path for this aircraft: what it can bank for and its guidance follows."""
+        """Radius of the tightest bend of a path for this aircraft, limited by its bank and its guidance."""
         return max(self.turn_radius_m(airspeed_m_s), self.guided_radius_m(airspeed_m_s))
 
 
@@ -193,7 +196,7 @@ Limits = MulticopterLimits | FixedWingLimits
 """Limits of one vehicle."""
 
 WIDEST_LIMITS: Final = MulticopterLimits(speed_m_s=20.0, acceleration_m_s2=5.0)
-"""What is refused for any multicopter; a vehicle's own limits are read from it later."""
+"""Limits beyond which any multicopter is refused; a vehicle's own limits are read from it later."""
 
 WIDEST_FIXED_WING_LIMITS: Final = FixedWingLimits(
     airspeed_min_m_s=3.0,
@@ -203,4 +206,4 @@ WIDEST_FIXED_WING_LIMITS: Final = FixedWingLimits(
     bank_parameter="more than its autopilot will allow",
     altitude_max_m=3000.0,
 )
-"""The same for a fixed wing."""
+"""Limits beyond which any fixed wing is refused."""

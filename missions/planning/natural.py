@@ -30,13 +30,14 @@ def natural_trajectory(
 
     Args:
         curve: a `Lissajous`, or `Lap` of one; its parameter is the phase of the fundamental.
-        fundamental_period_s: time for 2 pi of the parameter: once round for a closed curve.
-        altitude_m: above the origin.
-        limits: of the vehicle.
-        duration_s: end, at rest, after this time if the curve is not done before.
+        fundamental_period_s: time for 2 pi of the parameter: one lap of a closed curve.
+        altitude_m: height above the origin.
+        limits: limits of the vehicle.
+        duration_s: end at rest after this time, if the curve is not finished before.
 
     Raises:
-        PlanError: the period needs more speed or acceleration than there is; names the shortest possible one.
+        PlanError: the period needs more speed or acceleration than the limits allow; the message names the
+            shortest possible period.
     """
     limits.check_altitude(altitude_m)
     if not (math.isfinite(fundamental_period_s) and fundamental_period_s > 0.0):
@@ -63,7 +64,7 @@ def natural_trajectory(
                 f"a search time of {duration_s:g} s is too short; ask for at least {math.ceil(2 * ramp_s)} s"
             )
         whole_s = min(whole_s, duration_s)
-    if whole_s < 2.0 * ramp_s:  # a short arc: ramp up and straight down again
+    if whole_s < 2.0 * ramp_s:  # a short arc: ramp up, and immediately down again
         ramp_s = 0.5 * whole_s
     t = np.arange(math.ceil(whole_s / STEP_S) + 1) * STEP_S
     u, pace, change = _phase(np.minimum(t, whole_s), whole_s, ramp_s, rate)
@@ -109,7 +110,7 @@ def _trajectory(
 
 
 def _rate_limited(course: Array, largest_step: float) -> Array:
-    """The course with its changes limited; the nose lags at a cusp and catches up."""
+    """The course with limited changes; at a cusp the yaw lags behind and then catches up."""
     if np.abs(np.diff(course)).max() <= largest_step:
         return course
     out = course.tolist()
@@ -119,7 +120,7 @@ def _rate_limited(course: Array, largest_step: float) -> Array:
 
 
 def natural_frequencies(curve: Curve, fundamental_period_s: float) -> tuple[float, float]:
-    """Frequencies east and north, rad/s, of a curve that `is_lissajous` in its own time law."""
+    """Frequencies east and north, rad/s, of a curve for which `is_lissajous` is true, in its own time law."""
     inner = getattr(curve, "curve", curve)
     assert isinstance(inner, Lissajous)
     rate = math.tau / fundamental_period_s
@@ -127,6 +128,6 @@ def natural_frequencies(curve: Curve, fundamental_period_s: float) -> tuple[floa
 
 
 def is_lissajous(curve: Curve) -> bool:
-    """Whether a curve has a time law of its own."""
+    """Whether a curve has its own time law."""
     inner = getattr(curve, "curve", curve)
     return isinstance(inner, Lissajous)

@@ -1,10 +1,10 @@
-"""Speed along a path: as fast as asked, as slow as curvature needs, smooth in time.
+"""Speed along a path: as fast as commanded, as slow as curvature requires, and smooth in time.
 
-Between two stops: the speed limit from curvature and yaw rate, then a forward and a backward pass for the
-    tangential
-acceleration (Bobrow, Dubowsky, Gibson 1985, for a point mass), then the distance flown, as a function of
-time, is averaged over a triangular window, which bounds jerk and makes starts and stops smooth. Averaging
-shifts speed along the path, so the result is checked, and the limits lowered where they were passed.
+Between two stops, the speed limit follows from curvature and yaw rate, and a forward and a backward pass
+apply the tangential acceleration (Bobrow, Dubowsky, Gibson 1985, for a point mass). Then the distance flown,
+as a function of time, is averaged over a triangular window, which bounds jerk and makes starts and stops
+smooth. Averaging shifts speed along the path, so the result is checked, and the limits are lowered where they
+were exceeded.
 """
 
 from dataclasses import dataclass
@@ -38,13 +38,13 @@ def speed_profile(
     Args:
         arc_m: distances (n,) at which curvature is given, increasing.
         curvature_per_m: curvature (n,).
-        speed_m_s: speed asked for.
-        limits: of the vehicle.
+        speed_m_s: commanded speed.
+        limits: limits of the vehicle.
     """
     start, stop = float(arc_m[0]), float(arc_m[-1])
     count = max(16, int(np.ceil((stop - start) / _GRID_M)))
     even = np.linspace(start, stop, count + 1)
-    grid = np.union1d(even, arc_m)  # knots are closer together in bends
+    grid = np.union1d(even, arc_m)  # in bends the knots are closer together
     grid = grid[np.concatenate(([True], np.diff(grid) > 1e-7))]
     bend = np.abs(np.interp(grid, arc_m, curvature_per_m))
     bend = np.maximum(bend, 1e-9)
@@ -61,7 +61,7 @@ def speed_profile(
         excess = np.ones_like(even)
         nearest = np.clip(np.rint((profile.arc_m - start) / (stop - start) * count).astype(np.intp), 0, count)
         np.maximum.at(excess, nearest, ratio)
-        # spread to neighbours within the window, since they carry the excess
+        # spread to neighbours within the window, because they cause the excess
         reach = max(1, int(0.5 * limits.smoothing_s * speed_m_s / _GRID_M))
         excess = np.interp(grid, even, _running_max(excess, reach))
         allowed = np.maximum(allowed / excess, _SLOWEST_M_S**2)
@@ -105,7 +105,7 @@ def _running_max(values: Array, reach: int) -> Array:
 
 
 def _stretched(profile: Profile, factor: float) -> Profile:
-    """The same path slower by `factor` >= 1 throughout."""
+    """The same path, slower by `factor` >= 1 everywhere."""
     if factor == 1.0:
         return profile
     old = np.arange(len(profile.arc_m)) * STEP_S * factor

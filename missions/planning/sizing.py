@@ -1,4 +1,4 @@
-"""Sizes of patterns that suit an aircraft's turns, for whoever has not chosen any."""
+"""Default sizes of patterns that suit an aircraft's turns, used when none are specified."""
 
 import math
 from typing import Final
@@ -16,12 +16,12 @@ _LEGS_MIN: Final = 3
 
 
 def spacing_for_turns_m(airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Track spacing of sweeps and squares: a leg of it has room for a right angle at both ends."""
+    """Track spacing of sweeps and squares: each leg has room for a right-angle turn at both ends."""
     return _tens(_ROOM * leg_needed_m(_SQUARE_RAD, airspeed_m_s, limits))
 
 
 def curve_side_m(curve: Curve, side_m: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Side of a curved pattern, given one of some side: as usual, or as large as its bends need."""
+    """Side of a curved pattern, from one with any side: the default, or as large as its bends need."""
     if isinstance(curve, Polyline):
         return WINGS_SIDE_M
     needed_m = side_m * limits.path_radius_m(airspeed_m_s) / smallest_radius_m(curve)
@@ -34,12 +34,12 @@ def sector_side_m(airspeed_m_s: float, limits: FixedWingLimits) -> float:
 
 
 def legs_side_m(spacing_m: float) -> float:
-    """Side of a sweep or a square of whole track spacings."""
+    """Side of a sweep or a square with a whole number of track spacings."""
     return spacing_m * max(_LEGS_MIN, math.ceil(WINGS_SIDE_M / spacing_m - 1e-9))
 
 
 def spacing_within_m(side_m: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Track spacing that parts a side evenly, with room for turns; for a side too short, the usual one."""
+    """Track spacing that divides a side evenly with room for turns; if the side is too short, the default."""
     legs = math.floor(side_m / (_ROOM * leg_needed_m(_SQUARE_RAD, airspeed_m_s, limits)))
     return side_m / legs if legs >= 1 else spacing_for_turns_m(airspeed_m_s, limits)
 

@@ -1,4 +1,4 @@
-"""A path in time: position, velocity, acceleration and yaw for every moment."""
+"""A path as a function of time: position, velocity, acceleration and yaw."""
 
 import itertools
 import math
@@ -19,7 +19,7 @@ _SAME_COURSE_RAD: Final = 0.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrajectoryPoint:
-    """Where to be, and how to move, at one moment: NED at the pattern's origin, m, m/s, m/s^2, rad, rad/s."""
+    """Commanded state at one time: NED from the pattern's origin, m, m/s, m/s^2, rad, rad/s."""
 
     position_ned_m: tuple[float, float, float]
     velocity_ned_m_s: tuple[float, float, float]
@@ -64,7 +64,7 @@ class Trajectory:
         return float(np.linalg.norm(self.acceleration_ned_m_s2, axis=1).max())
 
     def at(self, time_s: float) -> TrajectoryPoint:
-        """The point at a time; before the start and after the end the first and the last one."""
+        """The point at a time; before the start the first point, after the end the last."""
         place = min(max(time_s / self.step_s, 0.0), len(self.yaw_rad) - 1.0)
         k = min(int(place), len(self.yaw_rad) - 2)
         f = place - k
@@ -94,20 +94,20 @@ def plan_trajectory(
     limits: MulticopterLimits,
     duration_s: float | None = None,
 ) -> Trajectory:
-    """Fly a curve from rest to rest at constant altitude, nose along the path.
+    """Plan the flight of a curve from rest to rest at constant altitude, with yaw along the path.
 
     Speed is `speed_m_s` wherever curvature, yaw rate and acceleration allow; at sharp corners and cusps
     the vehicle stops and turns.
 
     Args:
         curve: pattern around the origin of the local frame.
-        altitude_m: above the origin.
-        speed_m_s: ground speed asked for.
-        limits: of the vehicle.
-        duration_s: end, at rest, after this time (the search time) if the curve is not done before.
+        altitude_m: height above the origin.
+        speed_m_s: commanded ground speed.
+        limits: limits of the vehicle.
+        duration_s: end at rest after this time (the search time), if the curve is not finished before.
 
     Raises:
-        PlanError: speed or altitude out of the limits, or a curve that leads too far.
+        PlanError: speed or altitude are out of the limits, or the curve extends too far.
     """
     limits.check_speed(speed_m_s)
     limits.check_altitude(altitude_m)
@@ -127,8 +127,8 @@ def line_trajectory(
     speed_m_s: float,
     limits: MulticopterLimits,
 ) -> Trajectory:
-    """Straight from one point to another, from rest to rest; yaw along the way (0 for a climb on the
-    spot).
+    """Plan a straight flight between two points, from rest to rest; yaw along the path (0 for a vertical
+    climb).
     """
     start, stop = np.array(start_ned_m), np.array(stop_ned_m)
     distance = float(np.linalg.norm(stop - start))
@@ -154,8 +154,8 @@ class _Piece:
 
     Attributes:
         profile: distance, speed and acceleration in time.
-        first, last: the knots it runs over.
-        arc_m, course_rad, curvature_per_m: of these knots, as seen from inside the stretch.
+        first, last: its first and last knot.
+        arc_m, course_rad, curvature_per_m: values at these knots, on the inner side of the stretch.
         turn_s: time for the turn on the spot before it.
     """
 
@@ -177,7 +177,7 @@ def _plan_pieces(
         knots = slice(first, last + 1)
         arc = table.arc_m[knots]
         curvature, course = table.curvature_per_m[knots].copy(), table.course_rad[knots].copy()
-        if len(arc) > 2:  # a stop belongs to neither side: its curvature and course are the turn's
+        if len(arc) > 2:  # a stop belongs to neither side: its curvature and course are those of the turn
             curvature[0], curvature[-1] = curvature[1], curvature[-2]
             if abs(course[1] - course[0]) > _SAME_COURSE_RAD:
                 course[0] = course[1]
@@ -209,7 +209,7 @@ def _cut(
     limits: MulticopterLimits,
     duration_s: float,
 ) -> list[_Piece]:
-    """The longest plan that ends, at rest, within the time."""
+    """The longest plan that ends at rest within the time."""
     kept: list[_Piece] = []
     left = duration_s
     for piece in pieces:
@@ -276,7 +276,7 @@ def _append_turn(
     yaws: list[Array],
     yaw_rates: list[Array],
 ) -> None:
-    """Stand still and turn the nose from one course to the next, smoothly (cubic)."""
+    """Stand still and turn from one course to the next, smoothly (cubic)."""
     count = max(2, math.ceil(piece.turn_s / STEP_S))
     f = np.arange(1, count) / count
     start, stop = yaws[-1][-1], piece.course_rad[0]
@@ -288,5 +288,5 @@ def _append_turn(
 
 
 def flight_curve(curve: Curve, corner_m: float) -> Curve:
-    """The curve as it is flown with setpoints: a polyline gets rounded corners."""
+    """The curve as it is flown by setpoints: a polyline gets rounded corners."""
     return curve.rounded(corner_m) if isinstance(curve, Polyline) else curve

@@ -1,4 +1,4 @@
-"""Whether an aircraft that can't stop can follow a curve: its bends against the tightest turn."""
+"""Checks whether an aircraft that can't stop can follow a curve, by its tightest turn."""
 
 import math
 from typing import Final
@@ -12,7 +12,8 @@ from missions.planning.corners import corner_reach_m
 from missions.planning.limits import FixedWingLimits
 
 _SAMPLES: Final = 20_000
-_ROLL_S: Final = 1.0  # to roll from level into the steepest turn, with the time the roll takes to begin
+# time to roll from level into the steepest turn, including the delay before the roll begins
+_ROLL_S: Final = 1.0
 _SAME: Final = 1e-3
 _SHARPEST_RAD: Final = math.radians(170.0)
 
@@ -24,12 +25,12 @@ def smallest_radius_m(curve: Curve) -> float:
 
 
 def roll_in_m(airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Distance flown over ground while rolling into a turn, at most."""
+    """Largest distance flown over ground while rolling into a turn."""
     return (limits.true_airspeed_m_s(airspeed_m_s) + limits.wind_m_s) * _ROLL_S
 
 
 def leg_needed_m(turn_rad: float, airspeed_m_s: float, limits: FixedWingLimits) -> float:
-    """Length of a leg with such a corner at both its ends."""
+    """Length of a leg with such a corner at both ends."""
     radius_m = limits.path_radius_m(airspeed_m_s)
     return 2.0 * corner_reach_m(turn_rad, radius_m, roll_in_m(airspeed_m_s, limits))
 
@@ -43,20 +44,21 @@ def check_turns(
     size_m: tuple[float, float] | None = None,
     spacing_m: float | None = None,
 ) -> float:
-    """Refuse a curve that is too tight; gives the turn radius it was checked for.
+    """Refuse a curve that is too tight; returns the turn radius that it was checked for.
 
-    A polyline's corners are turned as `planning.corners` has it: each takes a part of both its legs.
+    A polyline's corners are rounded as in `planning.corners`: each corner uses a part of both its legs.
 
     Args:
-        curve: to be flown.
-        airspeed_m_s: equivalent.
-        limits: of the aircraft.
-        radius_m: tightest turn; None: what the limits say of a path that the autopilot's guidance follows.
-        size_m, spacing_m: width and height, and track spacing, that the curve was made for: a refusal then
-            tells those that would do.
+        curve: the curve to be flown.
+        airspeed_m_s: equivalent airspeed.
+        limits: limits of the aircraft.
+        radius_m: smallest turn radius; None: the limits' radius for a path that the autopilot's guidance
+            follows.
+        size_m, spacing_m: width and height, and track spacing, that the curve was made for; the error message
+            then names values that are sufficient.
 
     Raises:
-        PlanError: says how tight it is, and what to change.
+        PlanError: names the turn radius and what to change.
     """
     if radius_m is None:
         radius_m = limits.path_radius_m(airspeed_m_s)
@@ -85,7 +87,7 @@ def check_turns(
 
 
 def _shortest_leg(curve: Polyline, radius_m: float, ramp_m: float) -> tuple[float, float]:
-    """(needed over present length, present length m) of the leg that is shortest for its turns."""
+    """(needed length over present length, present length m) of the leg that is shortest for its turns."""
     vertices = curve.vertices_m
     lengths = curve.leg_lengths_m
     taken = [0.0] * len(lengths)

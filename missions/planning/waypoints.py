@@ -1,4 +1,4 @@
-"""A curve as waypoints: close together where it bends, far apart where it is straight."""
+"""A curve as waypoints: close together in bends, far apart on straight parts."""
 
 import itertools
 import math
@@ -24,14 +24,14 @@ def waypoints_along(
 ) -> list[tuple[float, float]]:
     """Waypoints (north, east), m, the first and the last point of the curve included.
 
-    A polyline gives its own corners. Otherwise the legs' sagitta, c^2 kappa / 8 for a chord c, stays below
-    `deviation_m` as far as `spacing_min_m` allows.
+    For a polyline these are its corners. For other curves the sagitta of the legs, c^2 kappa / 8 for a chord
+    c, stays below `deviation_m` as far as `spacing_min_m` allows.
 
     Args:
         curve: the pattern.
         deviation_m: largest distance from the straight legs to the curve.
         spacing_min_m, spacing_max_m: limits of the leg lengths.
-        length_m: end after this much of the curve.
+        length_m: length of the curve after which to end.
     """
     if not (deviation_m > 0.0 and 0.0 < spacing_min_m <= spacing_max_m):
         raise PlanError(
@@ -71,11 +71,11 @@ def _cut_polyline(curve: Polyline, length_m: float | None) -> list[tuple[float, 
 
 
 def leg_speeds(points: list[tuple[float, float]], trajectory: Trajectory) -> list[float]:
-    """Speed (m/s) for the leg to each waypoint: the slowest the planned trajectory flies it.
+    """Speed (m/s) for the leg to each waypoint: the lowest speed of the planned trajectory on that leg.
 
-    Waypoint missions know no acceleration limits; with the speeds of the plan a vehicle takes bends as the
-    plan does. The smooth start and stop of the trajectory don't count. The first waypoint gets the speed of
-    the leg behind it.
+    Waypoint missions have no acceleration limits; with the speeds of the plan a vehicle flies bends as
+    planned. The smooth start and stop of the trajectory are ignored. The first waypoint gets the speed of the
+    leg after it.
 
     Args:
         points: waypoints (north, east) on the trajectory's path, in order.

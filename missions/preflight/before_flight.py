@@ -1,4 +1,4 @@
-"""The look at a vehicle before a mission is flown with it."""
+"""The checks of a vehicle before a mission is flown with it."""
 
 import asyncio
 import math
@@ -40,23 +40,25 @@ _PARAMETERS_AT_ONCE: Final = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """What was found of one vehicle."""
+    """The findings about one vehicle."""
 
     system_id: int
     findings: tuple[Finding, ...]
 
     @property
     def problems(self) -> tuple[Finding, ...]:
-        """What stands in the way."""
+        """The findings that prevent the flight."""
         return tuple(f for f in self.findings if f.level is Level.PROBLEM)
 
 
 Confirm = Callable[[Sequence[Look]], Coroutine[Any, Any, bool]]
-"""Shown what was found, says whether to fly; it waits as tasks do, so that the link is kept up meanwhile."""
+"""Receives the findings and returns whether to fly. It is a coroutine, so that the link is serviced
+meanwhile.
+"""
 
 
 async def look(vehicle: Vehicle, mission: Mission[Any], options: MissionOptions) -> Look:
-    """Look at a vehicle that is ready to arm, and at what is to be flown with it."""
+    """Check a vehicle that is ready to arm, and the mission to be flown with it."""
     snapshot, fence_items = await _snapshot(vehicle)
     outline = await mission.outline(vehicle, options)
     planned = () if outline is None else outline.fence
@@ -74,10 +76,10 @@ async def look(vehicle: Vehicle, mission: Mission[Any], options: MissionOptions)
 
 
 async def confirmed(looks: Sequence[Look], confirm: Confirm) -> None:
-    """Ask; heartbeats go on meanwhile.
+    """Ask for confirmation; heartbeats continue meanwhile.
 
     Raises:
-        MissionError: it was not to be flown.
+        MissionError: the flight was not confirmed.
     """
     if await confirm(looks):
         return
@@ -91,7 +93,7 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
     for name in (*_ASKED, FILTER_STATUS[vehicle.autopilot]):
         if vehicle.message(name) is None:
             await vehicle.set_message_rate(name, 2.0)
-    told: list[Mapping[str, Any]] = []  # of the filter
+    told: list[Mapping[str, Any]] = []  # reports of the navigation filter
     with vehicle.messages(FILTER_STATUS[vehicle.autopilot]) as stream:
         await vehicle.clock.sleep(_LISTEN_S)
         parameters = await _parameters(vehicle)
@@ -119,7 +121,7 @@ async def _snapshot(vehicle: Vehicle) -> tuple[Snapshot, list[MissionItem]]:
 
 
 async def _parameters(vehicle: Vehicle) -> dict[str, float]:
-    """Those that are looked at, as far as the vehicle has them; a few at a time, for slow lines."""
+    """The parameters for the checks, as far as the vehicle has them; read in small groups, for slow lines."""
     names = dict.fromkeys(
         (
             *(r.name for r in RULES[vehicle.autopilot] if r.kind in (None, vehicle.kind)),
@@ -157,7 +159,7 @@ def _match(vehicle: Vehicle, mission: Mission[Any]) -> list[Finding]:
 def _way(
     vehicle: Vehicle, outline: Outline | None, items: Sequence[MissionItem], parameters: Mapping[str, float]
 ) -> list[Finding]:
-    """Where the mission leads: near home, and inside the fence."""
+    """Findings about the mission's path: near home, and inside the fence."""
     if outline is None or not outline.points_ned_m:
         return [warning("way", "the mission does not state where it flies", "check it yourself")]
     points = outline.points_ned_m
@@ -214,7 +216,7 @@ def _fence_type(parameters: Mapping[str, float], bit: int) -> bool:
 
 
 def _endurance(snapshot: Snapshot, outline: Outline | None) -> Finding:
-    """Whether the battery lasts, as far as both are known."""
+    """Finding about the battery's endurance for the mission, as far as both are known."""
     duration_s = None if outline is None else outline.duration_s
     if duration_s is None:
         return warning("duration", "the mission does not state how long it flies", "check it yourself")

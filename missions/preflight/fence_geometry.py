@@ -1,4 +1,4 @@
-"""Whether a way keeps inside a geofence."""
+"""Checks whether a path stays inside a geofence."""
 
 import math
 from collections.abc import Iterable
@@ -10,12 +10,13 @@ _STEP_M: Final = 5.0
 
 
 def first_outside(shapes: tuple[FenceShape, ...], way: Iterable[Point], *, join: bool) -> Point | None:
-    """The first point of a way (straight between its points) that a fence forbids; None: it is all inside.
+    """The first point of a path (straight between its points) that a fence forbids; None: the whole path is
+    inside.
 
     Args:
-        shapes: of the fence, north and east of home.
-        way: its points, north and east of home, m.
-        join: of several shapes to stay in one is enough.
+        shapes: shapes of the fence, north and east of home.
+        way: points of the path, north and east of home, m.
+        join: whether being inside one of several inclusion shapes is enough.
     """
     last: Point | None = None
     for point in way:

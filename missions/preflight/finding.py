@@ -1,11 +1,11 @@
-"""One thing that was looked at."""
+"""One result of the checks before a flight."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Level(StrEnum):
-    """How a finding stands in the way of a flight."""
+    """Severity of a finding."""
 
     OK = "ok"
     WARNING = "warning"
@@ -14,13 +14,13 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What was found, and what to do about it.
+    """One result of a check, with advice.
 
     Attributes:
-        level: a problem keeps the vehicle from arming, or the mission from being flown.
-        subject: a word or two.
+        level: severity. A problem prevents arming, or prevents the mission from being flown.
+        subject: one or two words.
         text: what was found.
-        advice: what to do; "" where nothing is to be done.
+        advice: what to do; "" when no action is needed.
     """
 
     level: Level
@@ -34,15 +34,15 @@ class Finding:
 
 
 def ok(subject: str, text: str) -> Finding:
-    """Nothing to do."""
+    """A finding that needs no action."""
     return Finding(level=Level.OK, subject=subject, text=text)
 
 
 def warning(subject: str, text: str, advice: str) -> Finding:
-    """Worth a thought."""
+    """A finding that the user should consider."""
     return Finding(level=Level.WARNING, subject=subject, text=text, advice=advice)
 
 
 def problem(subject: str, text: str, advice: str) -> Finding:
-    """In the way."""
+    """A finding that prevents the flight."""
     return Finding(level=Level.PROBLEM, subject=subject, text=text, advice=advice)

@@ -1,4 +1,4 @@
-"""Checks of what the autopilot says of itself: sensors, arming, GPS, filter, home, battery, pilot."""
+"""Checks of the state that the autopilot reports: sensors, arming, GPS, filter, home, battery, pilot."""
 
 import math
 from typing import Final
@@ -21,7 +21,7 @@ _NEEDED: Final = (
 _SAID_ELSEWHERE: Final = PREARM_BIT | _RC_BIT | dialect.MAV_SYS_STATUS_SENSOR_BATTERY
 _TERRAIN_BIT: Final = dialect.MAV_SYS_STATUS_TERRAIN
 TERRAIN_PARAMETERS: Final = ("TERRAIN_FOLLOW", "RTL_ALT_TYPE")
-"""ArduPilot flies by terrain data where one of them is not 0."""
+"""ArduPilot flies by terrain data if one of them is not 0."""
 _REASONS: Final = ("PreArm", "Arm:", "Arming denied", "Preflight Fail", "Preflight:")
 _UNKNOWN_EPH: Final = 65535
 _SATELLITES: Final = 6
@@ -35,7 +35,7 @@ _BATTERY_LOW, _BATTERY_HALF = 20, 50
 
 
 def health_findings(snapshot: Snapshot) -> list[Finding]:
-    """All of them, in the order in which a person looks."""
+    """All health findings, in the order of a manual inspection."""
     return [
         *sensors(snapshot),
         arming(snapshot),
@@ -48,7 +48,7 @@ def health_findings(snapshot: Snapshot) -> list[Finding]:
 
 
 def sensors(snapshot: Snapshot) -> list[Finding]:
-    """SYS_STATUS: what is fitted and enabled, and not healthy."""
+    """Finding about SYS_STATUS: sensors that are present and enabled, but not healthy."""
     enabled = snapshot.whole("SYS_STATUS", "onboard_control_sensors_enabled")
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health")
     present = snapshot.whole("SYS_STATUS", "onboard_control_sensors_present")
@@ -62,7 +62,7 @@ def sensors(snapshot: Snapshot) -> list[Finding]:
         ]
     sick = enabled & present & ~health & ~_SAID_ELSEWHERE
     if not any(snapshot.parameters.get(name) for name in TERRAIN_PARAMETERS):
-        sick &= ~_TERRAIN_BIT  # it has no data here, and no use for them
+        sick &= ~_TERRAIN_BIT  # there is no terrain data here, and no use for it
     missing = _NEEDED & ~present & ~dialect.MAV_SYS_STATUS_AHRS
     findings = []
     if missing:
@@ -85,25 +85,25 @@ def _bit_names(bits: int) -> str:
     for bit in range(32):
         if bits & 1 << bit:
             name = enum_name("MAV_SYS_STATUS_SENSOR", 1 << bit) or f"bit {bit}"
-            name = name.removeprefix("MAV_SYS_STATUS_")  # as some of them begin
+            name = name.removeprefix("MAV_SYS_STATUS_")  # some names have this prefix
             names.append(name.lower().replace("_", " "))
     return ", ".join(names)
 
 
 def reasons_against_arming(texts: tuple[str, ...]) -> list[str]:
-    """The texts in which autopilots say why they don't arm, each once."""
+    """The texts in which autopilots report why they refuse to arm, without repetitions."""
     return list(dict.fromkeys(t.strip() for t in texts if t.startswith(_REASONS)))
 
 
 def not_ready_because(texts: tuple[str, ...], sensors_unhealthy: int) -> str:
-    """Why the pre-arm checks are not passed: the autopilot's texts, else the sensors that are not healthy.
+    """Why the pre-arm checks fail: the autopilot's texts or, without any, the sensors that are not healthy.
 
     Args:
-        texts: what the autopilot said when it was asked.
-        sensors_unhealthy: bits of SYS_STATUS: enabled, and not healthy.
+        texts: texts that the autopilot sent after a request.
+        sensors_unhealthy: SYS_STATUS bits of the sensors that are enabled and not healthy.
 
     Returns:
-        Words; "" where nothing is known.
+        The reasons as text; "" when none is known.
     """
     reasons = reasons_against_arming(texts)
     if reasons:
@@ -113,7 +113,7 @@ def not_ready_because(texts: tuple[str, ...], sensors_unhealthy: int) -> str:
 
 
 def arming(snapshot: Snapshot) -> Finding:
-    """Whether it could be armed, and what it said if not."""
+    """Whether it could be armed, and the reported reasons if not."""
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health")
     base_mode = snapshot.whole("HEARTBEAT", "base_mode") or 0
     if base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
@@ -128,7 +128,7 @@ def arming(snapshot: Snapshot) -> Finding:
 
 
 def gps(snapshot: Snapshot) -> Finding:
-    """Fix, satellites and dilution."""
+    """Finding about fix, satellites and dilution."""
     fix = snapshot.whole("GPS_RAW_INT", "fix_type")
     if fix is None:
         return warning("GPS", "no receiver was reported", "a flight to places needs one")
@@ -147,7 +147,7 @@ def gps(snapshot: Snapshot) -> Finding:
 
 
 def navigation(snapshot: Snapshot) -> Finding:
-    """The filter's flags and how well its measurements fit."""
+    """Finding about the filter's flags and the test ratios of its measurements."""
     if "EKF_STATUS_REPORT" in snapshot.messages:
         return _ekf_status_report(snapshot)
     flags = snapshot.whole("ESTIMATOR_STATUS", "flags")
@@ -186,7 +186,7 @@ def _fit(values: dict[str, float], what: str, warn: float, bad: float) -> Findin
 
 
 def home(snapshot: Snapshot) -> Finding:
-    """Home is set, and where the vehicle is."""
+    """Finding about the home position and the vehicle's place."""
     lat = snapshot.number("HOME_POSITION", "latitude")
     lon = snapshot.number("HOME_POSITION", "longitude")
     alt = snapshot.number("HOME_POSITION", "altitude")
@@ -209,7 +209,7 @@ def home(snapshot: Snapshot) -> Finding:
 
 
 def battery(snapshot: Snapshot) -> Finding:
-    """Voltage and charge."""
+    """Finding about voltage and charge."""
     voltage_mv = snapshot.whole("SYS_STATUS", "voltage_battery")
     remaining = snapshot.whole("SYS_STATUS", "battery_remaining")
     if voltage_mv in (None, 0, 0xFFFF) and remaining in (None, -1):
@@ -231,7 +231,7 @@ def battery(snapshot: Snapshot) -> Finding:
 
 
 def remote_control(snapshot: Snapshot) -> Finding:
-    """Whether a pilot could take over."""
+    """Finding on whether a pilot could take over."""
     present = snapshot.whole("SYS_STATUS", "onboard_control_sensors_present") or 0
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
     channels = snapshot.whole("RC_CHANNELS", "chancount") or 0

@@ -1,4 +1,4 @@
-"""What an autopilot does when it hears its ground station no more, by its parameters."""
+"""The autopilot's reaction to the loss of its ground station, from its parameters."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -47,11 +47,13 @@ PARAMETERS: Final[Mapping[tuple[str, VehicleKind], tuple[str, ...]]] = MappingPr
         ),
     }
 )  # fmt: skip
-"""Those that say it."""
+"""The parameters that define it."""
 
 
 def lost_link_words(flavour: str, kind: VehicleKind, parameters: Mapping[str, float]) -> list[str]:
-    """What happens in an uploaded mission, and to streamed setpoints; with the parameters that say so."""
+    """The reaction during an uploaded mission and to streamed setpoints, as text with the parameters that
+    define it.
+    """
     if flavour == "px4":
         return _px4(parameters)
     return _plane(parameters) if kind is VehicleKind.FIXED_WING else _copter(parameters)

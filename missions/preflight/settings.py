@@ -1,4 +1,4 @@
-"""Checks of a vehicle's parameters: what a careful person would not leave so, by flavour."""
+"""Checks of a vehicle's parameters for unsafe values, by flavour."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -13,15 +13,15 @@ from missions.preflight.snapshot import Snapshot
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
-    """One parameter that says something about safety.
+    """One parameter that is relevant to safety.
 
     Attributes:
-        name: of the parameter.
-        bad: whether its value is worth a word.
-        text: the word.
+        name: name of the parameter.
+        bad: whether its value is to be reported.
+        text: text of the finding.
         advice: what to do.
-        level: how bad it is.
-        kind: of the vehicles it is about; None: all.
+        level: severity.
+        kind: kind of vehicles that it applies to; None: all.
     """
 
     name: str
@@ -73,7 +73,7 @@ RULES: Final[Mapping[str, tuple[Rule, ...]]] = MappingProxyType(
         ),
     }
 )  # fmt: skip
-"""By flavour."""
+"""Rules by flavour."""
 
 FENCE_PARAMETERS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
     {
@@ -81,14 +81,14 @@ FENCE_PARAMETERS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "ardupilot": ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_RADIUS", "FENCE_ALT_MAX", "FENCE_OPTIONS"),
     }
 )
-"""Those that say what it is."""
+"""The parameters that define the geofence."""
 
 _FENCE_ALTITUDE, _FENCE_CIRCLE, _FENCE_POLYGONS = 1, 2, 4
-_FENCE_UNION: Final = 2  # of FENCE_OPTIONS
+_FENCE_UNION: Final = 2  # bit of FENCE_OPTIONS
 
 
 def settings_findings(snapshot: Snapshot) -> list[Finding]:
-    """What the parameters are worth a word for; one line when nothing is."""
+    """Findings about parameters with unsafe or unusual values; one line when there are none."""
     parameters = snapshot.parameters
     if not parameters:
         return []
@@ -115,10 +115,10 @@ def settings_findings(snapshot: Snapshot) -> list[Finding]:
 
 
 def fence(snapshot: Snapshot, planned: int = 0) -> Finding:
-    """Whether a geofence keeps the vehicle in.
+    """Finding on whether a geofence limits the flight.
 
     Args:
-        planned: points of the fence that the mission brings; it takes the place of the vehicle's own.
+        planned: number of points of the mission's fence, which replaces the vehicle's own.
     """
     parameters = snapshot.parameters
     items = planned or snapshot.fence_items or 0
@@ -152,19 +152,23 @@ def fence(snapshot: Snapshot, planned: int = 0) -> Finding:
 
 
 def areas_watched(flavour: str, parameters: Mapping[str, float]) -> bool:
-    """Whether the autopilot keeps to the areas of its fence: PX4 always, ArduPilot when it is told to."""
+    """Whether the autopilot enforces the areas of its fence: PX4 always, ArduPilot when a parameter enables
+    it.
+    """
     if flavour == "px4":
         return True
     return bool(parameters.get("FENCE_ENABLE")) and bool(_bits(parameters, "FENCE_TYPE") & _FENCE_POLYGONS)
 
 
 def shapes_join(flavour: str, parameters: Mapping[str, float]) -> bool:
-    """Whether of several areas to stay in one is enough: PX4 always, ArduPilot when it is told so."""
+    """Whether being inside one of several inclusion areas is enough: PX4 always, ArduPilot when a parameter
+    enables it.
+    """
     return flavour == "px4" or bool(_bits(parameters, "FENCE_OPTIONS") & _FENCE_UNION)
 
 
 def _bits(parameters: Mapping[str, float], name: str) -> int:
-    """A parameter of flags; none when it is not told, or no number."""
+    """The value of a parameter of flags; 0 when it is not known or not a number."""
     value = parameters.get(name, 0.0)
     return int(value) if math.isfinite(value) else 0
 

@@ -1,4 +1,4 @@
-"""What a vehicle has told, for checks that don't care how it was heard."""
+"""The data that a vehicle has reported, for checks that do not depend on how they were received."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,21 +9,21 @@ from typing import Any, Final
 from missions.kind import VehicleKind
 
 Fields = Mapping[str, Any]
-"""A message's fields by name, in wire units. What is not a number is None or NaN."""
+"""A message's fields by name, in wire units. Values that are not numbers are None or NaN."""
 
 FILTER_STATUS: Final[Mapping[str, str]] = MappingProxyType(
     {"px4": "ESTIMATOR_STATUS", "ardupilot": "EKF_STATUS_REPORT"}
 )
-"""By flavour: the message by which the navigation filter tells how it is; see `usual`."""
+"""By flavour: the message in which the navigation filter reports its state; see `usual`."""
 
 
 def usual(messages: Sequence[Fields]) -> Fields:
-    """The newest of some messages of a filter, with the median of how well measurements fit.
+    """The newest of several messages of a filter, with the median of the test ratios of its measurements.
 
-    One measurement's ratio is mostly its noise (ArduPilot's `ekf_check` and PX4 smooth them as well).
+    The ratio of a single measurement is mostly noise (ArduPilot's `ekf_check` and PX4 smooth them as well).
 
     Args:
-        messages: of one name, oldest first; at least one.
+        messages: messages of one name, oldest first; at least one.
     """
     newest = messages[-1]
     smoothed = {
@@ -36,15 +36,15 @@ def usual(messages: Sequence[Fields]) -> Fields:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Snapshot:
-    """The newest of everything.
+    """The newest data of a vehicle.
 
     Attributes:
         flavour: "px4" or "ardupilot"; "" for another autopilot.
-        kind: class of vehicle; None: one that isn't flown here.
-        messages: newest of each name, from the autopilot.
-        texts: what it said, oldest first.
-        parameters: those that are known.
-        fence_items: of the vehicle's geofence; None: not known.
+        kind: class of vehicle; None: one that this program does not fly.
+        messages: the autopilot's newest message of each name.
+        texts: its status texts, oldest first.
+        parameters: the known parameters.
+        fence_items: items of the vehicle's geofence; None: not known.
     """
 
     flavour: str
@@ -55,11 +55,11 @@ class Snapshot:
     fence_items: int | None = None
 
     def number(self, message: str, name: str) -> float | None:
-        """A field of a message, when both are there."""
+        """A field of a message; None when the message or the value is missing."""
         value = self.messages.get(message, {}).get(name)
         return value if isinstance(value, int | float) and value == value else None
 
     def whole(self, message: str, name: str) -> int | None:
-        """The same of a whole number."""
+        """An integer field of a message; None when the message or the value is missing."""
         value = self.number(message, name)
         return None if value is None else int(value)

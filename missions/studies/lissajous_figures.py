@@ -1,4 +1,4 @@
-"""The paper's figures 6 and 7: the drones' paths, and the target as each estimator has it, in one run."""
+"""The paper's figures 6 and 7: the drones' paths, and each estimator's target position, in one run."""
 
 from pathlib import Path
 from typing import Any, Final
@@ -29,11 +29,11 @@ _NAMES: Final = {
 }
 _UNIT: Final = "(no unit, as in the paper)"
 _ZOOM: Final = 12.0
-"""Half the side of the window that figure 7 looks into."""
+"""Half the side of the window in figure 7."""
 
 
 def draw_paths(path: Path, run: SampleRun) -> None:
-    """Figure 6: both drones' paths, the target's, and where the estimators have the first drone."""
+    """Figure 6: the paths of both drones and the target, and the estimates of the first drone's position."""
     figure = _figure("The paper's figure 6: drone paths", (10.5, 7.6))
     axes = figure.add_subplot()
     for drone in range(run.drones.shape[1]):
@@ -58,7 +58,7 @@ def draw_paths(path: Path, run: SampleRun) -> None:
 
 
 def draw_target(path: Path, run: SampleRun) -> None:
-    """Figure 7: the target by each estimator, a part of that from near, and how far off each is."""
+    """Figure 7: each estimator's target position, an enlarged part of it, and the error of each."""
     figure = _figure("The paper's figure 7: the target by each estimator", (11.5, 8.6))
     grid = figure.add_gridspec(2, 2, height_ratios=(3.0, 1.3))
     place, near = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])

@@ -1,7 +1,7 @@
 """The Monte Carlo study `lissajous-localization`: two drones on Lissajous paths localise a target (Table IV).
 
-Every run has a random stream of its own, named by seed, cell and run, so neither the number of workers nor
-that of the runs changes any of them; all estimators of a run see the same flight.
+Every run has its own random stream, named by seed, cell and run, so its result does not depend on the number
+of workers or runs. All estimators of a run process the same flight.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,13 +34,13 @@ _TARGET: Final = setting.target_places()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyRequest:
-    """What is asked for.
+    """The request of a study.
 
     Attributes:
-        runs: per cell.
-        seed: one seed gives one table.
-        workers: processes; 1 works in this one.
-        equations: readings to work through.
+        runs: number of runs per cell.
+        seed: the same seed gives the same table.
+        workers: number of processes; 1: this process.
+        equations: readings of the equations to compute.
     """
 
     runs: int = 1000
@@ -64,11 +64,11 @@ class StudyResult:
     """Errors of all runs.
 
     Attributes:
-        request: as given.
+        request: the request of the study.
         complete: whether all runs were done.
-        failure: why not, where nobody interrupted it; "".
-        errors: by equations: (cells, runs, estimators), in the order of `CELLS` and of the block's columns;
-            NaN: not done.
+        failure: reason why runs are missing; "" if none are missing or the user interrupted the study.
+        errors: errors by equations: (cells, runs, estimators), in the order of `CELLS` and of the block's
+            columns; NaN: the run was not done.
     """
 
     request: StudyRequest
@@ -87,18 +87,19 @@ class _Task:
 
 
 def run_study(request: StudyRequest, on_progress: Callable[[float], None] | None = None) -> StudyResult:
-    """Work through all cells.
+    """Compute all cells.
 
     Args:
-        request: what is asked for.
-        on_progress: called with the share that is done.
+        request: request of the study.
+        on_progress: called with the finished share.
 
-    An interruption (Ctrl-C) or a worker that was killed gives what is there, marked incomplete.
+    After an interruption (Ctrl-C) or a killed worker the finished runs are returned, marked incomplete.
     """
     chunks = [(first, min(first + _CHUNK, request.runs)) for first in range(0, request.runs, _CHUNK)]
     tasks = [
         _Task(cell, first, last, request.seed, request.equations)
-        for first, last in chunks  # all cells side by side: what is there after an interruption is of use
+        # all cells in parallel, so that the results are useful after an interruption
+        for first, last in chunks
         for cell in range(len(CELLS))
     ]
     errors = {
@@ -123,21 +124,21 @@ def run_study(request: StudyRequest, on_progress: Callable[[float], None] | None
 
 
 def compile_study() -> None:
-    """Compile the kernels, or load them, so that workers find them ready."""
+    """Compile or load the kernels, so that they are ready for the workers."""
     simulate(block_of(Equations.CORRECTED), 0, 0, 0, steps=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampleRun:
-    """One run with all that figures 6 and 7 show.
+    """One run with the data of figures 6 and 7.
 
     Attributes:
-        block: estimators of the run.
-        target: (steps, 2).
+        block: the estimators of the run.
+        target: (steps, 2), true positions.
         drones: (steps, drones, 4), true states.
-        first_drone: (steps, estimators, 2), where each believes the first drone to be.
-        estimates: (steps, estimators, 2), where each believes the target to be.
-        errors: (estimators,).
+        first_drone: (steps, estimators, 2), estimated positions of the first drone.
+        estimates: (steps, estimators, 2), estimated positions of the target.
+        errors: (estimators,) error of each.
     """
 
     block: Block
@@ -203,7 +204,7 @@ def simulate(
 
 
 def _work(task: _Task) -> Sequence[Array]:
-    """Errors (runs, estimators) of some runs of a cell, for each of the equations."""
+    """Errors (runs, estimators) of some runs of a cell, for each of the readings of the equations."""
     blocks = [block_of(equations) for equations in task.equations]
     found: dict[tuple[Discretisation, Column], list[float]] = {}
     for truth in dict.fromkeys(block.truth for block in blocks):

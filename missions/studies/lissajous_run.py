@@ -1,7 +1,7 @@
-"""One run of the localisation study, compiled: two drones on Lissajous paths look at a moving target.
+"""One run of the localisation study, compiled: two drones on Lissajous paths observe a moving target.
 
 The filter and the fusion are those of the live estimators (`estimators.lissajous.model`,
-`estimators.target_fusion.transform`); here stand the truth, the measurements and the score.
+`estimators.target_fusion.transform`); this module contains the truth, the measurements and the score.
 """
 
 import math
@@ -69,23 +69,23 @@ def run_once(
     errors: Array,
     trace: Array,
 ) -> None:
-    """Simulate and estimate; the error of each estimator is the mean over time of sqrt((ex^2 + ey^2) / 2).
+    """Simulate and estimate. The error of each estimator is the mean over time of sqrt((ex^2 + ey^2) / 2).
 
     Args:
         dt_s: step.
         truth_form: `Discretisation` of the truth.
-        truth_omega, nominal_omega: (drones, 2), true frequencies and those the filters believe in.
-        truth_start, start: (drones, 4), true and believed state at time zero.
+        truth_omega, nominal_omega: (drones, 2), true frequencies, and those that the filters assume.
+        truth_start, start: (drones, 4), true and assumed state at time zero.
         start_covariance, process, sensor: (drones, 4, 4); `_root`: their lower Cholesky factors.
-        frequency_variance: (drones, 2) that filters believe in.
-        sight: (drones, 2, 2) of the target in the drone's frame.
-        target: (steps, 2), its places.
+        frequency_variance: (drones, 2), assumed by the filters.
+        sight: (drones, 2, 2) covariance of the target's position in the drone's frame.
+        target: (steps, 2), its positions.
         kinds, forms, with_frequency: (estimators,): kind, `Discretisation`, factor on the frequency
             variance (0: plain Kalman).
         normals: (steps, drones, NORMALS), standard.
-        errors: (estimators,), written.
-        trace: (steps, drones + estimators, 4) or of no steps: true drone states, then drone 0's estimate of
-            its own place and the target's place by each estimator.
+        errors: (estimators,), overwritten.
+        trace: (steps, drones + estimators, 4) or with zero steps: true drone states, then drone 0's estimate
+            of its own place and the target's place by each estimator.
     """
     steps, drones, count = normals.shape[0], truth_start.shape[0], kinds.shape[0]
     traced = trace.shape[0] == steps

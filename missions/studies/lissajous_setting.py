@@ -1,9 +1,9 @@
 """The setting of the localisation study, from Steckenrider, Leamy and Furukawa 2020.
 
-What they give in Tables II, III and V, what they found (Table IV), and what is chosen here because the text
-leaves it open.
+It contains the values of their Tables II, III and V, their results (Table IV), and values that are chosen
+here because the text does not specify them.
 
-All is unitless, as in the paper. The state is (x, x', y, y').
+All values are unitless, as in the paper. The state is (x, x', y, y').
 """
 
 import math
@@ -72,18 +72,18 @@ SIGHT: Final[Array] = 0.1 * np.array([[[0.28, 0.12], [0.12, 0.31]], [[0.33, -0.1
 TARGET_CENTRE: Final = (50.0, 50.0)
 TARGET_RADIUS: Final = 100.0
 TARGET_PERIOD: Final = 20.0
-"""The paper says a circle and no more. What shows in Table IV is its mean distance, some 135."""
+"""The paper specifies only a circle. Table IV depends on its mean distance, about 135."""
 
 
 class Equations(StrEnum):
-    """Which reading of the paper's equations."""
+    """Readings of the paper's equations."""
 
     CORRECTED = "corrected"
-    """17 with (w dt)^2 / 2, 25a with -dt^2, 28 and 29 as they must be."""
+    """17 with (w dt)^2 / 2, 25a with -dt^2, 28 and 29 in their correct form."""
     SIGN_AS_PRINTED = "sign as printed"
-    """As corrected, but for the sign in 25a: the reading that gives the paper's Table IV."""
+    """As corrected, except for the sign in 25a: the reading that gives the paper's Table IV."""
     AS_PRINTED = "as printed"
-    """17 and 25a as printed, 17 in the truth as well. 28 and 29 are corrected all the same."""
+    """17 and 25a as printed, also 17 in the truth. 28 and 29 are still corrected."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,9 +92,9 @@ class Column:
 
     Attributes:
         name: N, K, P as in the paper, and F for the frequencies as states.
-        kind: of `lissajous_run`.
-        form: how the filter's matrix is made.
-        with_frequency: whether it knows that the frequencies are uncertain.
+        kind: kind in `lissajous_run`.
+        form: computation of the filter's matrix.
+        with_frequency: whether it takes the uncertainty of the frequencies into account.
     """
 
     name: str
@@ -105,11 +105,11 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """Estimators that see the same flights.
+    """Estimators that process the same flights.
 
     Attributes:
-        equations: what the block's P stands for.
-        truth: how the drones themselves move.
+        equations: reading of the equations in the block's P.
+        truth: computation of the drones' true motion.
         columns: the estimators.
     """
 
@@ -119,7 +119,7 @@ class Block:
 
 
 def block_of(equations: Equations) -> Block:
-    """The estimators of one reading."""
+    """The estimators of one reading of the equations."""
     form = {
         Equations.CORRECTED: Discretisation.SERIES,
         Equations.SIGN_AS_PRINTED: Discretisation.PRINTED_SIGN,
@@ -138,7 +138,7 @@ def block_of(equations: Equations) -> Block:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperCell:
-    """A cell of Table IV: median errors, and shares of runs won in per cent."""
+    """A cell of Table IV: median errors, and the per cent of runs that each estimator won."""
 
     n_rmse: float
     k_rmse: float
@@ -188,7 +188,7 @@ def nominal_omega(delta: float) -> Array:
 
 
 def frequency_variance(epsilon: float, delta: float) -> Array:
-    """Variances (drones, 2). Their row of Table II is lost in the text; epsilon times the frequency is the
+    """Variances (drones, 2). Their row of Table II is missing in the text; epsilon times the frequency is the
     reading that gives Table IV.
     """
     variance: Array = epsilon * nominal_omega(delta)
@@ -196,7 +196,7 @@ def frequency_variance(epsilon: float, delta: float) -> Array:
 
 
 def target_places() -> Array:
-    """The target (STEPS, 2)."""
+    """The target's positions (STEPS, 2)."""
     angle = math.tau / TARGET_PERIOD * DT * np.arange(1, STEPS + 1)
     x, y = TARGET_CENTRE
     return np.stack((x + TARGET_RADIUS * np.cos(angle), y + TARGET_RADIUS * np.sin(angle)), axis=1)

@@ -1,6 +1,6 @@
-"""The study's figures: medians, wins, the table, and what `summary.json` holds.
+"""The study's figures: medians, wins, the table, and the contents of `summary.json`.
 
-"The paper" is Steckenrider et al. 2020; its Table IV stands beside ours.
+"The paper" is Steckenrider et al. 2020; its Table IV stands next to ours.
 """
 
 import math
@@ -26,10 +26,10 @@ _TITLES: Final = {
 
 def cells_of(result: StudyResult) -> list[dict[str, float]]:
     """One entry for each cell: `n_rmse`, `k_rmse`, `p_rmse` (medians over the runs), `wins` (per cent of runs
-    in which P was best), the paper's beside them, and standard errors.
+    in which P was best), the paper's values, and standard errors.
 
-    Keys without a prefix are of the corrected equations, or where these were not asked for, of the first
-    that were. `f_rmse` is the filter that has the frequencies as states.
+    Keys without a prefix belong to the corrected equations or, if these were not requested, to the first
+    requested ones. `f_rmse` belongs to the filter with the frequencies as states.
     """
     first = result.request.equations[0]
     plain = Equations.CORRECTED if Equations.CORRECTED in result.errors else first
@@ -63,7 +63,7 @@ def _figures(errors: Array, names: Sequence[str]) -> dict[str, float]:
         key = name.lower()
         figures[f"{key}_rmse"] = round(float(np.median(errors[:, column])), 5)
         figures[f"{key}_error"] = round(_median_error(errors[:, column]), 5)
-    three = errors[:, :3]  # the paper's contest is between N, K and P; who ties wins as well
+    three = errors[:, :3]  # the paper compares N, K and P; a tie counts as a win
     best = three.min(axis=1, keepdims=True)
     shares = 100.0 * np.mean(three <= best * (1.0 + 1e-9), axis=0)
     figures |= {
@@ -76,14 +76,14 @@ def _figures(errors: Array, names: Sequence[str]) -> dict[str, float]:
 
 
 def _median_error(values: Array) -> float:
-    """Standard error of a median, from the order statistics a standard deviation away on either side."""
+    """Standard error of a median, from the order statistics one standard deviation away on either side."""
     half = 0.5 / math.sqrt(len(values))
     low, high = np.quantile(values, (max(0.0, 0.5 - half), min(1.0, 0.5 + half)))
     return 0.5 * float(high - low)
 
 
 def summary_of(result: StudyResult, wall_time_s: float) -> dict[str, Any]:
-    """What `summary.json` holds beside versions and command."""
+    """Contents of `summary.json` besides versions and command."""
     request = result.request
     return {
         "study": "lissajous-localization",
@@ -100,7 +100,7 @@ def summary_of(result: StudyResult, wall_time_s: float) -> dict[str, Any]:
 
 
 def table_of(cells: Sequence[Mapping[str, float]], equations: Sequence[Equations]) -> list[str]:
-    """Lines of the table: ours beside the paper's."""
+    """Lines of the table: our values next to the paper's."""
     plain = Equations.CORRECTED if Equations.CORRECTED in equations else equations[0]
     others = [e for e in equations if e is not plain]
     head = f"{'':13}{'paper':^31}  {_TITLES[plain]:^40}"

@@ -1,4 +1,4 @@
-"""Work shared among processes, in any number, with the same results."""
+"""Distributes work among any number of processes, with the same results."""
 
 import multiprocessing
 import os
@@ -16,22 +16,22 @@ Result = TypeVar("Result")
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Number of processors that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
+    except AttributeError:  # not available on every system
         return os.cpu_count() or 1
 
 
 def work_through(
     work: Callable[[Task], Result], tasks: Sequence[Task], workers: int
 ) -> Iterator[tuple[Task, Result]]:
-    """Do all tasks; gives each with its result as it is done, in any order.
+    """Do all tasks; yields each task with its result when it is finished, in any order.
 
     Args:
         work: a function of a module, so that other processes can import it.
-        tasks: what to call it with.
-        workers: processes; 1: this one.
+        tasks: its arguments.
+        workers: number of processes; 1: this process.
 
     Raises:
         BrokenProcessPool: a worker was killed.
@@ -42,7 +42,7 @@ def work_through(
         return
     pool = ProcessPoolExecutor(
         min(workers, len(tasks)),
-        # a fresh interpreter each: a fork would copy threads' locks in whatever state they are
+        # each worker has a new interpreter: a fork would copy the locks of other threads in any state
         mp_context=multiprocessing.get_context("spawn"),
         initializer=_prepare_worker,
     )
@@ -55,7 +55,7 @@ def work_through(
 
 
 def _prepare_worker() -> None:
-    """Ctrl-C is the parent's to handle; a parent that was killed leaves no worker behind."""
+    """Ignore Ctrl-C, which the parent handles, and end the worker when the parent is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None
@@ -64,4 +64,5 @@ def _prepare_worker() -> None:
 
 def _end_with(sentinel: int) -> None:
     wait([sentinel])
-    os._exit(1)  # the pool's queues would wait for ever: workers hold their other end, too
+    # a normal exit would wait forever for the pool's queues, because workers hold their other end, too
+    os._exit(1)

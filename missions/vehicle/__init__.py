@@ -1,6 +1,4 @@
-"""What a mission may ask of a vehicle: one shape for PX4 and ArduPilot, over MAVLink only, on vehicle
-time.
-"""
+"""The interface of missions to a vehicle: the same for PX4 and ArduPilot, over MAVLink, on vehicle time."""
 
 from missions.kind import VehicleKind
 from missions.vehicle.adapter import Mode

@@ -1,4 +1,4 @@
-"""What differs between PX4 and ArduPilot, seen from a mission."""
+"""The differences between PX4 and ArduPilot for a mission."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 PREARM: Final = "pre-arm checks"
-"""What `Adapter.readiness` calls the autopilot's own checks."""
+"""Name of the autopilot's own checks in the result of `Adapter.readiness`."""
 
 
 class Mode(StrEnum):
-    """Flight modes a mission asks for, by what the vehicle does in them."""
+    """Flight modes that a mission commands, named by the vehicle's behaviour."""
 
     HOLD = "hold"
     TAKEOFF = "takeoff"
@@ -40,21 +40,22 @@ class ModeCommand:
 
 
 class Adapter(Protocol):
-    """One autopilot firmware's ways. Stateless: the state is the vehicle's.
+    """The behaviour of one autopilot firmware. Stateless: the state is in the vehicle object.
 
     Attributes:
         name: "px4" or "ardupilot".
         kind: class of vehicle.
         modes: HEARTBEAT.custom_mode of each mode.
-        stream_rates_hz: telemetry a mission needs.
-        bytewise_parameters: integers travel as bit patterns in PARAM_VALUE (PX4), not as numbers.
-        setpoints_before_guided: setpoints must flow before the guided mode can be entered.
-        first_mission_item_is_home: item 0 of a mission is home, whatever is uploaded there.
-        goto_mode: the mode DO_REPOSITION puts the vehicle into.
+        stream_rates_hz: rates of the telemetry that a mission needs.
+        bytewise_parameters: whether integers are sent as bit patterns in PARAM_VALUE (PX4), not as numbers.
+        setpoints_before_guided: whether setpoints must be streamed before the guided mode can be entered.
+        first_mission_item_is_home: whether item 0 of a mission is always home, regardless of the uploaded
+            item.
+        goto_mode: the mode after DO_REPOSITION.
         resting_mode: a mode in which the vehicle may stand on the ground and be armed.
-        unset: what stands in a command or item parameter that is not set.
-        roll_alone: in the guided mode a roll command may leave pitch and throttle to the autopilot.
-        limiting_parameters: the parameters `limits` reads.
+        unset: value of a command or item parameter that is not set.
+        roll_alone: whether a roll command in the guided mode may leave pitch and throttle to the autopilot.
+        limiting_parameters: the parameters that `limits` reads.
     """
 
     name: str
@@ -75,15 +76,15 @@ class Adapter(Protocol):
         ...
 
     def mode_command(self, mode: Mode) -> ModeCommand:
-        """How DO_SET_MODE asks for a mode."""
+        """The parameters of DO_SET_MODE for a mode."""
         ...
 
     def readiness(self, vehicle: "Vehicle") -> list[str]:
-        """What is still missing before the vehicle can be armed; empty when ready."""
+        """Names of what is still missing before the vehicle can be armed; empty when it is ready."""
         ...
 
     async def prepare_arming(self, vehicle: "Vehicle") -> None:
-        """Go to a mode in which arming is allowed."""
+        """Switch to a mode in which arming is allowed."""
         ...
 
     async def take_off(self, vehicle: "Vehicle", altitude_m: float) -> None:
@@ -91,18 +92,18 @@ class Adapter(Protocol):
         ...
 
     async def start_streams(self, vehicle: "Vehicle") -> None:
-        """Ask for the telemetry a mission needs, where the firmware doesn't send it by itself."""
+        """Request the telemetry that a mission needs, if the firmware doesn't send it by default."""
         ...
 
     async def start_mission(self, vehicle: "Vehicle") -> None:
-        """Fly the uploaded mission, from the ground or in the air."""
+        """Start the uploaded mission, on the ground or in the air."""
         ...
 
     def limits(self, parameters: Mapping[str, float]) -> "Limits":
-        """What the vehicle's parameters allow a planner.
+        """The limits for a planner, from the vehicle's parameters.
 
         Args:
-            parameters: those named in `limiting_parameters`; what is missing has the firmware's default.
+            parameters: those named in `limiting_parameters`; a missing one has the firmware's default.
         """
         ...
 
@@ -111,7 +112,7 @@ class Adapter(Protocol):
         ...
 
     async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
-        """The same of a waypoint that asks for none."""
+        """The acceptance radius of a waypoint that specifies none."""
         ...
 
     async def loiter(
@@ -121,20 +122,22 @@ class Adapter(Protocol):
         ...
 
     async def change_altitude(self, vehicle: "Vehicle", altitude_m: float) -> None:
-        """Command a height above home, the rest of the flight as it is."""
+        """Command a height above home; the rest of the flight does not change."""
         ...
 
     async def change_airspeed(self, vehicle: "Vehicle", airspeed_m_s: float) -> None:
-        """Command an airspeed, the rest of the flight as it is."""
+        """Command an airspeed; the rest of the flight does not change."""
         ...
 
     def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
-        """The mission item that begins a mission on the ground."""
+        """The first item of a mission that begins on the ground."""
         ...
 
 
 def missing_basics(vehicle: "Vehicle") -> list[str]:
-    """What every firmware must have said before the vehicle can be armed, and has not."""
+    """The messages that every firmware must have sent before the vehicle can be armed, and that were not
+    received.
+    """
     missing = []
     status = vehicle.message("SYS_STATUS")
     if status is None or not status.onboard_control_sensors_health & dialect.MAV_SYS_STATUS_PREARM_CHECK:

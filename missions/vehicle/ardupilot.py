@@ -1,4 +1,4 @@
-"""ArduPilot's copter as a mission meets it (4.6 behaviour)."""
+"""The interface of missions to ArduPilot's copter (4.6 behaviour)."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -50,11 +50,13 @@ _EKF_CONST_POS: Final = 0x80
 
 
 class ArduCopter:
-    """ArduPilot copter: sends nothing until asked, numbers home as mission item 0, speaks PARAM_FLOAT."""
+    """ArduPilot copter: it sends nothing until requested, numbers home as mission item 0, and uses
+    PARAM_FLOAT.
+    """
 
     name = "ardupilot"
     kind = VehicleKind.MULTICOPTER
-    # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would obey (throttle low:
+    # HOLD is BRAKE: it holds position without a pilot's sticks, which LOITER would follow (throttle low:
     # descend)
     modes: Mapping[Mode, int] = MappingProxyType(
         {
@@ -119,7 +121,7 @@ class ArduCopter:
 
     async def start_mission(self, vehicle: "Vehicle") -> None:
         if not vehicle.armed:
-            await vehicle.arm()  # AUTO is not an armable mode: armed in GUIDED
+            await vehicle.arm()  # AUTO is not a mode for arming: arm in GUIDED
         await vehicle.set_mode(Mode.MISSION)
         await vehicle.command(dialect.MAV_CMD_MISSION_START, 0.0, 0.0)
 

@@ -1,4 +1,4 @@
-"""ArduPilot's plane as a mission meets it (4.6 behaviour)."""
+"""The interface of missions to ArduPilot's plane (4.6 behaviour)."""
 
 import math
 from collections.abc import Mapping
@@ -38,13 +38,14 @@ _NAMES: Final[Mapping[int, str]] = MappingProxyType(
     }
 )
 _TURN_EFFECT: Final = 0.85
-"""Of the acceleration of a coordinated turn, what a bank is planned to give. Between 1, without sideslip, and
-the 0.7 of ArduPilot 4.6.3's built-in plane model, which slips in its turns."""
-_TAKEOFF_PITCH_DEG: Final = 12.0  # lowest pitch of a mission's takeoff
+"""Share of a coordinated turn's acceleration that a planned bank is assumed to give. It is between 1, without
+sideslip, and the 0.7 of ArduPilot 4.6.3's built-in plane model, which slips in its turns.
+"""
+_TAKEOFF_PITCH_DEG: Final = 12.0  # lowest pitch in a mission's takeoff
 
 
 class ArduPlane(ArduCopter):
-    """ArduPilot with wings: takes off in TAKEOFF, lands in AUTO only, and may keep pitch and throttle."""
+    """ArduPilot plane: takes off in TAKEOFF, lands only in AUTO, may control pitch and throttle itself."""
 
     kind = VehicleKind.FIXED_WING
     # LOITER: circles where it is. It lands by a mission's landing only: LAND is the way home
@@ -91,7 +92,7 @@ class ArduPlane(ArduCopter):
     async def start_mission(self, vehicle: "Vehicle") -> None:
         await vehicle.set_mode(Mode.MISSION)
         if not vehicle.armed:
-            await vehicle.arm_here()  # the roll begins when it is armed
+            await vehicle.arm_here()  # the takeoff roll begins with arming
 
     def limits(self, parameters: Mapping[str, float]) -> Limits:
         values = {**self.limiting_parameters, **parameters}
@@ -146,7 +147,7 @@ class ArduPlane(ArduCopter):
         )
 
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
-        return min(asked_m, 255.0)  # param2 holds no more
+        return min(asked_m, 255.0)  # largest value of param2
 
     def takeoff_item(self, home: GeodeticPosition, altitude_m: float) -> MissionItem:
         return MissionItem(

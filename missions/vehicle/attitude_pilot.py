@@ -1,9 +1,8 @@
-"""An aircraft flown by bank angle from a mission; the rest is held by whoever can.
+"""Flight of an aircraft by bank angle from a mission; the autopilot or a loop of the mission holds the rest.
 
-ArduPilot's plane takes the roll alone and holds altitude and airspeed itself. PX4 takes roll, pitch and
-thrust together, so that a total-energy loop of the mission makes the last two, from pressure, airspeed and
-climb
-rate: no position is needed for either.
+ArduPilot's plane accepts a roll command alone and holds altitude and airspeed itself. PX4 needs roll, pitch
+and thrust together, so a total-energy loop of the mission computes the last two from pressure, airspeed and
+climb rate. Neither needs a position.
 """
 
 import math
@@ -30,7 +29,7 @@ _GROUND_S: Final = 10.0
 class AttitudePilot:
     """Height, airspeed and air data of one aircraft, and its attitude commands.
 
-    Made on the ground: the pressure there is where heights are counted from.
+    It is created on the ground, because heights are relative to the pressure there.
 
     Args:
         vehicle: a fixed wing.
@@ -48,7 +47,7 @@ class AttitudePilot:
 
     @classmethod
     async def on_ground(cls, vehicle: "Vehicle") -> "AttitudePilot":
-        """Ask for the streams it needs, and take the pressure on the ground.
+        """Request the needed streams, and measure the pressure on the ground.
 
         Raises:
             MissionError: the vehicle reports no pressure, or is in the air.
@@ -73,7 +72,7 @@ class AttitudePilot:
         return cls(vehicle, total / count)
 
     def close(self) -> None:
-        """Stop listening."""
+        """Stop receiving messages."""
         self._stop()
 
     def _on_pressure(self) -> None:
@@ -84,12 +83,12 @@ class AttitudePilot:
 
     @property
     def height_m(self) -> float:
-        """Pressure height over the ground it was taken on; NaN before the first sample."""
+        """Pressure height above the place of the ground pressure; NaN before the first sample."""
         return self._pressure.height_m
 
     @property
     def airspeed_true_m_s(self) -> float:
-        """True airspeed; NaN when it is not told."""
+        """True airspeed; NaN when it is not reported."""
         pressure = self._vehicle.latest(telemetry.Pressure)
         air = self._vehicle.latest(telemetry.AirData)
         if pressure is None or air is None:
@@ -98,16 +97,17 @@ class AttitudePilot:
 
     @property
     def climb_m_s(self) -> float:
-        """Climb rate by the autopilot; 0 when it is not told."""
+        """Climb rate reported by the autopilot; 0 when it is not reported."""
         air = self._vehicle.latest(telemetry.AirData)
         return 0.0 if air is None else air.climb_m_s
 
     async def prepare(self, altitude_m: float, airspeed_m_s: float | None) -> None:
-        """Read what the loop needs to know of the aircraft; say what shall be held.
+        """Read the aircraft's parameters that the loop needs, and set the altitude and the airspeed to be
+        held.
 
         Args:
-            altitude_m: above the ground it started from.
-            airspeed_m_s: equivalent; None: the autopilot's own.
+            altitude_m: height above the ground at the start.
+            airspeed_m_s: equivalent airspeed; None: the autopilot's default.
         """
         vehicle = self._vehicle
         limits = await vehicle.limits()
@@ -118,19 +118,19 @@ class AttitudePilot:
             self._energy = EnergyController(await _energy_parameters(vehicle))
 
     async def begin(self) -> None:
-        """Give altitude and airspeed to an autopilot that holds them itself. It is in its guided mode."""
+        """Send altitude and airspeed to an autopilot that holds them itself and is in its guided mode."""
         vehicle = self._vehicle
         if vehicle.adapter.roll_alone:
             await vehicle.change_altitude(self._altitude_m)
             await vehicle.change_airspeed(self._airspeed_m_s)
 
     def hold(self, *, altitude_m: float | None = None, airspeed_m_s: float | None = None) -> None:
-        """Other values for the loop of the mission (PX4)."""
+        """Change the altitude or the airspeed of the mission's loop (PX4)."""
         self._altitude_m = self._altitude_m if altitude_m is None else altitude_m
         self._airspeed_m_s = self._airspeed_m_s if airspeed_m_s is None else airspeed_m_s
 
     def setpoint(self, time_us: int, roll_rad: float) -> AttitudeSetpoint:
-        """The attitude command for a roll."""
+        """The attitude setpoint for a roll angle."""
         if self._energy is None:
             return AttitudeSetpoint(roll_rad=roll_rad)
         air = self._vehicle.latest(telemetry.AirData)
@@ -161,7 +161,7 @@ class AttitudePilot:
 
 
 async def _energy_parameters(vehicle: "Vehicle") -> EnergyParameters:
-    """From PX4's parameters of this aircraft."""
+    """Parameters of the energy loop, from PX4's parameters of this aircraft."""
     get = vehicle.parameter_or
     least, most = await get("FW_THR_MIN", 0.0), await get("FW_THR_MAX", 1.0)
     trim = min(max(await get("FW_THR_TRIM", 0.5), least + 0.02), most - 0.02)

@@ -1,4 +1,4 @@
-"""Streamed attitude commands: SET_ATTITUDE_TARGET with its type mask."""
+"""Streamed attitude setpoints: SET_ATTITUDE_TARGET with its type mask."""
 
 import math
 from dataclasses import dataclass
@@ -17,13 +17,14 @@ _IGNORE_ATTITUDE: Final = 0x80
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttitudeSetpoint:
-    """How the aircraft shall lie now, and how hard its motor works.
+    """The commanded attitude and thrust of an aircraft.
 
     Attributes:
         roll_rad: bank angle, right wing down positive.
-        pitch_rad: nose above the horizon; None: left to the autopilot's altitude control (ArduPilot's plane).
-        thrust: 0..1; None: left to the autopilot's speed control (ArduPilot).
-        yaw_rad: heading; a fixed wing turns by its bank and takes no notice of it.
+        pitch_rad: pitch angle, nose up positive; None: the autopilot's altitude control determines it
+            (ArduPilot's plane).
+        thrust: 0..1; None: the autopilot's speed control determines it (ArduPilot).
+        yaw_rad: heading; a fixed wing turns by its bank and ignores it.
     """
 
     roll_rad: float
@@ -40,10 +41,10 @@ class AttitudeSetpoint:
 
     @property
     def type_mask(self) -> int:
-        """ATTITUDE_TARGET_TYPEMASK: what to ignore.
+        """ATTITUDE_TARGET_TYPEMASK of the fields to ignore.
 
-        Roll alone travels as ArduPilot's plane takes it: attitude ignored as a whole, the bit of the roll
-        rate clear (0xC6).
+        Roll alone is sent in the form that ArduPilot's plane accepts: the attitude bit is set (ignored), and
+        the bit of the roll rate is clear (0xC6).
         """
         thrust = _IGNORE_THRUST if self.thrust is None else 0
         if self.pitch_rad is None:
@@ -51,7 +52,9 @@ class AttitudeSetpoint:
         return _IGNORE_RATES | thrust
 
     def message(self, time_us: int, system_id: int, offset_ned_m: Vector = (0.0, 0.0, 0.0)) -> Any:
-        """The message. An attitude has no place, so the offset of the local frame changes nothing."""
+        """The setpoint as a MAVLink message. An attitude has no position, so the offset of the local frame
+        has no effect.
+        """
         return dialect.MAVLink_set_attitude_target_message(
             time_us // 1000 & 0xFFFFFFFF,
             system_id,

@@ -22,9 +22,9 @@ class VehicleCommands(VehicleView):
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
         super().__init__(connection, system_id)
-        self._rates_hz: dict[str, float] = {}  # asked for by this mission
+        self._rates_hz: dict[str, float] = {}  # rates requested by this mission
 
-    _arming_us: int | None = None  # when arming was asked for, or granted
+    _arming_us: int | None = None  # time at which arming was requested or accepted
 
     # sending
 
@@ -33,7 +33,7 @@ class VehicleCommands(VehicleView):
         self.connection.send(message)
 
     def send_command(self, command: int, *params: float) -> None:
-        """Send a COMMAND_LONG once, and wait for no answer."""
+        """Send a COMMAND_LONG once, without waiting for an answer."""
         values = (*params, *(0.0,) * (7 - len(params)))
         self.send(
             dialect.MAVLink_command_long_message(self.system_id, AUTOPILOT_COMPONENT, command, 0, *values)
@@ -43,7 +43,7 @@ class VehicleCommands(VehicleView):
         self.send_command(dialect.MAV_CMD_REQUEST_MESSAGE, float(definition(name).message_id))
 
     async def request(self, name: str, timeout_s: float = 2.0) -> MAVLinkMessage:
-        """Have one message sent now (REQUEST_MESSAGE) and wait for it."""
+        """Request one message (REQUEST_MESSAGE) and wait for it."""
         with self.messages(name) as stream:
             self._request_message(name)
             try:
@@ -53,7 +53,7 @@ class VehicleCommands(VehicleView):
                 raise VehicleTimeout(f"no {name} within {timeout_s:g} s of asking; {self.heard()}") from None
 
     async def set_message_rate(self, name: str, rate_hz: float) -> None:
-        """Have a message streamed at a rate; a vehicle that refuses keeps what it had."""
+        """Request a message at a rate; a vehicle that refuses keeps its present rate."""
         self._rates_hz[name] = rate_hz
         interval_us = 1e6 / rate_hz
         await self.try_command(
@@ -61,17 +61,17 @@ class VehicleCommands(VehicleView):
         )
 
     async def command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> None:
-        """Send a COMMAND_LONG until it is answered.
+        """Send a COMMAND_LONG repeatedly until it is answered.
 
         Raises:
             CommandRejected: the answer was not ACCEPTED.
-            VehicleTimeout: no answer to any of the attempts.
+            VehicleTimeout: none of the attempts was answered.
         """
         result = await self.try_command(command, *params, timeout_s=timeout_s)
         self.require(command, result)
 
     async def try_command(self, command: int, *params: float, timeout_s: float = _ACK_S) -> int:
-        """As `command`, but gives the MAV_RESULT back."""
+        """As `command`, but returns the MAV_RESULT."""
         values = (*params, *(0.0,) * (7 - len(params)))
 
         def message(attempt: int) -> MAVLinkMessage:
@@ -88,9 +88,9 @@ class VehicleCommands(VehicleView):
 
     @property
     def may_be_armed(self) -> bool:
-        """Whether a heartbeat says armed, or none that knows has come since arming was asked for.
+        """Whether a heartbeat reports armed, or no later heartbeat has come since arming was requested.
 
-        A heartbeat within half a second may have been made before.
+        A heartbeat received within half a second of the request may have been sent before it.
         """
         if self.armed:
             return True
@@ -107,7 +107,7 @@ class VehicleCommands(VehicleView):
         y: int,
         z: float,
     ) -> None:
-        """Send a COMMAND_INT until it is answered; raises as `command`."""
+        """Send a COMMAND_INT repeatedly until it is answered; raises as `command`."""
         message = dialect.MAVLink_command_int_message(
             self.system_id, AUTOPILOT_COMPONENT, frame, command, 0, 0, *params, x, y, z
         )
@@ -148,10 +148,11 @@ class VehicleCommands(VehicleView):
     # modes and arming
 
     async def set_mode(self, mode: Mode, timeout_s: float = 8.0) -> None:
-        """Switch the flight mode, and see it in a heartbeat: PX4 acknowledges modes before it knows.
+        """Switch the flight mode and wait for it in a heartbeat, because PX4 acknowledges a mode before it
+        has switched.
 
-        A refusal is tried again until the deadline, since several pass by themselves (a mission that was
-        just uploaded, an estimator that settles).
+        After a refusal it tries again until the deadline, because some causes are temporary (a mission that
+        was just uploaded, an estimator that settles).
         """
         target = self.adapter.modes[mode]
         asked = self.adapter.mode_command(mode)

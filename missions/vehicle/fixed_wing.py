@@ -1,4 +1,4 @@
-"""What a mission may ask of an aircraft with wings beside what it asks of any vehicle."""
+"""The functions of a vehicle that only fixed wings have."""
 
 import math
 from collections.abc import AsyncIterator
@@ -31,13 +31,14 @@ _GROUND_FRAME: Final = dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Approach:
-    """How an aircraft comes down: a circle to lose height on, and a straight line from it to the ground.
+    """The landing approach of an aircraft: a circle for the descent, and a straight line from it to the
+    ground.
 
     Attributes:
-        place: where to touch the ground.
+        place: place of the touch-down.
         heading_rad: direction of the landing, clockwise from north.
-        height_m: above home, at the end of the circle.
-        circle_radius_m: of the circle, clockwise positive.
+        height_m: height above home at the end of the circle.
+        circle_radius_m: radius of the circle, clockwise positive.
     """
 
     place: GeodeticPosition
@@ -55,21 +56,21 @@ class Approach:
 
     @property
     def length_m(self) -> float:
-        """Of the straight part, over ground."""
+        """Length of the straight part, over ground."""
         return self.height_m / math.tan(_GLIDE_SLOPE_RAD)
 
     def items(self) -> list[MissionItem]:
-        """The circle, left along the line of the landing, and the landing."""
+        """The items of the circle, which is left along the line of the landing, and of the landing."""
         frame = LocalFrame(self.place)
         north, east = math.cos(self.heading_rad), math.sin(self.heading_rad)
-        # the circle touches the line where the descent begins; its centre lies abeam
+        # the circle touches the line where the descent begins; its centre is abeam of that point
         back, side = -self.length_m, self.circle_radius_m
         lat, lon, _ = frame.geodetic_from_ned(back * north - side * east, back * east + side * north, 0.0)
         return [
             MissionItem(
                 command=dialect.MAV_CMD_NAV_LOITER_TO_ALT,
                 frame=_GROUND_FRAME,
-                param1=1.0,  # leave it in the direction of the next item only
+                param1=1.0,  # leave the circle only in the direction of the next item
                 param2=self.circle_radius_m,
                 param4=1.0,  # the line to the next item begins where the circle is left
                 x=lat,
@@ -87,39 +88,41 @@ class Approach:
 
 
 class FixedWingFlight(VehicleStore):
-    """The part of a vehicle that is for wings only; a multicopter answers with a PlanError."""
+    """The part of a vehicle for fixed wings only; for a multicopter the functions raise PlanError."""
 
     runway_heading_rad: float | None = None
     """Heading on the ground before the last takeoff: along the runway."""
 
     forecast_wind_m_s: float = FORECAST_WIND_M_S
-    """Wind that turns are planned for; what the user expects of the day, not what blows."""
+    """Wind that turns are planned for: the user's forecast, not the measured wind."""
 
     pilot: "AttitudePilot | None" = None
-    """What flies it by attitude; see `prepare_piloting`."""
+    """The object that flies the aircraft by attitude; see `prepare_piloting`."""
 
     _payload: Payload | None = None
 
     @property
     def _whole(self) -> "Vehicle":
-        """This vehicle with all that it can do."""
+        """This object as a complete vehicle."""
         return cast("Vehicle", self)
 
     @property
     def payload(self) -> Payload:
-        """Camera, gimbal and survey magnetometer of this vehicle (of a multicopter too)."""
+        """Camera, gimbal and survey magnetometer of this vehicle (also of a multicopter)."""
         if self._payload is None:
             self._payload = Payload(self._whole)
         return self._payload
 
     def note_runway(self) -> None:
-        """Remember which way the aircraft stands on the ground; it will land that way, or the opposite."""
+        """Store the heading of the aircraft on the ground; it will land in that direction or the opposite
+        one.
+        """
         attitude = self.latest(telemetry.Attitude)
         if attitude is not None and not self.armed:
             self.runway_heading_rad = attitude.yaw_rad
 
     async def prepare_piloting(self) -> "AttitudePilot":
-        """On the ground: get ready to be flown by headings or rolls; heights count from here."""
+        """On the ground: prepare for flight by headings or rolls; heights are relative to this place."""
         from missions.vehicle.attitude_pilot import AttitudePilot
 
         self._require_wings("prepare_piloting")
@@ -143,13 +146,13 @@ class FixedWingFlight(VehicleStore):
         wait: bool = True,
         timeout_s: float | None = None,
     ) -> None:
-        """Go to a place and circle it.
+        """Fly to a place and circle it.
 
         Args:
-            place: centre, and altitude above mean sea level; None: where it is now.
-            radius_m: None: the autopilot's own.
-            clockwise: seen from above.
-            wait: until it circles there, near its altitude.
+            place: centre, and altitude above mean sea level; None: the present position.
+            radius_m: radius; None: the autopilot's default.
+            clockwise: direction, seen from above.
+            wait: whether to wait until it circles there, near the altitude.
 
         Raises:
             PlanError: not a fixed wing, or too far away; nothing was sent.
@@ -189,11 +192,11 @@ class FixedWingFlight(VehicleStore):
         )
 
     async def change_altitude(self, altitude_m: float) -> None:
-        """Go on at another height above home."""
+        """Change the height above home."""
         await self.adapter.change_altitude(self._whole, altitude_m)
 
     async def change_airspeed(self, airspeed_m_s: float) -> None:
-        """Go on at another airspeed."""
+        """Change the airspeed."""
         self._require_wings("change_airspeed")
         await self.adapter.change_airspeed(self._whole, airspeed_m_s)
 
@@ -206,13 +209,13 @@ class FixedWingFlight(VehicleStore):
         """Fly headings: `async with vehicle.heading_flight(altitude_m=100) as flight`, then
         `await flight.turn_to(1.57)`.
 
-        Altitude and airspeed are held; `prepare_piloting` was called on the ground. ArduPilot's plane gets
-        commands (GUIDED_CHANGE_HEADING), PX4 a stream of attitudes that hold the heading. At the end the
-        vehicle holds.
+        Altitude and airspeed are held; `prepare_piloting` must have been called on the ground. ArduPilot's
+        plane receives commands (GUIDED_CHANGE_HEADING), PX4 a stream of attitude setpoints that hold the
+        heading. At the end the vehicle holds its position.
 
         Args:
-            altitude_m: above home.
-            airspeed_m_s: None: the autopilot's own.
+            altitude_m: height above home.
+            airspeed_m_s: airspeed; None: the autopilot's default.
         """
         from missions.vehicle.heading_flight import open_heading_flight
 
@@ -223,7 +226,7 @@ class FixedWingFlight(VehicleStore):
     # coming down
 
     def landing_heading_rad(self) -> float:
-        """Direction to land in: that of the takeoff, or the opposite when the wind has turned.
+        """Direction of the landing: that of the takeoff, or the opposite one when the wind has turned.
 
         Raises:
             MissionError: neither runway nor heading is known.
@@ -240,7 +243,9 @@ class FixedWingFlight(VehicleStore):
         return math.remainder(heading, math.tau)
 
     def wind_ne_m_s(self) -> tuple[float, float] | None:
-        """The autopilot's estimate of the wind, where the air moves to (WIND_COV or WIND); None: not told."""
+        """The autopilot's estimate of the velocity of the air (WIND_COV or WIND), north and east; None: not
+        reported.
+        """
         m = self.message("WIND_COV")
         if m is not None and math.isfinite(m.wind_x) and math.isfinite(m.wind_y):
             return float(m.wind_x), float(m.wind_y)
@@ -253,11 +258,11 @@ class FixedWingFlight(VehicleStore):
     async def land_along(
         self, approach: Approach | None = None, *, wait: bool = True, timeout_s: float = 900.0
     ) -> None:
-        """Land by an approach: it is uploaded in place of the vehicle's mission, and flown.
+        """Upload an approach in place of the vehicle's mission, and fly it to land.
 
         Args:
-            approach: None: at home, along the runway.
-            wait: until the vehicle is disarmed.
+            approach: the approach; None: at home, along the runway.
+            wait: whether to wait until the vehicle is disarmed.
         """
         from missions.vehicle import mission_transfer
 

@@ -1,4 +1,4 @@
-"""Streaming setpoints: PX4's OFFBOARD and ArduPilot's GUIDED, with their rules of entry."""
+"""Streamed setpoints: PX4's OFFBOARD and ArduPilot's GUIDED, with their conditions for entry."""
 
 import asyncio
 from collections.abc import Callable
@@ -19,15 +19,15 @@ SetpointSource = Callable[[float], AnySetpoint | None]
 _BEFORE_ENTRY_S: Final = 0.6
 _SLOWEST_HZ: Final = 2.5
 _LEAD: Final = (
-    0.5  # of a period: a setpoint stands until the next one, so it is taken from the middle of that time
+    0.5  # of a period: a setpoint is valid until the next one, so it is computed for the middle of that time
 )
 
 
 class GuidedSession:
     """Setpoints streamed to one vehicle, at a fixed rate of vehicle time.
 
-    While the vehicle is not heard, the last place is held; a source goes on from there when it is back, if it
-    is still in the guided mode.
+    While no message is received from the vehicle, the last place is held. When the link is back and the
+    vehicle is still in the guided mode, the source continues from there.
     """
 
     def __init__(self, vehicle: "Vehicle", rate_hz: float, home_offset_ned_m: Vector) -> None:
@@ -50,7 +50,7 @@ class GuidedSession:
 
         Raises:
             MissionError: the vehicle left the guided mode (a failsafe, a pilot), or its link was lost.
-            PlanError: the source gave something that is no setpoint.
+            PlanError: the source returned something that is not a setpoint.
         """
         first = _setpoint_of(source, 0.0)
         if first is None:
@@ -65,7 +65,9 @@ class GuidedSession:
         await self._until_done(self._task)
 
     async def finish(self) -> None:
-        """Leave the guided mode for hold while setpoints still go out, so that no failsafe sees a gap."""
+        """Switch from the guided mode to hold while setpoints are still sent, so that no failsafe detects a
+        gap.
+        """
         if self._entered:
             await self._vehicle.set_mode(Mode.HOLD)
 
@@ -90,7 +92,7 @@ class GuidedSession:
         vehicle, clock = self._vehicle, self._vehicle.clock
         due_us = clock.time_us
         while True:
-            if vehicle.link_quiet:  # nobody knows where the vehicle is: it shall not be led on
+            if vehicle.link_quiet:  # the vehicle's position is not known: hold the setpoint
                 self._start_us += self._period_us
                 self._last = _held(self._last)
             elif self._source is not None:
@@ -104,7 +106,8 @@ class GuidedSession:
             if self._last is not None:
                 vehicle.send(self._last.message(due_us, vehicle.system_id, self._offset))
             due_us += self._period_us
-            if due_us < clock.time_us - self._period_us:  # fell behind: go on from now, without a burst
+            # too late: continue from the present time, without a burst
+            if due_us < clock.time_us - self._period_us:
                 due_us = clock.time_us
             await clock.sleep_until(due_us)
 
@@ -114,7 +117,7 @@ class GuidedSession:
 
         def look(_frame: object) -> None:
             if self._vehicle.link_just_back:
-                return  # PX4 goes back to OFFBOARD by itself when setpoints come again
+                return  # PX4 returns to OFFBOARD by itself when setpoints are received again
             if not left.done() and self._vehicle.custom_mode != target:
                 left.set_result(self._vehicle.mode)
 
@@ -124,7 +127,7 @@ class GuidedSession:
             async with self._vehicle.link_guard("the end of the setpoints"):
                 await asyncio.wait({done, left, stream}, return_when=asyncio.FIRST_COMPLETED)
             if stream.done():
-                await stream  # raises what ended it
+                await stream  # raises the error that ended it
             if left.done() and not done.done():
                 raise MissionError(
                     f"the vehicle left the guided mode for {left.result()}; {self._vehicle.heard()}"
@@ -137,7 +140,7 @@ class GuidedSession:
 
 
 def _held(setpoint: AnySetpoint | None) -> AnySetpoint | None:
-    """The setpoint to wait with: the same place, at rest; what has no place as it is."""
+    """The setpoint for waiting: the same place, at rest; a setpoint without a place is not changed."""
     if not isinstance(setpoint, Setpoint) or setpoint.position_ned_m is None:
         return Setpoint(velocity_ned_m_s=(0.0, 0.0, 0.0)) if isinstance(setpoint, Setpoint) else setpoint
     return Setpoint(position_ned_m=setpoint.position_ned_m, yaw_rad=setpoint.yaw_rad)

@@ -1,4 +1,4 @@
-"""Flying headings: by commands where the autopilot has them (ArduPilot), by a stream of rolls where not
+"""Flight of headings: by commands if the autopilot supports them (ArduPilot), otherwise by a stream of rolls
 (PX4).
 """
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
 _RATE_HZ: Final = 25.0
-_HEADING: Final = 1.0  # GUIDED_CHANGE_HEADING: of the nose, not over ground
+_HEADING: Final = 1.0  # GUIDED_CHANGE_HEADING: heading of the vehicle, not course over ground
 _TURN_M_S2: Final = 5.0
 _SETTLED_RAD: Final = math.radians(5.0)
 
@@ -30,7 +30,7 @@ class HeadingFlight:
     """An aircraft that flies headings; see `FixedWingFlight.heading_flight`.
 
     Attributes:
-        heading_rad: the one asked for last.
+        heading_rad: the last commanded heading.
     """
 
     def __init__(self, vehicle: "Vehicle", pilot: AttitudePilot, controller: HeadingController) -> None:
@@ -41,10 +41,10 @@ class HeadingFlight:
         self._ended = False
 
     async def turn_to(self, heading_rad: float, *, wait: bool = False, timeout_s: float = 60.0) -> None:
-        """Fly a heading from now on, the short way round.
+        """Turn to a heading, the short way round, and hold it.
 
         Args:
-            wait: until the nose is within 5 degrees of it.
+            wait: whether to wait until the yaw is within 5 degrees of it.
         """
         if not math.isfinite(heading_rad):
             raise PlanError(f"a heading of {heading_rad} can't be flown; give an angle")
@@ -75,19 +75,19 @@ class HeadingFlight:
         )
 
     async def change_altitude(self, altitude_m: float) -> None:
-        """Another height above home."""
+        """Change the height above home."""
         if self._vehicle.adapter.roll_alone:
             await self._vehicle.change_altitude(altitude_m)
         self._pilot.hold(altitude_m=altitude_m)
 
     async def change_airspeed(self, airspeed_m_s: float) -> None:
-        """Another airspeed."""
+        """Change the airspeed."""
         if self._vehicle.adapter.roll_alone:
             await self._vehicle.change_airspeed(airspeed_m_s)
         self._pilot.hold(airspeed_m_s=airspeed_m_s)
 
     def setpoint(self, _time_s: float) -> AttitudeSetpoint | None:
-        """What is streamed to PX4."""
+        """The setpoint that is streamed to PX4."""
         if self._ended:
             return None
         attitude = self._vehicle.latest(telemetry.Attitude)
@@ -102,7 +102,7 @@ class HeadingFlight:
         return self._pilot.setpoint(self._vehicle.clock.time_us, roll)
 
     def end(self) -> None:
-        """No more setpoints."""
+        """Stop the setpoints."""
         self._ended = True
 
 
@@ -110,7 +110,7 @@ class HeadingFlight:
 async def open_heading_flight(
     vehicle: "Vehicle", altitude_m: float, airspeed_m_s: float | None
 ) -> AsyncIterator[HeadingFlight]:
-    """Enter the guided mode, fly on as the nose points, and hold at the end."""
+    """Enter the guided mode, keep the present heading, and hold the position at the end."""
     pilot = vehicle.pilot
     if pilot is None:
         raise PlanError("call `await vehicle.prepare_piloting()` on the ground, before takeoff")

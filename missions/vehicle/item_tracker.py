@@ -1,14 +1,17 @@
-"""How far a vehicle has come in an uploaded mission, from messages that may be lost, repeated or reordered.
+"""Progress of a vehicle in an uploaded mission, from messages that may be lost, repeated or reordered.
 
-Sans-IO: `ItemTracker` takes what MISSION_ITEM_REACHED, MISSION_CURRENT and positions say. Each is evidence by
-itself:
+Sans-IO: `ItemTracker` uses MISSION_ITEM_REACHED, MISSION_CURRENT and positions. Each of them is sufficient
+evidence alone:
 
-* MISSION_ITEM_REACHED: the item, and all before it, are done. PX4 1.16.1 and ArduPilot 4.6.3 send it for a
-  DO_ item and then not for the waypoint directly before it; PX4 repeats the newest one at 1 Hz, ten times.
-* MISSION_CURRENT: all items before the one that is flown to are done. ArduPilot adds that all are done.
-* Positions: a waypoint is done when the vehicle was within its radius and left it, or has stayed there.
+* MISSION_ITEM_REACHED: the item and all items before it are done. PX4 1.16.1 and ArduPilot 4.6.3 send it for
+  a DO_ item, and do not send it for the waypoint directly before that item; PX4 repeats the newest one at 1
+  Hz, ten times.
+* MISSION_CURRENT: all items before the one that is flown to are done. ArduPilot also reports when all are
+  done.
+* Positions: a waypoint is done when the vehicle was within its radius and left it, or when it has stayed
+  there.
 
-The place in the mission never goes back: what is older than the place is ignored.
+The place in the mission never goes back: evidence of an earlier place is ignored.
 """
 
 import math
@@ -22,17 +25,17 @@ from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
 
 LAST_NAV: Final = dialect.MAV_CMD_NAV_LAST
-"""Commands up to this one are flown; those beyond it happen on the way."""
+"""Commands up to this one are flown; later ones are executed on the way."""
 LANDINGS: Final = frozenset((dialect.MAV_CMD_NAV_LAND, dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH))
-"""Commands that bring the vehicle to the ground, and with which a mission ends."""
+"""Commands that bring the vehicle to the ground and end a mission."""
 THROUGH: Final = frozenset((dialect.MAV_CMD_NAV_WAYPOINT, dialect.MAV_CMD_NAV_SPLINE_WAYPOINT))
-"""Commands that name a place to pass."""
+"""Commands that contain a place to pass."""
 
 _TAKEOFF: Final = dialect.MAV_CMD_NAV_TAKEOFF
 _DO_JUMP: Final = dialect.MAV_CMD_DO_JUMP
 _MOST_STEPS: Final = 20_000
 _SETTLED_S: Final = 5.0
-_CLIMBED_M: Final = 1.0  # below a takeoff's altitude, where it is about to end
+_CLIMBED_M: Final = 1.0  # below a takeoff's altitude; above this height the takeoff is about to end
 _CIRCLE_M: Final = 80.0
 _NO_MISSION: Final = 0xFFFF  # MISSION_CURRENT.seq
 _HEARTBEATS_AWAY: Final = 3
@@ -44,8 +47,8 @@ class FlownOrder:
     """The items of a mission in the order in which they are executed; jumps are followed.
 
     Attributes:
-        indices: of the items, without the jumps; ends with the first landing or return.
-        endless: a jump repeats for ever, or more often than 20000 items in all.
+        indices: indices of the items, without the jumps; they end with the first landing or return.
+        endless: whether a jump repeats forever, or gives more than 20000 items in total.
         again_from: place in `indices` from which an endless mission repeats; None: not known.
     """
 
@@ -55,7 +58,7 @@ class FlownOrder:
 
     @classmethod
     def of(cls, items: Sequence[MissionItem]) -> "FlownOrder":
-        """The order of a mission's items; DO_JUMP names its target by its index in `items`."""
+        """The order of a mission's items; DO_JUMP contains its target's index in `items`."""
         indices: list[int] = []
         repeats: dict[int, int] = {}
         index = 0
@@ -83,15 +86,16 @@ class FlownOrder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissionStep:
-    """One item at one place of the order.
+    """One item at one place of the flown order.
 
     Attributes:
-        index: of the item.
-        command: MAV_CMD.
-        place: where positions show that it is done; None: they don't show it.
-        radius_m: of the place; infinite: any position that is not lower than the place.
-        stay_s: within the radius, after which it counts as done; infinite: only messages tell.
-        through: it is done when the vehicle was within the radius and left it.
+        index: index of the item.
+        command: MAV_CMD of the item.
+        place: position at which the item is done; None: positions do not show that it is done.
+        radius_m: radius of the place; infinite: any position that is not lower than the place counts.
+        stay_s: time within the radius after which the item counts as done; infinite: only messages show that
+            it is done.
+        through: the item is done when the vehicle was within the radius and left it.
     """
 
     index: int
@@ -103,7 +107,7 @@ class MissionStep:
 
     @property
     def flown(self) -> bool:
-        """Whether it is flown, not done on the way."""
+        """Whether the item is flown, and not executed on the way."""
         return self.command <= LAST_NAV
 
     def contains(self, lat_deg: float, lon_deg: float, alt_m: float) -> bool:
@@ -121,10 +125,10 @@ def mission_steps(
     """The steps of a mission, for an `ItemTracker`.
 
     Args:
-        items: with their places set (a place of 0, 0 is none).
-        order: of the items.
-        home: heights of relative frames count from it.
-        acceptance_m: radius of a waypoint that names none, or a smaller one.
+        items: items with their places set (0, 0 is not a place).
+        order: order of the items.
+        home: reference of heights in relative frames.
+        acceptance_m: radius of a waypoint that specifies none, or a smaller one.
     """
     return tuple(_step(index, items[index], home, acceptance_m) for index in order.indices)
 
@@ -158,13 +162,14 @@ class ItemTracker:
     """Follows a mission; see the module.
 
     Args:
-        steps: of the mission, in the order in which they are executed.
+        steps: steps of the mission, in the order of execution.
         again_from: step from which an endless mission repeats; None: it does not.
-        first: number of item 0 on the wire.
+        first: sequence number of item 0 on the link.
 
     Attributes:
-        behind: how many steps are done. It never decreases; an endless mission goes beyond its steps.
-        reached: item and time of each step that was done, in this order.
+        behind: number of finished steps. It never decreases; in an endless mission it exceeds the number of
+            steps.
+        reached: item and time of each finished step, in order.
     """
 
     def __init__(
@@ -180,7 +185,7 @@ class ItemTracker:
 
     @property
     def current(self) -> int:
-        """Item that is being flown; the last one when all are done."""
+        """Index of the item that is being flown; the last one when all are done."""
         return self._step(min(self.behind, self._end - 1)).index if self._steps else 0
 
     @property
@@ -190,18 +195,18 @@ class ItemTracker:
 
     @property
     def over(self) -> bool:
-        """Whether all is done that is flown; what only happens at the end may be left."""
+        """Whether all items that are flown are done; items that are only executed at the end may remain."""
         rest = self._steps[self.behind :]
         return self._again_from is None and not any(step.flown for step in rest)
 
     @property
     def coming_down(self) -> bool:
-        """Whether a landing or return at the mission's end is being flown, or done."""
+        """Whether a landing or return at the mission's end is in progress or done."""
         return self.lands and self.behind >= len(self._steps) - 1
 
     @property
     def at_the_last_place(self) -> bool:
-        """Whether the vehicle was within the radius of the last waypoint, and nothing else is left to fly."""
+        """Whether the vehicle was within the radius of the last waypoint, and no other item is left."""
         if self._again_from is not None or self._near_us is None:
             return False
         rest = [step for step in self._steps[self.behind :] if step.flown and step.command not in LANDINGS]
@@ -214,11 +219,11 @@ class ItemTracker:
         return ends and self._again_from is None
 
     def place_of(self, index: int) -> int:
-        """The first step of an item, or of the one after it where it has none (a jump)."""
+        """The first step of an item, or of the item after it if it has no step (a jump)."""
         return next((k for k, step in enumerate(self._steps) if step.index >= index), len(self._steps) - 1)
 
     def on_message(self, message: Any, time_us: int) -> None:
-        """MISSION_ITEM_REACHED, MISSION_CURRENT or GLOBAL_POSITION_INT came."""
+        """Process a MISSION_ITEM_REACHED, MISSION_CURRENT or GLOBAL_POSITION_INT."""
         kind = message.get_type()
         if kind == "MISSION_ITEM_REACHED":
             self.on_reached(message.seq - self.first, time_us)
@@ -228,7 +233,7 @@ class ItemTracker:
             self.on_position(message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3, time_us)
 
     def on_reached(self, index: int, time_us: int) -> None:
-        """MISSION_ITEM_REACHED came; the index counts from 0."""
+        """Process a MISSION_ITEM_REACHED; the index counts from 0."""
         if self.behind and self._step(self.behind - 1).index == index:
             return  # repeated
         place = self._place_of(index)
@@ -236,8 +241,9 @@ class ItemTracker:
             self._go_to(place + 1, time_us)
 
     def on_current(self, index: int, time_us: int, state: int = 0) -> None:
-        """MISSION_CURRENT came; the index counts from 0, `state` is its MISSION_STATE (0: not known)."""
-        self._started = self._started or state in _STARTED  # before that, "complete" is of the flight before
+        """Process a MISSION_CURRENT; the index counts from 0, `state` is its MISSION_STATE (0: not known)."""
+        # before that, "complete" refers to the previous flight
+        self._started = self._started or state in _STARTED
         if state == dialect.MISSION_STATE_COMPLETE and self._started and self._again_from is None:
             self._go_to(len(self._steps), time_us)
             return
@@ -246,7 +252,7 @@ class ItemTracker:
             self._go_to(place, time_us)
 
     def on_position(self, lat_deg: float, lon_deg: float, alt_m: float, time_us: int) -> None:
-        """A position came."""
+        """Process a position."""
         place = self.behind
         while place < self._end and not self._step(place).flown:
             place += 1
@@ -267,7 +273,7 @@ class ItemTracker:
 
     @property
     def _end(self) -> int:
-        """Beyond the steps that are looked at: an endless mission has one more round ahead."""
+        """End of the steps that are considered; an endless mission has one more round ahead."""
         count = len(self._steps)
         return count if self._again_from is None else max(count, self.behind) + count - self._again_from
 
@@ -278,9 +284,9 @@ class ItemTracker:
         return self._steps[self._again_from + (place - count) % (count - self._again_from)]
 
     def _place_of(self, index: int) -> int | None:
-        """The step ahead that a message about an item is about; None: there is none, or the message is old.
+        """The step ahead to which a message about an item refers; None: there is none, or the message is old.
 
-        Where jumps repeat an item, the message may be about a step that is done; the nearer one counts.
+        When jumps repeat an item, the message may refer to a finished step; the nearer step is used.
         """
         now = self.behind
         ahead = next((k for k in range(now, self._end) if self._step(k).index == index), None)
@@ -301,9 +307,9 @@ class ItemTracker:
 
 
 class MissionModeWatch:
-    """Whether a vehicle has left the mission's mode: by three heartbeats in a row.
+    """Detects that a vehicle has left the mission's mode, by three consecutive heartbeats.
 
-    What explains another mode (the end of the mission) may come a moment after the first of them.
+    The message that explains another mode (the end of the mission) may come shortly after the first of them.
     """
 
     def __init__(self, mission_mode: int) -> None:
@@ -311,6 +317,6 @@ class MissionModeWatch:
         self._away = 0
 
     def left(self, custom_mode: int) -> bool:
-        """A heartbeat came; whether it is the third away from the mission."""
+        """Process a heartbeat; returns whether it is the third in a row outside the mission's mode."""
         self._away = 0 if custom_mode == self._mission_mode else self._away + 1
         return self._away >= _HEARTBEATS_AWAY

@@ -1,6 +1,6 @@
-"""What a vehicle's messages say: identity, newest values, streams, waiting with deadlines.
+"""The data that a vehicle's messages contain: identity, newest values, streams, and waits with deadlines.
 
-The lower half of `Vehicle`: it listens, and sends nothing but what it is given.
+This is the lower half of `Vehicle`: it receives, and sends only the messages that it is given.
 """
 
 import asyncio
@@ -40,7 +40,7 @@ ADAPTERS: Final[Mapping[tuple[str, VehicleKind], Callable[[], Adapter]]] = Mappi
         ("ardupilot", VehicleKind.FIXED_WING): ArduPlane,
     }
 )
-"""By firmware and class of vehicle."""
+"""Adapters by firmware and class of vehicle."""
 
 _FIRMWARES: Final = {
     dialect.MAV_AUTOPILOT_PX4: "px4",
@@ -49,17 +49,17 @@ _FIRMWARES: Final = {
 
 
 class VehicleView:
-    """The listening half of a vehicle.
+    """The receiving half of a vehicle.
 
     Args:
         connection: a started connection.
-        system_id: the vehicle's; None: the first autopilot heard.
+        system_id: system id of the vehicle; None: the first autopilot received.
 
     Attributes:
-        connection: as given.
-        notes: where a mission notes its phases, its progress and what it commands, for the run's summary.
+        connection: the connection that was given.
+        notes: the mission's record of its phases, its progress and its commands, for the run's summary.
         status_texts: the newest texts from the autopilot, oldest first.
-        first_heard_us: vehicle time of the first heartbeat that came when that time was known.
+        first_heard_us: vehicle time of the first heartbeat that was received when vehicle time was known.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -69,11 +69,12 @@ class VehicleView:
         self._system_id = system_id
         self._adapter: Adapter | None = None
         self._last_ack: Any = None
-        self._modes_asked: set[int] = set()  # custom modes asked for since the present `goto` began
+        self._modes_asked: set[int] = set()  # custom modes that were requested since the present `goto` began
         self._heard_us: int | None = None
-        self._sound: dict[type, tuple[Any, int]] = {}  # newest telemetry of use, and when it was looked at
+        # newest usable telemetry, and the time at which it was examined
+        self._sound: dict[type, tuple[Any, int]] = {}
         self.first_heard_us = 0
-        self._timed = False  # whether that was a time of the vehicle's
+        self._timed = False  # whether that time was a time of the vehicle
         self._assembler = StatusTextAssembler()
         self._watch = LinkWatch(connection.clock, lambda: self.heard(silence=False))
         self._watch.on_lost = self._link_lost
@@ -94,7 +95,7 @@ class VehicleView:
 
     @property
     def adapter(self) -> Adapter:
-        """The firmware's ways."""
+        """The adapter of the vehicle's firmware."""
         return self._known(self._adapter)
 
     @property
@@ -149,7 +150,7 @@ class VehicleView:
 
     @property
     def regain_s(self) -> float:
-        """How long a lost link may take to come back, in seconds of this machine's clock; 0: not at all."""
+        """Longest time for which a lost link may stay lost, in seconds of this machine's clock; 0: none."""
         return self._watch.regain_s
 
     @regain_s.setter
@@ -158,7 +159,7 @@ class VehicleView:
 
     @property
     def link_quiet(self) -> bool:
-        """Whether nothing has come from the vehicle for three seconds, while something of it is awaited."""
+        """Whether no message was received from the vehicle for three seconds, while a task waits for one."""
         return self._watch.quiet
 
     @property
@@ -168,7 +169,7 @@ class VehicleView:
 
     @property
     def link_just_back(self) -> bool:
-        """Whether the vehicle was heard again a moment ago, after a silence."""
+        """Whether a silence of the vehicle ended a moment ago."""
         return self._watch.just_back
 
     def _link_lost(self) -> None:
@@ -200,11 +201,11 @@ class VehicleView:
         return self.connection.latest(name, self.system_id)
 
     def latest(self, kind: type[T]) -> T | None:
-        """Newest telemetry of a kind, as `latest(Position)`; None before the first.
+        """Newest telemetry of a kind, for example `latest(Position)`; None before the first.
 
         Kinds: `Position`, `LocalPosition`, `Attitude`, `AirData`, `Pressure`, `Battery`, `Gps`,
-        `MissionProgress`. A message whose numbers are none (NaN, infinite) is passed over: for a second the
-        one before it stands, then nothing is known.
+        `MissionProgress`. A message with NaN or infinite values is ignored: for one second the message before
+        it is returned, then None.
         """
         name, convert = SOURCES[kind]
         message = self.message(name)
@@ -219,20 +220,20 @@ class VehicleView:
         return before[0] if before is not None and now_us - before[1] <= _SOUND_FOR_US else None
 
     def home_or_none(self) -> GeodeticPosition | None:
-        """Home as the vehicle reports it, when it has."""
+        """Home as reported by the vehicle, or None."""
         message = self.message("HOME_POSITION")
         return None if message is None else home(message)
 
     @property
     def home(self) -> GeodeticPosition:
-        """Home as the vehicle reports it."""
+        """Home as reported by the vehicle."""
         place = self.home_or_none()
         if place is None:
             raise VehicleTimeout("the vehicle has not reported its home position: call wait_ready first")
         return place
 
     async def position(self, timeout_s: float = 5.0) -> Position:
-        """Newest global position, waited for when there is none yet."""
+        """Newest global position; waits for one when there is none yet."""
         return await self.wait_until(
             lambda: self.latest(Position),
             what="position",
@@ -255,19 +256,19 @@ class VehicleView:
 
     @property
     def armed(self) -> bool:
-        """By the newest heartbeat."""
+        """Whether the newest heartbeat reports armed."""
         heartbeat = self.message("HEARTBEAT")
         return heartbeat is not None and bool(heartbeat.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
 
     @property
     def custom_mode(self) -> int:
-        """HEARTBEAT.custom_mode, as the firmware numbers it."""
+        """HEARTBEAT.custom_mode, in the firmware's numbering."""
         heartbeat = self.message("HEARTBEAT")
         return 0 if heartbeat is None else int(heartbeat.custom_mode)
 
     @property
     def mode(self) -> str:
-        """Flight mode by the newest heartbeat, as the firmware calls it."""
+        """Flight mode of the newest heartbeat, with the firmware's name."""
         return self.adapter.mode_name(self.custom_mode)
 
     @property
@@ -277,14 +278,16 @@ class VehicleView:
         return 0 if message is None else int(message.landed_state)
 
     def addressed_here(self, message: MAVLinkMessage) -> bool:
-        """Whether a reply is for this mission: for all, or for its own ids."""
+        """Whether a reply is for this mission: addressed to all, or to its own ids."""
         return message.target_system in (0, self.connection.system_id) and message.target_component in (
             0,
             self.connection.component_id,
         )
 
     def heard(self, *, silence: bool = True) -> str:
-        """What was heard last, for error messages; with `silence`, also how long ago when that is long."""
+        """What was received last, as text for error messages; with `silence`, also how long ago, when that is
+        long.
+        """
         if self._adapter is None or self._heard_us is None:
             return "nothing was received from an autopilot"
         parts = [f"last received: mode {self.mode}, {'armed' if self.armed else 'disarmed'}"]
@@ -306,14 +309,14 @@ class VehicleView:
     # waiting
 
     def link_guard(self, awaited: str | Callable[[], str]) -> AbstractAsyncContextManager[None]:
-        """`async with`: LinkClosed when the heartbeats stop while the block waits for what is named."""
+        """`async with`: raises LinkClosed when the heartbeats stop while the block waits for `awaited`."""
         return self._watch.guard(awaited if callable(awaited) else lambda: awaited)
 
     @asynccontextmanager
     async def deadline(self, seconds: float, awaited: str | Callable[[], str]) -> AsyncIterator[None]:
         """`async with`: TimeoutError after `seconds` of vehicle time, LinkClosed when the link is lost.
 
-        Where a lost link may come back, the time in which nothing is heard does not count.
+        When a lost link may come back, the time without received messages does not count.
         """
         if not self.regain_s:
             async with self.link_guard(awaited), self.clock.timeout(seconds):
@@ -327,7 +330,9 @@ class VehicleView:
                 running_out.cancel()
 
     async def _run_out(self, scope: asyncio.Timeout, seconds: float) -> None:
-        """Let a deadline pass; who was not heard then gets all of it anew when it is."""
+        """Let a deadline pass. If the link was silent then, the full time starts again when the vehicle is
+        received.
+        """
         await self.clock.sleep(seconds)
         while self._deaf:
             while self._deaf:
@@ -337,7 +342,7 @@ class VehicleView:
 
     @property
     def _deaf(self) -> bool:
-        """Whether no heartbeat has come for three seconds of vehicle time."""
+        """Whether no heartbeat was received for three seconds of vehicle time."""
         return self._heard_us is not None and self.clock.time_us - self._heard_us > _DEAF_AFTER_US
 
     async def wait_until(
@@ -348,21 +353,22 @@ class VehicleView:
         on: Sequence[str],
         timeout_s: float,
     ) -> T:
-        """Wait until `predicate` gives something true, looked at now and after each message named in `on`.
+        """Wait until `predicate` returns a true value, and return it. It is called now and after each message
+        named in `on`.
 
         Args:
-            predicate: looks at the newest values; may raise to give up.
-            what: what is awaited, for the error.
-            on: message names.
+            predicate: checks the newest values; it may raise an error to end the wait.
+            what: description of what is awaited, for the error.
+            on: names of messages.
             timeout_s: vehicle seconds.
 
         Raises:
-            VehicleTimeout: says what was awaited and what was heard last.
+            VehicleTimeout: the message names what was awaited and what was received last.
             LinkClosed: the heartbeats stopped.
         """
         value = predicate()
         if value:
-            await asyncio.sleep(0)  # a caller that polls in a loop lets the clock go on, too
+            await asyncio.sleep(0)  # also lets the clock advance for a caller that polls in a loop
             return value
         changed = asyncio.Event()
         stops = [self.connection.listen(name, lambda _frame: changed.set()) for name in on]
@@ -383,5 +389,5 @@ class VehicleView:
 
 
 def describe_ack(ack: Any) -> str:
-    """A COMMAND_ACK in words: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
+    """A COMMAND_ACK as text: "NAV_TAKEOFF: TEMPORARILY_REJECTED"."""
     return f"{command_name(ack.command)}: {enum_name('MAV_RESULT', ack.result) or f'result {ack.result}'}"

@@ -1,4 +1,4 @@
-"""Whether a vehicle is still there: waits end when its heartbeats stop, unless they come back in time."""
+"""Monitors the heartbeats of a vehicle: waits end when they stop, unless they come back in time."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -15,21 +15,22 @@ _JUST_BACK_S: Final = 5.0
 
 
 class LinkWatch:
-    """Ends waits when no heartbeat has come for 10 s of the event loop's time, and `regain_s` more.
+    """Ends waits when no heartbeat was received for 10 s plus `regain_s` of the event loop's time.
 
-    That is wall time for a vehicle elsewhere, however fast it simulates, and vehicle time in the loop of an
-    embedded one. A vehicle slower than real time gets 10 s of its own. Time in which this process was busy
-    (the look at the link comes late by as much) is not silence. Before the first heartbeat nothing ends.
+    That is wall time for a vehicle that is not embedded, at any simulation speed, and vehicle time in the
+    loop of an embedded one. A vehicle slower than real time gets 10 s of its own time. Time in which this
+    process was busy (so that the check of the link was late by the same time) does not count as silence.
+    Before the first heartbeat no wait is ended.
 
     Args:
         clock: vehicle time.
-        heard: what was heard last, for the error.
+        heard: text of what was received last, for the error.
 
     Attributes:
-        regain_s: how long a lost link may take to come back.
-        quiet: no heartbeat for 3 s, while somebody waits.
+        regain_s: longest time for which a lost link may stay lost.
+        quiet: no heartbeat for 3 s, while a task waits.
         lost: the link counts as lost.
-        on_lost, on_regained: called when it is lost, and when it is back.
+        on_lost, on_regained: called when the link is lost, and when it is back.
     """
 
     def __init__(self, clock: Clock, heard: Callable[[], str]) -> None:
@@ -46,7 +47,7 @@ class LinkWatch:
         self._timer: asyncio.TimerHandle | None = None
 
     def on_heartbeat(self) -> None:
-        """A heartbeat of the vehicle came just now."""
+        """Note that a heartbeat of the vehicle was received."""
         self._heard_s = asyncio.get_running_loop().time()
         if self.quiet:
             self.quiet = False
@@ -57,15 +58,16 @@ class LinkWatch:
 
     @property
     def just_back(self) -> bool:
-        """Whether a silence ended a moment ago: the autopilot may not have taken notice yet."""
+        """Whether a silence ended a moment ago, so that the autopilot may not have noticed it yet."""
         return self._back_s is not None and asyncio.get_running_loop().time() - self._back_s < _JUST_BACK_S
 
     @asynccontextmanager
     async def guard(self, awaited: Callable[[], str]) -> AsyncIterator[None]:
-        """Raises LinkClosed when the heartbeats stop, and don't come back in time, while the block waits.
+        """Context that raises LinkClosed when the heartbeats stop, and don't come back in time, while the
+        block waits.
 
         Args:
-            awaited: what the block waits for, for the error.
+            awaited: returns the description of what the block waits for, for the error.
         """
         scope = asyncio.timeout(None)
         try:
@@ -88,12 +90,12 @@ class LinkWatch:
         return 0.0 if self._heard_s is None else asyncio.get_running_loop().time() - self._heard_s
 
     def _slowness(self) -> float:
-        """Wall seconds in which a vehicle slower than real time lives one."""
+        """Wall seconds per vehicle second, for a vehicle slower than real time."""
         rate = self._clock.rate if isinstance(self._clock, TelemetryClock) else 1.0
         return 1.0 / min(1.0, rate)
 
     def _start(self) -> None:
-        # goes on over the many short waits of a command, and ends with the last of them
+        # continues during the many short waits of a command, and ends with the last of them
         if self._timer is None:
             loop = asyncio.get_running_loop()
             self._timer = loop.call_later(_LOOK_EVERY_S, self._look, loop.time() + _LOOK_EVERY_S)

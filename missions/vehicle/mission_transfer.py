@@ -1,4 +1,4 @@
-"""The MAVLink mission protocol, from the ground station's side: missions, geofences and rally points."""
+"""The MAVLink mission protocol of a ground station: missions, geofences and rally points."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 _RETRY_S: Final = 1.5
 _RETRIES: Final = 5
 _SENDINGS: Final = 3
-_STUCK_S: Final = 6.0  # PX4 gives a transfer up after 5 s
-_ERRORS_BORNE: Final = 10  # an item that ArduPilot asked for eight times may come eight times
+_STUCK_S: Final = 6.0  # PX4 cancels a transfer after 5 s
+_ERRORS_BORNE: Final = 10  # an item that ArduPilot requested eight times may arrive there eight times
 _GIVEN_UP: Final = (dialect.MAV_MISSION_ERROR, dialect.MAV_MISSION_OPERATION_CANCELLED)
 _DO_JUMP: Final = 177
 _NAMES: Final = {
@@ -35,7 +35,7 @@ def _item_message(item: MissionItem, sequence: int, system_id: int, mission_type
 
 
 def renumbered(items: Sequence[MissionItem], by: int) -> list[MissionItem]:
-    """Items whose jumps lead to the same items when `by` others stand before them all."""
+    """The items with jump targets adjusted for `by` other items placed before all of them."""
     return [replace(i, param1=i.param1 + by) if i.command == _DO_JUMP and by else i for i in items]
 
 
@@ -50,15 +50,17 @@ async def upload(
     *,
     before: int = 0,
 ) -> None:
-    """Send a whole plan, numbered as the vehicle numbers it; anew from the start when a transfer gets stuck.
+    """Send a whole plan, numbered as the vehicle numbers it. A transfer that stalls is restarted from the
+    beginning.
 
     Args:
-        before: how many of the items are not the user's own (ArduPilot's home): an item that is refused is
-            numbered from 1 without them.
+        before: number of items that are not the user's own (ArduPilot's home). The error for a refused item
+            counts from 1 without them.
 
     Raises:
-        CommandRejected: the vehicle refused it; names the item where it says which.
-        VehicleTimeout: it stopped asking for items.
+        CommandRejected: the vehicle refused the plan; the message names the item when the vehicle reported
+            it.
+        VehicleTimeout: the vehicle stopped requesting items.
     """
     for sending in range(_SENDINGS):
         try:
@@ -97,7 +99,7 @@ async def _send_plan(
                     ) from None
                 if asked < 0:
                     vehicle.send(count)
-                else:  # its acknowledgement was lost: PX4 repeats it
+                else:  # the acknowledgement was lost: PX4 repeats it
                     vehicle.send(_item_message(items[-1], len(items) - 1, vehicle.system_id, mission_type))
                 continue
             if not vehicle.addressed_here(reply) or reply.mission_type != mission_type:
@@ -106,21 +108,22 @@ async def _send_plan(
                 if reply.type == dialect.MAV_MISSION_ACCEPTED:
                     if all_sent:
                         return
-                    continue  # of an earlier transfer
+                    continue  # belongs to an earlier transfer
                 if reply.type == dialect.MAV_MISSION_INVALID_SEQUENCE:
-                    continue  # to an item that was sent twice: the transfer stays open (ArduPilot)
+                    continue  # answers an item that was sent twice: the transfer stays open (ArduPilot)
                 if reply.type == dialect.MAV_MISSION_ERROR and all_sent and asked >= 0:
-                    # "no transfer": it is over, and how it ended was lost
+                    # "no transfer": it has ended, and the message with its result was lost
                     raise VehicleTimeout(f"how the vehicle took the {what} is not known; {vehicle.heard()}")
                 if reply.type in _GIVEN_UP and asked >= 0:
-                    # nothing was heard for long: PX4 (5 s) says so to the next item, ArduPilot (8 s) at once
+                    # long silence: PX4 (after 5 s) reports the timeout at the next item, ArduPilot (after 8
+                    # s) immediately
                     raise VehicleTimeout(
                         f"the vehicle gave the {what} up after {asked + 1} of {len(items)} items: "
                         f"{_result_name(reply.type)}; {vehicle.heard()}"
                     )
                 errors += 1
                 if reply.type in _GIVEN_UP and asked < 0 and errors <= _ERRORS_BORNE:
-                    continue  # perhaps to an item of an earlier transfer that came twice
+                    continue  # may answer a repeated item of an earlier transfer
                 where = ""
                 if asked >= 0:
                     where = f" at item {asked - before + 1} ({command_name(items[asked].command)})"
@@ -140,7 +143,7 @@ async def _ask(
     mission_type: MissionType,
     sequence: int | None = None,
 ) -> Any:
-    """Send a request until its answer comes."""
+    """Send a request repeatedly until its answer is received."""
     with vehicle.messages(name) as replies:
         for _ in range(_RETRIES):
             vehicle.send(message)
@@ -174,7 +177,7 @@ def _end_download(vehicle: "VehicleCommands", mission_type: MissionType) -> None
 async def download(
     vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION
 ) -> list[MissionItem]:
-    """The whole plan the vehicle holds, as it numbers it."""
+    """Download the whole plan from the vehicle, in the vehicle's numbering."""
     items = []
     for k in range(await _ask_count(vehicle, mission_type)):
         request = dialect.MAVLink_mission_request_int_message(vehicle.system_id, 1, k, int(mission_type))
@@ -184,9 +187,9 @@ async def download(
 
 
 async def clear(vehicle: "VehicleCommands", mission_type: MissionType = MissionType.MISSION) -> None:
-    """Delete the plan the vehicle holds, and see that it is gone.
+    """Delete the plan that the vehicle holds, and verify that it is deleted.
 
-    An acknowledgement does not tell what it is for: one of an earlier upload may come late.
+    An acknowledgement does not state which request it answers: one of an earlier upload may arrive late.
     """
     what = _NAMES[mission_type]
     errors = 0

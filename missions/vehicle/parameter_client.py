@@ -1,4 +1,4 @@
-"""Reading and setting a vehicle's parameters (MAVLink parameter protocol)."""
+"""Reads and sets a vehicle's parameters (MAVLink parameter protocol)."""
 
 import math
 import struct
@@ -17,7 +17,7 @@ _REAL32: Final = 9
 
 
 def value_from_wire(value: float, kind: int, bytewise: bool) -> float:
-    """The number in PARAM_VALUE: PX4 puts the bytes of integers into the float, ArduPilot converts them."""
+    """The number in PARAM_VALUE: PX4 stores the bytes of integers in the float, ArduPilot converts them."""
     if bytewise and kind in _INTEGER_CODES:
         return float(struct.unpack(_INTEGER_CODES[kind], struct.pack("<f", value))[0])
     return value
@@ -36,10 +36,10 @@ def _name(message: Any) -> str:
 
 
 async def read(vehicle: "VehicleCommands", name: str) -> tuple[float, int]:
-    """Value and MAV_PARAM_TYPE of a parameter.
+    """Read value and MAV_PARAM_TYPE of a parameter.
 
     Raises:
-        VehicleTimeout: no answer; autopilots don't answer for names they don't know.
+        VehicleTimeout: no answer was received; autopilots don't answer requests for unknown names.
     """
     message = dialect.MAVLink_param_request_read_message(
         vehicle.system_id, 1, name.encode("ascii", "replace")[:16], -1
@@ -60,11 +60,11 @@ async def read(vehicle: "VehicleCommands", name: str) -> tuple[float, int]:
 
 
 async def write(vehicle: "VehicleCommands", name: str, value: float) -> None:
-    """Set a parameter and see it confirmed.
+    """Set a parameter and wait for the confirmation.
 
     Raises:
         CommandRejected: the vehicle kept another value.
-        VehicleTimeout: no answer.
+        VehicleTimeout: no answer was received.
     """
     if not math.isfinite(value):
         raise CommandRejected(f"parameter {name} = {value} is not a number a vehicle can take", 0)

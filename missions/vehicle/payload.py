@@ -1,7 +1,7 @@
-"""What hangs on a vehicle beside the autopilot: camera, gimbal, survey magnetometer.
+"""The payload of a vehicle: camera, gimbal, survey magnetometer.
 
-Each is a MAVLink component of the vehicle's system with ids of its own (docs/fixed_wing.md). What they say is
-taken as it comes; nothing is sent but what is asked for.
+Each is a MAVLink component of the vehicle's system with its own component id (docs/fixed_wing.md). Their
+messages are used as they arrive; only requested messages are sent.
 """
 
 import math
@@ -20,7 +20,8 @@ GIMBAL_COMPONENT: Final = 154
 SURVEY_MAGNETOMETER_COMPONENT: Final = 158
 TOTAL_FIELD_NAME: Final = "MAG_NT"
 
-_CONTROL_TOLD_US: Final = 3_000_000  # the gimbal manager tells by then who has the control
+# within this time the gimbal manager reports which component has the control
+_CONTROL_TOLD_US: Final = 3_000_000
 
 _IN_VEHICLE_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_VEHICLE_FRAME
 _IN_EARTH_FRAME: Final = dialect.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
@@ -32,8 +33,8 @@ class Detection:
     """One object in one image (LANDING_TARGET of the camera).
 
     Attributes:
-        time_us: when the image was taken, vehicle time.
-        target: which object the camera's tracker believes it to be (`target_num`).
+        time_us: vehicle time at which the image was taken.
+        target: number that the camera's tracker assigns to the object (`target_num`).
         image_x, image_y: normalized image coordinates: x to the right, y down, unit focal length.
     """
 
@@ -45,13 +46,13 @@ class Detection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GimbalAttitude:
-    """Where the gimbal looks (GIMBAL_DEVICE_ATTITUDE_STATUS).
+    """The attitude of the gimbal (GIMBAL_DEVICE_ATTITUDE_STATUS).
 
     Attributes:
         time_us: vehicle time.
-        q: Hamilton quaternion (w x y z) that takes gimbal vectors (x along the line of sight, y right,
-            z down) to the reference frame.
-        from_north: the reference frame is NED; otherwise it is the vehicle's level frame, x along its
+        q: Hamilton quaternion (w x y z) that rotates gimbal vectors (x along the line of sight, y right, z
+            down) to the reference frame.
+        from_north: whether the reference frame is NED; otherwise it is the vehicle's level frame, x along its
         heading.
     """
 
@@ -61,7 +62,7 @@ class GimbalAttitude:
 
 
 def detection(m: Any) -> Detection | None:
-    """From LANDING_TARGET; None when its angles are no angles of an image."""
+    """From LANDING_TARGET; None when its angles are not possible in an image."""
     if not (abs(m.angle_x) < 0.5 * math.pi and abs(m.angle_y) < 0.5 * math.pi):
         return None
     return Detection(
@@ -73,10 +74,10 @@ def detection(m: Any) -> Detection | None:
 
 
 def gimbal_attitude(m: Any) -> GimbalAttitude | None:
-    """From GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is none.
+    """The attitude from GIMBAL_DEVICE_ATTITUDE_STATUS; None when its quaternion is invalid.
 
-    Roll and pitch are those against the horizon. Yaw is from north or from the vehicle's heading, as the
-    flags say; in gimbals older than those flags YAW_LOCK stands for north.
+    Roll and pitch are relative to the horizon. Yaw is relative to north or to the vehicle's heading, as the
+    flags specify; for gimbals older than those flags YAW_LOCK means north.
     """
     w, x, y, z = (float(value) for value in m.q)
     norm = math.sqrt(w * w + x * x + y * y + z * z)
@@ -95,26 +96,26 @@ class Payload:
     """The payload components of one vehicle.
 
     Args:
-        vehicle: whose.
+        vehicle: the vehicle that carries them.
     """
 
     def __init__(self, vehicle: "Vehicle") -> None:
         self._vehicle = vehicle
-        self._control_since_us: int | None = None  # when control of the gimbal was asked for
+        self._control_since_us: int | None = None  # time at which control of the gimbal was requested
 
-    # listening
+    # receiving
 
     def on_detection(self, listener: Callable[[Detection], None]) -> Callable[[], None]:
-        """Call `listener` with each detection; returns what ends it."""
+        """Call `listener` with each detection; returns a function that ends this."""
         return self._listen("LANDING_TARGET", CAMERA_COMPONENT, detection, listener)
 
     def on_gimbal_attitude(self, listener: Callable[[GimbalAttitude], None]) -> Callable[[], None]:
-        """Call `listener` with each attitude of the gimbal; returns what ends it."""
+        """Call `listener` with each attitude of the gimbal; returns a function that ends this."""
         return self._listen("GIMBAL_DEVICE_ATTITUDE_STATUS", GIMBAL_COMPONENT, gimbal_attitude, listener)
 
     def on_total_field(self, listener: Callable[[int, float], None]) -> Callable[[], None]:
         """Call `listener` with (vehicle time us, total magnetic field nT) of each sample of the survey
-        magnetometer; returns what ends it.
+        magnetometer; returns a function that ends this.
         """
 
         def sample(m: Any) -> tuple[int, float] | None:
@@ -144,10 +145,10 @@ class Payload:
         return self._vehicle.connection.listen(name, look)
 
     async def require(self, *components: int, timeout_s: float = 5.0) -> None:
-        """Wait until each of these components was heard.
+        """Wait until a message of each of these components was received.
 
         Raises:
-            VehicleTimeout: one was not; names it.
+            VehicleTimeout: a component was not received; the message names it.
         """
         vehicle = self._vehicle
         names = {
@@ -175,18 +176,18 @@ class Payload:
     # gimbal
 
     def gimbal_range_rad(self) -> tuple[float, float, float, float] | None:
-        """(lowest pitch, highest pitch, leftmost yaw, rightmost yaw) against the vehicle, by the gimbal
-        manager's information; None before it was told (`request_gimbal_information`).
+        """(lowest pitch, highest pitch, leftmost yaw, rightmost yaw) relative to the vehicle, reported by the
+        gimbal manager; None before it was received (`request_gimbal_information`).
         """
         vehicle = self._vehicle
         m = vehicle.connection.latest("GIMBAL_MANAGER_INFORMATION", vehicle.system_id, GIMBAL_COMPONENT)
         return None if m is None else (m.pitch_min, m.pitch_max, m.yaw_min, m.yaw_max)
 
     async def request_gimbal_information(self, timeout_s: float = 3.0) -> tuple[float, float, float, float]:
-        """Ask the gimbal manager for its range, and wait for it.
+        """Request the range from the gimbal manager, wait for it and return it as `gimbal_range_rad`.
 
         Raises:
-            VehicleTimeout: it does not say.
+            VehicleTimeout: the gimbal manager does not report it.
         """
         vehicle = self._vehicle
         self._command(
@@ -200,7 +201,7 @@ class Payload:
         )
 
     def take_gimbal_control(self) -> None:
-        """Become the primary control of the gimbal."""
+        """Request the primary control of the gimbal."""
         connection = self._vehicle.connection
         self._control_since_us = self._vehicle.clock.time_us
         self._command(
@@ -212,10 +213,11 @@ class Payload:
         )
 
     def gimbal_taken_by(self) -> tuple[int, int] | None:
-        """(system, component) of somebody else who has the primary control of the gimbal; None: nobody, or it
-        is not told.
+        """(system, component) of another component that has the primary control of the gimbal; None: no other
+        has it, or it is not reported.
 
-        By GIMBAL_MANAGER_STATUS. The gimbal takes no notice then of what this mission sends it.
+        From GIMBAL_MANAGER_STATUS. While another component has the control, the gimbal ignores this mission's
+        commands.
         """
         vehicle = self._vehicle
         m = vehicle.connection.latest("GIMBAL_MANAGER_STATUS", vehicle.system_id, GIMBAL_COMPONENT)
@@ -236,7 +238,7 @@ class Payload:
             )
 
     def set_gimbal_rate(self, rate_hz: float) -> None:
-        """Have the gimbal report its attitude at a rate."""
+        """Request the gimbal's attitude at a rate."""
         self._command(
             dialect.MAV_CMD_SET_MESSAGE_INTERVAL,
             float(dialect.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS),
@@ -251,15 +253,15 @@ class Payload:
         pitch_rate_rad_s: float = math.nan,
         yaw_rate_rad_s: float = math.nan,
     ) -> None:
-        """Point the gimbal, angles against the vehicle's body (pitch up and yaw right positive)."""
+        """Point the gimbal; angles are relative to the vehicle's body (pitch up and yaw right positive)."""
         self._set_pitchyaw(pitch_rad, yaw_rad, pitch_rate_rad_s, yaw_rate_rad_s)
 
     def turn_gimbal(self, *, pitch_rate_rad_s: float, yaw_rate_rad_s: float) -> None:
-        """Turn the gimbal at rates, wherever it looks."""
+        """Turn the gimbal at angular rates from its present attitude."""
         self._set_pitchyaw(math.nan, math.nan, pitch_rate_rad_s, yaw_rate_rad_s)
 
     def point_gimbal_at(self, lat_deg: float, lon_deg: float, alt_m: float) -> None:
-        """Have the gimbal look at a place by itself (region of interest)."""
+        """Command the gimbal to point at a place continuously (region of interest)."""
         vehicle = self._vehicle
         vehicle.send(
             dialect.MAVLink_command_int_message(

@@ -1,4 +1,4 @@
-"""PX4 as a mission meets it (v1.16 behaviour)."""
+"""The interface of missions to PX4 (v1.16 behaviour)."""
 
 import math
 from collections.abc import Mapping
@@ -48,7 +48,7 @@ def _custom_mode(mode: Mode) -> int:
 
 
 class Px4:
-    """PX4: OFFBOARD needs setpoints before and all the time; mode commands are acknowledged twice."""
+    """PX4: OFFBOARD needs setpoints before entry and continuously; mode commands are acknowledged twice."""
 
     name = "px4"
     kind = VehicleKind.MULTICOPTER
@@ -98,14 +98,14 @@ class Px4:
         await vehicle.command(dialect.MAV_CMD_NAV_TAKEOFF, -1.0, nan, nan, nan, nan, nan, height_amsl)
 
     async def start_streams(self, vehicle: "Vehicle") -> None:
-        """PX4 streams by itself; only what its link's set lacks is asked for."""
+        """Request only the messages that are missing in the link's set, because PX4 streams by default."""
         await vehicle.clock.sleep(1.2)
         for name, rate_hz in self.stream_rates_hz.items():
             if vehicle.message(name) is None:
                 await vehicle.set_message_rate(name, rate_hz)
 
     async def start_mission(self, vehicle: "Vehicle") -> None:
-        # the uploaded mission becomes available a moment after its acknowledgement: set_mode tries again
+        # the uploaded mission becomes available shortly after its acknowledgement: set_mode tries again
         await vehicle.set_mode(Mode.MISSION)
         if not vehicle.armed:
             await vehicle.arm()
@@ -115,7 +115,7 @@ class Px4:
         return MulticopterLimits(speed_m_s=values["MPC_XY_VEL_MAX"], acceleration_m_s2=values["MPC_ACC_HOR"])
 
     async def acceptance_m(self, vehicle: "Vehicle", asked_m: float) -> float:
-        return asked_m  # a waypoint's param2 counts
+        return asked_m  # a waypoint's param2 is used
 
     async def own_acceptance_m(self, vehicle: "Vehicle") -> float:
         return await vehicle.parameter_or("NAV_ACC_RAD", 10.0)
@@ -126,7 +126,7 @@ class Px4:
         raise PlanError("a multicopter does not circle a place by itself: use goto, or an orbit of your own")
 
     async def change_altitude(self, vehicle: "Vehicle", altitude_m: float) -> None:
-        # a latitude and longitude of INT32_MAX: where it is
+        # INT32_MAX as latitude and longitude means the present place
         await vehicle.command_int(
             dialect.MAV_CMD_DO_REPOSITION,
             dialect.MAV_FRAME_GLOBAL,

@@ -1,4 +1,4 @@
-"""PX4's fixed wing as a mission meets it (v1.16 behaviour)."""
+"""The interface of missions to PX4's fixed wing (v1.16 behaviour)."""
 
 import math
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Px4Plane(Px4):
-    """PX4 with wings: OFFBOARD takes roll, pitch and thrust together; circles are flown by DO_ORBIT."""
+    """PX4 fixed wing: OFFBOARD needs roll, pitch and thrust together; circles are flown by DO_ORBIT."""
 
     kind = VehicleKind.FIXED_WING
     stream_rates_hz: Mapping[str, float] = MappingProxyType({**Px4.stream_rates_hz, "VFR_HUD": 10.0})
@@ -41,7 +41,8 @@ class Px4Plane(Px4):
             bank_max_rad=math.radians(values["FW_R_LIM"]),
             bank_parameter="FW_R_LIM",
             guidance_s=max(0.1, values["NPFG_DAMPING"]) * max(1.0, values["NPFG_PERIOD"]) / math.pi,
-            guidance_parameter="NPFG_PERIOD",  # waypoint_lead_s is 0: it switches legs by its own distance
+            # waypoint_lead_s is 0: PX4 determines the switch to the next leg itself
+            guidance_parameter="NPFG_PERIOD",
         )
 
     async def loiter(
@@ -49,7 +50,7 @@ class Px4Plane(Px4):
     ) -> None:
         if radius_m is None:
             radius_m = abs(await vehicle.parameter_or("NAV_LOITER_RAD", 80.0))
-        # PX4 1.16.1 does not read the radius of DO_REPOSITION: it circles NAV_LOITER_RAD clockwise.
+        # PX4 1.16.1 ignores the radius of DO_REPOSITION: it circles clockwise with NAV_LOITER_RAD.
         # DO_ORBIT takes a signed radius, and an aircraft stays in Hold with it
         await vehicle.command_int(
             dialect.MAV_CMD_DO_ORBIT,

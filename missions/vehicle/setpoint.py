@@ -17,11 +17,11 @@ _ZERO: Final[Vector] = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setpoint:
-    """What the vehicle shall do now; None: not controlled, or no feed-forward.
+    """The commanded state of the vehicle; None: not controlled, or no feed-forward.
 
     Attributes:
-        position_ned_m: in the autopilot's local frame (or from home: see `Vehicle.follow`).
-        velocity_ned_m_s, acceleration_ned_m_s2: demands, or feed-forward when a position is given.
+        position_ned_m: position in the autopilot's local frame (or from home: see `Vehicle.follow`).
+        velocity_ned_m_s, acceleration_ned_m_s2: commands, or feed-forward when there is a position.
         yaw_rad: heading, clockwise from north.
         yaw_rate_rad_s: turn rate.
     """
@@ -38,7 +38,7 @@ class Setpoint:
 
     @property
     def type_mask(self) -> int:
-        """POSITION_TARGET_TYPEMASK: what to ignore."""
+        """POSITION_TARGET_TYPEMASK of the fields to ignore."""
         return (
             (_IGNORE_POSITION if self.position_ned_m is None else 0)
             | (_IGNORE_VELOCITY if self.velocity_ned_m_s is None else 0)
@@ -48,7 +48,9 @@ class Setpoint:
         )
 
     def message(self, time_us: int, system_id: int, offset_ned_m: Vector = _ZERO) -> Any:
-        """The message, its position moved by `offset_ned_m` (where home lies in the local frame)."""
+        """The MAVLink message, with the position moved by `offset_ned_m` (the place of home in the local
+        frame).
+        """
         position = self.position_ned_m or _ZERO
         if self.position_ned_m is not None:
             position = (

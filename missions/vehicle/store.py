@@ -1,4 +1,4 @@
-"""What a vehicle keeps for a mission: plans and parameters."""
+"""The data that a vehicle stores for a mission: plans and parameters."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final
@@ -21,20 +21,21 @@ from missions.vehicle.item_tracker import (
 _REWINDS: Final = 4
 _REWIND_S: Final = 1.5
 _ACCEPTANCE_M: Final = 2.0
-"""Radius in which a position shows that a waypoint was passed, where the waypoint names none."""
+"""Distance at which a position shows that a waypoint was passed, if the waypoint specifies none."""
 
 
 class VehicleStore(VehicleCommands):
-    """The storing half of a vehicle: plans are uploaded, followed and fetched, parameters read and set."""
+    """The part of a vehicle for stored data: plans are uploaded and followed, parameters read and set."""
 
-    _tracker: ItemTracker | None = None  # of the mission that was uploaded last
+    _tracker: ItemTracker | None = None  # tracker of the mission that was uploaded last
 
     # missions
 
     async def upload_mission(self, items: Sequence[MissionItem]) -> int:
-        """Upload a plan; gives the wire number of its first item (1 for ArduPilot, whose item 0 is home).
+        """Upload a plan; returns the sequence number of its first item on the link (1 for ArduPilot, whose
+        item 0 is home).
 
-        It is flown from its first item on. Jumps name items by their index in `items`.
+        The flight starts at its first item. Jumps name items by their index in `items`.
         """
         first = 1 if self.adapter.first_mission_item_is_home else 0
         home = self.home
@@ -50,9 +51,9 @@ class VehicleStore(VehicleCommands):
         return first
 
     async def rewind_mission(self) -> None:
-        """Have the stored mission begin at its first item: the vehicle may be at the end of its last flight.
+        """Set the stored mission to its first item, because it may be at the end of its last flight.
 
-        A vehicle that does not confirm it (MISSION_CURRENT) is warned of in the notes.
+        If the vehicle does not confirm it (MISSION_CURRENT), the notes get a warning.
         """
         first = 1 if self.adapter.first_mission_item_is_home else 0
         with self.messages("MISSION_CURRENT") as stream:
@@ -68,36 +69,36 @@ class VehicleStore(VehicleCommands):
         self.notes.warn("the vehicle did not confirm (MISSION_CURRENT) that its mission begins anew")
 
     async def upload_plan(self, mission_type: MissionType, items: Sequence[MissionItem]) -> None:
-        """Upload a geofence or rally points in place of those the vehicle has."""
+        """Upload a geofence or rally points, which replace those on the vehicle."""
         await mission_transfer.upload(self, items, mission_type)
 
     async def download_plan(self, mission_type: MissionType) -> list[MissionItem]:
-        """The geofence or the rally points the vehicle holds."""
+        """Download the geofence or the rally points from the vehicle."""
         return await mission_transfer.download(self, mission_type)
 
     async def download_mission(self) -> list[MissionItem]:
-        """The plan the vehicle holds (without ArduPilot's home item)."""
+        """Download the plan from the vehicle (without ArduPilot's home item)."""
         items = await mission_transfer.download(self)
         if not self.adapter.first_mission_item_is_home:
             return items
         return mission_transfer.renumbered(items[1:], -1)
 
     async def clear_mission(self) -> None:
-        """Delete the plan the vehicle holds."""
+        """Delete the plan on the vehicle."""
         await mission_transfer.clear(self)
 
     async def wait_item_reached(
         self, sequence: int, timeout_s: float, progress: Callable[[int], None] | None = None
     ) -> None:
-        """Wait until the mission has reached item `sequence` (wire number) or gone beyond.
+        """Wait until the mission has reached item `sequence` (sequence number on the link) or a later one.
 
-        MISSION_ITEM_REACHED, MISSION_CURRENT and positions are evidence of it, see `ItemTracker`.
+        The evidence is MISSION_ITEM_REACHED, MISSION_CURRENT and positions; see `ItemTracker`.
 
         Args:
-            progress: called with the number of each item reached.
+            progress: called with the number of each reached item.
 
         Raises:
-            MissionError: the vehicle left the mission before.
+            MissionError: the vehicle left the mission before that.
         """
         tracker = self._tracker or ItemTracker([MissionStep(index=k) for k in range(sequence + 1)])
         mode = MissionModeWatch(self.adapter.modes[Mode.MISSION])
@@ -140,14 +141,14 @@ class VehicleStore(VehicleCommands):
         return value
 
     async def parameter_or(self, name: str, default: float) -> float:
-        """Read a parameter, or `default` when the vehicle doesn't answer for it."""
+        """Read a parameter; returns `default` when the vehicle doesn't answer."""
         try:
             return await self.parameter(name)
         except VehicleTimeout:
             return default
 
     async def set_parameter(self, name: str, value: float) -> None:
-        """Set a parameter and see it confirmed."""
+        """Set a parameter and wait for the confirmation."""
         await parameter_client.write(self, name, value)
 
     async def set_parameters(self, values: Mapping[str, float]) -> None:

@@ -1,7 +1,7 @@
-"""Room for the streams that a flight is steered by, on a line that does not carry all of them.
+"""Reserves capacity for the streams that a flight needs, on a line that can't carry all streams.
 
-An autopilot thins everything alike: of a set that is five times what a serial line carries, the attitude
-comes at a fifth of its rate as well. What is not needed is slowed down instead.
+An autopilot reduces all rates equally: if a set needs five times the capacity of a serial line, the attitude
+also comes at a fifth of its rate. Instead, messages that are not needed are slowed down.
 """
 
 from collections import Counter
@@ -14,27 +14,28 @@ if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle
 
 ENOUGH: Final = 0.8
-"""Of the rate asked for."""
+"""Share of the requested rate that is sufficient."""
 SLOW_HZ: Final = 1.0
-"""What is not needed is asked for at this rate: for the log, and for people."""
+"""Rate that is requested for messages that are not needed: for the log, and for display."""
 _LOOKS: Final = 10
 _LOOK_S: Final = 0.2
 _SLOWED_HZ: Final = 1.5
 _LEFT_ALONE: Final = frozenset({"HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "EVENT"})
-"""Streams that are not asked for, and answers."""
+"""Messages whose rates are not requested, and answers."""
 
 
 async def make_room(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> list[str]:
-    """Look at what a serial line brings. When something needed comes too slowly, all that is not needed is
-    slowed down, and the rest asked for at the rates that are needed.
+    """Measure the message rates on a serial line. When a needed message is too slow, reduce the rates of all
+    messages that are not needed, and request the needed ones at the needed rates.
 
-    On other links nothing is done: they carry what is asked for, or do not tell what they carry.
+    On other links nothing is done: they have enough capacity for the requested messages, or their capacity is
+    not known.
 
     Args:
-        needed_hz: the rates of the messages that have to come.
+        needed_hz: needed rates by message name.
 
     Returns:
-        The messages that were slowed down.
+        The messages whose rates were reduced.
     """
     if vehicle.connection.bytes_per_s is None:
         return []
@@ -49,13 +50,13 @@ async def make_room(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> list[
     ]
     for name in slowed:
         await vehicle.set_message_rate(name, SLOW_HZ)
-    for name, rate_hz in needed_hz.items():  # some may be asked for at more by the autopilot's own set
+    for name, rate_hz in needed_hz.items():  # the autopilot's own set may have a higher rate for some
         await vehicle.set_message_rate(name, rate_hz)
     return slowed
 
 
 async def _listen(vehicle: "Vehicle", needed_hz: Mapping[str, float]) -> tuple[Counter[str], Counter[str]]:
-    """How often needed messages came, and in how many of ten looks each message was another."""
+    """Count needed messages, and for each message in how many of ten checks it had changed."""
     heard: Counter[str] = Counter()
     changed: Counter[str] = Counter()
 

@@ -1,4 +1,4 @@
-"""The vehicle as a mission sees it."""
+"""The interface of missions to a vehicle."""
 
 import asyncio
 import math
@@ -22,16 +22,17 @@ from missions.vehicle.guided import GuidedSession, SetpointSource
 
 _GROUND: Final = 1
 _ACCEPTED: Final = 0
-_REASONS_S: Final = 5.0  # at the end of a wait for readiness, in which the autopilot says what is missing
-_FARTHEST_M: Final = 10_000.0  # from home; beyond, latitude and longitude are more likely mistaken
+# at the end of a wait for readiness: time in which the autopilot reports what is missing
+_REASONS_S: Final = 5.0
+_FARTHEST_M: Final = 10_000.0  # largest distance from home; farther coordinates are probably a mistake
 _MAY_PASS: Final = (1, 4)  # TEMPORARILY_REJECTED (PX4), FAILED (ArduPilot)
 
 
 class Vehicle(FixedWingFlight):
-    """A vehicle over MAVLink, PX4 or ArduPilot: which one, its heartbeat says.
+    """A vehicle over MAVLink, PX4 or ArduPilot; its heartbeat identifies the firmware.
 
-    All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` says what was awaited and
-    what was heard. Heights are above home; local positions are NED metres from home.
+    All times are the vehicle's. Every wait has a deadline; a `VehicleTimeout` names what was awaited and what
+    was received. Heights are above home; local positions are NED metres from home.
     """
 
     def __init__(self, connection: Connection, system_id: int | None = None) -> None:
@@ -45,16 +46,16 @@ class Vehicle(FixedWingFlight):
             self._resuming = asyncio.get_running_loop().create_task(self._ask_again())
 
     async def _ask_again(self) -> None:
-        """Streams as before: a link that was away may have begun anew with its own."""
+        """Request the streams again, because a link that was lost may have restarted with its own streams."""
         with suppress(MissionError):
             await self.adapter.start_streams(self)
             for name, rate_hz in tuple(self._rates_hz.items()):
                 await self.set_message_rate(name, rate_hz)
 
-    # beginning
+    # start
 
     async def wait_heartbeat(self, timeout_s: float = 15.0) -> None:
-        """Wait for an autopilot to be heard; from then on its firmware and system id are known."""
+        """Wait for a heartbeat of an autopilot; from then on its firmware and system id are known."""
         await self.wait_until(
             lambda: self._adapter,
             what="heartbeat of a PX4 or ArduPilot autopilot",
@@ -66,9 +67,10 @@ class Vehicle(FixedWingFlight):
         """Wait until the vehicle could be armed: pre-arm checks, home, navigation.
 
         Args:
-            timeout_s: for each of its waits.
-            leave_mission: a vehicle that stands disarmed in the mode of a mission leaves it. In that mode the
-                checks may not pass: ArduPilot's plane after a landing waits for another mode or mission.
+            timeout_s: time limit of each of its waits.
+            leave_mission: whether a disarmed vehicle in the mode of a mission is switched to another mode. In
+                that mode the checks may fail: ArduPilot's plane waits for another mode or mission after a
+                landing.
         """
         await self.wait_heartbeat(timeout_s)
         await self.adapter.start_streams(self)
@@ -90,10 +92,11 @@ class Vehicle(FixedWingFlight):
             await self._wait_readiness(ready, timeout_s)
 
     async def _wait_readiness(self, ready: Callable[[], bool], timeout_s: float) -> None:
-        """Wait; for the last seconds have the autopilot run its checks, so that it says what it lacks.
+        """Wait until the vehicle is ready. In the last seconds the autopilot is commanded to run its checks,
+        so that it reports what is missing.
 
         Raises:
-            VehicleTimeout: it is not ready; with the reasons that the autopilot reports.
+            VehicleTimeout: it is not ready; the message contains the reasons that the autopilot reported.
         """
 
         async def wait(seconds: float) -> None:
@@ -135,11 +138,11 @@ class Vehicle(FixedWingFlight):
         return int(status.onboard_control_sensors_enabled & ~status.onboard_control_sensors_health)
 
     async def limits(self, altitude_m: float = 0.0) -> Limits:
-        """What the vehicle's parameters allow a planner.
+        """The limits for a planner, from the vehicle's parameters.
 
         Args:
-            altitude_m: above home, what will be flown at. An aircraft turns wider in thin air, and in the
-                wind of `forecast_wind_m_s`.
+            altitude_m: height of the flight above home. An aircraft turns wider in thin air, and in the wind
+                of `forecast_wind_m_s`.
         """
         adapter = self.adapter
         limits = adapter.limits(
@@ -160,12 +163,12 @@ class Vehicle(FixedWingFlight):
     # flying
 
     async def arm(self, timeout_s: float = 15.0) -> None:
-        """Arm, and see it in a heartbeat; a refusal that may pass is tried again until the deadline."""
+        """Arm and wait for it in a heartbeat; after a temporary refusal it tries again until the deadline."""
         await self.adapter.prepare_arming(self)
         await self.arm_here(timeout_s)
 
     async def arm_here(self, timeout_s: float = 15.0) -> None:
-        """As `arm`, in the mode the vehicle is in."""
+        """As `arm`, in the present mode of the vehicle."""
         end_us = self.clock.time_us + round(timeout_s * 1e6)
         while not self.armed:
             result = await self.try_command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
@@ -177,7 +180,7 @@ class Vehicle(FixedWingFlight):
         await self.wait_until(lambda: self.armed, what="armed heartbeat", on=("HEARTBEAT",), timeout_s=5.0)
 
     async def disarm(self) -> None:
-        """Disarm, and see it in a heartbeat. Refused in the air."""
+        """Disarm and wait for it in a heartbeat. In the air the vehicle refuses it."""
         await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
         await self.wait_disarmed(5.0)
 
@@ -231,11 +234,11 @@ class Vehicle(FixedWingFlight):
     ) -> None:
         """Fly straight to a point (DO_REPOSITION) and wait until the vehicle is there and slow.
 
-        For multicopters: an aircraft with wings can't be slow; see `loiter`.
+        For multicopters only, because a fixed wing can't be slow; see `loiter` for those.
 
         Raises:
             PlanError: the target is more than 10 km from home; nothing was sent.
-            MissionError: the vehicle disarmed, or changed to a mode this mission did not ask for (a
+            MissionError: the vehicle disarmed, or changed to a mode that this mission did not command (a
                 failsafe, a pilot).
         """
         if self.kind is VehicleKind.FIXED_WING:
@@ -263,7 +266,7 @@ class Vehicle(FixedWingFlight):
 
         def there() -> bool:
             if self._heard_us is not None and self._heard_us >= accepted_us + HEARTBEAT_AGE_US:
-                if self.custom_mode == goto_mode:  # from now on the mode before is a change too
+                if self.custom_mode == goto_mode:  # from now on a return to the previous mode is a change too
                     expected.intersection_update((goto_mode,))
                 self._require_flying(expected, lambda: f"{distance_m():.1f} m before the target")
             p = self.latest(telemetry.Position)
@@ -290,7 +293,7 @@ class Vehicle(FixedWingFlight):
             )
 
     def _require_flying(self, expected: Set[int], where: Callable[[], str]) -> None:
-        """Raise when the vehicle disarmed, or is in a mode neither expected nor asked for meanwhile."""
+        """Raise an error when the vehicle is disarmed, or in a mode neither expected nor requested."""
         if not self.armed:
             happened = "is disarmed"
         elif self.custom_mode not in expected and self.custom_mode not in self._modes_asked:
@@ -303,20 +306,20 @@ class Vehicle(FixedWingFlight):
     async def goto_ned(
         self, north_m: float, east_m: float, down_m: float, *, tolerance_m: float = 1.0
     ) -> None:
-        """`goto` a point NED from home."""
+        """`goto` to a point in NED from home."""
         lat, lon, alt = LocalFrame(self.home).geodetic_from_ned(north_m, east_m, down_m)
         await self.goto(GeodeticPosition(lat_deg=lat, lon_deg=lon, alt_m=alt), tolerance_m=tolerance_m)
 
     async def set_speed(self, speed_m_s: float) -> None:
-        """Ground speed for missions, goto and return (DO_CHANGE_SPEED)."""
+        """Command the ground speed for missions, goto and return (DO_CHANGE_SPEED)."""
         await self.command(dialect.MAV_CMD_DO_CHANGE_SPEED, 1.0, speed_m_s, -1.0)
 
     @asynccontextmanager
     async def guided(self, rate_hz: float = 25.0) -> AsyncIterator[GuidedSession]:
         """Fly by streamed setpoints: `async with vehicle.guided() as g: await g.follow(source)`.
 
-        PX4 gets setpoints before and all the time in OFFBOARD; between two `follow` the last one is
-        repeated. At the end the vehicle holds.
+        PX4 receives setpoints before and continuously in OFFBOARD; between two calls of `follow` the last one
+        is repeated. At the end the vehicle holds its position.
         """
         session = GuidedSession(self, rate_hz, await self.home_in_local_frame())
         try:
@@ -329,31 +332,31 @@ class Vehicle(FixedWingFlight):
         """Follow streamed setpoints until the source ends, then hold.
 
         Args:
-            source: called with vehicle seconds since the first setpoint was due; a `Setpoint` NED from
-                home, or None at the end.
+            source: called with vehicle seconds since the first setpoint was due; returns a `Setpoint` in NED
+                from home, or None at the end.
             rate_hz: setpoints per vehicle second; PX4 needs more than 2.
         """
         async with self.guided(rate_hz) as session:
             await session.follow(source)
 
     async def start_mission(self) -> None:
-        """Fly the uploaded mission; arms and takes off when on the ground."""
+        """Start the uploaded mission; on the ground it arms and takes off."""
         await self.adapter.start_mission(self)
 
     async def return_to_launch(self, *, wait: bool = True, timeout_s: float = 600.0) -> None:
-        """Return, land and (with `wait`) see the vehicle disarmed."""
+        """Return, land and (with `wait`) wait until the vehicle is disarmed."""
         await self.set_mode(Mode.RETURN)
         if wait:
             await self.wait_disarmed(timeout_s)
 
     async def land(self, *, wait: bool = True, timeout_s: float = 300.0) -> None:
-        """Land here and (with `wait`) see the vehicle disarmed."""
+        """Land here and (with `wait`) wait until the vehicle is disarmed."""
         await self.set_mode(Mode.LAND)
         if wait:
             await self.wait_disarmed(timeout_s)
 
     async def wait_landed(self, timeout_s: float = 300.0) -> None:
-        """Wait until the vehicle says it stands on the ground."""
+        """Wait until the vehicle reports that it is landed."""
         await self.wait_until(
             lambda: self.landed_state == _GROUND,
             what="landing",
@@ -364,9 +367,10 @@ class Vehicle(FixedWingFlight):
     # frames
 
     async def local_origin(self) -> GeodeticPosition:
-        """Where the autopilot's local frame (LOCAL_POSITION_NED, local setpoints) has its origin.
+        """The origin of the autopilot's local frame (LOCAL_POSITION_NED, local setpoints).
 
-        From GPS_GLOBAL_ORIGIN, or where a vehicle doesn't tell that, from positions in both frames.
+        It is taken from GPS_GLOBAL_ORIGIN or, when a vehicle doesn't report that, from positions in both
+        frames.
         """
         if self._local_origin is None:
             try:
@@ -402,12 +406,12 @@ class Vehicle(FixedWingFlight):
 
     @asynccontextmanager
     async def safe_on_exit(self, action: Mode = Mode.RETURN) -> AsyncIterator["Vehicle"]:
-        """Leave the vehicle safe: when the block fails, is cancelled or interrupted in flight, `action` is
-        commanded. On the ground it is disarmed first.
+        """Leave the vehicle safe: when the block fails, is cancelled or is interrupted in flight, `action` is
+        commanded. A vehicle on the ground is disarmed first.
 
         Args:
-            action: `Mode.RETURN` (then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is refused, the
-                other two are tried.
+            action: `Mode.RETURN` (the vehicle then lands by itself), `Mode.LAND` or `Mode.HOLD`. If it is
+                refused, the other two are tried.
         """
         try:
             yield self
@@ -416,20 +420,21 @@ class Vehicle(FixedWingFlight):
             raise
 
     async def _make_safe(self, action: Mode) -> None:
-        # heartbeats come once a second: a vehicle that was just armed doesn't say so yet
+        # Heartbeats come once a second: after arming, the newest heartbeat may still report disarmed.
         if self._adapter is not None and self.may_be_armed:
             await asyncio.shield(asyncio.ensure_future(self._command_safe(action)))
 
     async def _command_safe(self, action: Mode) -> None:
         if self.landed_state == _GROUND:
-            with suppress(MissionError):  # refused when it has just left the ground
+            with suppress(MissionError):  # refused if it has just left the ground
                 await self.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, timeout_s=0.5)
-        # a disarmed vehicle too: in the mission's mode it would fly off when it is armed again
+        # also for a disarmed vehicle: in the mission's mode it would fly off when it is armed again
         for mode in (action, *(m for m in (Mode.RETURN, Mode.LAND, Mode.HOLD) if m is not action)):
             self.notes.left = f"was commanded to {mode} and did not answer"
             try:
                 await self.set_mode(mode, 5.0)
-            except LinkClosed:  # the vehicle may still hear us: what it was told first shall stand
+            # the vehicle may still receive our messages: it keeps the first action commanded
+            except LinkClosed:
                 return
             except MissionError:
                 continue

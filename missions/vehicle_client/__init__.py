@@ -1,1 +1,1 @@
-"""Talking to a vehicle on the bench through MAVSDK: what it is, its parameters, its logs, its health."""
+"""A client for a vehicle on the bench through MAVSDK: identity, parameters, logs, health."""

@@ -1,4 +1,4 @@
-"""Our connection strings as MAVSDK takes them."""
+"""Conversion of our connection strings to those of MAVSDK."""
 
 from pathlib import Path
 
@@ -17,10 +17,10 @@ from missions.errors import PlanError
 
 
 def mavsdk_url(address: Address) -> str:
-    """The same link for MAVSDK.
+    """The MAVSDK connection string for a link.
 
     Raises:
-        PlanError: a kind of link that MAVSDK has not.
+        PlanError: MAVSDK does not support this kind of link.
     """
     match address:
         case UdpServer():

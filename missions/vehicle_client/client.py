@@ -1,4 +1,4 @@
-"""A vehicle through MAVSDK: connected, told apart, and its newest messages kept."""
+"""A connection to a vehicle through MAVSDK: it finds the vehicle and keeps its newest messages."""
 
 import asyncio
 import json
@@ -36,19 +36,19 @@ WANTED: Final[Mapping[str, tuple[str, ...]]] = {
     "ardupilot": ("SYS_STATUS", "GPS_RAW_INT", "GLOBAL_POSITION_INT", "HOME_POSITION", "EKF_STATUS_REPORT",
                   "BATTERY_STATUS", "EXTENDED_SYS_STATE", "RC_CHANNELS", "SYSTEM_TIME"),
 }  # fmt: skip
-"""Messages that tell how a vehicle is."""
+"""Messages that report the state of a vehicle."""
 
 
 class VehicleClient:
     """One vehicle that MAVSDK has found; made by `open_client`.
 
     Attributes:
-        system: MAVSDK's, for its plugins.
+        system: MAVSDK's system, for its plugins.
         system_id: MAVLink system id.
-        direct: MAVSDK's plugin for messages as they are.
-        messages: the newest of each name from the autopilot.
-        texts: what the vehicle said, oldest first.
-        parameter_types: MAV_PARAM_TYPE of the parameters that were told.
+        direct: MAVSDK's plugin for unprocessed MAVLink messages.
+        messages: the autopilot's newest message of each name.
+        texts: the vehicle's status texts, oldest first.
+        parameter_types: MAV_PARAM_TYPE of the received parameters.
     """
 
     def __init__(self, system: System, system_id: int) -> None:
@@ -58,26 +58,27 @@ class VehicleClient:
         self.messages: dict[str, Mapping[str, Any]] = {}
         self.texts: list[str] = []
         self.parameter_types: dict[str, int] = {}
-        self._filter: deque[Mapping[str, Any]] = deque(maxlen=_KEPT_FILTER)  # what it told of itself lately
+        # newest reports of its navigation filter
+        self._filter: deque[Mapping[str, Any]] = deque(maxlen=_KEPT_FILTER)
         self._answers = False
         self._tasks: list[asyncio.Task[None]] = []
 
     def start(self) -> None:
-        """Begin to keep what it says."""
+        """Start to keep received messages."""
         loop = asyncio.get_running_loop()
         self._tasks = [loop.create_task(self._keep_messages()), loop.create_task(self._keep_texts())]
 
     async def stop(self) -> None:
-        """Keep nothing more."""
+        """Stop keeping received messages."""
         for task in self._tasks:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
     @asynccontextmanager
     async def quiet(self) -> AsyncIterator[None]:
-        """A block in which nothing is kept, for transfers of many messages.
+        """A block in which received messages are not kept, for transfers of many messages.
 
-        MAVSDK would turn each of them into text for us: more than half of a download's processor time here.
+        MAVSDK would convert each of them to text, which takes more than half of a download's processor time.
         """
         await self.stop()
         try:
@@ -89,7 +90,7 @@ class VehicleClient:
         async for message in self.direct.subscribe_message(""):
             if message.component_id != _AUTOPILOT or message.system_id != self.system_id:
                 continue
-            with suppress(ValueError):  # NaN in a field is no JSON
+            with suppress(ValueError):  # NaN in a field is not valid JSON
                 fields = json.loads(message.fields_json)
                 self.messages[message.message_name] = fields
                 if message.message_name == FILTER_STATUS.get(self.flavour):
@@ -101,7 +102,7 @@ class VehicleClient:
         async for text in TelemetryAsync(self.system).subscribe_status_text():
             self.texts = [*self.texts[-_KEPT_TEXTS:], text.text.strip()]
 
-    # who it is
+    # identity of the vehicle
 
     @property
     def flavour(self) -> str:
@@ -110,12 +111,12 @@ class VehicleClient:
 
     @property
     def kind(self) -> VehicleKind | None:
-        """Class of vehicle; None: one that isn't flown here."""
+        """Class of vehicle; None: one that this program does not fly."""
         return KIND_OF_TYPE.get(int(self.messages.get("HEARTBEAT", {}).get("type", -1)))
 
     @property
     def mode(self) -> str:
-        """Flight mode, as the firmware calls it."""
+        """Flight mode, with the firmware's name."""
         custom_mode = int(self.messages.get("HEARTBEAT", {}).get("custom_mode", 0))
         if self.kind is None or (self.flavour, self.kind) not in ADAPTERS:
             return f"mode {custom_mode}"
@@ -124,7 +125,7 @@ class VehicleClient:
     def snapshot(
         self, parameters: Mapping[str, float] | None = None, fence_items: int | None = None
     ) -> Snapshot:
-        """What it has told so far; of its filter's measurements the median of the last ones."""
+        """The data received so far; of the filter's measurements, the median of the newest ones."""
         messages = dict(self.messages)
         if self._filter:
             messages[FILTER_STATUS[self.flavour]] = usual(self._filter)
@@ -137,18 +138,18 @@ class VehicleClient:
             fence_items=fence_items,
         )
 
-    # asking
+    # requests
 
     async def wait_for(self, *names: str, timeout_s: float) -> list[str]:
-        """Wait until messages of these names have come; gives those that have not."""
+        """Wait until messages of these names were received; returns the names that were not."""
         return await _missing(names, self.messages, timeout_s)
 
     async def wait_for_types(self, names: Collection[str], *, timeout_s: float) -> list[str]:
-        """Wait until the types of these parameters are known; gives those that are not."""
+        """Wait until the types of these parameters are known; returns the names whose types are not."""
         return await _missing(names, self.parameter_types, timeout_s)
 
     async def command(self, command: int, *parameters: float) -> int | None:
-        """COMMAND_LONG; its MAV_RESULT, or None without an answer."""
+        """Send a COMMAND_LONG; returns its MAV_RESULT, or None without an answer."""
         fields = {f"param{k}": value for k, value in enumerate((*parameters, *(0.0,) * 7)[:7], start=1)}
         fields |= {"target_system": self.system_id, "target_component": _AUTOPILOT, "command": command}
         message = MavlinkMessage(
@@ -166,10 +167,10 @@ class VehicleClient:
             return None
 
     async def require_answers(self) -> None:
-        """See that it answers, before something is asked that would be waited for long.
+        """Check that the vehicle answers, before a request that would have a long timeout.
 
         Raises:
-            VehicleTimeout: it is heard, and doesn't.
+            VehicleTimeout: messages of the vehicle are received, but it does not answer.
         """
         version = float(definition("AUTOPILOT_VERSION").message_id)
         if not self._answers:
@@ -178,7 +179,7 @@ class VehicleClient:
             raise VehicleTimeout(f"vehicle {self.system_id} sends heartbeats, but does not answer")
 
     async def ask_for(self, names: Sequence[str], rate_hz: float = 2.0) -> None:
-        """Have messages streamed that are not (ArduPilot sends only what it was asked for)."""
+        """Request messages that are not streamed (ArduPilot sends only requested ones)."""
         for name in names:
             if name not in self.messages:
                 await self.command(
@@ -189,7 +190,7 @@ class VehicleClient:
 
 
 async def _missing(names: Collection[str], known: Container[str], timeout_s: float) -> list[str]:
-    """Wait until all names are known; gives those that are not in the end."""
+    """Wait until all names are known; returns those that are still missing at the end."""
     loop = asyncio.get_running_loop()
     end_s = loop.time() + timeout_s
     while missing := [name for name in names if name not in known]:
@@ -203,22 +204,23 @@ async def _missing(names: Collection[str], known: Container[str], timeout_s: flo
 async def open_client(
     address: Address, *, timeout_s: float = 10.0, system_id: int | None = None
 ) -> AsyncIterator[VehicleClient]:
-    """Connect, and find the vehicle.
+    """Connect, and find the vehicle. The context ends the connection.
 
     Args:
-        timeout_s: to hear an autopilot.
-        system_id: of the vehicle; None: the first one heard.
+        timeout_s: time limit for receiving a heartbeat of an autopilot.
+        system_id: system id of the vehicle; None: the first vehicle received.
 
     Raises:
-        PlanError: a link that MAVSDK has not.
-        MissionError: it can't be opened, or no autopilot is heard there; says what was heard.
+        PlanError: MAVSDK does not support the link.
+        MissionError: the link can't be opened, or no autopilot is received on it; the message names what was
+            received.
     """
     url = mavsdk_url(address)
     said: list[str] = []
 
     def keep(_level: object, message: str, _file: object, _line: int) -> bool:
         said.append(message)
-        return True  # not to the terminal
+        return True  # do not print it on the terminal
 
     log_subscribe(keep)
     configuration = Configuration.create_with_component_type(ComponentType.GROUND_STATION)
@@ -261,7 +263,7 @@ async def _find(mavsdk: Mavsdk, timeout_s: float, system_id: int | None) -> Syst
 
 
 async def _heard(address: Address) -> str:
-    """What there is on a link without the autopilot that was looked for."""
+    """Description of what is received on a link without the requested autopilot."""
     try:
         quality = await listen(address, _LISTEN_S)
     except BridgeError as error:

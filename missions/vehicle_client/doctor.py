@@ -1,4 +1,4 @@
-"""How a vehicle is, and what keeps it from arming."""
+"""Examines a vehicle: its state, and what prevents arming."""
 
 import asyncio
 from contextlib import aclosing
@@ -36,13 +36,13 @@ _SLOW_HEARTBEAT_HZ: Final = 0.7
 async def examine(
     address: Address, *, timeout_s: float, system_id: int | None, unix_time_us: int
 ) -> list[Finding]:
-    """All findings, in the order in which a person looks.
+    """Examine a vehicle; returns all findings, in the order of a manual inspection.
 
     Args:
-        unix_time_us: this machine's clock, when the examination begins.
+        unix_time_us: time of this machine's clock when the examination begins.
 
     Raises:
-        MissionError: no vehicle is heard.
+        MissionError: no vehicle is received.
         BridgeError: the link can't be opened.
     """
     begun_s = asyncio.get_running_loop().time()
@@ -57,7 +57,7 @@ async def examine(
             await client.wait_for(*wanted, timeout_s=_WAIT_S)
             return [*findings, *health_findings(client.snapshot()), problem("link", str(error), why)]
         await client.ask_for(wanted)
-        await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the reasons are told again
+        await client.command(dialect.MAV_CMD_RUN_PREARM_CHECKS)  # the reasons are reported again
         missing = await client.wait_for(*wanted, timeout_s=_WAIT_S)
         await asyncio.sleep(_TEXTS_S)
         try:
@@ -94,12 +94,15 @@ async def _fence_items(client: VehicleClient) -> int | None:
 
 
 async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
-    """What PX4's arming checks report by events; nothing where there are none, or MAVSDK has no names."""
+    """Findings from the events in which PX4 reports its arming checks; empty when there are no events, or
+    MAVSDK has no names for them.
+    """
     if snapshot.flavour != "px4":
         return []
     health = snapshot.whole("SYS_STATUS", "onboard_control_sensors_health") or 0
     events = EventsAsync(client.system)
-    await ComponentMetadataAsync(client.system).request_autopilot_component()  # gives events their names
+    # provides the names of the events
+    await ComponentMetadataAsync(client.system).request_autopilot_component()
     telling = asyncio.create_task(_next_report(events))
     try:
         for _ in range(_REPORTS):
@@ -119,7 +122,7 @@ async def _events(client: VehicleClient, snapshot: Snapshot) -> list[Finding]:
 
 
 async def _next_report(events: EventsAsync) -> HealthAndArmingCheckReport:
-    """The next report as a whole: asked for its last one, MAVSDK may give one that is still coming in."""
+    """The next complete report: MAVSDK's last report may still be incomplete."""
     async with aclosing(events.subscribe_health_and_arming_checks()) as reports:
         return await anext(reports)
 

@@ -1,4 +1,4 @@
-"""What is connected."""
+"""Information about the connected vehicle."""
 
 from typing import Any, Final
 
@@ -13,7 +13,7 @@ _ARMED: Final = dialect.MAV_MODE_FLAG_SAFETY_ARMED
 
 
 async def information(client: VehicleClient) -> dict[str, Any]:
-    """Everything that `flightstack vehicle info` tells, as plain values; what is not known is None."""
+    """Everything that `flightstack vehicle info` prints, as plain values; None for unknown values."""
     wanted = WANTED.get(client.flavour, WANTED["px4"])
     await client.ask_for(wanted)
     version = float(dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
@@ -57,7 +57,7 @@ def _landed(state: int | None) -> str | None:
 
 
 async def _versions(client: VehicleClient) -> dict[str, Any]:
-    """By MAVSDK's info plugin."""
+    """Versions, from MAVSDK's info plugin."""
     info = InfoAsync(client.system)
     found: dict[str, Any] = dict.fromkeys(("firmware", "firmware_git", "os", "vendor", "product", "uid"))
     try:
@@ -79,9 +79,10 @@ async def _versions(client: VehicleClient) -> dict[str, Any]:
 
 
 def _git_hash(client: VehicleClient) -> str:
-    """AUTOPILOT_VERSION.flight_custom_version: PX4 sends its bytes reversed, ArduPilot as text.
+    """Git hash from AUTOPILOT_VERSION.flight_custom_version: PX4 sends its bytes reversed, ArduPilot sends
+    text.
 
-    MAVSDK's own (`flight_sw_git_hash`) takes them for PX4's, whatever the autopilot.
+    MAVSDK's `flight_sw_git_hash` assumes PX4's order for every autopilot.
     """
     raw = client.messages.get("AUTOPILOT_VERSION", {}).get("flight_custom_version")
     if not isinstance(raw, list):

@@ -1,7 +1,7 @@
-"""Listening to a link with our own parser: who is there, and how much gets lost.
+"""Listening to a link with our own parser: the components on it, and the share of lost frames.
 
-MAVSDK hands messages over without their sequence numbers and keeps no count of losses, and it says nothing of
-what it hears of a link without an autopilot; both are told by the frames themselves.
+MAVSDK does not pass on sequence numbers, does not count losses, and reports nothing about a link without an
+autopilot. The frames themselves contain both.
 """
 
 import asyncio
@@ -20,20 +20,20 @@ SIGNED = (
     "it signs its messages, and may accept no message without its key; this command can't sign: use a link "
     "that takes unsigned frames (serial, USB), or clear the key"
 )
-"""Why a vehicle that is heard does not answer."""
+"""The reason why a vehicle does not answer although its messages are received."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkQuality:
-    """What came in over a while.
+    """The frames received in an interval.
 
     Attributes:
-        seconds: of listening.
-        frames, lost: good frames of the autopilot, and those missing in its sequence.
-        bytes_total, bytes_junk: received, and of those what was no frame.
-        rates_hz: of the autopilot's messages by name.
-        components: (system, component) heard.
-        signed: whether the autopilot signs what it says.
+        seconds: duration of listening.
+        frames, lost: valid frames of the autopilot, and frames missing in its sequence.
+        bytes_total, bytes_junk: bytes received, and bytes that belonged to no frame.
+        rates_hz: rates of the autopilot's messages, by name.
+        components: (system, component) pairs received.
+        signed: whether the autopilot signs its messages.
     """
 
     seconds: float
@@ -47,11 +47,11 @@ class LinkQuality:
 
     @property
     def loss(self) -> float:
-        """Share of the autopilot's frames that did not come, 0..1."""
+        """Share of the autopilot's frames that were lost, 0..1."""
         return self.lost / max(1, self.frames + self.lost)
 
     def heard(self) -> str:
-        """In words, for an error."""
+        """What was received, as text for an error."""
         if not self.bytes_total:
             return f"nothing was received in {self.seconds:.0f} s: is it on, is this the right link?"
         if not self.components:
@@ -67,10 +67,10 @@ class LinkQuality:
 
 
 async def listen(address: Address, seconds: float, system_id: int | None = None) -> LinkQuality:
-    """Listen to a link of our own for so long, with heartbeats of a ground station.
+    """Open a link and listen for the given time, sending heartbeats as a ground station.
 
     Args:
-        system_id: of the autopilot whose frames count; None: the lowest heard.
+        system_id: system id of the autopilot whose frames are counted; None: the lowest received.
 
     Raises:
         BridgeError: the link can't be opened.
@@ -96,7 +96,7 @@ async def listen(address: Address, seconds: float, system_id: int | None = None)
                     who = (frame.system_id, frame.component_id)
                     if who in last:
                         gap = (frame.sequence - last[who] - 1) & 0xFF
-                        if gap < 128:  # a larger one is a frame that came late
+                        if gap < 128:  # a larger gap means that a frame came late
                             lost[who] += gap
                     last[who] = frame.sequence
                     signed |= frame.signed and frame.component_id == 1

@@ -21,7 +21,7 @@ _TLOG_MAGICS: Final = (0xFE, 0xFD)
 class VehicleLogs:
     """The logs of one vehicle.
 
-    One plugin for all: MAVSDK fetches only logs that the same plugin has listed.
+    All requests use one plugin, because MAVSDK downloads only logs that the same plugin has listed.
     """
 
     def __init__(self, client: VehicleClient) -> None:
@@ -30,10 +30,10 @@ class VehicleLogs:
         self._plugin = LogFilesAsync(client.system)
 
     async def entries(self) -> list[Entry]:
-        """The logs the vehicle has, oldest first.
+        """Request the list of logs on the vehicle, oldest first.
 
         Raises:
-            MissionError: it doesn't tell.
+            MissionError: the vehicle does not report it.
         """
         try:
             found = await self._plugin.get_entries()
@@ -46,19 +46,19 @@ class VehicleLogs:
         return sorted(found, key=lambda entry: entry.id)
 
     async def download(self, entry: Entry, folder: Path, progress: Callable[[float], None]) -> Path:
-        """Fetch one log into a folder; it was listed by `entries` of this object.
+        """Download one log into a folder; `entries` of this object must have listed it.
 
-        MAVSDK fetches what is missing of a log again by itself and drops a log that it can't complete, so
-        that a download goes on at the level of whole logs: those that are there are not fetched again.
+        MAVSDK requests missing parts of a log again by itself and discards a log that it can't complete. A
+        repeated download therefore continues with whole logs: existing ones are not downloaded again.
 
         Raises:
-            MissionError: it does not come.
-            PlanError: there is another file of its name.
+            MissionError: the log is not received.
+            PlanError: another file with its name exists.
         """
         part = folder / f"log_{entry.id}.part"
         failure = ""
         for _ in range(_TRIES):
-            part.unlink(missing_ok=True)  # MAVSDK writes no file that is there
+            part.unlink(missing_ok=True)  # MAVSDK does not overwrite an existing file
             try:
                 async with self._client.quiet():
                     async for _result, data in self._plugin.download_log_file(entry, str(part)):
@@ -78,7 +78,7 @@ class VehicleLogs:
 
     @property
     def _armed(self) -> str:
-        """Why nothing came, if it is for that."""
+        """Reason why no log was received, if it is that the vehicle is armed."""
         base_mode = int(self._client.messages.get("HEARTBEAT", {}).get("base_mode", 0))
         return _ARMED if base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED else ""
 
@@ -86,7 +86,7 @@ class VehicleLogs:
         """Delete all logs of the vehicle.
 
         Raises:
-            MissionError: it doesn't.
+            MissionError: the vehicle doesn't delete them.
         """
         try:
             await self._plugin.erase_all_log_files()
@@ -95,7 +95,7 @@ class VehicleLogs:
 
 
 def _named(part: Path, entry: Entry) -> Path:
-    """A fetched file under its own name."""
+    """Rename a downloaded file to its final name."""
     size = part.stat().st_size
     if size != entry.size_bytes:
         part.unlink()
@@ -110,10 +110,10 @@ def _named(part: Path, entry: Entry) -> Path:
 
 
 def chosen(found: list[Entry], which: str) -> list[Entry]:
-    """The logs a user means: "all", "newest", or a number.
+    """The logs that the user selects: "all", "newest", or a number.
 
     Raises:
-        PlanError: there is none such.
+        PlanError: there is no such log.
     """
     if not found:
         raise PlanError("the vehicle has no logs")
@@ -128,7 +128,7 @@ def chosen(found: list[Entry], which: str) -> list[Entry]:
 
 
 def log_name(entry: Entry, head: bytes) -> str:
-    """A file name that tells number, date and, by its content, the format."""
+    """A file name that contains number, date and, from the content, the format."""
     suffix = next((s for magic, s in _HEADS if head.startswith(magic)), "")
     if not suffix:
         suffix = ".tlog" if len(head) > 8 and head[8] in _TLOG_MAGICS else ".log"
@@ -137,7 +137,7 @@ def log_name(entry: Entry, head: bytes) -> str:
 
 
 def fetched(folder: Path, entry: Entry) -> Path | None:
-    """A file of a folder that is this log already, whole."""
+    """A complete file of this log in a folder, or None."""
     for path in sorted(folder.glob(f"log_{entry.id}_*")):
         if path.suffix != ".part" and path.stat().st_size == entry.size_bytes:
             with path.open("rb") as file:

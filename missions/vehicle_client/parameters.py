@@ -1,4 +1,4 @@
-"""A vehicle's parameters through MAVSDK: read, set, saved, loaded, compared."""
+"""A vehicle's parameters through MAVSDK: read, set, save, load and compare."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -25,7 +25,7 @@ _LIST_TRIES: Final = 3
 _TYPES_S: Final = 1.0
 _INTEGERS: Final = frozenset((1, 2, 3, 4, 5, 6))
 _INT32: Final = INTEGER_LIMITS[ParameterType.INT32]
-_SIX_DIGITS: Final = 5e-6 + 6e-8  # half of the last of six digits at most, and single precision
+_SIX_DIGITS: Final = 5e-6 + 6e-8  # half of the last of six digits, plus single precision
 _LARGEST_FLOAT: Final = float(np.finfo(np.float32).max)
 
 
@@ -42,26 +42,27 @@ class Value:
     type: int
 
     def __str__(self) -> str:
-        """The shortest decimal that reads back as the same value."""
+        """The shortest decimal that converts back to the same value."""
         return str(self.number) if isinstance(self.number, int) else str(np.float32(self.number))
 
 
 def same(a: float, b: float) -> bool:
-    """Whether two numbers are one value of a vehicle, which stores single precision."""
+    """Whether two numbers are the same value on a vehicle, which stores single precision."""
     if math.isnan(a) or math.isnan(b):
         return math.isnan(a) and math.isnan(b)
     return a == b or np.float32(a) == np.float32(b)
 
 
 def _rounds_to(number: float, rounded: float) -> bool:
-    """Whether a number of single precision may have been rounded to another one of six digits."""
+    """Whether a number in single precision may have been rounded to another number of six digits."""
     return not isinstance(number, int) and math.isclose(number, rounded, rel_tol=_SIX_DIGITS)
 
 
 async def read_all(client: VehicleClient) -> dict[str, Value]:
-    """All parameters by name, in alphabetical order.
+    """Read all parameters by name, in alphabetical order.
 
-    MAVSDK knows int and float only; the exact types are those of the PARAM_VALUE messages that it asked for.
+    MAVSDK distinguishes only int and float; the exact types are taken from the PARAM_VALUE messages that it
+    requested.
 
     Raises:
         VehicleTimeout: the vehicle doesn't list them.
@@ -87,10 +88,10 @@ async def read_all(client: VehicleClient) -> dict[str, Value]:
 
 
 async def read_one(client: VehicleClient, name: str) -> Value:
-    """One parameter.
+    """Read one parameter.
 
     Raises:
-        PlanError: the vehicle has none of that name.
+        PlanError: the vehicle has no parameter of that name.
     """
     plugin = ParamAsync(client.system)
     try:
@@ -118,11 +119,11 @@ async def _unknown(client: VehicleClient, name: str, error: ParamError) -> str:
 
 
 async def write_one(client: VehicleClient, name: str, number: float, type_: int) -> Value:
-    """Set a parameter, and read it back.
+    """Set a parameter, read it back and return its value.
 
     Raises:
-        PlanError: not a value of this type.
-        CommandRejected: the vehicle kept another one.
+        PlanError: the number is not a value of this type.
+        CommandRejected: the vehicle kept another value.
     """
     plugin = ParamAsync(client.system)
     try:
@@ -146,16 +147,16 @@ async def write_one(client: VehicleClient, name: str, number: float, type_: int)
 
 
 def _whole_range(type_: int) -> tuple[int, int]:
-    """What fits in a type, as far as MAVSDK, which sets signed numbers of 32 bits, can set it."""
+    """Range of a type, limited to the signed 32-bit integers that MAVSDK can set."""
     low, high = INTEGER_LIMITS.get(_known_type(type_), _INT32)
     return low, min(high, _INT32[1])
 
 
 def format_values(path: Path, values: Mapping[str, Value], system_id: int) -> str:
-    """Values in the format that a file's suffix names, types kept where the format has them.
+    """Values as text in the format of a file's suffix; types are included if the format has them.
 
     Raises:
-        PlanError: the suffix names none.
+        PlanError: the suffix is unknown.
     """
     numbers = {name: value.number for name, value in values.items()}
     suffix = path.suffix.lower()
@@ -182,7 +183,7 @@ def _known_type(type_: int) -> ParameterType:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """A parameter that two sides don't agree on; None: it has none of that name."""
+    """A parameter that differs between two sides; None: that side has no such parameter."""
 
     name: str
     vehicle: Value | None
@@ -192,12 +193,13 @@ class Difference:
 def differences(
     values: Mapping[str, Value], other: Mapping[str, float], *, rounded: bool = False
 ) -> list[Difference]:
-    """All of them, by name. Parameters that only the vehicle has are none: a file may hold a part.
+    """All differences, by name. Parameters that only the vehicle has are not differences, because a file may
+    contain only a part.
 
     Args:
         values: the vehicle's.
-        other: what they are compared with.
-        rounded: the others have six digits: what differs by no more than their rounding is the same.
+        other: values that they are compared with.
+        rounded: whether the other values have six digits; differences within their rounding are then ignored.
     """
     found = []
     for name, number in sorted(other.items()):
@@ -210,7 +212,7 @@ def differences(
 async def load(
     client: VehicleClient, changes: Iterable[Difference], tell: Callable[[str], None]
 ) -> list[str]:
-    """Set all that differ; gives the names that the vehicle did not take, with its reasons."""
+    """Set all parameters that differ; returns the names that the vehicle did not accept, with its reasons."""
     refused = []
     for change in changes:
         if change.vehicle is None or change.other is None:

@@ -1,1 +1,1 @@
-"""Patterns flown by aircraft with wings."""
+"""Patterns flown by fixed wings."""

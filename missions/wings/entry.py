@@ -1,4 +1,4 @@
-"""Into a pattern and out of it: straight flight in its direction before and after, reached from a circle."""
+"""Entry into a pattern and exit from it: straight flight before and after it, entered from a circle."""
 
 import math
 from dataclasses import dataclass
@@ -9,22 +9,22 @@ from missions import telemetry
 from missions.planning.flyable import FlyablePath
 from missions.vehicle.vehicle import Vehicle
 
-_LEAD_IN_S: Final = 8.0  # straight flight before the pattern: what a turn has left of errors settles
+_LEAD_IN_S: Final = 8.0  # straight flight before the pattern, in which the remaining errors of a turn settle
 _LEAD_OUT_S: Final = 4.0
-_CIRCLE_RADII: Final = 1.3  # of the tightest turn: room for the guidance
+_CIRCLE_RADII: Final = 1.3  # multiple of the tightest turn's radius; leaves a margin for the guidance
 _READY_RAD: Final = math.radians(12.0)
-_NEAR: Final = 0.5  # of the circle's radius
+_NEAR: Final = 0.5  # share of the circle's radius
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """A circle that touches the path where it begins, and is left along it.
+    """A circle that touches the path at its beginning and is left along the path.
 
     Attributes:
-        centre_m: north, east.
-        radius_m: of the circle.
-        clockwise: seen from above.
-        north_m, east_m, course_rad: where it is left, and the direction.
+        centre_m: centre, north and east.
+        radius_m: radius of the circle.
+        clockwise: direction, seen from above.
+        north_m, east_m, course_rad: place where it is left, and course there.
     """
 
     centre_m: tuple[float, float]
@@ -36,7 +36,7 @@ class Entry:
 
     @classmethod
     def to(cls, path: FlyablePath, turn_radius_m: float, from_m: tuple[float, float] = (0.0, 0.0)) -> "Entry":
-        """The circle at a path's beginning, on the side where the aircraft comes from."""
+        """The circle at a path's beginning, on the side from which the aircraft comes."""
         (north, east), course, _ = path.at(float(path.arc_m[0]))
         radius_m = _CIRCLE_RADII * turn_radius_m
         right = (from_m[1] - east) * math.cos(course) - (from_m[0] - north) * math.sin(course) >= 0.0
@@ -54,7 +54,7 @@ class Entry:
         )
 
     def leaving(self, vehicle: Vehicle, soon_s: float) -> bool:
-        """Whether the aircraft will fly along the path's beginning in a moment."""
+        """Whether the aircraft will fly along the path's beginning after `soon_s`."""
         p = vehicle.latest(telemetry.Position)
         if p is None:
             return False
@@ -69,5 +69,5 @@ class Entry:
 
 
 def with_leads(path: FlyablePath, ground_speed_m_s: float) -> FlyablePath:
-    """A pattern's path with the way into it and out of it, for the fastest speed over ground."""
+    """A pattern's path with entry and exit, for the highest ground speed."""
     return path.with_leads(_LEAD_IN_S * ground_speed_m_s, _LEAD_OUT_S * ground_speed_m_s)

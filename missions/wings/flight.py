@@ -1,4 +1,4 @@
-"""What both ways of flying a pattern with wings share: its path, and the approach at its end."""
+"""Common parts of both ways to fly a pattern with a fixed wing: its path, and the approach at its end."""
 
 from dataclasses import dataclass
 from typing import Final
@@ -15,7 +15,7 @@ from missions.vehicle.vehicle import Vehicle
 _APPROACH_HEIGHT_M: Final = 40.0
 _APPROACH_LAYER_M: Final = 15.0
 _APPROACH_CIRCLE_M: Final = 80.0
-_SLOW: Final = 0.5  # of the airspeed: slowest over ground that is waited for
+_SLOW: Final = 0.5  # share of the airspeed: slowest ground speed that deadlines allow for
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,11 +23,11 @@ class PatternFlight:
     """One aircraft's pattern.
 
     Attributes:
-        options: as this aircraft flies them.
-        limits: of this aircraft.
-        path: of the pattern, from home.
-        route: the same with straight flight before and after it.
-        turn_radius_m: tightest turn over ground.
+        options: options as this aircraft flies them.
+        limits: limits of this aircraft.
+        path: path of the pattern, from home.
+        route: path with straight flight before and after it.
+        turn_radius_m: radius of the tightest turn over ground.
     """
 
     options: FlightOptions
@@ -38,18 +38,18 @@ class PatternFlight:
 
     @property
     def slow_m_s(self) -> float:
-        """Slowest over ground that a deadline allows for."""
+        """Slowest ground speed that a deadline allows for."""
         return _SLOW * self.options.speed_m_s
 
     @property
     def away_s(self) -> float:
-        """Time to fly from anywhere of the pattern to its start, or home, at most."""
+        """Longest time of a flight from any place of the pattern to its start, or home."""
         return (self.route.reach_m + 10.0 * self.turn_radius_m) / self.slow_m_s
 
     def commanded(
         self, vehicle: Vehicle, waypoints: list[tuple[float, float]], acceptance_m: float
     ) -> CommandedPath:
-        """What the flight is scored against."""
+        """The path with which the flight is compared."""
         down_m = -self.options.own_altitude_m
         points = self.path.points_m
         return CommandedPath(
@@ -60,7 +60,7 @@ class PatternFlight:
         )
 
     def approach(self, vehicle: Vehicle) -> Approach:
-        """Down to the runway it took off from; a team's circles lie in layers."""
+        """Approach to the runway of the takeoff; the circles of a team are in layers."""
         return Approach(
             place=vehicle.home,
             heading_rad=vehicle.landing_heading_rad(),

@@ -1,9 +1,9 @@
-"""From a path to a bank angle, for an autopilot that holds altitude and airspeed by itself.
+"""Computes bank angles that follow a path, for an autopilot that holds altitude and airspeed by itself.
 
-The distance from the path obeys d'' + 2 zeta omega d' + omega^2 d = 0 around the acceleration that the path's
-own curvature takes, looked up as far ahead as the bank needs to build up. A slow integral takes out what a
-wing that hangs a little leaves. What a bank gives is measured in flight (`TurnEffect`): an aircraft that
-slips in its turns has to bank more.
+The distance from the path obeys d'' + 2 zeta omega d' + omega^2 d = 0 around the acceleration for the path's
+own curvature, which is looked up ahead by the time in which a bank builds up. A slow integral removes the
+offset of a wing that is not exactly level. The acceleration of a bank is measured in flight (`TurnEffect`):
+an aircraft that slips in its turns must bank more.
 """
 
 import math
@@ -15,40 +15,40 @@ from missions.planning.flyable import FlyablePath
 from missions.wings.place import PlaceOnPath
 
 _LEAST_COS_CRAB: Final = 0.5
-_LEAST_CURVE: Final = 0.3  # of the radius: how far inside a bend its centre still counts
+_LEAST_CURVE: Final = 0.3  # share of the radius: limit of the distance inside a bend
 _INTEGRAL_WITHIN_M: Final = 15.0
 _INTEGRAL_MAX_M_S2: Final = 1.0
-_PRIOR_M2_S3: Final = 10.0  # as much as a second at 18 degrees of bank
+_PRIOR_M2_S3: Final = 10.0  # equal to one second at 18 degrees of bank
 _LEAST_EFFECT: Final = 0.5
 _LARGEST_EFFECT: Final = 1.3
-_LEAST_BANK_M_S2: Final = 0.8  # 5 degrees: below, it is noise that is compared
+_LEAST_BANK_M_S2: Final = 0.8  # 5 degrees; smaller values would mainly contain noise
 _LONGEST_GAP_S: Final = 0.5
-_EFFECT_MEMORY_S: Final = 30.0  # of banked flight
+_EFFECT_MEMORY_S: Final = 30.0  # time of banked flight
 
 
 class TurnEffect:
     """Acceleration that a bank gives, as a share of a coordinated turn's; least squares over telemetry.
 
-    Of the acceleration across the course, speed times rate of the course, against g tan(bank). Coordinated
-    turns give 1; the plane model in ArduPilot 4.6.3, which slips in turns, 0.7.
+    It compares the acceleration across the course (speed times rate of the course) with g tan(bank).
+    Coordinated turns give 1; the plane model in ArduPilot 4.6.3, which slips in turns, gives 0.7.
     """
 
     def __init__(self) -> None:
-        self._banked = self._turned = _PRIOR_M2_S3  # begins at 1
+        self._banked = self._turned = _PRIOR_M2_S3  # the initial estimate is 1
         self._last: tuple[int, float] | None = None
 
     @property
     def share(self) -> float:
-        """The estimate, within what an aircraft can have."""
+        """The estimate, limited to values that are possible for an aircraft."""
         return max(_LEAST_EFFECT, min(_LARGEST_EFFECT, self._turned / self._banked))
 
     def update(self, time_us: int, vel_ne_m_s: tuple[float, float], roll_rad: float, yaw_rad: float) -> None:
-        """Take a position message's velocity, and the attitude of the moment.
+        """Process the velocity of a position message, and the present attitude.
 
         Args:
-            time_us: of the velocity; one that was taken already is left out.
-            vel_ne_m_s: over ground.
-            roll_rad, yaw_rad: of the attitude.
+            time_us: time of the velocity; a velocity that was already processed is ignored.
+            vel_ne_m_s: velocity over ground.
+            roll_rad, yaw_rad: roll and yaw.
         """
         speed, course = math.hypot(*vel_ne_m_s), math.atan2(vel_ne_m_s[1], vel_ne_m_s[0])
         last, self._last = self._last, (time_us, course)
@@ -68,11 +68,11 @@ class PathRollParameters:
     """Gains and limits.
 
     Attributes:
-        frequency_rad_s, damping: of the distance from the path.
-        integral_per_s: how fast a lasting distance is taken out, of the frequency's share.
-        lead_s: from a roll command to the bank.
-        approach_max_rad: steepest angle to the path.
-        bank_max_rad: steepest bank.
+        frequency_rad_s, damping: frequency and damping of the distance from the path.
+        integral_per_s: rate at which a constant distance is removed, relative to the frequency's share.
+        lead_s: delay from a roll command to the bank.
+        approach_max_rad: largest angle to the path.
+        bank_max_rad: largest bank.
     """
 
     frequency_rad_s: float = 0.6
@@ -92,9 +92,9 @@ class PathRoll:
     """Bank angles that follow a path.
 
     Args:
-        path: with its leads.
+        path: path with entry and exit.
         parameters: gains and limits.
-        effect: of banks; it goes on to be updated by whoever has the telemetry.
+        effect: effect of banks; the owner of the telemetry continues to update it.
     """
 
     def __init__(
@@ -107,12 +107,12 @@ class PathRoll:
         self._time_us: int | None = None
 
     def roll_rad(self, place: PlaceOnPath, heading_rad: float, time_us: int) -> float:
-        """The bank for a moment.
+        """The bank for the present state.
 
         Args:
-            place: where along the path the aircraft is.
-            heading_rad: of the nose.
-            time_us: of the vehicle.
+            place: place of the aircraft along the path.
+            heading_rad: heading of the aircraft.
+            time_us: vehicle time.
         """
         p = self._parameters
         speed, across = place.ground_speed_m_s, place.across_m
@@ -121,7 +121,7 @@ class PathRoll:
         _, _, curvature = self._path.at(place.arc_m + p.lead_s * speed)
         off = math.remainder(over_ground - course, math.tau)
         away_m_s = speed * math.sin(off)
-        # of the parallel curve the aircraft is on
+        # curvature of the parallel curve on which the aircraft is
         bend = speed * speed * math.cos(off) * curvature / max(_LEAST_CURVE, 1.0 - curvature * across)
         steepest = speed * math.sin(p.approach_max_rad)
         back_m_s = p.frequency_rad_s / (2.0 * p.damping) * across

@@ -1,4 +1,4 @@
-"""Flying a pattern with wings: along the path by setpoints, or as an uploaded mission with its landing."""
+"""Flies a pattern with a fixed wing, by setpoints along the path or as an uploaded mission."""
 
 from functools import partial
 from typing import Final
@@ -22,10 +22,10 @@ _REACH_SAMPLES: Final = 1000
 
 
 def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -> float:
-    """Refuse a pattern that an aircraft can't fly; gives the turn radius it was checked for.
+    """Refuse a pattern that an aircraft can't fly; returns the turn radius that it was checked for.
 
     Raises:
-        PlanError: says what, and which option to change.
+        PlanError: names the reason and the option to change.
     """
     if options.period_s is not None:
         raise PlanError(
@@ -47,7 +47,7 @@ def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -
     try:
         return check(radius_m=limits.path_radius_m(options.speed_m_s))
     except PlanError:
-        if options.via is Via.WAYPOINTS:  # followed by the autopilot's own guidance
+        if options.via is Via.WAYPOINTS:  # the autopilot's own guidance follows it
             raise
     return check(radius_m=limits.turn_radius_m(options.speed_m_s))
 
@@ -55,7 +55,7 @@ def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -
 async def fly_pattern_with_wings(
     vehicle: Vehicle, options: FlightOptions, curve: Curve, limits: FixedWingLimits
 ) -> None:
-    """From the ground back to the ground; see `missions.pattern_flight.fly_pattern`."""
+    """Fly the pattern, including takeoff and landing; see `missions.pattern_flight.fly_pattern`."""
     flight = pattern_flight_of(vehicle, options, curve, limits)
     vehicle.note_runway()
     if options.via is Via.SETPOINTS:
@@ -67,10 +67,10 @@ async def fly_pattern_with_wings(
 def pattern_flight_of(
     vehicle: Vehicle, options: FlightOptions, curve: Curve, limits: FixedWingLimits
 ) -> PatternFlight:
-    """The pattern as the aircraft can fly it.
+    """The pattern in the form that the aircraft can fly.
 
     Raises:
-        PlanError: it can't.
+        PlanError: the aircraft can't fly it.
     """
     radius_m = check_wings(curve, options, limits)
     path = flyable_path(curve, radius_m, roll_in_m(options.speed_m_s, limits))

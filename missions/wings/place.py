@@ -1,4 +1,4 @@
-"""Where along a path an aircraft is, by its telemetry."""
+"""Place of an aircraft along a path, from its telemetry."""
 
 import math
 
@@ -9,23 +9,23 @@ from missions.planning.flyable import FlyablePath
 from missions.vehicle.vehicle import Vehicle
 
 _AHEAD_M = 80.0
-_OLDEST_S = 1.0  # a position is carried on by its velocity for so long
+_OLDEST_S = 1.0  # longest extrapolation of a position by its velocity
 
 
 class PlaceOnPath:
-    """The place along a path, found again at every `update`; it never goes back.
+    """The place along a path, updated by every `update`; it never goes back.
 
     Args:
-        vehicle: its home is the path's origin.
-        path: with its leads.
-        from_arc_m: where along it the aircraft is to begin with.
+        vehicle: vehicle whose home is the path's origin.
+        path: path with entry and exit.
+        from_arc_m: initial place of the aircraft along the path.
 
     Attributes:
         arc_m: distance of the place along the path.
-        north_m, east_m: of the aircraft, now.
-        vel_north_m_s, vel_east_m_s: its velocity over ground.
-        ground_speed_m_s: at least 1.
-        across_m: distance from the path, positive right of it.
+        north_m, east_m: present position of the aircraft.
+        vel_north_m_s, vel_east_m_s: velocity over ground.
+        ground_speed_m_s: ground speed, at least 1.
+        across_m: distance from the path, positive to the right of it.
     """
 
     def __init__(self, vehicle: Vehicle, path: FlyablePath, from_arc_m: float) -> None:
@@ -39,10 +39,10 @@ class PlaceOnPath:
         self._frame = LocalFrame(vehicle.home)
 
     def update(self) -> None:
-        """Look where the aircraft is now.
+        """Read the present position of the aircraft.
 
         Raises:
-            MissionError: it tells no position, or is not armed any more.
+            MissionError: it reports no position, or is no longer armed.
         """
         vehicle = self._vehicle
         p = vehicle.latest(telemetry.Position)

@@ -1,4 +1,4 @@
-"""A pattern by streamed setpoints: points of the path for PX4, bank angles for ArduPilot's plane."""
+"""Flies a pattern by streamed setpoints: points of the path for PX4, bank angles for ArduPilot's plane."""
 
 import math
 from dataclasses import replace
@@ -18,20 +18,20 @@ from missions.wings.flight import PatternFlight
 from missions.wings.guidance import PathRoll, PathRollParameters, TurnEffect
 from missions.wings.place import PlaceOnPath
 
-_ENTRY_S: Final = 0.8  # from the decision to leave the circle to the first setpoint that is flown
+_ENTRY_S: Final = 0.8  # delay from the decision to leave the circle to the first flown setpoint
 _BANK_SHARE: Final = 0.95
 _QUICKEST_RAD_S: Final = 0.6
 _STREAM_S: Final = 0.05  # age of a position, and of a setpoint
 
 
 async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
-    """From the ground back to the ground."""
+    """Fly the pattern, including takeoff and landing."""
     notes, clock, options = vehicle.notes, vehicle.clock, flight.options
     notes.commanded = flight.commanded(vehicle, [], options.acceptance_m)
     gains = await _gains(vehicle, flight)
     notes.begin("takeoff", clock.stamp_us)
     await vehicle.takeoff(options.own_altitude_m)
-    notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set it anew
+    notes.commanded = replace(notes.commanded, origin=vehicle.home)  # arming has set the home again
     notes.begin("transit", clock.stamp_us)
     effect = TurnEffect()
     await _to_the_start(vehicle, flight, effect)
@@ -46,9 +46,10 @@ async def fly_setpoints(vehicle: Vehicle, flight: PatternFlight) -> None:
 
 
 async def _to_the_start(vehicle: Vehicle, flight: PatternFlight, effect: TurnEffect) -> None:
-    """Circle beside the way into the pattern until the aircraft flies along it, at its height.
+    """Circle next to the entry of the pattern until the aircraft flies along the entry, at the pattern's
+    height.
 
-    The circle shows what a bank gives.
+    On the circle the effect of a bank is measured.
     """
     frame = LocalFrame(vehicle.home)
     here = await vehicle.position()
@@ -78,18 +79,19 @@ async def _to_the_start(vehicle: Vehicle, flight: PatternFlight, effect: TurnEff
 def path_point(
     route: FlyablePath, arc_m: float, speed_m_s: float, lead_s: float, height_m: float
 ) -> Setpoint:
-    """The point of a path where the aircraft is, and as velocity the direction of the path a moment ahead.
+    """The setpoint with the aircraft's place on the path and, as velocity, the direction of the path `lead_s`
+    ahead.
 
     PX4's guidance demands V * 4 pi damping / period * sin(angle to that direction). In a bend, the direction
-    of the path so long ahead makes this the acceleration of the bend. It is not sent as an acceleration,
-    since PX4 1.16.1 takes the curvature from it with the wrong sign on an aircraft.
+    of the path at this lead time makes the demand equal to the acceleration of the bend. It is not sent as an
+    acceleration, because PX4 1.16.1 derives a curvature with the wrong sign from it on a fixed wing.
 
     Args:
-        route: of the pattern.
-        arc_m: where along it the aircraft is.
-        speed_m_s: over ground.
+        route: route of the pattern.
+        arc_m: place of the aircraft along it.
+        speed_m_s: ground speed.
         lead_s: period / (4 pi damping) of the guidance.
-        height_m: above home.
+        height_m: height above home.
     """
     (north, east), _, _ = route.at(arc_m)
     _, course, _ = route.at(arc_m + lead_s * speed_m_s)
@@ -107,7 +109,9 @@ def _measure(vehicle: Vehicle, effect: TurnEffect) -> None:
 
 
 async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
-    """How long before it a bend is commanded; for banks, as quick as the aircraft's own guidance is tuned."""
+    """Lead time of a bend's command and, for banks, gains as fast as the tuning of the aircraft's own
+    guidance.
+    """
     bank_max_rad = _BANK_SHARE * flight.limits.bank_max_rad
     if not vehicle.adapter.roll_alone:
         period_s = max(1.0, await vehicle.parameter_or("NPFG_PERIOD", 10.0))
@@ -123,7 +127,7 @@ async def _gains(vehicle: Vehicle, flight: PatternFlight) -> PathRollParameters:
 
 
 class _Stream:
-    """Setpoints by where the aircraft is along the route; tells the pattern's beginning and end."""
+    """Setpoints for the aircraft's place along the route; notes the beginning and the end of the pattern."""
 
     def __init__(
         self, vehicle: Vehicle, flight: PatternFlight, gains: PathRollParameters, effect: TurnEffect
@@ -136,7 +140,7 @@ class _Stream:
         self._lead_s = gains.lead_s
 
     def _go_on(self) -> bool:
-        """Find the place; False behind the pattern's end."""
+        """Update the place; returns False after the pattern's end."""
         notes, place = self._vehicle.notes, self._place
         place.update()
         length_m = self._flight.path.length_m
@@ -151,7 +155,7 @@ class _Stream:
         return False
 
     def point(self, _time_s: float) -> AnySetpoint | None:
-        """For PX4: a point of the path."""
+        """The setpoint for PX4: a point of the path."""
         if not self._go_on():
             return None
         place = self._place
@@ -159,7 +163,7 @@ class _Stream:
         return path_point(self._flight.route, place.arc_m, place.ground_speed_m_s, self._lead_s, height_m)
 
     def roll(self, _time_s: float) -> AnySetpoint | None:
-        """For ArduPilot's plane, which takes no path: the bank that follows it."""
+        """The setpoint for ArduPilot's plane, which accepts no path: the bank that follows it."""
         vehicle = self._vehicle
         if not self._go_on():
             return None

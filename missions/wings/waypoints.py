@@ -1,4 +1,4 @@
-"""A pattern as an uploaded mission: takeoff, a circle to begin it from, its waypoints, the landing."""
+"""Flies a pattern as an uploaded mission: takeoff, an entry circle, its waypoints, the landing."""
 
 import math
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ from missions.wings.place import PlaceOnPath
 _DEVIATION_M: Final = 1.0
 _SPACING_MIN_S: Final = 1.6
 _SPACING_MAX_M: Final = 300.0
-_TURN_IN_MAX_M: Final = 250.0  # ArduPlane takes no more than 255 from a waypoint's radius
+_TURN_IN_MAX_M: Final = 250.0  # ArduPlane accepts at most 255 as a waypoint's radius
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatternItems:
-    """A plan to upload, and where the pattern is in it.
+    """A plan to upload, and the items of the pattern in it.
 
     Attributes:
         items: the plan.
-        waypoints: of the pattern, north and east of home.
+        waypoints: waypoints of the pattern, north and east of home.
         first, last: indices of the pattern's first and last waypoint.
     """
 
@@ -40,7 +40,7 @@ class PatternItems:
 
 
 def mission_items(vehicle: Vehicle, flight: PatternFlight) -> PatternItems:
-    """From the takeoff to the landing."""
+    """All items from the takeoff to the landing."""
     options = flight.options
     waypoints = waypoints_of(flight.path, options)
     radius_m = turn_in_m(options, flight.limits)
@@ -55,7 +55,7 @@ def mission_items(vehicle: Vehicle, flight: PatternFlight) -> PatternItems:
 
 
 async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
-    """From the ground back to the ground."""
+    """Fly the pattern, including takeoff and landing."""
     notes, clock, options = vehicle.notes, vehicle.clock, flight.options
     acceptance_m = await vehicle.adapter.acceptance_m(vehicle, options.acceptance_m)
     plan = mission_items(vehicle, flight)
@@ -88,7 +88,7 @@ async def fly_waypoints(vehicle: Vehicle, flight: PatternFlight) -> None:
         if options.search_time_s is None:
             raise
         notes.cut_short = True
-        await vehicle.land_along(flight.approach(vehicle), wait=False)  # the search time is over
+        await vehicle.land_along(flight.approach(vehicle), wait=False)  # the search time has ended
     notes.begin("return", clock.stamp_us)
     await vehicle.wait_disarmed(600.0 + 2.0 * flight.away_s)
     notes.end(clock.stamp_us)
@@ -106,12 +106,12 @@ def waypoints_of(path: FlyablePath, options: FlightOptions) -> list[tuple[float,
 def turn_in_m(options: FlightOptions, limits: FixedWingLimits) -> float:
     """Distance before a waypoint at which the aircraft turns to the next leg.
 
-    Between short legs the course to follow is that of the middle of a leg: half a leg is added to the way
+    Between short legs the followed course is that of the middle of a leg: half a leg is added to the distance
     flown in the time that the guidance needs.
 
     Args:
-        options: an acceptance radius that the user chose is kept.
-        limits: of the aircraft.
+        options: options; an acceptance radius that the user specified is kept.
+        limits: limits of the aircraft.
     """
     if options.chosen("acceptance_m") or limits.waypoint_lead_s == 0.0:
         return options.acceptance_m
@@ -121,7 +121,7 @@ def turn_in_m(options: FlightOptions, limits: FixedWingLimits) -> float:
 
 
 def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
-    """Takeoff, airspeed, and a circle that is left along the first leg, at the pattern's height."""
+    """Takeoff, airspeed, and a circle at the pattern's height that is left along the first leg."""
     options = flight.options
     entry = Entry.to(flight.route, flight.turn_radius_m)
     lat, lon, _ = LocalFrame(vehicle.home).geodetic_from_ned(*entry.centre_m, 0.0)
@@ -136,7 +136,7 @@ def _way_in(vehicle: Vehicle, flight: PatternFlight) -> list[MissionItem]:
         ),
         MissionItem(
             command=dialect.MAV_CMD_NAV_LOITER_TO_ALT,
-            param1=1.0,  # leave it in the direction of the next item only
+            param1=1.0,  # leave the circle only in the direction of the next item
             param2=math.copysign(entry.radius_m, 1.0 if entry.clockwise else -1.0),
             param4=1.0,  # the leg begins where the circle is left
             x=lat,
@@ -161,7 +161,7 @@ def _waypoint(
 
 
 async def _passed(vehicle: Vehicle, place: PlaceOnPath, arc_m: float) -> None:
-    """Wait until the aircraft is so far along: waypoints count as reached before they are passed."""
+    """Wait until the aircraft has passed a place; waypoints count as reached before they are passed."""
 
     def there() -> bool:
         place.update()
