@@ -1,7 +1,7 @@
 """Roll and pitch as the direction down in the body frame: motion, correction and gyro bias (compiled).
 
-The direction down, `d = R^T e_3`, is the rotation R from body to level of Tolman et al. 2021 without yaw: with
-the projector of (3) and (11), `R' = R [(I - d d^T) w]x` moves d by `d' = -w x d`, for d x d = 0. R is
+The direction down, `d = R^T e_3`, is the rotation R from body to level of Tolman et al. 2021 without yaw:
+with the projector of (3) and (11), `R' = R [(I - d d^T) w]x` moves d by `d' = -w x d`, for d x d = 0. R is
 therefore rebuilt from roll and pitch when it is needed, and yaw cannot accumulate in it.
 """
 

@@ -2,8 +2,8 @@
 
 Source: Steckenrider, Leamy, Furukawa 2020 (SSRR), section III. The state is (x, x', y, y') relative to the
 pattern's centre; with the frequencies included, it is (x, x', y, y', w_x, w_y). For the paper's equations
-with errors (17, 25a, 28, 29; docs/papers.md) the corrected form is the default, and the printed form is kept for comparison
-in the study.
+with errors (17, 25a, 28, 29; docs/papers.md) the corrected form is the default, and the printed form is kept
+for comparison in the study.
 """
 
 import math

@@ -1,8 +1,8 @@
 """The place of a detection relative to the drone, from direction and range, with the uncertainty of both.
 
 Steckenrider et al. 2020 take the target's place in the drone's frame as measured (equation 30). A camera
-measures a direction; the range comes from the tag's apparent size (AprilTags, as in the paper), the message, or the
-height.
+measures a direction; the range comes from the tag's apparent size (AprilTags, as in the paper), the message,
+or the height.
 """
 
 import math

@@ -1,4 +1,6 @@
-"""The picture of a search: the occupancy map at four times, as figure 8 of Lum et al. 2005, and its result."""
+"""The picture of a search: the occupancy map at four times, as figure 8 of Lum et al. 2005, and the
+result.
+"""
 
 import math
 from pathlib import Path
