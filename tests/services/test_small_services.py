@@ -212,11 +212,18 @@ def test_px4_gripper_is_acknowledged_when_it_is_done() -> None:
 # traffic
 
 
-def report(vehicle: Vehicle, *, address: int = 7, heading_cdeg: int = 18000, speed_cm_s: int = 10_000) -> Any:
-    """Some 1 km north of the vehicle, at its height."""
+def report(
+    vehicle: Vehicle,
+    *,
+    address: int = 7,
+    heading_cdeg: int = 18000,
+    speed_cm_s: int = 10_000,
+    place_ne_m: tuple[float, float] = (1000.0, 0.0),
+) -> Any:
+    """ADSB_VEHICLE of an aircraft at the vehicle's height, by default 1 km north of it."""
     frame = vehicle.rig.context.frame
     assert frame is not None
-    lat, lon, alt_m = frame.geodetic_from_ned(1000.0, 0.0, 0.0)
+    lat, lon, alt_m = frame.geodetic_from_ned(*place_ne_m, 0.0)
     return mavlink.MAVLink_adsb_vehicle_message(
         address,
         round(lat * 1e7),
@@ -249,6 +256,25 @@ def test_traffic_that_goes_away_or_is_slow_is_no_conflict(change: dict[str, int]
     vehicle = Vehicle("px4")
     vehicle.hear(report(vehicle, **change))
     assert not any(text.startswith("Traffic") for text in vehicle.texts())
+
+
+@pytest.mark.parametrize(
+    ("place_ne_m", "heading_deg", "conflict"),
+    [
+        ((700.0, 700.0), 225, True),
+        ((-700.0, 700.0), 315, True),
+        ((700.0, 700.0), 135, False),
+        ((-700.0, 700.0), 225, False),
+    ],
+)
+def test_traffic_from_any_direction_is_a_conflict_when_its_path_leads_here(
+    place_ne_m: tuple[float, float], heading_deg: int, conflict: bool
+) -> None:
+    vehicle = Vehicle("px4")
+    vehicle.hear(report(vehicle, heading_cdeg=100 * heading_deg, place_ne_m=place_ne_m))
+    alert = "".join(vehicle.texts())
+    assert alert.startswith("Traffic alert") == conflict
+    assert (f"Heading {heading_deg}" in alert) == conflict
 
 
 def test_px4_returns_from_traffic_when_told_so() -> None:
