@@ -72,6 +72,18 @@ def test_sequence_wraps_and_lost_events_can_be_asked_for() -> None:
     assert len(rig.request(5, 4)) == KEPT  # all that there could be, and no more
 
 
+def test_an_event_has_its_time_and_its_level_for_both_logs() -> None:
+    rig = Rig()
+    rig.service.tick(12_345_000)
+    rig.sent()
+    rig.service.follow(events.TakeoffDetected(time_us=0))
+    (message,) = rig.sent()
+    level = next(kind.level for kind in px4_events.KINDS if kind.event_id == message.id)
+    assert level > 0
+    assert message.log_levels == 16 * level + level
+    assert message.event_time_boot_ms == 12_345
+
+
 def test_refused_arming_brings_the_reasons() -> None:
     rig = Rig()
     rig.commander.situation.ready = False
