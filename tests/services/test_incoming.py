@@ -130,7 +130,9 @@ def test_an_attitude_in_ros_axes_is_the_same_attitude() -> None:
     service.handle(odometry(m.MAV_FRAME_LOCAL_ENU, m.MAV_FRAME_BODY_FRD, q=tuple(q)), _ELSEWHERE, 0)
     wanted = _euler(0.1, 0.2, math.radians(30.0))
     found = noted.samples[0].values[Q_LOCAL_FROM_FRD]
-    assert abs(float(found @ wanted)) == pytest.approx(1.0, abs=1e-9)
+    np.testing.assert_allclose(
+        math.copysign(1.0, float(found @ wanted)) * np.asarray(found), wanted, atol=1e-9
+    )
 
 
 def test_ardupilot_takes_one_frame_and_only_with_viso_type() -> None:
