@@ -54,7 +54,7 @@ if TYPE_CHECKING:  # its module imports scipy
     from flightsim.flight_envelope import FlightEnvelope
 
 SLOW_RATE_HZ: Final = 50
-_TURNS: Final = 5  # iterations of the slow loop in which each microservice with `unhurried` is called once
+_TURNS: Final = 5  # iterations of the slow loop; microservices with `coarse_timers` are called in one of them
 _COMPONENT: Final = 1
 _ALWAYS_ANSWERED: Final = frozenset({mavlink.MAVLINK_MSG_ID_TIMESYNC, mavlink.MAVLINK_MSG_ID_PING})
 
@@ -254,11 +254,11 @@ class Autopilot:
         self._timed: tuple[TimedService, ...] = (
             self._parameter_service,
             self.missions,
-            *(more for more in timed if not more.unhurried),
+            *(more for more in timed if not more.coarse_timers),
             self.intervals,
         )
-        unhurried = [more for more in timed if more.unhurried]
-        self._unhurried = tuple(unhurried[turn::_TURNS] for turn in range(_TURNS))
+        coarse_timers = [more for more in timed if more.coarse_timers]
+        self._coarse_timers = tuple(coarse_timers[turn::_TURNS] for turn in range(_TURNS))
         self._turn = 0
         self.commands = CommandService.for_flavour(
             flavour.name,
@@ -352,7 +352,7 @@ class Autopilot:
         for service in self._timed:
             service.tick(time_us)
         self._turn = turn = (self._turn + 1) % _TURNS
-        for service in self._unhurried[turn]:
+        for service in self._coarse_timers[turn]:
             service.tick(time_us)
         for event in self.commander.drain_events():
             self._follow(event)

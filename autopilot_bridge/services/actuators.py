@@ -32,7 +32,7 @@ class Tunes(Microservice):
 class Px4Actuators(Microservice):
     """PX4's answers. An action that takes time (the gripper) is acknowledged when it ends."""
 
-    unhurried = True
+    coarse_timers = True
 
     _MOTORS: Final = range(1, 13)  # ACTUATOR_OUTPUT_FUNCTION
     _SERVOS: Final = range(33, 41)
@@ -92,7 +92,7 @@ class Px4Actuators(Microservice):
 class ArdupilotActuators(Microservice):
     """The answers that are the same for all ArduPilot vehicles."""
 
-    unhurried = True
+    coarse_timers = True
 
     _RELAYS: Final = 6
 

@@ -39,7 +39,7 @@ _GYRO, _BAROMETER = 1, 1  # param1, param3
 class ArdupilotCalibration(Microservice):
     """All calibrations of an ArduPilot vehicle except the compass. They change nothing."""
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(self, parts: AutopilotParts) -> None:
         self._parts = parts

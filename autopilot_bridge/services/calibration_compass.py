@@ -30,7 +30,7 @@ _MILLIGAUSS: Final = 1000.0
 class CompassCalibration(Microservice):
     """Calibration of the one compass."""
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(self, parts: AutopilotParts) -> None:
         self._parts = parts

@@ -38,7 +38,7 @@ class Px4Calibration(Microservice):
     calibration fail.
     """
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(self, parts: AutopilotParts) -> None:
         self._commander = parts.commander

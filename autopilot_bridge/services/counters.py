@@ -16,7 +16,7 @@ class Counters(Microservice):
         parts: the autopilot's parameters and plans.
     """
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(self, parts: AutopilotParts) -> None:
         self._parameters = parts.parameters

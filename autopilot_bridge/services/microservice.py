@@ -83,10 +83,10 @@ class Microservice:
     contents.
 
     Attributes:
-        unhurried: its timers may be late by a tenth of a second: `tick` is called only at 10 Hz.
+        coarse_timers: `tick` is called at 10 Hz only, so timers may be late by a tenth of a second.
     """
 
-    unhurried: ClassVar[bool] = False
+    coarse_timers: ClassVar[bool] = False
 
     @property
     def commands(self) -> Mapping[int, Handler]:
@@ -111,7 +111,7 @@ class Microservice:
         return False
 
     def tick(self, time_us: int) -> None:
-        """Timers and queues, at 50 Hz of vehicle time, or 10 Hz for the unhurried."""
+        """Timers and queues, at 50 Hz of vehicle time, or at 10 Hz with `coarse_timers`."""
 
     def follow(self, event: Event) -> None:
         """Something happened to the vehicle."""

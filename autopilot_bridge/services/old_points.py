@@ -55,7 +55,7 @@ class OldPoints(Microservice):
         announce: sends a STATUSTEXT.
     """
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(
         self, parameters: ParameterStore, stores: Mapping[MissionType, MissionStore], announce: Announce

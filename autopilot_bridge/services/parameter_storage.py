@@ -72,7 +72,7 @@ class ParameterStorageService(Microservice):
         announce: sends a STATUSTEXT.
     """
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(
         self,

@@ -73,7 +73,7 @@ class PowerService(Microservice):
         act: executes the action; None: this autopilot can't be restarted.
     """
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(self, policy: PowerPolicy, commander: Commander, act: PowerHook | None) -> None:
         self._policy = policy

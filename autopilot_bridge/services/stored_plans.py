@@ -93,7 +93,7 @@ class StoredPlans(Microservice):
         announce: sends a STATUSTEXT.
     """
 
-    unhurried = True
+    coarse_timers = True
 
     def __init__(
         self,

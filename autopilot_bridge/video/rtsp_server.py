@@ -100,7 +100,7 @@ class RtspPlayer:
     Attributes:
         playing: packets are sent to it.
         lost: see `studio.Player`.
-        heard: set when data of it are received by UDP.
+        heard: an event that is set when UDP data of the player are received.
     """
 
     def __init__(self, streams: Mapping[str, CameraStream], writer: asyncio.StreamWriter) -> None:
