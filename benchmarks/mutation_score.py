@@ -8,9 +8,9 @@
 
 `map` runs the unit tests once with coverage and records which test executes which line, and how long each
 test takes. `run` draws a random sample of mutants, applies each of them in memory, in a forked process, and
-runs the tests that execute the mutated line, the quickest first, until one fails. It writes nothing into the
-source tree. The results go to `results.jsonl`, one line for each mutant; an interrupted run continues where
-it ended. `show` prints the score of each package, and the change of each survivor.
+runs the tests that execute the mutated line, those of its package first, until one fails. It writes nothing
+into the source tree. The results go to `results.jsonl`, one line for each mutant; an interrupted run
+continues where it ended. `show` prints the score of each package, and the change of each survivor.
 
 Modules with kernels are tested as plain Python, without Numba (`--plain`), because most tests finish before
 Numba has compiled a mutant. A test of more than 30 s is left out, and the tests of one mutant end after
