@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import LocalFrame
 
 RETURN_POINT: Final = 5000
 POLYGON_INCLUSION: Final = 5001

@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, VehicleSpecification
 from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
+from flightsim.foundation.geodesy import LocalFrame
 
 GLIDE_SLOPE_RAD = math.radians(5.0)
 HEIGHT_M = 40.0  # where the slope begins

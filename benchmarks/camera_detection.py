@@ -22,10 +22,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.payload import PictureDetection, PinholeModel, SeenTargets
 from flightsim.payload.camera_view import CameraView, TargetView
 from flightsim.picture import Renderer
-from flightsim.rotations import quaternion_from_euler
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]

@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from autopilot_bridge.control import MulticopterController
-from autopilot_bridge.control import fixed_wing_setpoint as fixed_wing_sp
-from autopilot_bridge.control import setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingController
-from autopilot_bridge.flight import (
+from autopilot_bridge.control.fixed_wing import setpoint as fixed_wing_sp
+from autopilot_bridge.control.multicopter import MulticopterController
+from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.flight.multicopter import (
     FlightContext,
     GotoTask,
     HoldTask,
@@ -24,11 +24,11 @@ from autopilot_bridge.flight import (
     OffboardTask,
     OrbitTask,
 )
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.layout import NAV_SIZE
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 _ROUNDS = 40
 

@@ -10,9 +10,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.plan_files.wpl import format_wpl
 from missions.vehicle.fixed_wing import Approach
 
@@ -56,7 +56,7 @@ async def fly(vehicle, options):
     await vehicle.return_to_launch()
 """,
     "plane": """
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 
 async def fly(vehicle, options):

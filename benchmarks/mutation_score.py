@@ -41,7 +41,7 @@ from typing import Any, Final, NoReturn
 import numba
 import pytest
 
-import flightsim.kernels
+import flightsim.foundation.kernels
 from benchmarks.mutants import ROOT, Mutant, is_plain, sample
 from benchmarks.mutation_map import PLAIN_TESTS, PYTEST_OPTIONS, TESTS, TestMap, record
 
@@ -142,7 +142,9 @@ def _test(mutant: Mutant, text: str, tests: Sequence[str], failure: Path, limit_
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT_BYTES, MEMORY_LIMIT_BYTES))
         resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s + 5))
         numba.config.DISABLE_JIT = is_plain(mutant.path)
-        flightsim.kernels._CacheFile.save = lambda *_: None  # mutants stay out of the kernels' cache
+        flightsim.foundation.kernels._CacheFile.save = lambda *_: (
+            None
+        )  # mutants stay out of the kernels' cache
         sys.meta_path.insert(0, MutatedModule(mutant.module, ROOT / mutant.path, text))
         code = int(
             pytest.main([*PYTEST_OPTIONS, "-x", "--timeout=0", *tests], plugins=[FirstFailure(failure)])

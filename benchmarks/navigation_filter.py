@@ -15,8 +15,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, mechanisation
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import SensorReadings
-from flightsim.random_streams import RandomStreams
 
 WING = NavigationParameters(fixed_wing=True)
 QUADROTOR = NavigationParameters()

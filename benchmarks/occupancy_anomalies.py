@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
     DipoleSignature,
@@ -28,7 +29,6 @@ from flightsim.payload import (
     surveyed,
     synthetic_map,
 )
-from flightsim.random_streams import RandomStreams
 from missions.occupancy.detection import Anomaly, AnomalyDetector, MapError
 
 Array = NDArray[np.float64]

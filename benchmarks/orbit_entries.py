@@ -24,7 +24,7 @@ from missions.errors import PlanError
 from missions.library import find_mission
 from missions.options import parse_wind
 from missions.orbit.options import OrbitOptions
-from missions.session import COMPLETED, RunRequest, fly
+from missions.runs.session import COMPLETED, RunRequest, fly
 
 MEAN_ERROR_PERCENT, STD_M, ALTITUDE_M = 5.0, 8.0, 10.0
 FIGURES = ("radius_mean_error_percent", "radius_std_m", "altitude_error_m")

@@ -1,15 +1,15 @@
-"""Do flights and replays stay the same to the byte? For changes of the structure of the code.
+"""SHA-256 of flights and replays, to prove that a change of the code's structure changes no byte of them.
 
-    python -m benchmarks.same_flights before.json [--only NAME ...] [--logs FOLDER] [--jobs 2]   # before the change
-    python -m benchmarks.same_flights after.json                                                 # after it
-    python -m benchmarks.same_flights after.json --compare before.json                           # exit code 1: different
+    python -m benchmarks.same_flights before.json [--only NAME ...] [--logs FOLDER] [--jobs 2]
+    python -m benchmarks.same_flights after.json --compare before.json
 
-The flights touch every mission, both flavours, both ways to fly a pattern, teams, wind, turbulence, injected
-failures, cameras, and the orbit with the attitude filter. `before.json` contains the SHA-256 of the
-`flight.tlog` of each flight, and of the `estimates.npz` of the replay of each log in the folder. A run whose
-hash is in the file already is not repeated. Only the command line is used, so every revision can be measured.
+The first command runs before the change, the second after it, with exit code 1 if a hash differs. The flights
+touch every mission, both flavours, both ways to fly a pattern, teams, wind, turbulence, injected failures,
+cameras, and the orbit with the attitude filter. The file contains the hash of the `flight.tlog` of each
+flight, and of the `estimates.npz` of the replay of each log in the folder. A run whose hash is already in the
+file is not repeated. Only the command line is used, so every revision can be measured.
 
-As a mission (`flightstack fly benchmarks/same_flights.py`) this file is a short flight during which sensors fail.
+As a mission (`flightstack fly benchmarks/same_flights.py`), this file is a short flight with sensor failures.
 """
 
 import argparse
@@ -63,7 +63,8 @@ FLIGHTS: Final[dict[str, str]] = {
     "--search-time 200 --seed 2",
     "plan-px4": f"{PLAN} --home {HOME[0]},{HOME[1]},488",
     "plan-ardupilot": f"{PLAN} --home {HOME[0]},{HOME[1]},488 --autopilot ardupilot",
-    "own-mission": "examples/own_mission.py --altitude 15 --arg radius_m=30 --estimator examples/own_estimator.py",
+    "own-mission": "examples/own_mission.py --altitude 15 --arg radius_m=30 "
+    "--estimator examples/own_estimator.py",
     "failures-px4": "benchmarks/same_flights.py --wind 3 --estimator attitude",
     "failures-ardupilot": "benchmarks/same_flights.py --autopilot ardupilot --turbulence light",
 }
@@ -101,7 +102,7 @@ def _hash_of(command: list[str], result: Path) -> str:
     done = subprocess.run(
         [sys.executable, "-m", "missions", *command], check=False, capture_output=True, text=True
     )
-    print(f"  {' '.join(command)}: exit code {done.returncode}", file=sys.stderr, flush=True)
+    sys.stderr.write(f"{' '.join(command)}: exit code {done.returncode}\n")
     if not result.exists():
         return f"none: {(done.stderr.strip() or '?').splitlines()[-1]}"
     return hashlib.sha256(result.read_bytes()).hexdigest()
@@ -112,7 +113,15 @@ def _measured(name: str, logs: dict[str, Path]) -> str:
         folder = Path(temporary)
         if name in logs:
             out = folder / "replay"
-            command = ["replay", str(logs[name]), "--estimator", "attitude", "--no-picture", "--out", str(out)]
+            command = [
+                "replay",
+                str(logs[name]),
+                "--estimator",
+                "attitude",
+                "--no-picture",
+                "--out",
+                str(out),
+            ]
             return _hash_of(command, out / "estimates.npz")
         _write_plan(folder)
         mission, *options = FLIGHTS[name].split()
@@ -123,7 +132,9 @@ def _measured(name: str, logs: dict[str, Path]) -> str:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("file", type=Path)
     parser.add_argument("--compare", type=Path)
     parser.add_argument("--only", nargs="*")
@@ -138,12 +149,13 @@ def main() -> int:
             hashes[name] = value
             args.file.write_text(json.dumps(hashes, indent=1) + "\n")
     for name, value in hashes.items():
-        print(f"{name:28} {value}")
+        sys.stdout.write(f"{name:28} {value}\n")
     if args.compare is None:
         return 0
     before = json.loads(args.compare.read_text())
     different = [name for name in hashes if hashes[name] != before.get(name)]
-    print(f"{len(hashes) - len(different)} of {len(hashes)} the same; different: {different or 'none'}")
+    same = len(hashes) - len(different)
+    sys.stdout.write(f"{same} of {len(hashes)} are the same; different: {', '.join(different) or 'none'}\n")
     return int(bool(different))
 
 

@@ -10,7 +10,7 @@ from dataclasses import fields
 import numpy as np
 
 from flightsim import truth as t
-from flightsim.random_streams import RandomStreams
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.sensors import SensorSuite, SensorSuiteParameters
 
 PHYSICS_RATE_HZ = 250

@@ -21,10 +21,10 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Verdict
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.sitl import PacketLog, Sitl, SitlConfiguration, SitlVehicle, team
 from flightsim.airframe import AirframeKind, load_airframe
+from flightsim.foundation.geodesy import LocalFrame
 
 PHYSICS_RATE_HZ = 250
 NO_LANDING_NEEDED = {"MIS_TKO_LAND_REQ": 0.0}  # else PX4 refuses an aircraft this mission without end

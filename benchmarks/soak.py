@@ -30,8 +30,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from autopilot_bridge.clock import TelemetryClock
 from autopilot_bridge.links import open_link, parse_address
 from autopilot_bridge.mavlink import definition, dialect
-from missions.connection import Connection
 from missions.errors import MissionError
+from missions.vehicle.connection import Connection
 from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.vehicle import Vehicle
 from tests.fuzz.campaign import resident_bytes

@@ -23,7 +23,6 @@ import numpy as np
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.clock.pacing import wall_time_s
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import FrameParser, definition
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
@@ -33,6 +32,8 @@ from estimators.messages import read_message
 from estimators.runner import Runner
 from estimators.target_fusion import TargetFusionEstimator, TargetFusionParameters
 from flightsim.environment import Environment
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload import (
     CameraParameters,
     Circle,
@@ -40,16 +41,15 @@ from flightsim.payload import (
     GroundTargetParameters,
     PayloadParameters,
 )
-from flightsim.random_streams import RandomStreams
-from missions.connection import Connection
 from missions.notes import PATTERN
 from missions.options import FlightOptions, Via
-from missions.pattern_flight import fly_pattern
+from missions.pattern_search.flight import fly_pattern
 from missions.patterns.curve import Lap
 from missions.patterns.lissajous import Lissajous
-from missions.run import EPOCH_UNIX_US
+from missions.runs.concurrency import together
+from missions.runs.run_folder import EPOCH_UNIX_US
 from missions.studies.pool import processors, work_through
-from missions.together import together
+from missions.vehicle.connection import Connection
 from missions.vehicle.vehicle import Vehicle
 
 FORMS = ("measurement", "kalman", "proposed", "frequency")

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from estimators.airborne import ALWAYS, airborne_spans, duration_s, within
 from estimators.references import (
     AUTOPILOT,
@@ -24,6 +23,7 @@ from estimators.references import (
     target_reference,
 )
 from estimators.runner import EstimateTable, Runner
+from flightsim.foundation.geodesy import GeodeticPosition
 
 if TYPE_CHECKING:
     from estimators.logs import Log

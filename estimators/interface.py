@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage
 from estimators.messages import Message
+from flightsim.foundation.geodesy import GeodeticPosition
 
 __all__ = ["Estimate", "Estimator", "Need", "Outcome"]
 

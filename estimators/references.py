@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from estimators.euler import euler_from_quaternions
+from flightsim.foundation.euler import euler_from_quaternions
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 if TYPE_CHECKING:
     from estimators.logs import Log, Table

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.messages import Message
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 AUTOPILOT: Final = 1
 """Component id of autopilots (MAV_COMP_ID_AUTOPILOT1)."""

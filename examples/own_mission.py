@@ -9,8 +9,8 @@ import math
 
 from missions.errors import PlanError
 from missions.options import FlightOptions
-from missions.telemetry import Battery, Position
 from missions.vehicle import Setpoint, Vehicle
+from missions.vehicle.telemetry import Battery, Position
 
 
 class Mission:

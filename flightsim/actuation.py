@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.airframe import ActuatorChannel, Airframe, AirframeError, AirframeKind, Role
+from flightsim.foundation.kernels import bound, kernel
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
 from flightsim.jsbsim_model import find_property
-from flightsim.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 

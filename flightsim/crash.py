@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.rotations import rotate_inverse
+from flightsim.foundation.rotations import rotate_inverse
 
 Array = NDArray[np.float64]
 

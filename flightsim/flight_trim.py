@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flightsim.foundation.rotations import quaternion_from_euler, rotate
 from flightsim.initial_state import InitialState
 from flightsim.interface import AILERON, ELEVATOR, MAX_ACTUATORS, RUDDER, THROTTLE
-from flightsim.rotations import quaternion_from_euler, rotate
 from flightsim.wind_tunnel import FlightState
 
 __all__ = ["FlightTrim", "flight_pitch_rad", "flight_state"]

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.airframe import AirframeError, LaunchKind, LaunchParameters
+from flightsim.foundation.rotations import quaternion_from_euler, rotate_inverse
 from flightsim.jsbsim_model import LAUNCHER_FORCE, LAUNCHER_MOMENT, find_property
-from flightsim.rotations import quaternion_from_euler, rotate_inverse
 
 __all__ = ["Launcher"]
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from flightsim import truth as t
 from flightsim.airframe import AirframeError, AirframeKind, load_airframe
 from flightsim.environment import Environment
+from flightsim.foundation.rotations import quaternion_from_euler, rotate_inverse
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
 from flightsim.jsbsim_model import load_fdm
-from flightsim.rotations import quaternion_from_euler, rotate_inverse
 
 Array = NDArray[np.float64]
 

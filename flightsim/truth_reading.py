@@ -21,9 +21,9 @@ from flightsim.crash import (
     NEAR_M,
     Touches,
 )
+from flightsim.foundation.kernels import bound, kernel
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.jsbsim_model import find_property
-from flightsim.kernels import bound, kernel
-from flightsim.rotations import quaternion_from_euler
 
 Array = NDArray[np.float64]
 

@@ -17,11 +17,11 @@ from flightsim import truth as t
 from flightsim.actuation import FixedWingActuators
 from flightsim.airframe import Airframe, AirframeError, AirframeKind, Role, load_airframe
 from flightsim.environment import Environment
+from flightsim.foundation.rotations import quaternion_from_euler, rotate
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, height_on_wheels_m, initialise
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import find_property, hold_motion, load_fdm
-from flightsim.rotations import quaternion_from_euler, rotate
 
 __all__ = ["FlightState", "Reading", "WindTunnel"]
 

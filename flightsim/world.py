@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Final
 
 from flightsim.environment import Environment
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
-from flightsim.random_streams import RandomStreams
 from flightsim.vehicle import Vehicle
 
 SLOW_RATE_HZ: Final = 50

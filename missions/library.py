@@ -65,7 +65,7 @@ class PatternMission(Mission[FlightOptions]):
         return self._size(options, limits) if isinstance(limits, FixedWingLimits) else options
 
     def check(self, options: FlightOptions, limits: Limits) -> None:
-        from missions.pattern_flight import check_pattern
+        from missions.pattern_search.flight import check_pattern
 
         for name in options.arguments:
             raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
@@ -76,24 +76,24 @@ class PatternMission(Mission[FlightOptions]):
         return self._make_curve(options)
 
     async def plan_items(self, vehicle: Vehicle, options: FlightOptions) -> Sequence[MissionItem]:
-        from missions.pattern_flight import pattern_items
+        from missions.pattern_search.flight import pattern_items
 
         return await pattern_items(vehicle, options, self.curve(options))
 
     async def outline(self, vehicle: Vehicle, options: FlightOptions) -> Outline:
-        from missions.pattern_flight import pattern_outline
+        from missions.pattern_search.flight import pattern_outline
 
         return pattern_outline(vehicle, options, self.curve(options))
 
     async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
-        from missions.pattern_flight import fly_pattern
+        from missions.pattern_search.flight import fly_pattern
 
         await fly_pattern(vehicle, options, self.curve(options))
 
     def estimator_settings(self, options: FlightOptions) -> Mapping[str, float]:
         if options.period_s is None:
             return {}  # at constant speed the motion is not harmonic
-        from missions.pattern_flight import pattern_frequencies
+        from missions.pattern_search.flight import pattern_frequencies
 
         x_rad_s, y_rad_s = pattern_frequencies(self.curve(options), options.period_s)
         return {"omega_x_rad_s": x_rad_s, "omega_y_rad_s": y_rad_s}

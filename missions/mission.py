@@ -13,12 +13,12 @@ from missions.scenario import Scenario, Setting
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from autopilot_bridge.geodesy import GeodeticPosition
     from autopilot_bridge.mission_plan import MissionItem
+    from flightsim.foundation.geodesy import GeodeticPosition
     from missions.notes import FlightNotes
     from missions.outline import Outline
-    from missions.records import FlightRecords
-    from missions.score import FlightScore
+    from missions.runs.records import FlightRecords
+    from missions.runs.score import FlightScore
     from missions.vehicle.vehicle import Vehicle
 
 AnyOptions = TypeVar("AnyOptions", bound=MissionOptions)
@@ -145,7 +145,7 @@ class Mission(Generic[AnyOptions]):
             debriefing: of the flight.
             max_error_m: the user's own bound for the path error.
         """
-        from missions.verdict import path_verdict
+        from missions.runs.verdict import path_verdict
 
         return verdict_of_all(debriefing, lambda notes, score: path_verdict(notes, score, max_error_m))
 
@@ -163,6 +163,6 @@ class Mission(Generic[AnyOptions]):
 
     def draw(self, path: "Path", title: str, debriefing: Debriefing) -> None:
         """Draw `track.png`."""
-        from missions.picture import draw_run
+        from missions.runs.picture import draw_run
 
         draw_run(path, title, list(debriefing.flights))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.options import MissionOptions
 
 PATTERN = "pattern"

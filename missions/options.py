@@ -8,9 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, Self
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.parameter_files import read_untyped_parameter_file
 from autopilot_bridge.parameters import ParameterError
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.planning.limits import Limits, MulticopterLimits
 from missions.planning.sizing import WINGS_SIDE_M, spacing_for_turns_m

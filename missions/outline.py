@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

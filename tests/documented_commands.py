@@ -6,7 +6,7 @@ from typing import Final
 
 import click
 
-from missions.cli import command_line
+from missions.cli.main import command_line
 
 _COMMAND: Final = re.compile(r"^(?:#)? {4,}(flightstack .*?)(?:  +#.*)?$", re.MULTILINE)
 

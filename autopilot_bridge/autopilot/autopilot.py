@@ -22,26 +22,26 @@ from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.flavours.flavour import Flavour
-from autopilot_bridge.flavours.gps_source import connected
+from autopilot_bridge.firmware.flavour import Flavour
+from autopilot_bridge.firmware.gps_source import connected
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Service, Source, TimedService
-from autopilot_bridge.services.command_common import CommandHooks
-from autopilot_bridge.services.commands import CommandService
-from autopilot_bridge.services.geofence import MissionFence
-from autopilot_bridge.services.message_interval import MessageIntervalService
+from autopilot_bridge.services.commands.handlers import CommandHooks
+from autopilot_bridge.services.commands.message_interval import MessageIntervalService
+from autopilot_bridge.services.commands.protocol import CommandService
+from autopilot_bridge.services.inputs.radio import RadioService
+from autopilot_bridge.services.inputs.setpoints import SetpointService
+from autopilot_bridge.services.inputs.timesync import TimeSyncService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice, Simulation
-from autopilot_bridge.services.mission import MissionService, new_stores
-from autopilot_bridge.services.parameters import ParameterService, fix_identity
-from autopilot_bridge.services.radio import RadioService
-from autopilot_bridge.services.setpoints import SetpointService
+from autopilot_bridge.services.parameters.parameter_file import boot_parameters
+from autopilot_bridge.services.parameters.protocol import ParameterService, fix_identity
+from autopilot_bridge.services.plans.geofence import MissionFence
+from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from autopilot_bridge.services.status_text import StatusTextService
-from autopilot_bridge.services.stored_parameters import boot_parameters
-from autopilot_bridge.services.timesync import TimeSyncService
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE, PowerHook, VehicleMemory
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources

@@ -6,10 +6,10 @@ from typing import Protocol
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.firmware import PAYLOAD_ROLE, Firmware
+from autopilot_bridge.firmware.ardupilot.messages import STREAM_RATE_PARAMETERS
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Channel
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE
-from autopilot_bridge.telemetry.ardupilot import STREAM_RATE_PARAMETERS
 from autopilot_bridge.telemetry.line import MICROSECONDS, LineBudget
 from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable

@@ -8,22 +8,25 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.firmware.ardupilot import messages as ardupilot
+from autopilot_bridge.firmware.ardupilot.plane import messages as ardupilot_plane
+from autopilot_bridge.firmware.px4 import messages as px4
+from autopilot_bridge.firmware.px4.plane import messages as px4_plane
 from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rule, px4_address_rule
-from autopilot_bridge.services.message_interval import IntervalPolicy
-from autopilot_bridge.services.mission_policy import (
+from autopilot_bridge.services.commands.message_interval import IntervalPolicy
+from autopilot_bridge.services.parameters.protocol import (
+    ARDUPILOT_PARAMETER_POLICY,
+    PX4_PARAMETER_POLICY,
+    ParameterPolicy,
+)
+from autopilot_bridge.services.plans.policy import (
     ARDUPILOT_MISSION_POLICY,
     ARDUPLANE_MISSION_POLICY,
     PX4_MISSION_POLICY,
     PX4_PLANE_MISSION_POLICY,
     MissionPolicy,
 )
-from autopilot_bridge.services.parameters import (
-    ARDUPILOT_PARAMETER_POLICY,
-    PX4_PARAMETER_POLICY,
-    ParameterPolicy,
-)
 from autopilot_bridge.services.vehicle_memory import LOG_ROLE
-from autopilot_bridge.telemetry import ardupilot, ardupilot_plane, px4, px4_plane
 from autopilot_bridge.telemetry.line import ARDUPILOT_FLOW_CONTROL, PX4_FLOW_CONTROL, FlowControl
 from flightsim.airframe import AirframeKind
 

@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 
-from autopilot_bridge.flavours.flavour import Flavour
-from autopilot_bridge.telemetry.ardupilot import ArdupilotMessages
-from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
+from autopilot_bridge.firmware.ardupilot.messages import ArdupilotMessages
+from autopilot_bridge.firmware.ardupilot.plane.messages import ArduPlaneMessages
+from autopilot_bridge.firmware.flavour import Flavour
+from autopilot_bridge.firmware.px4.messages import Px4Messages
+from autopilot_bridge.firmware.px4.plane.messages import Px4PlaneMessages
 from autopilot_bridge.telemetry.common import CommonMessages, TelemetrySources
-from autopilot_bridge.telemetry.px4 import Px4Messages
-from autopilot_bridge.telemetry.px4_plane import Px4PlaneMessages
 from autopilot_bridge.telemetry.streams import Values
 from flightsim.airframe import AirframeKind
 

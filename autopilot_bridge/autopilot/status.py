@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.events import BatteryLevel, FailsafeAction
-from autopilot_bridge.flavours.flavour import Flavour, Identity, ModeDisplay
+from autopilot_bridge.firmware.flavour import Flavour, Identity, ModeDisplay
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.streams import Values
 

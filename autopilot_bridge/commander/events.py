@@ -6,7 +6,7 @@ from enum import Enum, IntEnum, auto
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
-from autopilot_bridge.geodesy import GeodeticPosition
+from flightsim.foundation.geodesy import GeodeticPosition
 
 
 class DisarmReason(Enum):

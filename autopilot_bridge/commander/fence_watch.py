@@ -9,8 +9,8 @@ from typing import Final
 from autopilot_bridge.commander.events import Event, FenceBreached, FenceSwitched
 from autopilot_bridge.commander.geofence import Geofence, Place
 from autopilot_bridge.commander.geofence_parameters import AutoEnable, FenceParameters, FenceType
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionStore
+from flightsim.foundation.geodesy import LocalFrame
 
 _NOTHING: Final = FenceType(0)
 _MAX_COUNT: Final = 65500  # ArduPilot's counter stops there

@@ -12,7 +12,7 @@ from autopilot_bridge.commander.fixed_wing_phases import PhaseWatch
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.fixed_wing import (
     DescendTask,
@@ -28,11 +28,11 @@ from autopilot_bridge.flight.fixed_wing import (
     TakeoffTask,
 )
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.hold import IdleTask
-from autopilot_bridge.flight.offboard import OffboardKind
+from autopilot_bridge.flight.multicopter.hold import IdleTask
+from autopilot_bridge.flight.multicopter.offboard import OffboardKind
+from autopilot_bridge.flight.multicopter.yaw import Turn
 from autopilot_bridge.flight.plan_reading import is_waypoint, target_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
-from autopilot_bridge.flight.yaw import Turn
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 

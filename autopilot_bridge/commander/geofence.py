@@ -12,8 +12,8 @@ from autopilot_bridge.fence_shapes import (
     fence_shapes,
     outside_shapes,
 )
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionStore
+from flightsim.foundation.geodesy import LocalFrame
 
 Place = tuple[float, float, float]
 

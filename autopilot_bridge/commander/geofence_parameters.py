@@ -5,7 +5,7 @@ from enum import IntEnum, IntFlag
 from typing import Final
 
 from autopilot_bridge.commander.events import FailsafeAction
-from flightsim.checks import check_fields, require_finite
+from flightsim.foundation.checks import check_fields, require_finite
 
 
 class FenceType(IntFlag):

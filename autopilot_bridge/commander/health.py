@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from autopilot_bridge.geodesy import LocalFrame
 from flightsim import interface
+from flightsim.foundation.geodesy import LocalFrame
 from flightsim.interface import Reading, SensorReadings
 
 _STALE_US: Final = {

@@ -6,8 +6,8 @@ from typing import Final
 
 from autopilot_bridge.commander.events import Event, HomeSet
 from autopilot_bridge.flight.context import FlightContext
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import layout as nav
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 _SETTLING_M: Final = 0.1
 

@@ -11,24 +11,24 @@ from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.policy import CommanderPolicy
 from autopilot_bridge.commander.vehicle_tasks import Circle, CircleFlown, Place
-from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
-from autopilot_bridge.flight.follow import FollowTask
-from autopilot_bridge.flight.goto import RepositionTask
-from autopilot_bridge.flight.guided import GuidedKind, GuidedTask
-from autopilot_bridge.flight.hold import BrakeTask, HoldTask, IdleTask
-from autopilot_bridge.flight.land import LandTask
-from autopilot_bridge.flight.loiter import LoiterTask
-from autopilot_bridge.flight.manual import ManualMode, ManualTask
-from autopilot_bridge.flight.mission import MissionTask
-from autopilot_bridge.flight.offboard import OffboardKind, OffboardTask
-from autopilot_bridge.flight.orbit import OrbitTask, OrbitYaw, circle_ahead
+from autopilot_bridge.flight.multicopter.follow import FollowTask
+from autopilot_bridge.flight.multicopter.goto import RepositionTask
+from autopilot_bridge.flight.multicopter.guided import GuidedKind, GuidedTask
+from autopilot_bridge.flight.multicopter.hold import BrakeTask, HoldTask, IdleTask
+from autopilot_bridge.flight.multicopter.land import LandTask
+from autopilot_bridge.flight.multicopter.loiter import LoiterTask
+from autopilot_bridge.flight.multicopter.manual import ManualMode, ManualTask
+from autopilot_bridge.flight.multicopter.mission import MissionTask
+from autopilot_bridge.flight.multicopter.offboard import OffboardKind, OffboardTask
+from autopilot_bridge.flight.multicopter.orbit import OrbitTask, OrbitYaw, circle_ahead
+from autopilot_bridge.flight.multicopter.precision_land import PrecisionLandTask, landing_task
+from autopilot_bridge.flight.multicopter.return_home import ReturnTask
+from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
+from autopilot_bridge.flight.multicopter.yaw import Turn
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.precision_land import PrecisionLandTask, landing_task
-from autopilot_bridge.flight.return_home import ReturnTask
-from autopilot_bridge.flight.takeoff import TakeoffTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind
-from autopilot_bridge.flight.yaw import Turn
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 
 _MANUAL: Final = {

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.geofence_parameters import FenceParameters
 from autopilot_bridge.commander.modes import FlightMode
-from flightsim.checks import check_fields, require_finite
+from flightsim.foundation.checks import check_fields, require_finite
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from enum import Enum, auto
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
 
 
 class MissionRestart(Enum):

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.vehicle_tasks import CircleFlown, VehicleTasks
-from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.task import FlightTask, clear_setpoint
 

@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import fixed_wing_setpoint
-from autopilot_bridge.control.setpoint import SETPOINT_SIZE
+from autopilot_bridge.control.fixed_wing import setpoint as fixed_wing_setpoint
+from autopilot_bridge.control.multicopter.setpoint import SETPOINT_SIZE
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.surroundings import Surroundings
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.health import NavigationHealth
+from flightsim.foundation.geodesy import LocalFrame
 
 if TYPE_CHECKING:
     from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
@@ -151,7 +151,7 @@ class FlightContext:
         nav: navigation state, layout `navigation.layout` (shared with the filter).
         attitude_setpoint: q_ned_from_frd that the attitude loop follows, a view; None: not available.
         health: the filter's own state; None before the first solution.
-        setpoint: control setpoint, layout `control.setpoint` or `control.fixed_wing_setpoint` (shared with
+        setpoint: control setpoint, layout `control.setpoint` or `control.fixed_wing.setpoint` (shared with
             the controller); tasks write it.
         home_ned_m: home in the local frame, (3,); NaN while unset.
         home_yaw_rad: heading at home, NaN while unset.

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-from flightsim.checks import check_fields, require_not_negative, require_positive
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
 
 
 class FollowHeight(IntEnum):

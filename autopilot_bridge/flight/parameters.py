@@ -11,7 +11,7 @@ from autopilot_bridge.flight.avoidance_parameters import AvoidanceParameters
 from autopilot_bridge.flight.follow_parameters import FollowParameters
 from autopilot_bridge.flight.precision_parameters import Precision, PrecisionParameters
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
-from flightsim.checks import check_fields, require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
 
 _MAY_BE_ZERO: Final = frozenset(
     {

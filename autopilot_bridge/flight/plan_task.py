@@ -18,7 +18,6 @@ from autopilot_bridge.flight.context import (
     WaypointReached,
     WaypointStarted,
 )
-from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_reading import (
     CONDITIONS,
     JUMPS,
@@ -29,6 +28,7 @@ from autopilot_bridge.flight.plan_reading import (
     jump_target,
     target_of,
 )
+from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS, RoiMode, roi_of
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
+from autopilot_bridge.flight.multicopter.yaw import wrap_pi
 from autopilot_bridge.flight.plan_reading import Command, target_of
-from autopilot_bridge.flight.yaw import wrap_pi
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav_layout
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from autopilot_bridge.flight.plan_habits import PlanHabits
+from autopilot_bridge.flight.plan_rules import PlanHabits
 from autopilot_bridge.flight.return_place import ReturnPlace, plan_landing, way_back
 from autopilot_bridge.flight.return_rules import ALONG_PLAN, ReturnDestination
 from autopilot_bridge.mission_plan import MissionStore

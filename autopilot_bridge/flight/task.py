@@ -6,7 +6,7 @@ import math
 from enum import IntEnum
 from typing import Protocol, runtime_checkable
 
-from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext
 
 

@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.air_aiding import AirAiding
@@ -29,6 +28,7 @@ from autopilot_bridge.navigation.report import report
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.standby import Standby
 from autopilot_bridge.navigation.terrain import TerrainEstimator, update_terrain
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.interface import SensorReadings
 
 Array = NDArray[np.float64]

@@ -43,7 +43,7 @@ from autopilot_bridge.navigation.states import (
     X_VEL,
     Q,
 )
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

@@ -29,7 +29,7 @@ from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S
 from autopilot_bridge.navigation.states import GYRO, HISTORY_Q, X_GYRO_BIAS
-from autopilot_bridge.rotation import yaw_of
+from flightsim.foundation.vectors import yaw_of
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from autopilot_bridge.navigation.states import (
     DX,
     PH,
 )
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

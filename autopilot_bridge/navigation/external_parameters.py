@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from flightsim.checks import check_fields, require_not_negative, require_positive
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,7 +12,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import mechanisation
 from autopilot_bridge.navigation.aiding import HAS_RANGE, Aiding
 from autopilot_bridge.navigation.alignment import Alignment
@@ -29,8 +28,9 @@ from autopilot_bridge.navigation.layout import (
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import Solution
 from autopilot_bridge.navigation.states import GYRO, GYRO_LAST, HISTORY_Q
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.kernels import bound
 from flightsim.interface import SensorReadings
-from flightsim.kernels import bound
 
 FIXED_IN_FLIGHT: Final = (
     "covariance_rate_hz",

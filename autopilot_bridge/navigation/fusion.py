@@ -33,7 +33,7 @@ from autopilot_bridge.navigation.states import (
     X_VEL,
     R,
 )
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,6 @@ wing that found its way without it."""
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.gps_quality import GpsQuality
@@ -13,6 +12,7 @@ from autopilot_bridge.navigation.height_aiding import HeightAiding
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S
 from autopilot_bridge.navigation.states import X_POS
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.interface import (
     GPS_ALT_M,
     GPS_EPH_M,

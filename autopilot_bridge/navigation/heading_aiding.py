@@ -5,13 +5,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.aiding_parts import AidingParts
 from autopilot_bridge.navigation.alignment import magnetic_heading_rad
 from autopilot_bridge.navigation.heading_check import HeadingCheck
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.states import R
+from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.magnetics import magnetic_field_ned_gauss
 
 Array = NDArray[np.float64]

@@ -50,7 +50,7 @@ from autopilot_bridge.navigation.states import (
     Q,
     R,
 )
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
-from flightsim.checks import check_fields, require_not_negative, require_positive
+from flightsim.foundation.checks import check_fields, require_not_negative, require_positive
 
 _MAY_BE_ZERO = frozenset(
     {
@@ -29,7 +29,7 @@ class NavigationParameters:
     """The filter's assumptions about its sensors, and the limits of their use.
 
     The noise figures are the defaults of PX4 1.16's EKF2, converted to continuous time; a flavour sets them
-    by its parameters (`flavours/navigation_noise.py`). They are not the simulated sensors' figures: the
+    by its parameters (`firmware/navigation_noise.py`). They are not the simulated sensors' figures: the
     firmwares' defaults cover vibration, timing errors and cheap sensors on all frames, so they are larger.
     Airspeed, sideslip and wind are different: the firmwares' noise includes gusts, which this filter measures
     separately. Gates are in standard deviations of the innovation. Times and checks follow EKF2 unless noted

@@ -43,7 +43,7 @@ from autopilot_bridge.navigation.states import (
     Q,
     R,
 )
-from flightsim.rotations import multiply, quaternion_from_euler
+from flightsim.foundation.rotations import multiply, quaternion_from_euler
 
 Array = NDArray[np.float64]
 

@@ -29,7 +29,7 @@ from autopilot_bridge.payload.camera_trigger import PhotoTrigger
 from autopilot_bridge.payload.camera_video import VideoStream
 from autopilot_bridge.payload.component import Component
 from autopilot_bridge.payload.vehicle_heard import VehicleHeard
-from autopilot_bridge.rotation import Quaternion, from_euler, product
+from flightsim.foundation.vectors import Quaternion, from_euler, product
 from flightsim.payload import Camera, CameraFrame, Gimbal
 
 CAMERA_COMPONENT: Final = int(mavlink.MAV_COMP_ID_CAMERA)

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_storage import PHOTO_QUALITY
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.file_transfer import FileTransferService
+from autopilot_bridge.services.files.file_transfer import FileTransferService
 from autopilot_bridge.storage.generated import GeneratedStore
 
 if TYPE_CHECKING:

@@ -3,11 +3,11 @@
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.camera_definition import URI, VERSION
 from autopilot_bridge.payload.component import fixed_text
-from autopilot_bridge.rotation import rotate
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.vectors import rotate
 from flightsim.payload import Detection
 
 if TYPE_CHECKING:

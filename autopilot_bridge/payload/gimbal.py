@@ -23,8 +23,8 @@ from autopilot_bridge.payload.gimbal_messages import (
     status_flags,
 )
 from autopilot_bridge.payload.vehicle_heard import VehicleHeard
+from flightsim.foundation.rotations import euler_from_quaternion
 from flightsim.payload import Gimbal, GimbalFlags
-from flightsim.rotations import euler_from_quaternion
 
 _ACCEPTED: Final = int(mavlink.MAV_RESULT_ACCEPTED)
 _DENIED: Final = int(mavlink.MAV_RESULT_DENIED)

@@ -3,10 +3,10 @@
 import math
 from typing import Any, Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mission_wire import RELATIVE_FRAMES, TERRAIN_FRAMES
 from autopilot_bridge.payload.vehicle_heard import STALE_US, VehicleHeard
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 _RELATIVE_FRAMES: Final = RELATIVE_FRAMES | TERRAIN_FRAMES  # the ground is assumed level with home
 _HAS_POSITION: Final = 1  # of FOLLOW_TARGET.est_capabilities

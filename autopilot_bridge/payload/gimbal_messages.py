@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.component import fixed_text
-from autopilot_bridge.rotation import yaw_of
+from flightsim.foundation.vectors import yaw_of
 from flightsim.payload import Gimbal, GimbalFlags
 
 GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)

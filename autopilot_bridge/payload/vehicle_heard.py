@@ -3,9 +3,9 @@
 import math
 from typing import Any, Final
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.rotation import Quaternion, from_euler
+from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.vectors import Quaternion, from_euler
 
 AUTOPILOT: Final = int(mavlink.MAV_COMP_ID_AUTOPILOT1)
 STALE_US: Final = 3_000_000

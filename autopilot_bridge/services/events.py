@@ -16,9 +16,9 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.arming import arming_reasons, shortfalls
 from autopilot_bridge.commander.events import ArmingDenied, Event
 from autopilot_bridge.commander.verdict import Reason, Result
-from autopilot_bridge.flavours import px4_events
-from autopilot_bridge.flavours.event_kinds import Occurrence
-from autopilot_bridge.flavours.texts import Notice
+from autopilot_bridge.firmware.event_kinds import Occurrence
+from autopilot_bridge.firmware.px4 import events as px4_events
+from autopilot_bridge.firmware.texts import Notice
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.mavlink.event_messages import (
     CURRENT_EVENT_SEQUENCE,
@@ -27,7 +27,7 @@ from autopilot_bridge.mavlink.event_messages import (
     ResponseEventError,
 )
 from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Source, send_to_all
-from autopilot_bridge.services.command_common import Command, Handler
+from autopilot_bridge.services.commands.handlers import Command, Handler
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.streams import Builder
 

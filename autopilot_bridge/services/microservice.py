@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.flavours.flavour import Flavour
+from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.mission_plan import MissionStore, MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Announce, Broadcast, Channel, MavlinkMessage, Source
-from autopilot_bridge.services.command_common import Command, Handler
-from autopilot_bridge.services.mission_policy import MissionPolicy
+from autopilot_bridge.services.commands.handlers import Command, Handler
+from autopilot_bridge.services.plans.policy import MissionPolicy
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
 from autopilot_bridge.telemetry.streams import Builder
 from flightsim.interface import SensorReadings

@@ -5,7 +5,7 @@ from typing import Final
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import Event
-from autopilot_bridge.flavours.flavour import Flavour
+from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Source
 
 CHUNK_BYTES: Final = 50

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any, Final
 
-from autopilot_bridge.services.stored_parameters import StoredParameters
+from autopilot_bridge.services.parameters.parameter_file import StoredParameters
 from autopilot_bridge.storage.card import MemoryCard
 
 LOG_ROLE: Final = "log"

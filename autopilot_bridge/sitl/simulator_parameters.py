@@ -8,10 +8,10 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from autopilot_bridge.flavours.mapping import clamp, number
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.parameters import ParameterStore
 from flightsim import truth as t
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.sensors import SensorSuite
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from flightsim.sensors.faults import UnsupportedFaultError

@@ -15,8 +15,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type, whole
+from flightsim.foundation.kernels import bound, kernel
 from flightsim.home import Home
-from flightsim.kernels import bound, kernel
 from flightsim.payload import GroundTargets
 from flightsim.truth import TRUTH_SIZE
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from autopilot_bridge.autopilot import Autopilot
-from autopilot_bridge.flavours import get_flavour
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.links import Link, Reach, memory_pair
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.mavlink.signing import signing_time

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingController
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.telemetry.common import TelemetrySources
 from autopilot_bridge.telemetry.flight_path import FlightPath, flight_path
 from flightsim import interface
-from flightsim.rotations import rotate_inverse
+from flightsim.foundation.rotations import rotate_inverse
 
 
 class Surfaces(NamedTuple):

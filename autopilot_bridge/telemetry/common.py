@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.mission_plan import MissionStore
 from autopilot_bridge.navigation import NavigationFilter

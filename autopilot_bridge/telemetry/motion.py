@@ -21,8 +21,8 @@ from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.records import record_type, whole
 from autopilot_bridge.telemetry.streams import Builder
 from autopilot_bridge.telemetry.view import TelemetryView
+from flightsim.foundation.kernels import bound, kernel
 from flightsim.interface import SensorReadings
-from flightsim.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 

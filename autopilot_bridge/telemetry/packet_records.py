@@ -13,7 +13,7 @@ from autopilot_bridge.mavlink.frame import (
     OVERHEAD_V2,
     SIGNATURE_SIZE,
 )
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]

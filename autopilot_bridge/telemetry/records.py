@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink.definitions import MessageDefinition
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 _NUMPY_CODES: Final = {
     "f": "<f4",

@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.kernels import bound, kernel
+from flightsim.foundation.kernels import bound, kernel
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from estimators.attitude import layout as at
 from estimators.attitude import parameters as par
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Final
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from estimators.input_guard import InputGuard
 from estimators.interface import Estimator, Need, Outcome
@@ -18,6 +17,7 @@ from estimators.lissajous.parameters import Form, LissajousParameters
 from estimators.lissajous.pattern_frame import PatternFrame, Track
 from estimators.lissajous.positions import PositionReader, values_of
 from estimators.messages import Message
+from flightsim.foundation.geodesy import GeodeticPosition
 
 __all__ = ["LissajousEstimator"]
 

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from estimators.lissajous.model import Array
 from estimators.lissajous.motion_filter import MotionFilter
 from estimators.lissajous.parameters import LissajousParameters
 from estimators.lissajous.positions import Fix
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 __all__ = ["PatternFrame", "Track"]
 

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from estimators.lissajous.parameters import Source
 from estimators.messages import Message
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 __all__ = ["MESSAGES", "Fix", "PositionReader"]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import MessageDefinition, WireField
 from autopilot_bridge.mavlink.frame import HEADER_SIZE_V1, HEADER_SIZE_V2, MAGIC_V2
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Columns = Mapping[str, NDArray[Any]]
 """Fields by name, in the order on the wire: shape (n,), (n, length) for arrays; strings as bytes ("S")."""

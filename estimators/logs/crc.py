@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Int = int | np.integer[Any]
 """An integer, in compiled code or outside it."""

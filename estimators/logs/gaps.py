@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
 from estimators.logs.crc import Int
 from estimators.logs.scan import STAMP_SIZE, FrameIndex, MessageTable, frame_end, message_row, scan
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 _UNKNOWN, _UNSUPPORTED, _BAD_CRC = range(3)
 # Figures that the kernel counts, by index.

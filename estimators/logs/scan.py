@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.mavlink.frame import MAGIC_V1, MAGIC_V2
 from estimators.logs.crc import Int, checksum
 from estimators.logs.dialect import Dialect
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 STAMP_SIZE: Final = 8
 """Size of the time stamp before each frame, bytes."""

@@ -28,7 +28,7 @@ from estimators.logs.scan import (
 )
 from estimators.logs.source import LogSource, Positions, SourceLoss, Stream, UnknownMessage
 from estimators.vehicle_time import UNIX_TIME_US, stamp_field, vehicle_times
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 _FAR_FUTURE_US: Final = 1 << 62
 _STAMP_SAMPLE: Final = 4096

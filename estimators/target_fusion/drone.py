@@ -6,8 +6,6 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.geodesy import GeodeticPosition
-from autopilot_bridge.rotation import Quaternion, from_euler, product, yaw_of
 from estimators.input_guard import InputGuard
 from estimators.interface import Outcome
 from estimators.lissajous.model import VX, VY, Array, course, course_variance
@@ -18,6 +16,8 @@ from estimators.target_fusion.orientation import Orientations
 from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
 from estimators.target_fusion.sight import Detection, place_in_level_frame
 from estimators.target_fusion.transform import ground_target
+from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.vectors import Quaternion, from_euler, product, yaw_of
 
 __all__ = ["Drone"]
 

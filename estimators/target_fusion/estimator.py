@@ -8,7 +8,6 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, dialect
 from estimators.interface import Estimator, Need, Outcome
 from estimators.lissajous.model import Array
@@ -20,6 +19,7 @@ from estimators.target_fusion.belief import TargetBelief
 from estimators.target_fusion.drone import Drone
 from estimators.target_fusion.estimate import TargetEstimate
 from estimators.target_fusion.parameters import Heading, Mount, TargetFusionParameters
+from flightsim.foundation.geodesy import GeodeticPosition
 
 __all__ = ["TargetFusionEstimator"]
 

@@ -2,7 +2,7 @@
 
 from bisect import bisect_left
 
-from autopilot_bridge.rotation import Quaternion, between
+from flightsim.foundation.vectors import Quaternion, between
 
 __all__ = ["Orientations"]
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from autopilot_bridge.rotation import Quaternion, rotate
 from estimators.lissajous.model import Array
 from estimators.target_fusion.parameters import Range, TargetFusionParameters
+from flightsim.foundation.vectors import Quaternion, rotate
 
 __all__ = ["Detection", "Seen", "place_in_level_frame"]
 

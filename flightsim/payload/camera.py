@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.checks import require_finite, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import require_finite, require_not_negative, require_positive, require_rate
+from flightsim.foundation.rotations import multiply, quaternion_from_euler, rotate
 from flightsim.home import Home
 from flightsim.payload import camera_kernel as k
 from flightsim.payload.camera_model import PinholeModel
@@ -25,7 +26,6 @@ from flightsim.payload.detection import (
 from flightsim.payload.gimbal import Gimbal
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.targets import NO_TAG, GroundTargets
-from flightsim.rotations import multiply, quaternion_from_euler, rotate
 from flightsim.sensors.schedule import steps_per_sample
 
 Array = NDArray[np.float64]

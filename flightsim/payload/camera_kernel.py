@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.kernels import kernel
-from flightsim.rotations import rotate, rotate_inverse
+from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import rotate, rotate_inverse
 
 Array = NDArray[np.float64]
 

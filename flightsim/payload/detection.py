@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_not_negative, require_positive, require_probability
+from flightsim.foundation.checks import require_not_negative, require_positive, require_probability
 from flightsim.payload.targets import NO_TAG
 
 Array = NDArray[np.float64]

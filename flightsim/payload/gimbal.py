@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_finite, require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import require_finite, require_not_negative, require_positive, require_rate
 from flightsim.payload import gimbal_kernel as k
 from flightsim.sensors.kernels import gauss_markov
 from flightsim.sensors.schedule import steps_per_sample

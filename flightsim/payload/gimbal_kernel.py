@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.kernels import kernel
-from flightsim.rotations import (
+from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import (
     euler_from_quaternion,
     integrate,
     multiply,

@@ -27,8 +27,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.kernels import kernel
 from flightsim.home import Home
-from flightsim.kernels import kernel
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from typing import Final, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_finite, require_positive
+from flightsim.foundation.checks import require_finite, require_positive
 
 Array = NDArray[np.float64]
 Places: TypeAlias = NDArray[np.float64] | np.float64

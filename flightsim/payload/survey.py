@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_not_negative, require_positive
+from flightsim.foundation.checks import require_not_negative, require_positive
 from flightsim.payload.magnetic_map import MagneticMap
 
 Array = NDArray[np.float64]

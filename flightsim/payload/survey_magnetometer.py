@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.rotations import rotate_inverse
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
-from flightsim.rotations import rotate_inverse
 from flightsim.sensors.kernels import gauss_markov
 from flightsim.sensors.schedule import steps_per_sample
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
 from flightsim.home import Home
 from flightsim.payload.magnetic_map import MagneticMap
 from flightsim.payload.main_field import MainField

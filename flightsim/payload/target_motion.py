@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from flightsim.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
 
 State = tuple[float, float, float, float]
 """north m, east m, north m/s, east m/s"""

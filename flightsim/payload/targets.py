@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_positive
+from flightsim.foundation.checks import require_positive
 from flightsim.payload.target_motion import TargetMotion
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 from flightsim.picture.ground_texture import LEVELS, TEXELS
 
 Array = NDArray[np.float64]

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import require_finite, require_not_negative, require_positive
+from flightsim.foundation.rotations import rotate
 from flightsim.payload.camera_model import PinholeModel, camera_from_gimbal
 from flightsim.payload.camera_view import CameraView
 from flightsim.picture import landscape_kernel as k
 from flightsim.picture.ground_texture import ground_texture
 from flightsim.picture.target_marks import draw_ball, draw_tag, shows_tag
-from flightsim.rotations import rotate
 
 Picture = NDArray[np.uint8]
 

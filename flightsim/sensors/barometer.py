@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.kernels import kernel
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
-from flightsim.kernels import kernel
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import gauss_markov, quantise
 from flightsim.sensors.sensor import SensorModel

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.kernels import kernel
 from flightsim.interface import VANE_ANGLE_OF_ATTACK_RAD, VANE_SIDESLIP_RAD, VANE_SIZE
-from flightsim.kernels import kernel
 from flightsim.sensors.kernels import quantise, saturate
 from flightsim.sensors.sensor import SensorModel
 

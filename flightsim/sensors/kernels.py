@@ -2,7 +2,7 @@
 
 import math
 
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 
 @kernel

@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import rotate_inverse
 from flightsim.interface import MAG_SIZE
-from flightsim.kernels import kernel
-from flightsim.rotations import rotate_inverse
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import quantise, saturate
 from flightsim.sensors.sensor import SensorModel

@@ -12,8 +12,8 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.kernels import bound
 from flightsim.interface import Reading
-from flightsim.kernels import bound
 from flightsim.sensors.fault_kinds import FaultTarget
 from flightsim.sensors.fault_stage import FaultPoint
 

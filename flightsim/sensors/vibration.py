@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
-from flightsim.checks import require_not_negative
-from flightsim.kernels import kernel
+from flightsim.foundation.checks import require_not_negative
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

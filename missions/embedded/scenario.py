@@ -4,10 +4,11 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.sitl import SitlConfiguration
 from estimators.logs.errors import LogError
 from estimators.logs.new_file import new_file
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
     NO_TAG,
@@ -33,7 +34,6 @@ from flightsim.payload import (
     truth_behind,
 )
 from flightsim.payload import TargetMotion as Motion
-from flightsim.random_streams import RandomStreams
 from missions.errors import MissionError
 from missions.scenario import MAX_DISTANCE_M, Scenario, SurveyScenario, TargetMotion, TargetScenario
 

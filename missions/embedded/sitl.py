@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from autopilot_bridge.clock import VirtualTimeLoop
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.links import Link
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, parse_home, team
 from autopilot_bridge.sitl.configuration import HOMES
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
+from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.wind_profile import WindLaw, WindProfile
 from missions.embedded.scenario import equipped

@@ -13,12 +13,12 @@ from estimators.fleet import Fleet
 from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
 from estimators.runner import Runner
-from missions.connection import Recorder
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
 from missions.notes import FlightNotes
-from missions.run import LOG_NAME
+from missions.runs.run_folder import LOG_NAME
+from missions.vehicle.connection import Recorder
 
 if TYPE_CHECKING:
     from autopilot_bridge.clock import Clock

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from missions.errors import PlanError
-from missions.request import RunRequest
+from missions.runs.request import RunRequest
 
 if TYPE_CHECKING:
     from missions.estimation.embedded import FlightEstimators

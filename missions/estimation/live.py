@@ -23,16 +23,16 @@ from estimators.fleet import Fleet
 from estimators.interface import Estimator
 from estimators.library import estimator_class, parameters_from
 from estimators.runner import ESTIMATOR_COMPONENTS, Runner
-from missions.connection import Connection
-from missions.end_signals import end_signals
 from missions.errors import LinkClosed
 from missions.estimation.embedded import COMPONENT_ID
 from missions.estimation.rates import CHECK_PERIOD_S, RateWatch, interval_request
 from missions.estimation.report import EstimationResult, ReportRequest, report
 from missions.estimation.tap import TEAM_SYSTEM, EstimatorTap, Publisher
-from missions.records import FlightRecorder
-from missions.run import LOG_NAME, create_run_folder
-from missions.signing import client_signing
+from missions.runs.end_signals import end_signals
+from missions.runs.records import FlightRecorder
+from missions.runs.run_folder import LOG_NAME, create_run_folder
+from missions.runs.signing import client_signing
+from missions.vehicle.connection import Connection
 
 __all__ = ["LiveProgress", "LiveRequest", "estimate"]
 

@@ -14,7 +14,7 @@ from estimators.logs.dialect import load_dialect
 from estimators.replay import replay
 from missions.errors import PlanError
 from missions.estimation.report import FAILED, EstimationResult, ReportRequest, report
-from missions.run import RUNS, create_run_folder
+from missions.runs.run_folder import RUNS, create_run_folder
 
 __all__ = ["ReplayRequest", "replay_logs"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimators.comparison import Comparison
 from estimators.references import AUTOPILOT, TRUTH, quantity_of
-from missions.picture import tidy
+from missions.runs.picture import tidy
 
 __all__ = ["draw_errors"]
 

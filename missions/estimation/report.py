@@ -15,7 +15,7 @@ from estimators.logs import Log, LogError, open_log
 from estimators.needs import Supply
 from estimators.replay import log_supplies, missing_of, vehicles_in
 from estimators.runner import EstimateTable, Runner
-from missions.run import replace_summary, versions, whole, write_summary
+from missions.runs.run_folder import replace_summary, versions, whole, write_summary
 
 __all__ = [
     "COMPLETED",

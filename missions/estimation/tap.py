@@ -15,7 +15,7 @@ from estimators.errors import EstimatorFailure
 from estimators.fleet import AUTOPILOT_COMPONENT, GROUND_SYSTEM, Fleet
 from estimators.interface import Outcome
 from estimators.runner import Runner, why_unheard
-from missions.connection import Recorder
+from missions.vehicle.connection import Recorder
 
 __all__ = ["PUBLISH_RATE_HZ", "EstimatorTap", "Publisher"]
 

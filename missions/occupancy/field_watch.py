@@ -9,12 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mavlink import decode
-from missions.connection import AUTOPILOT_COMPONENT
+from flightsim.foundation.geodesy import LocalFrame
 from missions.occupancy.detection import Anomaly, AnomalyDetector
 from missions.occupancy.survey_map import SurveyMap
-from missions.telemetry import Position, position
+from missions.vehicle.connection import AUTOPILOT_COMPONENT
+from missions.vehicle.telemetry import Position, position
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from missions.mission import Debriefing
     from missions.occupancy.detection import Anomaly
     from missions.occupancy.team import Searcher, SearchTeam
-    from missions.score import FlightScore
+    from missions.runs.score import FlightScore
 
 
 def search_figures(

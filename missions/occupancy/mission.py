@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from autopilot_bridge.geodesy import GeodeticPosition
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.mission import Debriefing, Mission, WorldDefaults
 from missions.occupancy.options import OccupancyOptions, check_reach, check_vehicle

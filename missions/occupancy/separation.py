@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 if TYPE_CHECKING:
-    from missions.records import FlightRecords
+    from missions.runs.records import FlightRecords
 
 Array = NDArray[np.float64]
 

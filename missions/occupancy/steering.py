@@ -6,12 +6,12 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Final, Protocol
 
-from autopilot_bridge.geodesy import LocalFrame
+from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.planning.limits import MulticopterLimits
-from missions.telemetry import Attitude
 from missions.vehicle.setpoint import Setpoint
+from missions.vehicle.telemetry import Attitude
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

@@ -16,10 +16,10 @@ from missions.occupancy.search import Search
 from missions.occupancy.steering import Steering, steering
 from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
-from missions.telemetry import Attitude, Position
-from missions.together import together
+from missions.runs.concurrency import together
 from missions.vehicle.adapter import Mode
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
+from missions.vehicle.telemetry import Attitude, Position
 
 if TYPE_CHECKING:
     from missions.vehicle.vehicle import Vehicle

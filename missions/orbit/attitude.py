@@ -8,8 +8,8 @@ import math
 from collections import deque
 from typing import Final, Protocol
 
-from autopilot_bridge.rotation import Quaternion, between, from_euler
-from missions.telemetry import Attitude
+from flightsim.foundation.vectors import Quaternion, between, from_euler
+from missions.vehicle.telemetry import Attitude
 
 _KEPT: Final = 256
 _STALE_US: Final = 500_000

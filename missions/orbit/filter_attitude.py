@@ -8,15 +8,15 @@ from collections import deque
 from typing import Final
 
 from autopilot_bridge.mavlink import Frame, decode
-from autopilot_bridge.rotation import Quaternion, from_euler, yaw_of
 from estimators.attitude import AttitudeEstimate, AttitudeEstimator, AttitudeParameters, VehicleKind
 from estimators.interface import Outcome
 from estimators.messages import read_message
 from estimators.needs import message_names
 from estimators.runner import ESTIMATOR_COMPONENTS, TRUTH_COMPONENT
 from estimators.vehicle_time import VehicleTime
-from missions import telemetry
+from flightsim.foundation.vectors import Quaternion, from_euler, yaw_of
 from missions.orbit.attitude import AutopilotAttitude
+from missions.vehicle import telemetry
 
 __all__ = ["FilterAttitude"]
 

@@ -6,8 +6,7 @@ from contextlib import suppress
 from statistics import fmean, pstdev
 from typing import Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
-from missions import telemetry
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
@@ -16,6 +15,7 @@ from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
 from missions.orbit.tracker import TargetStatus
 from missions.planning.limits import FixedWingLimits
+from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint
 from missions.vehicle.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT

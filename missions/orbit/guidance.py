@@ -23,7 +23,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from missions.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from missions.orbit.relative_target import RelativeState
 
 _LEAST_SPEED_M_S: Final = 1.0

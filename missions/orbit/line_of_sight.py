@@ -10,7 +10,7 @@ is used, so that a turning aircraft doesn't turn the frame.
 import math
 from dataclasses import dataclass
 
-from autopilot_bridge.rotation import Quaternion, Vector, conjugate, from_euler, rotate, yaw_of
+from flightsim.foundation.vectors import Quaternion, Vector, conjugate, from_euler, rotate, yaw_of
 from missions.vehicle.payload import GimbalAttitude
 
 

@@ -4,14 +4,14 @@ import math
 from collections.abc import Callable
 from typing import Any, Final
 
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mavlink import decode
-from missions import telemetry
+from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import MissionError
 from missions.orbit.attitude import AutopilotAttitude
 from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.options import WANDERING_M, AttitudeFrom, OrbitOptions
 from missions.orbit.tracker import TargetStatus, TargetTracker
+from missions.vehicle import telemetry
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.vehicle import Vehicle
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from missions.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.options import MissionOptions, check_positive
 from missions.planning.limits import FixedWingLimits, Limits

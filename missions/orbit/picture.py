@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from missions.mission import Debriefing
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import OrbitTruth, orbit_truth
-from missions.picture import draw_run, tidy
+from missions.runs.picture import draw_run, tidy
 
 _INK: Final = "#1f2937"
 _GREY: Final = "#9aa3af"

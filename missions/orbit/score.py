@@ -8,11 +8,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.mission import Debriefing
 from missions.notes import FlightNotes
 from missions.orbit.options import OrbitOptions
-from missions.records import FlightRecords
+from missions.runs.records import FlightRecords
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
-from autopilot_bridge.rotation import between, yaw_of
+from flightsim.foundation.vectors import between, yaw_of
 from missions.orbit.attitude import AttitudeSource
 from missions.orbit.line_of_sight import LineOfSight, line_of_sight_of_gimbal, pointing_angles
 from missions.orbit.relative_target import RelativeState, RelativeTarget, RelativeTargetParameters

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from missions.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 _ACCELERATION_FILTER_S: Final = 1.0
 

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from missions.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

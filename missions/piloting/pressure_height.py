@@ -3,7 +3,7 @@
 import math
 from typing import Final
 
-from missions.atmosphere import pressure_altitude_m
+from flightsim.foundation.atmosphere import pressure_altitude_m
 
 _FILTER_S: Final = 0.3
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import command_name
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 

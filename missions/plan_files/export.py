@@ -5,16 +5,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from missions.ending import AskedToEnd
 from missions.errors import MissionError, PlanError
 from missions.mission import Mission
 from missions.options import MissionOptions
 from missions.plan_files.files import check_suffix, write_mission_file
 from missions.planning.limits import Limits
-from missions.request import RunRequest
+from missions.runs.ending import AskedToEnd
+from missions.runs.request import RunRequest
 
 if TYPE_CHECKING:
-    from autopilot_bridge.geodesy import GeodeticPosition
+    from flightsim.foundation.geodesy import GeodeticPosition
     from missions.vehicle.vehicle import Vehicle
 
 
@@ -30,7 +30,7 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
         MissionError: no message is received from the vehicle, or it is not ready.
         KeyboardInterrupt: the user interrupted it.
     """
-    from missions.session import COMPLETED, INTERRUPTED, fly
+    from missions.runs.session import COMPLETED, INTERRUPTED, fly
 
     check_suffix(path)
     if request.options.vehicles > 1:

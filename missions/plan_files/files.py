@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.plan_files import qgc_plan, wpl

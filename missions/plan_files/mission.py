@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.mission import Debriefing, Mission, WorldDefaults, verdict_of_all
@@ -26,7 +26,7 @@ from missions.vehicle.item_tracker import THROUGH
 if TYPE_CHECKING:
     from missions.notes import FlightNotes
     from missions.outline import Outline
-    from missions.score import FlightScore
+    from missions.runs.score import FlightScore
     from missions.vehicle.vehicle import Vehicle
 
 _MODELS: Final = {VehicleKind.MULTICOPTER: "iris", VehicleKind.FIXED_WING: "aerosonde"}
@@ -111,7 +111,7 @@ class FileMission(Mission[FileOptions]):
 
     def _verdict(self, notes: "FlightNotes", score: "FlightScore", max_error_m: float | None) -> str:
         """Check that every waypoint was passed in order; the path between them is chosen by the autopilot."""
-        from missions.verdict import NO_TRACK, WAYPOINT_SLACK_M, flown_track, waypoint_verdict
+        from missions.runs.verdict import NO_TRACK, WAYPOINT_SLACK_M, flown_track, waypoint_verdict
 
         commanded = notes.commanded
         if commanded is None:

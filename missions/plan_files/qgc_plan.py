@@ -14,9 +14,9 @@ from autopilot_bridge.fence_shapes import (
     POLYGON_INCLUSION,
     RETURN_POINT,
 )
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import dialect, enum_name
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.plan_files.complex_items import landing_items, simple_items

@@ -9,9 +9,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.plan_files.document import (
     DO_CHANGE_SPEED,
     FLOWN_TO,

@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.plan_files.document import (
     DO_JUMP,

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import Final
 
-from missions.atmosphere import GRAVITY_M_S2, true_over_equivalent_airspeed
+from flightsim.foundation.atmosphere import GRAVITY_M_S2, true_over_equivalent_airspeed
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 

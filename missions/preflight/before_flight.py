@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from autopilot_bridge.fence_shapes import fence_shapes
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionType
+from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import MissionError
 from missions.mission import Mission
 from missions.options import MissionOptions

@@ -3,8 +3,8 @@
 import math
 from typing import Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect, enum_name
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.preflight.finding import Finding, ok, problem, warning
 from missions.preflight.snapshot import Snapshot
 

@@ -23,7 +23,7 @@ from estimators.lissajous.model import (
     predict_augmented,
 )
 from estimators.target_fusion.transform import INFORMATION, add_information, belief_of, ground_target
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

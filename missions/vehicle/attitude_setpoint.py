@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.rotation import from_euler
+from flightsim.foundation.vectors import from_euler
 from missions.errors import PlanError
 from missions.vehicle.setpoint import Vector
 

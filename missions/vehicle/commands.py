@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, definition, dialect
-from missions.connection import AUTOPILOT_COMPONENT, Connection
 from missions.errors import CommandRejected, VehicleTimeout
 from missions.vehicle.adapter import Mode
+from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection
 from missions.vehicle.link_view import VehicleView, describe_ack
 
 _ACK_S: Final = 1.0

@@ -6,13 +6,13 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, cast
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions import telemetry
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.planning.limits import FORECAST_WIND_M_S
+from missions.vehicle import telemetry
 from missions.vehicle.adapter import Mode
 from missions.vehicle.payload import Payload
 from missions.vehicle.store import VehicleStore

@@ -9,9 +9,9 @@ from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING, Final
 
 from autopilot_bridge.mavlink import dialect
-from missions import telemetry
 from missions.errors import MissionError, PlanError
 from missions.piloting.heading import HeadingController, heading_deg
+from missions.vehicle import telemetry
 from missions.vehicle.adapter import Mode
 from missions.vehicle.attitude_pilot import AttitudePilot
 from missions.vehicle.attitude_setpoint import AttitudeSetpoint

@@ -19,10 +19,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 LAST_NAV: Final = dialect.MAV_CMD_NAV_LAST
 """Commands up to this one are flown; later ones are executed on the way."""

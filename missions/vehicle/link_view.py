@@ -11,19 +11,19 @@ from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from autopilot_bridge.clock import Clock, TelemetryClock
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mavlink import MAVLinkMessage, command_name, decode, definition, dialect, enum_name
-from missions.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import VehicleTimeout
 from missions.kind import KIND_OF_TYPE, VehicleKind
 from missions.notes import FlightNotes, LinkLoss
-from missions.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 from missions.vehicle.adapter import Adapter
 from missions.vehicle.ardupilot import ArduCopter
 from missions.vehicle.arduplane import ArduPlane
+from missions.vehicle.connection import AUTOPILOT_COMPONENT, Connection, MessageStream
 from missions.vehicle.link_watch import LinkWatch
 from missions.vehicle.px4 import Px4
 from missions.vehicle.px4_plane import Px4Plane
+from missions.vehicle.telemetry import SOURCES, Position, StatusText, StatusTextAssembler, home
 
 T = TypeVar("T")
 

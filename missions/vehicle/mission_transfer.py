@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final
 from autopilot_bridge.mavlink import command_name, dialect, enum_name
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.mission_wire import item_from_message, item_message
-from missions.connection import AUTOPILOT_COMPONENT
 from missions.errors import CommandRejected, VehicleTimeout
+from missions.vehicle.connection import AUTOPILOT_COMPONENT
 
 if TYPE_CHECKING:
     from missions.vehicle.commands import VehicleCommands

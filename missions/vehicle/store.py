@@ -5,11 +5,11 @@ from typing import Final
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from missions.connection import AUTOPILOT_COMPONENT
 from missions.errors import MissionError, VehicleTimeout
 from missions.vehicle import mission_transfer, parameter_client
 from missions.vehicle.adapter import Mode
 from missions.vehicle.commands import VehicleCommands
+from missions.vehicle.connection import AUTOPILOT_COMPONENT
 from missions.vehicle.item_tracker import (
     FlownOrder,
     ItemTracker,

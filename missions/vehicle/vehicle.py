@@ -7,16 +7,16 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from typing import Final
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
-from missions import telemetry
-from missions.connection import Connection
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits, Limits
 from missions.preflight.health import not_ready_because
+from missions.vehicle import telemetry
 from missions.vehicle.adapter import PREARM, Mode
 from missions.vehicle.commands import HEARTBEAT_AGE_US
+from missions.vehicle.connection import Connection
 from missions.vehicle.fixed_wing import FixedWingFlight
 from missions.vehicle.guided import GuidedSession, SetpointSource
 

@@ -5,7 +5,7 @@ import math
 import pymap3d
 import pytest
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 ORIGINS = [
     GeodeticPosition(lat_deg=47.397742, lon_deg=8.545594, alt_m=488.0),

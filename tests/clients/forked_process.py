@@ -177,7 +177,7 @@ def _run(arguments: tuple[str, ...], cwd: str, environment: dict[str, str], pipe
     os.chdir(cwd)
     os.environ.clear()
     os.environ.update(environment)
-    from missions.cli import main
+    from missions.cli.main import main
 
     main(list(arguments))
 

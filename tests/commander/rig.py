@@ -8,16 +8,16 @@ import numpy as np
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.commander.health import HealthMonitor
-from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.flavours import get_flavour
+from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.flight.context import FlightContext, FlightPhase, LandedState
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.parameters import ParameterStore
 from flightsim import interface
 from flightsim.airframe import AirframeKind
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from flightsim.interface import SensorReadings
 
 PERIOD_US = 20_000

@@ -8,7 +8,7 @@ import pytest
 from autopilot_bridge.commander.events import Crashed
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.rotation import from_euler
+from flightsim.foundation.vectors import from_euler
 from tests.commander.rig import Rig
 
 

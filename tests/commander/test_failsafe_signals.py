@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.status import StatusReport
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.flavours import px4_events
+from autopilot_bridge.firmware.px4 import events as px4_events
 from tests.commander.rig import Rig
 from tests.commander.test_failsafes import battery, heartbeats
 

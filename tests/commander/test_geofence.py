@@ -18,10 +18,10 @@ from autopilot_bridge.commander.geofence_parameters import (
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
 from autopilot_bridge.flight.context import LandedState
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 from flightsim import interface
+from flightsim.foundation.geodesy import LocalFrame
 from tests.commander.rig import ORIGIN, Rig
 from tests.services.plane_rig import PlaneRig
 

@@ -8,14 +8,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot_bridge.control import MulticopterController, MulticopterParameters
-from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.control.attitude import attitude_control, body_z_of, quaternion_from_thrust_axis
-from autopilot_bridge.control.layout import PARAMETER_NAMES
-from autopilot_bridge.flight import OffboardTask
+from autopilot_bridge.control.multicopter import MulticopterController, MulticopterParameters
+from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.control.multicopter.attitude import (
+    attitude_control,
+    body_z_of,
+    quaternion_from_thrust_axis,
+)
+from autopilot_bridge.control.multicopter.layout import PARAMETER_NAMES
+from autopilot_bridge.flight.multicopter import OffboardTask
 from autopilot_bridge.navigation.layout import NAV_SIZE
 from flightsim.environment import Environment, Turbulence
-from flightsim.rotations import euler_from_quaternion, quaternion_from_euler
+from flightsim.foundation.rotations import euler_from_quaternion, quaternion_from_euler
 from tests.flight.rig import Rig, positions, tilts, velocities
 from tests.rotations import rotation_matrix
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot_bridge.control.mixer import ALLOCATION, allocate, command_from_thrust
+from autopilot_bridge.control.multicopter.mixer import ALLOCATION, allocate, command_from_thrust
 
 # front right, rear left, front left, rear right: (forward, right) of the rotor, +1 counterclockwise (torque
 # on the

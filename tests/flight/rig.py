@@ -9,14 +9,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import MulticopterController, MulticopterParameters
-from autopilot_bridge.flight import FlightContext, FlightParameters, FlightTask, LandDetector
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.control.multicopter import MulticopterController, MulticopterParameters
+from autopilot_bridge.flight.multicopter import FlightContext, FlightParameters, FlightTask, LandDetector
 from autopilot_bridge.navigation import layout as nav_layout
 from autopilot_bridge.navigation.health import NavigationHealth
 from flightsim import truth as t
 from flightsim.environment import Environment
-from flightsim.rotations import euler_from_quaternion, rotate
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.rotations import euler_from_quaternion, rotate
 from flightsim.vehicle import InitialState
 from flightsim.world import World, WorldParameters
 

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.flight import (
+from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.flight.context import FlightContext
+from autopilot_bridge.flight.multicopter import (
     HoldTask,
     LandDetector,
     LandDetectorParameters,
@@ -14,7 +15,6 @@ from autopilot_bridge.flight import (
     LandTask,
     OffboardTask,
 )
-from autopilot_bridge.flight.context import FlightContext
 from flightsim.environment import Environment, Turbulence
 from tests.flight.rig import Rig
 

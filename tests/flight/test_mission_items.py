@@ -6,8 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.flight import MissionTask
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import (
     FlightEvent,
     HomeChangeRequested,
@@ -15,9 +14,10 @@ from autopilot_bridge.flight.context import (
     MissionFinished,
     WaypointReached,
 )
+from autopilot_bridge.flight.multicopter import MissionTask
 from autopilot_bridge.flight.parameters import FlightParameters
-from autopilot_bridge.flight.plan_habits import ARDUCOPTER_PLANS, PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_reading import Command
+from autopilot_bridge.flight.plan_rules import ARDUCOPTER_PLANS, PX4_PLANS, PlanHabits
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as n
 from tests.flight.rig import Rig, positions, velocities

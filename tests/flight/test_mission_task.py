@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.flight import MissionTask, TaskStatus
 from autopilot_bridge.flight.context import MissionFinished, MissionModeRequested, WaypointReached
-from autopilot_bridge.flight.corners import passing_speed, turn_angle, turn_distance, turn_speed
+from autopilot_bridge.flight.multicopter import MissionTask, TaskStatus
+from autopilot_bridge.flight.multicopter.corners import passing_speed, turn_angle, turn_distance, turn_speed
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from tests.flight.rig import Rig, positions, velocities

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.flight import (
+from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.flight.context import TouchedDown
+from autopilot_bridge.flight.multicopter import (
     BrakeTask,
     FlightParameters,
     GotoTask,
@@ -26,11 +27,10 @@ from autopilot_bridge.flight import (
     TakeoffTask,
     TaskStatus,
 )
-from autopilot_bridge.flight.context import TouchedDown
-from autopilot_bridge.flight.return_home import return_height
-from autopilot_bridge.flight.yaw import Turn, YawSteering
+from autopilot_bridge.flight.multicopter.return_home import return_height
+from autopilot_bridge.flight.multicopter.yaw import Turn, YawSteering
 from autopilot_bridge.navigation import layout as nav_layout
-from flightsim.rotations import quaternion_from_euler
+from flightsim.foundation.rotations import quaternion_from_euler
 from tests.flight.rig import Rig, positions, tilts, velocities
 
 

@@ -17,7 +17,7 @@ from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.payload import GroundTargetParameters, PayloadParameters
 from flightsim.sensors import SensorSuiteParameters
-from missions.telemetry import StatusTextAssembler
+from missions.vehicle.telemetry import StatusTextAssembler
 from tests.rotations import yaw_rad
 
 FLAVOURS: Final = ("px4", "ardupilot")

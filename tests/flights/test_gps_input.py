@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.mavlink import dialect
-from autopilot_bridge.services.gps_input import GpsInputService
+from autopilot_bridge.services.inputs.gps_input import GpsInputService
 from flightsim import truth as t
 from tests.flights.flight import FLAVOURS, SYSTEM_ID, Flight
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from autopilot_bridge.flight.precision_land import PrecisionLandTask, PrecisionPhase
+from autopilot_bridge.flight.multicopter.precision_land import PrecisionLandTask, PrecisionPhase
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from flightsim import interface
 from flightsim import truth as t

@@ -13,7 +13,7 @@ import pytest
 
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
-from missions.session import RunRequest, fly
+from missions.runs.session import RunRequest, fly
 from tests.slow import slow, slow_after
 
 LISSAJOUS = ("L1", "L2", "L3", "L4")

@@ -12,7 +12,7 @@ from pymavlink import mavutil
 
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
-from missions.session import RunRequest, fly
+from missions.runs.session import RunRequest, fly
 from tests.rotations import rotation_matrix
 from tests.system.logs import known_name
 

@@ -8,7 +8,7 @@ import pytest
 
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
-from missions.session import RunRequest, fly
+from missions.runs.session import RunRequest, fly
 from tests.slow import slow
 
 FLAVOURS = ("px4", "ardupilot")

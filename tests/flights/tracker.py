@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
 from flightsim import truth as t
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from tests.flights.flight import Flight
 from tests.rotations import rotation_matrix
 

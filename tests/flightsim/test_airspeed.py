@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.random_streams import RandomStreams
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.sensors import AirspeedParameters, FlowVaneParameters, RangefinderParameters
 from flightsim.sensors.airspeed import impact_pressure_pa, pressure_recovery
 from flightsim.sensors.sensor import SensorModel, SensorParameters

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flightsim import truth as t
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
     LEVEL,
@@ -35,7 +36,6 @@ from flightsim.payload import (
     gimbal_from_camera,
 )
 from flightsim.payload.survey_magnetometer import SurveyMagnetometerParameters
-from flightsim.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 import pytest
 
-from flightsim.checks import check_fields, require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
 
 
 class Kind(IntEnum):

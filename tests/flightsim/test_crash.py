@@ -11,10 +11,10 @@ from flightsim import truth as t
 from flightsim.airframe import AirframeError, load_airframe
 from flightsim.crash import Touches, lay_down
 from flightsim.environment import Environment
+from flightsim.foundation.rotations import quaternion_from_euler, rotate
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS, THROTTLE
-from flightsim.rotations import quaternion_from_euler, rotate
 from flightsim.vehicle import Vehicle, VehicleDivergedError
 
 HOME = Home()

@@ -9,8 +9,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from flightsim import interface as i
 from flightsim import truth as t
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import Reading
-from flightsim.random_streams import RandomStreams
 from flightsim.sensors import (
     AirspeedParameters,
     BarometerParameters,

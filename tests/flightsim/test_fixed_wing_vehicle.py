@@ -8,10 +8,10 @@ import pytest
 from flightsim import truth as t
 from flightsim.airframe import Role
 from flightsim.environment import Environment, Turbulence
+from flightsim.foundation.rotations import euler_from_quaternion, rotate
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, MAX_ACTUATORS, RUDDER, STEERING, THROTTLE
-from flightsim.rotations import euler_from_quaternion, rotate
 from flightsim.trim_flight import FlightTrim, trim_flight
 from flightsim.vehicle import Vehicle
 

@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from scipy.spatial.transform import Rotation
 
 from flightsim import truth as t
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload import LEVEL, Gimbal, GimbalFlags, GimbalParameters
 from flightsim.payload.gimbal_kernel import joints_from_quaternion, quaternion_from_joints
-from flightsim.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 

@@ -11,22 +11,22 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from flightsim.kernels import bound, compiled_for, kernel, source_stamp
-from flightsim.rotations import quaternion_from_euler
+from flightsim.foundation.kernels import bound, compiled_for, kernel, source_stamp
+from flightsim.foundation.rotations import quaternion_from_euler
 
 ROOT = Path(__file__).parents[2]
 
 SOURCES = {
     "layout": "FACTOR = 2.0\nPLACE = slice(1, 3)\nTABLE = (1, (2.0, 'a'))\n",
     "inner": """
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 @kernel
 def offset(x):
     return x + 1.0
 """,
     "outer": """
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 from {package} import layout
 from {package}.inner import offset
 from {package}.layout import FACTOR, TABLE
@@ -50,7 +50,7 @@ print(outer(np.array([1.0, 2.0, 3.0])), sum(outer.stats.cache_hits.values()))
 BINDING_PROGRAM = """
 import numba
 import numpy as np
-from flightsim.kernels import _entry, bound
+from flightsim.foundation.kernels import _entry, bound
 from tiny.outer import outer
 arrays = np.array([1.0, 2.0, 3.0]), np.zeros((4, 3))[:, 1]
 print(sum(bound(outer, array)() for array in arrays))
@@ -88,6 +88,16 @@ def test_an_edit_anywhere_below_changes_the_stamp(
     edited = {**SOURCES, name: SOURCES[name].replace(old, new)}
     assert edited != SOURCES
     assert stamp(edited, monkeypatch) != stamp(SOURCES, monkeypatch)
+
+
+def test_a_kernel_that_moves_to_another_module_changes_the_stamp(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numba's code names the module of each kernel in it; code that names a missing module can't be loaded."""
+    moved = {
+        "layout": SOURCES["layout"],
+        "moved": SOURCES["inner"],
+        "outer": SOURCES["outer"].replace("inner", "moved"),
+    }
+    assert stamp(moved, monkeypatch) != stamp(SOURCES, monkeypatch)
 
 
 def test_an_edit_elsewhere_does_not(monkeypatch: pytest.MonkeyPatch) -> None:

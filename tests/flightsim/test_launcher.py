@@ -8,10 +8,10 @@ import pytest
 from flightsim import truth as t
 from flightsim.airframe import AirframeError, LaunchKind, LaunchParameters, load_airframe
 from flightsim.environment import Environment, Turbulence
+from flightsim.foundation.rotations import euler_from_quaternion
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.rotations import euler_from_quaternion
 from flightsim.vehicle import Vehicle
 from flightsim.world import World
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.integrate import dblquad
 from scipy.interpolate import RegularGridInterpolator
 
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.payload import (
@@ -28,7 +29,6 @@ from flightsim.payload import (
     synthetic_map,
 )
 from flightsim.payload.survey_grid import map_from_survey
-from flightsim.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 

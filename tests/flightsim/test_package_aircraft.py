@@ -10,8 +10,8 @@ from flightsim.environment import Environment
 from flightsim.flight_envelope import flight_envelope
 from flightsim.home import Home
 from flightsim.vehicle import Vehicle
-from missions.cli import run_command_line
-from missions.cli_sitl import sitl
+from missions.cli.main import run_command_line
+from missions.cli.sitl import sitl
 
 
 def make(model: str) -> Vehicle:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flightsim import truth as t
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
     LEVEL,
@@ -25,7 +26,6 @@ from flightsim.payload import (
     SurveyMagnetometer,
     SurveyMagnetometerParameters,
 )
-from flightsim.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ from scipy.signal import welch
 
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.jsbsim_model import ROTARY_GUSTS, load_fdm
 from flightsim.rotary_gusts import RotaryGusts, roll_gust_sigma_rad_s
-from flightsim.rotations import quaternion_from_euler
 from flightsim.turbulence import DrydenTurbulence
 from flightsim.vehicle import Vehicle
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightsim import interface as i
 from flightsim import truth as t
-from flightsim.random_streams import RandomStreams
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.sensors import (
     RTK_FIX_AFTER_10_S,
     BarometerParameters,

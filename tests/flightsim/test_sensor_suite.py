@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from flightsim import truth as t
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import Reading
-from flightsim.random_streams import RandomStreams
 from flightsim.sensors import (
     AirspeedParameters,
     BarometerParameters,

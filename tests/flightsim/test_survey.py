@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import Akima1DInterpolator
 
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
     MagneticMap,
@@ -16,7 +17,6 @@ from flightsim.payload import (
     truth_behind,
 )
 from flightsim.payload.survey import _between
-from flightsim.random_streams import RandomStreams
 
 PERFECT = SurveyParameters(
     noise_nt=0.0,

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.payload import (
     Circle,
     ConstantVelocity,
@@ -17,7 +18,6 @@ from flightsim.payload import (
     Static,
     TargetMotion,
 )
-from flightsim.random_streams import RandomStreams
 
 Array = NDArray[np.float64]
 S = 1_000_000

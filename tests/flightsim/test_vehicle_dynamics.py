@@ -8,10 +8,10 @@ from scipy.optimize import fsolve
 
 from flightsim import truth as t
 from flightsim.environment import Environment
+from flightsim.foundation.rotations import rotate
 from flightsim.home import Home
 from flightsim.initial_state import InitialState
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.rotations import rotate
 from flightsim.trim import HoverTrim, trim_hover
 from flightsim.vehicle import Vehicle
 

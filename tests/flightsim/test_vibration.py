@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from flightsim import truth as t
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S
-from flightsim.random_streams import RandomStreams
 from flightsim.sensors import ImuParameters, RotorVibrationParameters, SensorSuite, SensorSuiteParameters
 
 Array = NDArray[np.float64]

@@ -12,12 +12,12 @@ from contextlib import contextmanager
 import pytest
 
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition, dialect
-from missions.connection import Connection
-from missions.opening import Stage
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from missions.runs.vehicle_opening import Stage
 from missions.vehicle import Vehicle
+from missions.vehicle.connection import Connection
 
 STEP_US = 20_000
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
@@ -485,7 +485,7 @@ def elsewhere(monkeypatch):
             close=sitl.close,
         )
 
-    monkeypatch.setattr("missions.session.open_vehicles", stage)
+    monkeypatch.setattr("missions.runs.session.open_vehicles", stage)
     return sitl.autopilots[0]
 
 

@@ -4,7 +4,11 @@ import math
 
 import pytest
 
-from missions.atmosphere import air_density_ratio, pressure_altitude_m, true_over_equivalent_airspeed
+from flightsim.foundation.atmosphere import (
+    air_density_ratio,
+    pressure_altitude_m,
+    true_over_equivalent_airspeed,
+)
 
 # geopotential altitude m, pressure Pa, density kg/m^3
 STANDARD_ATMOSPHERE = [

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 from click.testing import CliRunner
 
-from missions.cli_confirm import confirmation, is_hardware
-from missions.cli_fly import fly
+from missions.cli.confirm import confirmation, is_hardware
+from missions.cli.fly import fly
 from missions.preflight.before_flight import Confirm, Look
 from missions.preflight.finding import ok, problem
 
@@ -87,5 +87,5 @@ def test_what_the_answers_do(
     async def typed(_question: str) -> str:
         return answer
 
-    monkeypatch.setattr("missions.cli_confirm.ask", typed)
+    monkeypatch.setattr("missions.cli.confirm.ask", typed)
     assert asyncio.run(asked([look])) is flies

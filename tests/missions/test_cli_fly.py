@@ -10,19 +10,19 @@ import pytest
 from click.testing import CliRunner
 
 from autopilot_bridge.clock import Clock
-from missions.cli_fly import fly
-from missions.cli_fly_report import Pace, tell
+from missions.cli.fly import fly
+from missions.cli.fly_report import Pace, tell
+from missions.cli.mission_command import FlightOption
+from missions.cli.pattern_command import ratio_of
 from missions.errors import PlanError
 from missions.library import MISSIONS
 from missions.mission import Debriefing
-from missions.mission_command import FlightOption
 from missions.options import FlightOptions
-from missions.pattern_command import ratio_of
-from missions.records import FlightRecords
-from missions.request import RunRequest
-from missions.run import wind_words
-from missions.session import Flight, RunResult
-from missions.session import title as run_title
+from missions.runs.records import FlightRecords
+from missions.runs.request import RunRequest
+from missions.runs.run_folder import wind_words
+from missions.runs.session import Flight, RunResult
+from missions.runs.session import title as run_title
 from missions.vehicle.vehicle import Vehicle
 
 
@@ -184,7 +184,7 @@ def test_turns_are_planned_for_the_wind_the_user_expects(
         asked.append(request)
         raise PlanError("enough")
 
-    monkeypatch.setattr("missions.session.fly", refuse)
+    monkeypatch.setattr("missions.runs.session.fly", refuse)
     assert CliRunner().invoke(fly, arguments).exit_code == 2
     assert [request.planning_wind_m_s for request in asked] == [planned_m_s]
 

@@ -10,7 +10,7 @@ import pytest
 from autopilot_bridge.mavlink import FrameParser
 from autopilot_bridge.tlog import TlogReader
 from estimators.logs import open_log
-from missions.cli import run_command_line
+from missions.cli.main import run_command_line
 from tests.clients.sitl_process import free_port
 from tests.estimators.logs.flight_log import RATE_HZ, SECONDS, write
 

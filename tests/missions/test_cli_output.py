@@ -67,7 +67,7 @@ def test_without_an_error_output_a_command_runs(closed: str, log: str) -> None:
 
 def test_no_file_gets_the_number_of_a_closed_stream() -> None:
     code = (
-        "import os, sys; from missions.cli import main\n"
+        "import os, sys; from missions.cli.main import main\n"
         "try: main(['nosuch'])\n"
         "except SystemExit as stop: print(stop.code, sys.stderr.fileno(), os.open('/dev/null', 0) > 2)"
     )

@@ -9,8 +9,8 @@ from tests.terminal import CTRL_C, END_OF_FILE, at_terminal
 
 FLY = """
 import asyncio, sys
-from missions.cli_confirm import confirmation
-from missions.ending import EndingSignals
+from missions.cli.confirm import confirmation
+from missions.runs.ending import EndingSignals
 from missions.errors import MissionError
 from missions.preflight.before_flight import Look, confirmed
 
@@ -39,8 +39,8 @@ with EndingSignals() as ending:
 FLY_WITH_PROGRESS = """
 import asyncio
 from types import SimpleNamespace
-from missions.cli_confirm import confirmation
-from missions.cli_fly_report import ProgressLine
+from missions.cli.confirm import confirmation
+from missions.cli.fly_report import ProgressLine
 from missions.preflight.before_flight import Look, confirmed
 
 async def flight():

@@ -9,8 +9,8 @@ from click.testing import CliRunner, Result
 from autopilot_bridge.links import Reach, listens_to_network, open_link, parse_address, reach_of
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, LinkSigning, SigningState, dialect
 from autopilot_bridge.tlog import TlogWriter
-from missions.cli import command_line
-from missions.signing import read_key
+from missions.cli.main import command_line
+from missions.runs.signing import read_key
 
 SHORT = ("--speedup", "0", "--duration", "2", "--no-wait")
 NETWORK = "udpin:0.0.0.0:0"

@@ -9,10 +9,10 @@ from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import DEFINITIONS
 from autopilot_bridge.sitl import PacketLog
 from autopilot_bridge.tlog import TlogReader
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import SyntheticMapParameters, synthetic_map
-from flightsim.random_streams import RandomStreams
-from missions.cli_sitl import sitl as command
+from missions.cli.sitl import sitl as command
 
 LINK = ("--link", "udpin:127.0.0.1:0")
 

@@ -15,8 +15,8 @@ from click.testing import CliRunner, Result
 
 from autopilot_bridge.sitl import Sitl, SitlServer
 from autopilot_bridge.tlog import TlogReader
-from missions.cli import command_line, run_command_line
-from missions.cli_losses import Losses
+from missions.cli.losses import Losses
+from missions.cli.main import command_line, run_command_line
 
 QUICK = ("sitl", "--speedup", "0", "--no-wait", "--link", "udpin:127.0.0.1:0")
 ASKING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -151,7 +151,7 @@ def key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, ...]:
     path = tmp_path / "key"
     path.write_text("pass phrase\n")
     seconds = count(1_000_000)
-    monkeypatch.setattr("missions.signing.now", lambda: next(seconds) * 100_000)
+    monkeypatch.setattr("missions.runs.signing.now", lambda: next(seconds) * 100_000)
     return "--signing-key", str(path), "--duration", "2"
 
 
@@ -179,7 +179,7 @@ def test_pictures_that_are_lost_are_told_and_the_command_fails(monkeypatch: pyte
     def lose(world: Sitl, video: str | None, pictures: Path | None, on_loss: Callable[[str], None]) -> None:
         on_loss("can't write photo IMG_0000.jpg: No space left on device")
 
-    monkeypatch.setattr("missions.cli_sitl.start_video", lose)
+    monkeypatch.setattr("missions.cli.sitl.start_video", lose)
     done = sitl("--duration", "1")
     assert done.return_value == 1 and "stopped at 1.0 s" in done.output
     assert "flightstack: can't write photo IMG_0000.jpg: No space left on device\n" in done.output

@@ -11,9 +11,10 @@ import pytest
 
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
-from missions import cli, cli_vehicle_params
-from missions.cli_vehicle import DownloadLine, _verdict
-from missions.cli_vehicle_link import confirm
+from missions.cli.main import main as cli
+from missions.cli import vehicle_params as cli_vehicle_params
+from missions.cli.vehicle import DownloadLine, _verdict
+from missions.cli.vehicle_link import confirm
 
 
 def test_half_a_parameter_file_does_not_stay_on_a_full_disk(

@@ -3,7 +3,7 @@
 import pytest
 from click.testing import CliRunner
 
-from missions.cli_sitl import sitl
+from missions.cli.sitl import sitl
 
 QUICK = ("--speedup", "0", "--duration", "0.5", "--no-wait", "--link", "udpin:127.0.0.1:0")
 

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 
 from autopilot_bridge.clock import LoopClock, run
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
-from missions.connection import Connection
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.embedded import EmbeddedConfiguration, open_embedded
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.planning.limits import FixedWingLimits
-from missions.telemetry import AirData, Attitude, Position
 from missions.vehicle import Mode, Vehicle
 from missions.vehicle.arduplane import ArduPlane
+from missions.vehicle.connection import Connection
 from missions.vehicle.fixed_wing import Approach
 from missions.vehicle.px4_plane import Px4Plane
+from missions.vehicle.telemetry import AirData, Attitude, Position
 from tests.slow import slow_after
 
 HEIGHT = 80.0

@@ -3,8 +3,8 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.vehicle.item_tracker import FlownOrder, ItemTracker, mission_steps
 
 HOME = GeodeticPosition(lat_deg=47.0, lon_deg=8.0, alt_m=400.0)

@@ -5,8 +5,8 @@ import pytest
 from autopilot_bridge.mavlink import FrameParser, LinkSigning, SigningKey, SigningState, dialect
 from missions.errors import VehicleTimeout
 from missions.options import FlightOptions
-from missions.request import RunRequest
-from missions.signing import require_key
+from missions.runs.request import RunRequest
+from missions.runs.signing import require_key
 
 KEY = SigningKey.from_passphrase("theirs")
 

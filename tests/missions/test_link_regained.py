@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import pytest
 
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import LocalFrame
 from missions.errors import LinkClosed, MissionError
 from missions.vehicle import Setpoint
 from missions.vehicle.adapter import Mode

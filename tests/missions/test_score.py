@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import FrameEncoder, dialect
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.notes import PATTERN, CommandedPath, FlightNotes
-from missions.records import FlightRecords
-from missions.run import team_figures, vehicle_summary, versions, write_summary
-from missions.score import path_errors_m, score
-from missions.waypoint_passes import waypoint_misses_m
+from missions.runs.records import FlightRecords
+from missions.runs.run_folder import team_figures, vehicle_summary, versions, write_summary
+from missions.runs.score import path_errors_m, score
+from missions.runs.waypoint_passes import waypoint_misses_m
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
 

@@ -6,13 +6,13 @@ import pytest
 
 from autopilot_bridge.clock import LoopClock, run
 from autopilot_bridge.mission_plan import MissionItem
-from missions.connection import Connection
 from missions.embedded import EmbeddedConfiguration, open_embedded
 from missions.library import find_mission
-from missions.limits_before_flight import adapted
 from missions.options import FlightOptions, Via
+from missions.runs.limits_before_flight import adapted
 from missions.vehicle import Vehicle
 from missions.vehicle.adapter import Mode
+from missions.vehicle.connection import Connection
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 

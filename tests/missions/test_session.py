@@ -18,15 +18,16 @@ from pymavlink import mavutil
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.tlog import TlogReader, TlogWriter
-from missions import cli, cli_fly
+from missions.cli import fly as cli_fly
+from missions.cli.main import main as cli
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.library import MISSIONS, PatternMission, find_mission
 from missions.mission import Mission
 from missions.options import FlightOptions, Via, parameters_from_file, parse_pair, parse_wind
-from missions.records import FlightRecords
-from missions.run import create_run_folder
-from missions.session import RunRequest, fly
+from missions.runs.records import FlightRecords
+from missions.runs.run_folder import create_run_folder
+from missions.runs.session import RunRequest, fly
 
 REQUIRED = {
     "mission", "vehicle", "autopilot", "seed", "outcome", "sim_time_s", "wall_time_s", "speedup",
@@ -243,7 +244,7 @@ def test_where_no_log_can_be_made_nothing_is_opened(embedded, tmp_path, monkeypa
     def full(_path):
         raise TlogError("disk full")
 
-    monkeypatch.setattr("missions.claimed_folder.TlogWriter", full)
+    monkeypatch.setattr("missions.runs.claimed_folder.TlogWriter", full)
     with pytest.raises(TlogError, match="disk full"):
         fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert embedded == []
@@ -266,7 +267,9 @@ def test_a_folder_is_one_run_s_from_its_beginning(embedded, tmp_path, monkeypatc
     refused = []
 
     def fly_another():
-        monkeypatch.setattr("missions.claimed_folder.create_run_folder", lambda out, name: out)  # just empty
+        monkeypatch.setattr(
+            "missions.runs.claimed_folder.create_run_folder", lambda out, name: out
+        )  # just empty
         with pytest.raises(PlanError, match=r"another run has begun in .*; choose another --out") as error:
             fly(find_mission("sector"), request)
         refused.append(error)
@@ -289,7 +292,7 @@ class FillingDisk(TlogWriter):
 
 
 def test_a_disk_that_fills_up_in_flight_ends_the_log_and_not_the_flight(embedded, tmp_path, monkeypatch):
-    monkeypatch.setattr("missions.claimed_folder.TlogWriter", FillingDisk)
+    monkeypatch.setattr("missions.runs.claimed_folder.TlogWriter", FillingDisk)
     monkeypatch.setattr(FillingDisk, "room", 100_000)
     result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
@@ -301,7 +304,7 @@ def test_a_disk_that_fills_up_in_flight_ends_the_log_and_not_the_flight(embedded
 
 
 def test_nothing_is_flown_on_a_full_disk(embedded, tmp_path, monkeypatch):
-    monkeypatch.setattr("missions.claimed_folder.TlogWriter", FillingDisk)
+    monkeypatch.setattr("missions.runs.claimed_folder.TlogWriter", FillingDisk)
     result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk; nothing was flown" in result.reason
@@ -312,7 +315,7 @@ def test_a_summary_that_finds_no_room_is_told(embedded, tmp_path, monkeypatch):
     def full(folder, summary):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("missions.session.write_summary", full)
+    monkeypatch.setattr("missions.runs.session.write_summary", full)
     result = fly(find_mission("lissajous"), RunRequest(options=small(), out=tmp_path / "run"))
     assert result.outcome == "failed"
     assert "No space left on device; check the disk" in result.reason
@@ -371,7 +374,9 @@ def test_a_failed_flight_exits_1_with_one_line(embedded, tmp_path, capsys, monke
 
 def lissajous_off_by(monkeypatch, offset_m):
     """Every commanded pattern is drawn some way off from what is flown."""
-    monkeypatch.setattr("missions.score.path_errors_m", lambda path, track: np.full(len(track), offset_m))
+    monkeypatch.setattr(
+        "missions.runs.score.path_errors_m", lambda path, track: np.full(len(track), offset_m)
+    )
 
 
 @pytest.mark.parametrize(("offset_m", "word"), [(1.9, "within the acceptance radius"), (2.1, "poor")])
@@ -500,7 +505,7 @@ def test_small_parsers():
 
 def test_help_does_not_import_what_flying_needs():
     code = (
-        "import sys; from missions.cli import run_command_line; run_command_line(['fly', '--help']);"
+        "import sys; from missions.cli.main import run_command_line; run_command_line(['fly', '--help']);"
         "heavy = {'numba', 'jsbsim', 'matplotlib', 'scipy', 'pymavlink'} & set(sys.modules);"
         "sys.exit(f'imported {heavy}' if heavy else 0)"
     )

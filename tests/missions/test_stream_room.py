@@ -8,7 +8,7 @@ from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.links import MemoryLink
 from autopilot_bridge.mavlink import DEFINITIONS, FrameParser
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
-from missions.connection import Connection
+from missions.vehicle.connection import Connection
 from missions.vehicle.stream_room import make_room
 from missions.vehicle.vehicle import Vehicle
 

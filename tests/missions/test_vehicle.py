@@ -10,9 +10,11 @@ from autopilot_bridge.clock import LoopClock, TelemetryClock, run
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mission_plan import MissionItem
-from missions.connection import Connection
 from missions.errors import CommandRejected, MissionError, VehicleTimeout
-from missions.telemetry import (
+from missions.runs.concurrency import together
+from missions.vehicle import Mode, Setpoint, Vehicle
+from missions.vehicle.connection import Connection
+from missions.vehicle.telemetry import (
     Attitude,
     Battery,
     LocalPosition,
@@ -22,8 +24,6 @@ from missions.telemetry import (
     attitude,
     local_position,
 )
-from missions.together import together
-from missions.vehicle import Mode, Setpoint, Vehicle
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 

@@ -6,12 +6,12 @@ import math
 import pytest
 
 from autopilot_bridge.clock import TelemetryClock
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, dialect
-from missions.connection import Connection
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import LinkClosed, MissionError, PlanError, VehicleTimeout
 from missions.vehicle import Mode, Setpoint, Vehicle
+from missions.vehicle.connection import Connection
 from missions.vehicle.link_watch import LinkWatch
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

@@ -11,9 +11,9 @@ from missions.kind import VehicleKind
 from missions.library import find_mission
 from missions.notes import PATTERN, CommandedPath, FlightNotes
 from missions.options import FlightOptions, Via
-from missions.score import Track
-from missions.session import RunRequest, fly
-from missions.verdict import path_verdict
+from missions.runs.score import Track
+from missions.runs.session import RunRequest, fly
+from missions.runs.verdict import path_verdict
 from tests.missions.conftest import HOME
 
 PATH = np.column_stack((np.arange(0.0, 201.0), np.zeros(201), np.full(201, -10.0)))

@@ -11,20 +11,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from missions.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
 from missions.library import PatternMission, find_mission
 from missions.options import FlightOptions, Via
+from missions.pattern_search.wings.entry import with_leads
+from missions.pattern_search.wings.pattern import check_wings
+from missions.pattern_search.wings.setpoints import path_point
+from missions.pattern_search.wings.waypoints import turn_in_m, waypoints_of
 from missions.patterns import named_lissajous
 from missions.planning.flyable import FlyablePath, flyable_path
 from missions.planning.limits import FixedWingLimits
 from missions.planning.turns import roll_in_m
 from missions.vehicle.arduplane import ArduPlane
 from missions.vehicle.px4_plane import Px4Plane
-from missions.wings.entry import with_leads
-from missions.wings.pattern import check_wings
-from missions.wings.setpoints import path_point
-from missions.wings.waypoints import turn_in_m, waypoints_of
 
 STOCK_PLANE = {"AIRSPEED_CRUISE": 22.0, "ROLL_LIMIT_DEG": 65.0, "NAVL1_PERIOD": 15.0, "RLL2SRV_TCONST": 0.25}
 """What ArduPilot 4.6.3's simulated plane reports, where it is not the firmware's default."""

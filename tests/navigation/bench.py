@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, layout
 from autopilot_bridge.navigation import states as s
 from flightsim import truth as t
-from flightsim.random_streams import RandomStreams
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.sensors.suite import SensorSuite, SensorSuiteParameters
 from tests.navigation.kinematic_flight import MAG_NED_GAUSS, RATE_HZ
 from tests.navigation.matched import MATCHED

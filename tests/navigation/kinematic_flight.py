@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from flightsim import truth as t
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 Array = NDArray[np.float64]
 Path = Callable[[Array], Array]

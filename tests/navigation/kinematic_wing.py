@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from autopilot_bridge.geodesy import LocalFrame
 from flightsim import truth as t
+from flightsim.foundation.geodesy import LocalFrame
 from tests.navigation.kinematic_flight import (
     EARTH_RATE,
     GRAVITY_M_S2,

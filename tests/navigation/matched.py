@@ -1,6 +1,6 @@
 """Filter noise that matches the simulated sensors, so that the covariance can be held to the errors.
 
-A flight has the firmware's defaults instead (`flavours/navigation_noise.py`), which are larger.
+A flight has the firmware's defaults instead (`firmware/navigation_noise.py`), which are larger.
 """
 
 import math

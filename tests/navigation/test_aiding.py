@@ -8,10 +8,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.navigation import layout
 from autopilot_bridge.navigation import states as s
 from flightsim import truth as t
+from flightsim.foundation.geodesy import GeodeticPosition
 from flightsim.interface import GPS_EPH_M
 from flightsim.magnetics import magnetic_field_ned_gauss
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit

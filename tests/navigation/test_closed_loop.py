@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from autopilot_bridge.control import MulticopterController
-from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.multicopter import MulticopterController
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, layout
 from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from autopilot_bridge.flavours import FLAVOUR_NAMES, get_flavour
+from autopilot_bridge.firmware import FLAVOUR_NAMES, get_flavour
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.sensors import RECEIVERS, GpsParameters, ImuParameters, SensorSuiteParameters
 from tests.navigation.bench import Bench

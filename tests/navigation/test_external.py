@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.navigation import layout
 from autopilot_bridge.navigation.external import (
     POSITION_M,
@@ -21,7 +20,8 @@ from autopilot_bridge.navigation.external import (
 )
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from flightsim import truth as t
-from flightsim.random_streams import RandomStreams
+from flightsim.foundation.geodesy import LocalFrame
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.sensors.fault_kinds import FaultType, SensorUnit
 from tests.navigation.bench import PARAMETERS, Bench
 from tests.navigation.kinematic_flight import HOME, fly

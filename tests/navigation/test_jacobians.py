@@ -14,8 +14,8 @@ from autopilot_bridge.navigation import (
 )
 from autopilot_bridge.navigation import states as s
 from autopilot_bridge.navigation.solution import process_from
-from flightsim.random_streams import RandomStreams
-from flightsim.rotations import quaternion_from_euler
+from flightsim.foundation.random_streams import RandomStreams
+from flightsim.foundation.rotations import quaternion_from_euler
 
 Array = NDArray[np.float64]
 SIZE = s.ERROR_SIZE_WITH_WIND

@@ -14,8 +14,8 @@ from autopilot_bridge.navigation.earth import (
     standard_temperature_k,
 )
 from autopilot_bridge.navigation.pitot import AirspeedCheck, GustVariance, Pitot
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import SensorReadings
-from flightsim.random_streams import RandomStreams
 from tests.navigation.matched import MATCHED
 
 PARAMETERS = NavigationParameters(fixed_wing=True, **MATCHED)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters
 from autopilot_bridge.navigation.gps_quality import GpsQuality
 from autopilot_bridge.navigation.terrain import TerrainEstimator
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import SensorReadings
-from flightsim.random_streams import RandomStreams
 from tests.navigation.bench import PARAMETERS, Bench
 from tests.navigation.kinematic_flight import fly
 

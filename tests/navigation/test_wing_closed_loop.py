@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingParameters
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.navigation import NavigationFilter, NavigationParameters, layout
 from autopilot_bridge.navigation import states as s
 from flightsim import truth as t

@@ -17,6 +17,7 @@ from autopilot_bridge.payload import (
     PayloadStation,
 )
 from flightsim import truth as t
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.home import Home
 from flightsim.payload import (
     CameraParameters,
@@ -30,7 +31,6 @@ from flightsim.payload import (
     Static,
     SurveyMagnetometerParameters,
 )
-from flightsim.rotations import quaternion_from_euler
 from tests.rotations import pitch_rad, yaw_rad
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)

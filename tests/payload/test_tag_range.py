@@ -7,6 +7,7 @@ import pytest
 
 from autopilot_bridge.payload.camera_messages import landing_target
 from flightsim import truth as t
+from flightsim.foundation.random_streams import RandomStreams
 from flightsim.home import Home
 from flightsim.payload import (
     Camera,
@@ -16,7 +17,6 @@ from flightsim.payload import (
     ResolutionDetection,
     Static,
 )
-from flightsim.random_streams import RandomStreams
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 HEIGHT_M = 40.0

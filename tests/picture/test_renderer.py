@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from flightsim import truth as t
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.home import Home
 from flightsim.payload import (
     Camera,
@@ -21,7 +22,6 @@ from flightsim.payload import (
     TargetView,
 )
 from flightsim.picture import Renderer, Scenery
-from flightsim.rotations import quaternion_from_euler
 from tests.rotations import rotation_matrix
 
 HOME = Home(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)

@@ -6,11 +6,11 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.command_common import CommandHooks
-from autopilot_bridge.services.commands import CommandService
-from autopilot_bridge.services.geofence import ArdupilotGeofence
-from autopilot_bridge.services.manual import ManualService, manual_rules
-from autopilot_bridge.services.setpoints import SetpointService
+from autopilot_bridge.services.commands.handlers import CommandHooks
+from autopilot_bridge.services.commands.protocol import CommandService
+from autopilot_bridge.services.inputs.manual import ManualService, manual_rules
+from autopilot_bridge.services.inputs.setpoints import SetpointService
+from autopilot_bridge.services.plans.geofence import ArdupilotGeofence
 from autopilot_bridge.services.status_text import StatusTextService
 from tests.commander.rig import Rig
 

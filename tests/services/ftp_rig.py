@@ -7,8 +7,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.file_transfer import FileTransferService
-from autopilot_bridge.services.ftp_protocol import Opcode
+from autopilot_bridge.services.files.file_transfer import FileTransferService
+from autopilot_bridge.services.files.ftp_protocol import Opcode
 from autopilot_bridge.storage import FileStore, MemoryStore
 
 HEADER = struct.Struct("<HBBBBBBI")

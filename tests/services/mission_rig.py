@@ -5,11 +5,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.mission import MissionService, new_stores
-from autopilot_bridge.services.mission_policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
+from autopilot_bridge.services.plans.policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
+from autopilot_bridge.services.plans.protocol import MissionService, new_stores
+from flightsim.foundation.geodesy import GeodeticPosition
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
 LAT, LON = 473977000, 85456000

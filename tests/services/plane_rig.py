@@ -7,14 +7,14 @@ import numpy as np
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.health import HealthMonitor
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.flavours import get_flavour
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.flight.context import FlightContext, LandedState
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.airframe import AirframeKind
+from flightsim.foundation.geodesy import LocalFrame
 from flightsim.interface import SensorReadings
 from tests.commander.rig import ORIGIN, READY_S, Judgement
 from tests.services.aircraft import SMALL_AIRCRAFT

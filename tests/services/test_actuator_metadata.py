@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from autopilot_bridge.flavours import get_flavour
-from autopilot_bridge.flavours.px4_actuators import FUNCTIONS, actuator_metadata
+from autopilot_bridge.firmware import get_flavour
+from autopilot_bridge.firmware.px4.actuators import FUNCTIONS, actuator_metadata
 from autopilot_bridge.parameters import ParameterDefinition
-from autopilot_bridge.services.component_metadata import parameter_metadata
+from autopilot_bridge.services.files.component_metadata import parameter_metadata
 from flightsim.airframe import AirframeKind
 
 KINDS = (AirframeKind.MULTICOPTER, AirframeKind.FIXED_WING)

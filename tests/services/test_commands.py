@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.control import setpoint as sp
+from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
 from tests.services.command_rig import NAN, ServiceRig
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot_bridge.services.file_transfer import BURST_REPLIES, REPLIES_PER_TICK
-from autopilot_bridge.services.ftp_protocol import MAX_DATA, FtpError, Opcode, crc32
-from autopilot_bridge.services.ftp_sessions import IDLE_US, MAX_SESSIONS, MAX_SESSIONS_PER_CLIENT
+from autopilot_bridge.services.files.file_transfer import BURST_REPLIES, REPLIES_PER_TICK
+from autopilot_bridge.services.files.ftp_protocol import MAX_DATA, FtpError, Opcode, crc32
+from autopilot_bridge.services.files.ftp_sessions import IDLE_US, MAX_SESSIONS, MAX_SESSIONS_PER_CLIENT
 from autopilot_bridge.storage import MemoryStore, Quota
 from autopilot_bridge.storage.folder import FolderStore
 from tests.services.ftp_rig import HEADER, FtpRig, Link

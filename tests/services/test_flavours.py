@@ -5,9 +5,11 @@ import math
 import pytest
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.control.parameters import MulticopterParameters
-from autopilot_bridge.flavours import FLAVOUR_NAMES, ardupilot_modes, get_flavour, px4_modes
-from autopilot_bridge.flavours.flavour import ModeDisplay
+from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
+from autopilot_bridge.firmware import FLAVOUR_NAMES, get_flavour
+from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
+from autopilot_bridge.firmware.flavour import ModeDisplay
+from autopilot_bridge.firmware.px4.copter import modes as px4_modes
 from autopilot_bridge.parameters import ParameterStore
 from flightsim.airframe import AirframeKind
 

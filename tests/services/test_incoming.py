@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pymavlink.generator.mavcrc import x25crc
 
 from autopilot_bridge.autopilot import Autopilot
-from autopilot_bridge.flavours import get_flavour
+from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.flight.obstacles import SECTORS, ObstacleMap
 from autopilot_bridge.flight.target_motion import TargetMotion
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
@@ -25,12 +25,12 @@ from autopilot_bridge.navigation.external import (
     ExternalSample,
 )
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.external_odometry import ExternalOdometryService
-from autopilot_bridge.services.landing_target import LandingTargetService
+from autopilot_bridge.services.inputs.external_odometry import ExternalOdometryService
+from autopilot_bridge.services.inputs.landing_target import LandingTargetService
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from flightsim.airframe import AirframeKind
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import SensorReadings
-from flightsim.rotations import quaternion_from_euler
 from tests.rotations import rotation_matrix
 
 FLAVOURS = ("px4", "ardupilot")

@@ -5,11 +5,12 @@ import math
 import pytest
 
 from autopilot_bridge.autopilot.firmware import FIRMWARES
+from autopilot_bridge.firmware.ardupilot import mission_rules as mission_rules_ardupilot
+from autopilot_bridge.firmware.px4 import mission_rules as mission_rules_px4
 from autopilot_bridge.flight.plan_reading import CONDITIONS, JUMPS, MARKERS, Command
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services import mission_rules_ardupilot, mission_rules_px4
-from autopilot_bridge.services.mission_equipment import CAMERA_COMMANDS, GIMBAL_COMMANDS
+from autopilot_bridge.services.plans.equipment import CAMERA_COMMANDS, GIMBAL_COMMANDS
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from flightsim.airframe import AirframeKind
 

@@ -12,8 +12,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.mission import MissionService, new_stores
-from autopilot_bridge.services.mission_policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
+from autopilot_bridge.services.plans.policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
+from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 
 POLICIES = {"px4": PX4_MISSION_POLICY, "ardupilot": ARDUPILOT_MISSION_POLICY}
 TICK_US = 20_000

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.mission_messages import ack_message, current_message, plan_checksum
+from autopilot_bridge.services.plans.messages import ack_message, current_message, plan_checksum
 from tests.services.mission_rig import (
     HOME,
     LAND,

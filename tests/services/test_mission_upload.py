@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.mission_policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
+from autopilot_bridge.services.plans.policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
 from tests.services.mission_rig import (
     LAND,
     RELATIVE,

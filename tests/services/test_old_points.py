@@ -5,12 +5,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.flavours import get_flavour
+from autopilot_bridge.firmware import get_flavour
+from autopilot_bridge.firmware.ardupilot.fence_and_rally_points import OldPoints, old_fence
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.mission import new_stores
-from autopilot_bridge.services.old_points import OldPoints, old_fence
+from autopilot_bridge.services.plans.protocol import new_stores
 from flightsim.airframe import AirframeKind
 from tests.services.mission_rig import Recorder
 

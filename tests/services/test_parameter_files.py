@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
+from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.parameter_files import (
     format_mavproxy,
     format_qgc,

@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
+from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source, ardupilot_address_rule, px4_address_rule
-from autopilot_bridge.services.parameters import (
+from autopilot_bridge.services.parameters.protocol import (
     ARDUPILOT_PARAMETER_POLICY,
     PX4_PARAMETER_POLICY,
     ParameterService,

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot_bridge.flavours.ardupilot_parameters import ARDUPILOT_PARAMETERS
-from autopilot_bridge.flavours.px4_parameters import PX4_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
+from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
 from autopilot_bridge.parameters import ParameterDefinition, ParameterError, ParameterStore, ParameterType
 
 TABLES = {"px4": PX4_PARAMETERS, "ardupilot": ARDUPILOT_PARAMETERS}

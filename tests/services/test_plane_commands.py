@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.status import StatusReport
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.mission_plan import MissionItem
 from tests.services.command_rig import NAN
 from tests.services.plane_rig import PlaneRig

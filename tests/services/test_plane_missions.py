@@ -8,15 +8,16 @@ from autopilot_bridge.commander import events
 from autopilot_bridge.commander.events import DisarmReason, FailsafeAction, FailsafeKind
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Reason
-from autopilot_bridge.flavours import ardupilot_plane_texts, px4_plane_texts
-from autopilot_bridge.flavours.px4_plane_parameters import PX4_PLANE_PARAMETERS
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.firmware.ardupilot.plane import texts as ardupilot_plane_texts
+from autopilot_bridge.firmware.px4.mission_feasibility import mission_problems
+from autopilot_bridge.firmware.px4.plane import texts as px4_plane_texts
+from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRules
+from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.mission import MissionService, new_stores
-from autopilot_bridge.services.mission_feasibility import mission_problems
-from autopilot_bridge.services.mission_feasibility_aircraft import AircraftRules
-from autopilot_bridge.services.mission_policy import ARDUPLANE_MISSION_POLICY, PX4_PLANE_MISSION_POLICY
+from autopilot_bridge.services.plans.policy import ARDUPLANE_MISSION_POLICY, PX4_PLANE_MISSION_POLICY
+from autopilot_bridge.services.plans.protocol import MissionService, new_stores
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from tests.services.mission_rig import HOME, Recorder
 
 TAKEOFF, WAYPOINT, LAND, LOITER_TO_ALT, LAND_START = 22, 16, 21, 31, 189

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from autopilot_bridge.commander.events import FailsafeAction
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
-from autopilot_bridge.flavours import ardupilot_plane_mapping, px4_plane_mapping
-from autopilot_bridge.flavours.ardupilot_plane_parameters import ARDUPILOT_PLANE_PARAMETERS
-from autopilot_bridge.flavours.px4_plane_parameters import PX4_PLANE_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.plane import mapping as ardupilot_plane_mapping
+from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
+from autopilot_bridge.firmware.px4.plane import mapping as px4_plane_mapping
+from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
 from autopilot_bridge.flight.fixed_wing.parameters import (
     FixedWingFlightParameters,
     LaunchKind,

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.control import setpoint as sp
-from autopilot_bridge.flight.guided import GuidedKind
-from autopilot_bridge.flight.offboard import OffboardKind
+from autopilot_bridge.control.multicopter import setpoint as sp
+from autopilot_bridge.flight.multicopter.guided import GuidedKind
+from autopilot_bridge.flight.multicopter.offboard import OffboardKind
 from tests.services.command_rig import NAN, ServiceRig
 
 POSITION_ONLY = 0x0DF8

@@ -9,9 +9,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.commander.events import SystemStatus
 from autopilot_bridge.commander.modes import FlightMode
-from autopilot_bridge.services.commands import CommandService
+from autopilot_bridge.services.commands.protocol import CommandService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
-from autopilot_bridge.services.small_services import small_services
+from autopilot_bridge.services.vehicle_services import small_services
 from tests.services.command_rig import ServiceRig
 from tests.services.plane_rig import PlaneRig
 

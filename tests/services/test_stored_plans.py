@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
-from autopilot_bridge.services.stored_plans import StoredPlans, pack_plan, unpack_plan
+from autopilot_bridge.services.plans.stored_plans import StoredPlans, pack_plan, unpack_plan
 from autopilot_bridge.storage import MemoryStore, Quota
 from autopilot_bridge.storage.files import make_directories, read_whole, replace_whole
 from flightsim.airframe import AirframeKind

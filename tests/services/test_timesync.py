@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.timesync import TimeSyncService
+from autopilot_bridge.services.inputs.timesync import TimeSyncService
 
 
 class Recorder:

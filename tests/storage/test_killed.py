@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from autopilot_bridge.autopilot.firmware import FIRMWARES
-from autopilot_bridge.flavours.card_layout import CARD_LAYOUTS
+from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterDefinition, ParameterStore, ParameterType
-from autopilot_bridge.services.stored_parameters import StoredParameters
-from autopilot_bridge.services.stored_plans import StoredPlans
+from autopilot_bridge.services.parameters.parameter_file import StoredParameters
+from autopilot_bridge.services.plans.stored_plans import StoredPlans
 from autopilot_bridge.storage import Mode, OpenFile, VehiclePath
 from autopilot_bridge.storage.folder import FolderStore
 from flightsim.airframe import AirframeKind

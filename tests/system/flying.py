@@ -22,7 +22,7 @@ from autopilot_bridge.sitl import (
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.payload import MagneticField, PayloadParameters
-from missions.connection import Connection
+from missions.vehicle.connection import Connection
 from missions.vehicle.vehicle import Vehicle
 
 T = TypeVar("T")

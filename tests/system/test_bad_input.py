@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from missions.cli import run_command_line
+from missions.cli.main import run_command_line
 from tests.clients.sitl_process import free_port
 from tests.system.runs import SHORT, Run, start, started
 

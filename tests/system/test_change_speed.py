@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from autopilot_bridge.flavours import FLAVOUR_NAMES
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.firmware import FLAVOUR_NAMES
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.vehicle.adapter import Mode
 from missions.vehicle.vehicle import Vehicle

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.links import Impairment, LossyLink
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.services.ftp_protocol import MAX_DATA, FtpError, Opcode
+from autopilot_bridge.services.files.ftp_protocol import MAX_DATA, FtpError, Opcode
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from autopilot_bridge.storage import MemoryStore, Mode, Quota
 from autopilot_bridge.storage.card import MemoryCard

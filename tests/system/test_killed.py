@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from autopilot_bridge.flavours.card_layout import CARD_LAYOUTS
+from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
 from autopilot_bridge.mavlink import Frame, decode, definition
-from autopilot_bridge.services.log_book import LogBook
+from autopilot_bridge.services.files.log_book import LogBook
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.folder import FolderStore

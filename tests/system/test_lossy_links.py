@@ -15,8 +15,8 @@ from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.links import Impairment, LossyLink, MemoryLink
 from autopilot_bridge.mavlink import FrameParser, decode, definition
 from autopilot_bridge.mission_plan import MissionItem
-from missions.connection import Connection
 from missions.errors import MissionError
+from missions.vehicle.connection import Connection
 from missions.vehicle.setpoint import Setpoint
 from missions.vehicle.vehicle import Vehicle
 from tests.slow import slow_after

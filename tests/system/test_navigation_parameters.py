@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from autopilot_bridge.flavours import FLAVOUR_NAMES, get_flavour
+from autopilot_bridge.firmware import FLAVOUR_NAMES, get_flavour
 from autopilot_bridge.navigation import NavigationParameters
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.parameters import ParameterStore

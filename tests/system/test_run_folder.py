@@ -17,7 +17,7 @@ from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
 from autopilot_bridge.sitl.truth import SIMULATOR_COMPONENT, TruthEncoder
 from flightsim import truth as t
-from missions.cli import run_command_line
+from missions.cli.main import run_command_line
 from tests.system.logs import counts, known_name, mavutil_counts, records
 from tests.system.runs import SHORT, Run, fly_all
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from click.testing import CliRunner
 
 from autopilot_bridge.tlog import TlogReader
-from missions.cli_sitl import sitl
+from missions.cli.sitl import sitl
 
 ARGUMENTS = ["--link", "udpin:127.0.0.1:0", "--speedup", "0", "--duration", "6", "--log"]
 

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from autopilot_bridge.firmware.ardupilot import mission_files, packed_parameters
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.services import mission_files, packed_parameters
 from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
 from autopilot_bridge.storage import MemoryStore, Quota
 from autopilot_bridge.storage.card import MemoryCard

@@ -12,31 +12,32 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingParameters
-from autopilot_bridge.flavours.ardupilot_plane_modes import CUSTOM_MODES
+from autopilot_bridge.control.fixed_wing import setpoint as sp
+from autopilot_bridge.firmware.ardupilot.plane import messages as ardupilot_plane
+from autopilot_bridge.firmware.ardupilot.plane.messages import ArduPlaneMessages
+from autopilot_bridge.firmware.ardupilot.plane.modes import CUSTOM_MODES
+from autopilot_bridge.firmware.px4.plane import messages as px4_plane
+from autopilot_bridge.firmware.px4.plane.messages import Px4PlaneMessages
 from autopilot_bridge.flight.context import FlightContext, LandedState
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LoiterTask, MissionTask
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import decode
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.services.channel import Source
-from autopilot_bridge.services.message_interval import MessageIntervalService
-from autopilot_bridge.telemetry import ardupilot_plane, px4_plane
-from autopilot_bridge.telemetry.ardupilot_plane import ArduPlaneMessages
+from autopilot_bridge.services.commands.message_interval import MessageIntervalService
 from autopilot_bridge.telemetry.common import TelemetrySources
 from autopilot_bridge.telemetry.flight_path import FlightPath, flight_path
-from autopilot_bridge.telemetry.px4_plane import Px4PlaneMessages
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 from autopilot_bridge.telemetry.view import TelemetryView
 from autopilot_bridge.tlog import TlogReader
 from flightsim import interface
 from flightsim.airframe import AirframeKind
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import SensorReadings
-from flightsim.rotations import quaternion_from_euler
 from tests.recorded_logs import recorded_log
 
 ORIGIN = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.0)

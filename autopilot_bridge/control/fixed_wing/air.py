@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, ROLL_MAX_RAD, stall_speed
-from flightsim.kernels import kernel
-from flightsim.rotations import wrap_pi
+from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import wrap_pi
 
 Array = NDArray[np.float64]
 

@@ -8,13 +8,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp_layout
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing import setpoint as sp_layout
 from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.control.fixed_wing.step import control_step
 from autopilot_bridge.navigation.layout import NAV_SIZE
+from flightsim.foundation.kernels import bound
 from flightsim.interface import MAX_ACTUATORS
-from flightsim.kernels import bound
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class FixedWingController:
 
     Attributes:
         step: writes `actuators` for this physics step from `nav` and `setpoint`.
-        setpoint: layout `control.fixed_wing_setpoint`; starts at level OFF.
+        setpoint: layout `control.fixed_wing.setpoint`; starts at level OFF.
         actuators: roles of `flightsim.interface`, `AILERON` ... `BRAKE`.
     """
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
-from flightsim.kernels import kernel
-from flightsim.rotations import wrap_pi
+from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import wrap_pi
 
 Array = NDArray[np.float64]
 

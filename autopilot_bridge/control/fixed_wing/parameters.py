@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from autopilot_bridge.control.fixed_wing.gains import gains_for
-from flightsim.checks import check_fields, require_finite, require_not_negative, require_positive
 from flightsim.flight_envelope import FlightEnvelope
+from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
 
 _ANY_SIGN: Final = frozenset(
     {

@@ -6,8 +6,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp_layout
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing import setpoint as sp_layout
 from autopilot_bridge.control.fixed_wing.air import update_air
 from autopilot_bridge.control.fixed_wing.attitude import (
     attitude_control,
@@ -18,9 +18,9 @@ from autopilot_bridge.control.fixed_wing.attitude import (
 )
 from autopilot_bridge.control.fixed_wing.energy import PITCH_LIMIT_RAD, energy_control
 from autopilot_bridge.control.fixed_wing.lateral import lateral_control
+from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, FLAPS, RUDDER, STEERING, THROTTLE
-from flightsim.kernels import kernel
-from flightsim.rotations import quaternion_from_euler
 
 Array = NDArray[np.float64]
 

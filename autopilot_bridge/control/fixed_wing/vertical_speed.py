@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, stall_speed
-from flightsim.kernels import kernel
+from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Flight tasks of the fixed wing, over the setpoint of `control.fixed_wing_setpoint`. Flavour-neutral."""
+"""Flight tasks of the fixed wing, over the setpoint of `control.fixed_wing.setpoint`. Flavour-neutral."""
 
 from autopilot_bridge.flight.fixed_wing.descend import DescendTask
 from autopilot_bridge.flight.fixed_wing.guided import GuidedTask
@@ -16,8 +16,8 @@ from autopilot_bridge.flight.fixed_wing.parameters import (
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnPhase, ReturnTask
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffPhase, TakeoffTask
-from autopilot_bridge.flight.guided import GuidedKind
-from autopilot_bridge.flight.offboard import OffboardKind
+from autopilot_bridge.flight.multicopter.guided import GuidedKind
+from autopilot_bridge.flight.multicopter.offboard import OffboardKind
 from autopilot_bridge.flight.return_rules import ReturnDestination
 
 __all__ = [

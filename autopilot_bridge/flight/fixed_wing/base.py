@@ -4,7 +4,7 @@ import math
 from abc import ABC, abstractmethod
 from typing import ClassVar, Protocol, runtime_checkable
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, FlightPhase
 from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance

@@ -3,14 +3,14 @@
 import math
 from typing import Final
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
 
 _NAN: Final = math.nan
 
 
 class FlightCommand:
-    """One setpoint of level FLY; NaN means not given. Fields as in `control.fixed_wing_setpoint`."""
+    """One setpoint of level FLY; NaN means not given. Fields as in `control.fixed_wing.setpoint`."""
 
     __slots__ = (
         "airspeed_m_s",

@@ -12,8 +12,8 @@ import numpy as np
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.guided import GuidedKind
-from autopilot_bridge.flight.offboard import Vector
+from autopilot_bridge.flight.multicopter.guided import GuidedKind
+from autopilot_bridge.flight.multicopter.offboard import Vector
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 
 _GRAVITY_M_S2: Final = 9.80665

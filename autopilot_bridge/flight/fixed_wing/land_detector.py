@@ -11,11 +11,11 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, LandedState
 from autopilot_bridge.navigation import layout as nav_layout
-from flightsim.checks import check_fields, require_positive
-from flightsim.kernels import kernel
+from flightsim.foundation.checks import check_fields, require_positive
+from flightsim.foundation.kernels import kernel
 
 _IDLE_THROTTLE: Final = 0.1
 _VELOCITY: Final = nav_layout.VEL_NED_M_S.start

@@ -6,7 +6,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TouchedDown
 from autopilot_bridge.flight.fixed_wing.approach import Approach, approach_along_leg, approach_into_wind
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath

@@ -5,9 +5,8 @@ from typing import Final
 
 import numpy as np
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase
-from autopilot_bridge.flight.corners import turn_angle
 from autopilot_bridge.flight.fixed_wing.base import GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle_item import CircleItem
 from autopilot_bridge.flight.fixed_wing.command import FlightCommand
@@ -19,8 +18,9 @@ from autopilot_bridge.flight.fixed_wing.position_lost import PositionLost
 from autopilot_bridge.flight.fixed_wing.return_home import ReturnTask
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.fixed_wing.takeoff import TakeoffTask
-from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
+from autopilot_bridge.flight.multicopter.corners import turn_angle
 from autopilot_bridge.flight.plan_reading import JUMPS, Command, is_navigation, is_waypoint, target_of
+from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_task import PlanTask
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus, clear_setpoint
 from autopilot_bridge.mission_plan import MissionItem, MissionStore

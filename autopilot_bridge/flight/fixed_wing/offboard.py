@@ -5,14 +5,14 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
 from autopilot_bridge.flight.fixed_wing.circle import Circle
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
-from autopilot_bridge.flight.offboard import NAN3, OffboardKind, Vector
+from autopilot_bridge.flight.multicopter.offboard import NAN3, OffboardKind, Vector
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
-from flightsim.rotations import euler_from_quaternion
+from flightsim.foundation.rotations import euler_from_quaternion
 
 _STILL_M_S: Final = 0.5  # a slower velocity has no direction
 _POWER_ON: Final = 0.05

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from autopilot_bridge.control.fixed_wing.gains import gains_for
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
-from flightsim.checks import check_fields, require_finite, require_not_negative, require_positive
+from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
 
 if TYPE_CHECKING:  # its module brings scipy
     from flightsim.flight_envelope import FlightEnvelope

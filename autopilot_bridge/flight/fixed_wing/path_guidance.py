@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
-from flightsim.kernels import compiled_for, kernel
+from flightsim.foundation.kernels import compiled_for, kernel
 
 Array = NDArray[np.float64]
 

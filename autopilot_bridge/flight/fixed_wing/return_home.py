@@ -11,8 +11,8 @@ from autopilot_bridge.flight.fixed_wing.base import AircraftTask, LandingTask
 from autopilot_bridge.flight.fixed_wing.landing import LandTask
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
-from autopilot_bridge.flight.plan_habits import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_reading import landing_start
+from autopilot_bridge.flight.plan_rules import PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.return_place import ReturnPlace, choose_return, plan_landing
 from autopilot_bridge.flight.return_plan import ReturnPlan
 from autopilot_bridge.flight.return_rules import ALONG_PLAN, ReturnDestination

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingParameters
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.navigation import layout as n
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.flight_envelope import FlightEnvelope
-from flightsim.rotations import euler_from_quaternion, rotate
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.rotations import euler_from_quaternion, rotate
 from flightsim.vehicle import InitialState
 from flightsim.world import World, WorldParameters
 

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
-from autopilot_bridge.control import setpoint as multicopter_sp
 from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingParameters
+from autopilot_bridge.control.fixed_wing import setpoint as sp
+from autopilot_bridge.control.multicopter import setpoint as multicopter_sp
 from autopilot_bridge.navigation import layout as n
+from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import AILERON, BRAKE, ELEVATOR, FLAPS, MAX_ACTUATORS, RUDDER, STEERING, THROTTLE
-from flightsim.rotations import quaternion_from_euler
 
 SURFACES = [AILERON, ELEVATOR, RUDDER, STEERING]
 

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingParameters
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.navigation import layout as n
 from flightsim.airframe import Role
 from flightsim.environment import CosineGust, Environment, Turbulence

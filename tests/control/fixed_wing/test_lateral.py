@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
 from autopilot_bridge.control.fixed_wing import FixedWingParameters
 from autopilot_bridge.control.fixed_wing import layout as c
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.control.fixed_wing.lateral import (
     airspeed_for_ground_speed,
     bank_limit,

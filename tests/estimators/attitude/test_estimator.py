@@ -4,11 +4,11 @@ import math
 
 import pytest
 
-from autopilot_bridge.rotation import conjugate, from_euler, rotate
 from estimators.attitude import AttitudeEstimator, AttitudeParameters
 from estimators.attitude.air import AirData, pressure_pa, true_over_equivalent
 from estimators.attitude.parameters import AirspeedSource
 from estimators.interface import Outcome
+from flightsim.foundation.vectors import conjugate, from_euler, rotate
 from tests.estimators.attitude.made import G, down_of, heartbeat, highres, made, scaled
 
 ROLL, PITCH = 0.3, -0.2

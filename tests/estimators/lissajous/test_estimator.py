@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import definition
 from estimators.interface import Outcome
 from estimators.lissajous import LissajousEstimator, LissajousParameters
 from estimators.lissajous.model import AXIS, axis, correct, predict
 from estimators.messages import message_class
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 FRAME = LocalFrame(HOME)

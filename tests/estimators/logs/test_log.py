@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as dialect
 
 from estimators.logs import LogError, open_log
 from estimators.logs.condition import Condition
-from missions.log_text import report_lines
+from missions.cli.log_text import report_lines
 from tests.estimators.logs.reference import EPOCH_US, build, pack, record, tlog
 from tests.recorded_logs import each_recorded_log
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import definition
-from autopilot_bridge.rotation import from_euler
 from estimators.interface import Outcome
 from estimators.messages import message_class
 from estimators.target_fusion import TargetFusionEstimator, TargetFusionParameters
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.vectors import from_euler
 from tests.rotations import rotation_matrix
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from autopilot_bridge.rotation import from_euler, product, rotate, yaw_of
 from estimators.target_fusion import Range, TargetFusionParameters
 from estimators.target_fusion.sight import Detection, place_in_level_frame
 from estimators.target_fusion.transform import INFORMATION, add_information, belief_of, ground_target
+from flightsim.foundation.vectors import from_euler, product, rotate, yaw_of
 
 DOWN = from_euler(0.0, -0.5 * math.pi, 0.0)
 

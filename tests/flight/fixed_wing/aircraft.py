@@ -12,11 +12,11 @@ from autopilot_bridge.control.fixed_wing import FixedWingController, FixedWingPa
 from autopilot_bridge.flight.context import FlightContext, ManualInput
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LandDetector
 from autopilot_bridge.flight.task import FlightTask
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import layout as n
 from flightsim import truth as t
 from flightsim.environment import Environment
-from flightsim.rotations import euler_from_quaternion, rotate
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.rotations import euler_from_quaternion, rotate
 from flightsim.vehicle import InitialState
 from flightsim.world import World, WorldParameters
 from tests.control.fixed_wing.aerosonde import AEROSONDE

@@ -9,13 +9,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext, LandedState
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters
 from autopilot_bridge.flight.task import FlightTask
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.navigation import layout as n
 from autopilot_bridge.navigation.health import NavigationHealth
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 
 Array = NDArray[np.float64]
 

@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightPhase, LandedState, TouchedDown
 from autopilot_bridge.flight.fixed_wing import DescendTask, FixedWingFlightParameters, LandPhase, LandTask
 from autopilot_bridge.flight.fixed_wing.approach import approach_along_leg
 from autopilot_bridge.flight.fixed_wing.flare import flare_airspeed, flare_height, flare_time, power
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.task import TaskStatus
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.navigation import layout as n
 from flightsim.environment import Environment
+from flightsim.foundation.geodesy import LocalFrame
 from flightsim.wind_profile import SURFACE_LAYER
 from tests.control.fixed_wing.aerosonde import AEROSONDE
 from tests.flight.fixed_wing.aircraft import Aircraft

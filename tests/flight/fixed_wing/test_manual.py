@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import ManualInput
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, ManualMode, ManualTask
 from autopilot_bridge.flight.fixed_wing.manual import stick, stick_airspeed, throttle_of

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import (
     FlightEvent,
     LandedState,

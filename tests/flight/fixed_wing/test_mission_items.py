@@ -8,8 +8,8 @@ import pytest
 
 from autopilot_bridge.flight.context import FlightEvent, ItemCommanded, WaypointReached
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LoiterTask, MissionTask, TurnInRule
-from autopilot_bridge.flight.plan_habits import ARDUPLANE_PLANS, PX4_PLANS, PlanHabits
 from autopilot_bridge.flight.plan_reading import Command
+from autopilot_bridge.flight.plan_rules import ARDUPLANE_PLANS, PX4_PLANS, PlanHabits
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from tests.flight.fixed_wing.kinematic import PointMass
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LoiterTask
 from autopilot_bridge.flight.parameters import FlightParameters

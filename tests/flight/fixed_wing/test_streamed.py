@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from autopilot_bridge.control import fixed_wing_setpoint as sp
+from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.fixed_wing import GuidedKind, GuidedTask, OffboardKind, OffboardTask
 from autopilot_bridge.flight.task import SpeedKind
 from autopilot_bridge.navigation import layout as n
 from flightsim.environment import Environment
-from flightsim.rotations import quaternion_from_euler
+from flightsim.foundation.rotations import quaternion_from_euler
 from tests.flight.fixed_wing.aircraft import Aircraft
 from tests.flight.fixed_wing.kinematic import PointMass
 

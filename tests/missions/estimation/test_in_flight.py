@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from estimators.logs import open_log
-from missions.cli import run_command_line
+from missions.cli.main import run_command_line
 from missions.errors import PlanError
 from missions.estimation.in_flight import estimators_of
 from missions.estimation.over_logs import ReplayRequest, replay_logs
 from missions.kind import VehicleKind
 from missions.library import find_mission
 from missions.options import FlightOptions, Via
-from missions.session import RunRequest, fly
+from missions.runs.session import RunRequest, fly
 
 LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")
 

@@ -16,10 +16,10 @@ import pytest
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
-from autopilot_bridge.rotation import from_euler
 from autopilot_bridge.tlog import TlogWriter
 from estimators.logs import open_log
-from missions.cli import run_command_line
+from flightsim.foundation.vectors import from_euler
+from missions.cli.main import run_command_line
 from tests.clients.forked_process import flightstack
 from tests.clients.sitl_process import free_port
 

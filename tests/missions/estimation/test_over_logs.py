@@ -10,7 +10,7 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.tlog import TlogWriter
-from missions.cli import run_command_line
+from missions.cli.main import run_command_line
 from tests.recorded_logs import recorded_log
 
 LEVEL = str(Path(__file__).parents[2] / "estimators" / "level.py")

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.occupancy.field_watch import ReadingPlacer
 from missions.occupancy.noise_check import white_noise_nt
-from missions.telemetry import Position
+from missions.vehicle.telemetry import Position
 
 HOME = GeodeticPosition(lat_deg=47.4, lon_deg=8.5, alt_m=480.0)
 FRAME = LocalFrame(HOME)

@@ -11,20 +11,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from autopilot_bridge.geodesy import LocalFrame
 from autopilot_bridge.mavlink import decode, definition
 from autopilot_bridge.tlog import TlogReader
+from flightsim.foundation.geodesy import LocalFrame
 from flightsim.payload import DipoleSignature, MagneticMap
-from missions import cli
+from missions.cli.main import main as cli
 from missions.embedded.scenario import magnetic_field_of
 from missions.errors import PlanError
 from missions.occupancy.mission import MAP_NAME, OccupancyMission
 from missions.occupancy.noise_check import require_quiet
 from missions.occupancy.options import OccupancyOptions
-from missions.records import FlightRecords
-from missions.request import RunRequest
+from missions.runs.records import FlightRecords
+from missions.runs.request import RunRequest
+from missions.runs.session import fly
 from missions.scenario import Scenario, Setting
-from missions.session import fly
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 
 SMALL = OccupancyOptions(

@@ -7,9 +7,9 @@ from collections import deque
 
 import numpy as np
 
-from autopilot_bridge.rotation import from_euler, product
-from missions.telemetry import Attitude
+from flightsim.foundation.vectors import from_euler, product
 from missions.vehicle.payload import Detection, GimbalAttitude
+from missions.vehicle.telemetry import Attitude
 from tests.rotations import rotation_matrix
 
 STEP_US = 20_000

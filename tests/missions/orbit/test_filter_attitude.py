@@ -6,11 +6,11 @@ import math
 import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, dialect
-from autopilot_bridge.rotation import yaw_of
+from flightsim.foundation.vectors import yaw_of
 from missions.library import find_mission
 from missions.orbit.filter_attitude import FilterAttitude
 from missions.orbit.options import AttitudeFrom, OrbitOptions
-from missions.session import RunRequest, fly
+from missions.runs.session import RunRequest, fly
 
 ROLL, PITCH, YAW = 0.3, -0.1, 2.0
 G = 9.80665

@@ -10,10 +10,10 @@ from autopilot_bridge.mavlink import decode
 from autopilot_bridge.tlog import TlogReader
 from missions.library import find_mission
 from missions.orbit.options import GpsOff, OrbitOptions
-from missions.records import FlightRecords
-from missions.run import EPOCH_UNIX_US
+from missions.runs.records import FlightRecords
+from missions.runs.run_folder import EPOCH_UNIX_US
+from missions.runs.session import RunRequest, fly
 from missions.scenario import Scenario
-from missions.session import RunRequest, fly
 from tests.slow import slow
 
 KEYS = {"radius_mean_error_percent", "radius_std_m", "altitude_error_m", "gps_lost_at_s"}

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from autopilot_bridge.rotation import between, conjugate, from_euler, rotate, yaw_of
+from flightsim.foundation.vectors import between, conjugate, from_euler, rotate, yaw_of
 from missions.orbit.line_of_sight import (
     gimbal_angles,
     gimbal_from_camera,

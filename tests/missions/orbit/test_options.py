@@ -5,7 +5,7 @@ import math
 import pytest
 from click.testing import CliRunner
 
-from missions.cli_fly import fly
+from missions.cli.fly import fly
 from missions.errors import PlanError
 from missions.orbit.options import OrbitOptions
 from missions.planning.limits import FixedWingLimits, MulticopterLimits

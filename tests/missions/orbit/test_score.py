@@ -7,8 +7,8 @@ from missions.notes import FlightNotes
 from missions.orbit.mission import OrbitMission
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
-from missions.records import FlightRecords
-from missions.score import score
+from missions.runs.records import FlightRecords
+from missions.runs.score import score
 
 MARKS = {
     "radius_estimate_mean_m": 150.4,

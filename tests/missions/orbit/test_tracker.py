@@ -6,8 +6,8 @@ import pytest
 
 from missions.orbit.attitude import AutopilotAttitude
 from missions.orbit.tracker import TargetStatus, TargetTracker, TrackerParameters
-from missions.telemetry import Attitude
 from missions.vehicle.payload import Detection, GimbalAttitude
+from missions.vehicle.telemetry import Attitude
 from tests.missions.orbit.coordinated_turn import PointMass
 
 

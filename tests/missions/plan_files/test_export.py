@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from autopilot_bridge.geodesy import GeodeticPosition
-from missions import cli
+from flightsim.foundation.geodesy import GeodeticPosition
+from missions.cli.main import main as cli
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.plan_files.files import read_mission_file, write_mission_file

@@ -11,7 +11,7 @@ from missions.options import FlightOptions
 from missions.plan_files.export import export_plan
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.options import FileOptions, Then
-from missions.session import RunRequest, fly
+from missions.runs.session import RunRequest, fly
 from tests.missions.plan_files.plans import LANDING, LAT, LON, changed, simple, waypoint, write
 
 both = pytest.mark.parametrize("flavour", ["px4", "ardupilot"])

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.plan_files.files import read_mission_file, write_mission_file

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.plan_files.document import MissionDocument
 from missions.plan_files.route import has_curves, path_ned_m, placed, route_of, scored_stops, straight
 from tests.missions.plan_files.plans import ALT, LAT, LON

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavwp
 
-from autopilot_bridge.geodesy import GeodeticPosition
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition
 from missions.errors import PlanError
 from missions.plan_files.files import read_mission_file
 from missions.plan_files.wpl import format_wpl, read_wpl

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from autopilot_bridge.fence_shapes import fence_shapes
-from autopilot_bridge.geodesy import GeodeticPosition, LocalFrame
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.kind import VehicleKind
 from missions.preflight.fence_geometry import first_outside
 from missions.preflight.finding import Finding, Level

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from missions.cli import run_command_line
-from missions.cli_study import study
+from missions.cli.main import run_command_line
+from missions.cli.study import study
 
 
 def test_the_run_folder_has_summary_table_and_figures(tmp_path: Path) -> None:

@@ -1,0 +1,268 @@
+"""The multicopter controller: navigation state and setpoint in, motor commands out, once per physics step."""
+
+import math
+from collections.abc import Callable
+from dataclasses import astuple, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.control.multicopter import layout as c
+from autopilot_bridge.control.multicopter import setpoint as sp_layout
+from autopilot_bridge.control.multicopter.attitude import (
+    attitude_control,
+    body_z_of,
+    limit_rates,
+    rate_control,
+)
+from autopilot_bridge.control.multicopter.mixer import MOTORS, allocate, command_from_thrust
+from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
+from autopilot_bridge.control.multicopter.position import (
+    estimate_hover_thrust,
+    trajectory_control,
+    update_airborne,
+    update_filters,
+    vertical_control,
+)
+from autopilot_bridge.navigation.layout import NAV_SIZE
+from flightsim.foundation.kernels import bound, kernel
+from flightsim.interface import MAX_ACTUATORS
+
+Array = NDArray[np.float64]
+
+POSITION_RATE_HZ: Final = 62.5  # of the position loop, at least
+_NAV_POS_DOWN: Final = 12
+_NAV_YAW: Final = 27
+_NAV_RATES: Final = 4
+_Q: Final = 11
+_RATES: Final = 15
+_THRUST: Final = 18
+_YAW_RATE: Final = 10
+_LEVEL: Final = 19
+_MIN_COS_TILT: Final = 0.5  # collective isn't raised any more beyond 60 deg of tilt
+
+
+@kernel
+def _finite4(v: Array, start: int) -> bool:
+    return (
+        math.isfinite(v[start])
+        and math.isfinite(v[start + 1])
+        and math.isfinite(v[start + 2])
+        and math.isfinite(v[start + 3])
+    )
+
+
+@kernel
+def _rest(nav: Array, s: Array, command: float, actuators: Array) -> None:
+    """Motors at one command, every integrator and filter at its start."""
+    for i in range(actuators.shape[0]):
+        actuators[i] = command if i < MOTORS else 0.0
+    for i in range(c.COUNTER, c.HOVER):
+        s[i] = 0.0
+    s[c.COUNTER] = s[c.DIVISOR]
+    s[c.Q_SETPOINT] = 1.0
+    s[c.START_DOWN_M] = nav[_NAV_POS_DOWN] if math.isfinite(nav[_NAV_POS_DOWN]) else 0.0
+    for i in range(3):
+        rate = nav[_NAV_RATES + i]
+        s[c.RATE_PREVIOUS + i] = rate if math.isfinite(rate) else 0.0
+    s[c.THRUST_GIVEN] = 0.0
+    s[c.THRUST_LAGGED] = 0.0
+
+
+@kernel
+def _collective(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
+    """Thrust setpoint below level TRAJECTORY; NaN flies the vertical part of the trajectory fields."""
+    if math.isfinite(sp[_THRUST]):
+        s[c.VEL_INTEGRAL + 2] = 0.0
+        s[c.BUMP + 2] = 0.0
+        s[c.ACC_SETPOINT + 2] = math.nan  # the vertical isn't controlled
+        return min(1.0, max(0.0, sp[_THRUST]))
+    # same speed limits and position P as in flight along a trajectory
+    vz = sp[5]
+    ez = sp[2] - nav[_NAV_POS_DOWN]
+    if math.isfinite(ez):
+        vz = (vz if math.isfinite(vz) else 0.0) + p[c.POS_Z_P] * ez
+    elif math.isnan(vz) and math.isnan(sp[8]):
+        vz = 0.0
+    s[c.VEL_SETPOINT + 2] = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz)) if vz == vz else vz
+    up = vertical_control(nav, sp, p, s, dt, entering)
+    _, _, cos_tilt = body_z_of(nav)
+    return min(p[c.THRUST_MAX], max(p[c.THRUST_MIN], up / max(_MIN_COS_TILT, cos_tilt)))
+
+
+@kernel
+def _step(nav: Array, sp: Array, p: Array, s: Array, scratch: Array, actuators: Array) -> None:
+    level = sp[_LEVEL]
+    dt = s[c.DT]
+    if not level >= sp_layout.IDLE:  # OFF, and NaN
+        _rest(nav, s, 0.0, actuators)
+        return
+    rates = nav[_NAV_RATES : _NAV_RATES + 3]
+    attitude_known = _finite4(nav, 0) and math.isfinite(rates[0] + rates[1] + rates[2])
+    if level < sp_layout.RATES or not attitude_known:
+        _rest(nav, s, p[c.MOTOR_IDLE], actuators)
+        return
+
+    switched = level != s[c.LAST_LEVEL]
+    s[c.COUNTER] += 1.0
+    if s[c.COUNTER] >= s[c.DIVISOR] or switched:
+        dt_outer = s[c.DT] * s[c.DIVISOR]
+        s[c.COUNTER] = 0.0
+        update_airborne(nav, s)
+        estimate_hover_thrust(nav, p, s, dt_outer)
+        update_filters(nav, p, s, dt_outer)
+        if level == sp_layout.TRAJECTORY:
+            trajectory_control(nav, sp, p, s, dt_outer, switched)
+        else:
+            s[c.VEL_INTEGRAL] = 0.0
+            s[c.VEL_INTEGRAL + 1] = 0.0
+            entering = math.isnan(s[c.ACC_SETPOINT + 2]) or s[c.LAST_LEVEL] == 0.0
+            s[c.THRUST_SETPOINT] = _collective(nav, sp, p, s, dt_outer, entering)
+            s[c.YAW_RATE_FF] = sp[_YAW_RATE] if math.isfinite(sp[_YAW_RATE]) else 0.0
+    s[c.LAST_LEVEL] = level
+
+    rate_sp = s[c.RATE_SETPOINT : c.RATE_SETPOINT + 3]
+    if level == sp_layout.RATES:
+        for i in range(3):
+            rate_sp[i] = sp[_RATES + i] if math.isfinite(sp[_RATES + i]) else 0.0
+    else:
+        q_sp = s[c.Q_SETPOINT : c.Q_SETPOINT + 4]
+        if level == sp_layout.ATTITUDE:
+            norm = 0.0
+            for i in range(4):
+                norm += sp[_Q + i] * sp[_Q + i]
+            if norm > 0.1 and math.isfinite(norm):
+                scale = 1.0 / math.sqrt(norm)
+                for i in range(4):
+                    q_sp[i] = sp[_Q + i] * scale
+            else:  # no attitude to fly: level, nose as it is
+                q_sp[0], q_sp[1], q_sp[2] = math.cos(0.5 * nav[_NAV_YAW]), 0.0, 0.0
+                q_sp[3] = math.sin(0.5 * nav[_NAV_YAW])
+        attitude_control(nav[0:4], q_sp, s[c.YAW_RATE_FF], p, rate_sp, scratch)
+        if level == sp_layout.ATTITUDE:
+            for i in range(3):
+                if math.isfinite(sp[_RATES + i]):
+                    rate_sp[i] += sp[_RATES + i]
+    limit_rates(rate_sp, p)
+
+    thrust = s[c.THRUST_SETPOINT]
+    # on the ground the legs hold the vehicle: an integrator would only store a kick for take-off
+    integrate = s[c.AIRBORNE] != 0.0 or thrust > 0.6 * s[c.HOVER]
+    rate_control(rates, rate_sp, p, s, dt, integrate)
+    if p[c.YAW_TORQUE_CUTOFF] > 0.0:
+        alpha = dt / (dt + 1.0 / (2.0 * math.pi * p[c.YAW_TORQUE_CUTOFF]))
+        s[c.YAW_TORQUE] += alpha * (s[c.UNALLOCATED + 2] - s[c.YAW_TORQUE])
+    else:
+        s[c.YAW_TORQUE] = s[c.UNALLOCATED + 2]
+    motor = s[c.MOTOR_THRUST : c.MOTOR_THRUST + MOTORS]
+    allocate(
+        s[c.UNALLOCATED],
+        s[c.UNALLOCATED + 1],
+        s[c.YAW_TORQUE],
+        thrust,
+        motor,
+        s[c.UNALLOCATED : c.UNALLOCATED + 3],
+    )
+    s[c.THRUST_GIVEN] = 0.25 * (motor[0] + motor[1] + motor[2] + motor[3])
+    for i in range(MOTORS):
+        command = command_from_thrust(motor[i], p[c.THRUST_MODEL])
+        command = max(p[c.MOTOR_IDLE], command)
+        actuators[i] = command if math.isfinite(command) else p[c.MOTOR_IDLE]
+    for i in range(MOTORS, actuators.shape[0]):
+        actuators[i] = 0.0
+
+
+class MulticopterController:
+    """Cascaded control of a quad-X: position, velocity, attitude, body rates, mixing.
+
+    The setpoint's level chooses where the cascade starts. Fields that are not set (NaN) are filled as
+    follows, so that no NaN reaches a motor: an axis with neither position, velocity nor acceleration stands
+    still; NaN yaw holds by yaw rate; a NaN or zero attitude is level flight at the present heading; NaN rates
+    are zero; NaN thrust at levels RATES and ATTITUDE means that the vertical part of the trajectory fields is
+    flown. Position and velocity loops do not use unknown parts of the navigation state; without attitude or
+    rates the motors idle.
+
+    Args:
+        parameters: gains and limits.
+        physics_rate_hz: rate at which `step` is called.
+        nav: navigation state, layout `navigation.layout`, shared with the filter.
+
+    Attributes:
+        step: writes `actuators` for this physics step from `nav` and `setpoint`.
+        setpoint: layout `control.setpoint`; starts at level OFF.
+        actuators: motor commands 0..1 (front right, rear left, front left, rear right), then zeros.
+    """
+
+    __slots__ = ("_packed", "_parameters", "_state", "actuators", "setpoint", "step")
+
+    def __init__(
+        self, parameters: MulticopterParameters | None = None, *, physics_rate_hz: float, nav: Array
+    ) -> None:
+        if not 50.0 <= physics_rate_hz <= 4000.0:
+            raise ValueError(f"physics_rate_hz = {physics_rate_hz} is not in 50..4000")
+        if nav.shape != (NAV_SIZE,) or nav.dtype != np.float64:
+            raise ValueError(
+                f"nav has shape {nav.shape} and type {nav.dtype}; float64 ({NAV_SIZE},) is accepted"
+            )
+        self._packed: Array = np.zeros(len(c.PARAMETER_NAMES))
+        self._state: Array = np.zeros(c.STATE_SIZE)
+        self.setpoint: Array = np.full(sp_layout.SETPOINT_SIZE, np.nan)
+        self.setpoint[sp_layout.LEVEL] = sp_layout.OFF
+        self.actuators: Array = np.zeros(MAX_ACTUATORS)
+        state = self._state
+        state[c.DT] = 1.0 / physics_rate_hz
+        state[c.DIVISOR] = max(1.0, math.floor(physics_rate_hz / POSITION_RATE_HZ))
+        state[c.COUNTER] = state[c.DIVISOR]
+        state[c.Q_SETPOINT] = 1.0
+        state[c.HOVER_VARIANCE] = 0.01
+        self.step: Callable[[], None] = bound(
+            _step, nav, self.setpoint, self._packed, state, np.zeros(8), self.actuators
+        )
+        self.set_parameters(MulticopterParameters() if parameters is None else parameters)
+        state[c.HOVER] = self._parameters.hover_thrust
+
+    @property
+    def parameters(self) -> MulticopterParameters:
+        """Gains and limits in use."""
+        return self._parameters
+
+    def set_parameters(self, parameters: MulticopterParameters) -> None:
+        """Replace gains and limits, in flight too; the hover-thrust estimate is kept while it is in use."""
+        self._parameters = parameters
+        self._packed[:] = astuple(parameters)
+        if not parameters.use_hover_thrust_estimate:
+            self._state[c.HOVER] = parameters.hover_thrust
+
+    def change(self, **values: float | bool) -> None:
+        """Replace single parameters by their field names."""
+        self.set_parameters(replace(self._parameters, **values))  # type: ignore[arg-type]
+
+    def set_ground_contact(self, contact: bool) -> None:
+        """Set whether the ground may carry part of the weight; hover thrust is not learnt then."""
+        self._state[c.GROUND_CONTACT] = 1.0 if contact else 0.0
+
+    @property
+    def hover_thrust(self) -> float:
+        """Estimate of the collective that hovers, 0..1."""
+        return float(self._state[c.HOVER])
+
+    @property
+    def thrust(self) -> float:
+        """Collective given by the motors after desaturation, 0..1."""
+        return float(self._state[c.THRUST_GIVEN])
+
+    @property
+    def attitude_setpoint(self) -> Array:
+        """q_ned_from_frd wanted by the attitude loop, a view (4,)."""
+        return self._state[c.Q_SETPOINT : c.Q_SETPOINT + 4]
+
+    @property
+    def rate_setpoint_frd_rad_s(self) -> Array:
+        """Body rates wanted by the rate loop, a view (3,)."""
+        return self._state[c.RATE_SETPOINT : c.RATE_SETPOINT + 3]
+
+    @property
+    def velocity_setpoint_ned_m_s(self) -> Array:
+        """Velocity wanted by the velocity loop, a view (3,); NaN where it isn't controlled."""
+        return self._state[c.VEL_SETPOINT : c.VEL_SETPOINT + 3]

@@ -1,0 +1,298 @@
+"""Position and velocity control of a multicopter: trajectory setpoint to thrust vector and attitude.
+
+The structure PX4 publishes (Multicopter Position Control; `PositionControl`): position P gives a velocity,
+velocity PID gives an acceleration, feed-forward adds at both places, the acceleration becomes a thrust
+vector under tilt and thrust limits with the vertical first, and the integrator follows what was really
+given (tracking anti-windup).
+
+Added to it: drag, which the accelerometer measures directly across the
+thrust axis, is fed forward below a cut-off on axes whose velocity is controlled (Kai, Allibert, Hua, Hamel,
+"Nonlinear feedback control of quadrotors exploiting first-order drag effects", 2017).
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.control.multicopter import layout as c
+from autopilot_bridge.control.multicopter.attitude import body_z_of, quaternion_from_thrust_axis
+from flightsim.foundation.kernels import kernel
+
+Array = NDArray[np.float64]
+
+GRAVITY_M_S2: Final = 9.80665
+_POS: Final = 0  # setpoint slots, as in control.setpoint
+_VEL: Final = 3
+_ACC: Final = 6
+_YAW: Final = 9
+_YAW_RATE: Final = 10
+_NAV_VEL: Final = 7  # navigation slots, as in navigation.layout
+_NAV_POS: Final = 10
+_NAV_ACC: Final = 13
+_NAV_FORCE: Final = 22
+_NAV_YAW: Final = 27
+
+_MIN_HOVER: Final = 0.05
+_MAX_HOVER: Final = 0.9
+_HOVER_PROCESS_STD_1_S: Final = 0.0036  # 1/sqrt(s) (PX4 HTE_HT_NOISE)
+_HOVER_ACCEL_STD_M_S2: Final = 1.0
+_HOVER_GATE: Final = 3.0  # standard deviations (PX4 HTE_ACC_GATE)
+_HOVER_MIN_STD: Final = 0.003  # keeps the estimate able to follow a battery
+_DRAG_MAX_M_S2: Final = 6.0
+_BUMP_TIME_S: Final = 0.3
+_AIRBORNE_CLIMB_M: Final = 0.2
+_AIRBORNE_SPEED_M_S: Final = 0.5
+
+
+@kernel
+def lowpass_gain(dt: float, cutoff_hz: float) -> float:
+    """Gain of a first-order low-pass step."""
+    return dt / (dt + 1.0 / (2.0 * math.pi * cutoff_hz))
+
+
+@kernel
+def estimate_hover_thrust(nav: Array, p: Array, s: Array, dt: float) -> None:
+    """One step of the scalar Kalman filter on hover thrust (PX4's idea, along the thrust axis).
+
+    The accelerometer along body z reads the thrust alone, g thrust / hover, whatever the tilt and the motion.
+    On the ground this is not valid: the decreasing thrust after a touchdown would be learnt as hover thrust,
+    and the landing would not be detected.
+    """
+    s[c.THRUST_LAGGED] += (s[c.THRUST_GIVEN] - s[c.THRUST_LAGGED]) * min(
+        1.0, dt / max(dt, p[c.ROTOR_TIME_CONSTANT])
+    )
+    measured = -nav[_NAV_FORCE + 2]
+    if p[c.USE_HOVER_ESTIMATE] == 0.0 or s[c.AIRBORNE] == 0.0 or s[c.GROUND_CONTACT] != 0.0:
+        return
+    if not math.isfinite(measured):
+        return
+    variance = s[c.HOVER_VARIANCE] + _HOVER_PROCESS_STD_1_S * _HOVER_PROCESS_STD_1_S * dt
+    hover = s[c.HOVER]
+    predicted = GRAVITY_M_S2 * s[c.THRUST_LAGGED] / hover
+    slope = -predicted / hover
+    innovation = measured - predicted
+    spread = slope * slope * variance + _HOVER_ACCEL_STD_M_S2 * _HOVER_ACCEL_STD_M_S2
+    if innovation * innovation <= _HOVER_GATE * _HOVER_GATE * spread:
+        gain = variance * slope / spread
+        new = min(_MAX_HOVER, max(_MIN_HOVER, hover + gain * innovation))
+        variance = (1.0 - gain * slope) * variance
+        # shift the vertical integrator so that the better estimate doesn't jerk the thrust
+        acc_z = s[c.ACC_SETPOINT + 2]
+        if math.isfinite(acc_z):
+            s[c.VEL_INTEGRAL + 2] += (acc_z - GRAVITY_M_S2) * hover / new + GRAVITY_M_S2 - acc_z
+        s[c.HOVER] = new
+    else:
+        variance *= 1.0 + 2.0 * dt  # gated out: grow, so that a wrong start can't lock the filter out
+    s[c.HOVER_VARIANCE] = min(0.04, max(_HOVER_MIN_STD * _HOVER_MIN_STD, variance))
+
+
+@kernel
+def update_airborne(nav: Array, s: Array) -> None:
+    """Latch AIRBORNE once the vehicle has moved vertically under power; OFF and IDLE clear it."""
+    if s[c.AIRBORNE] == 0.0 and (
+        abs(nav[_NAV_VEL + 2]) > _AIRBORNE_SPEED_M_S
+        or s[c.START_DOWN_M] - nav[_NAV_POS + 2] > _AIRBORNE_CLIMB_M
+    ):
+        s[c.AIRBORNE] = 1.0
+
+
+@kernel
+def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
+    """Low-passed acceleration (the velocity derivative) and measured drag."""
+    alpha = lowpass_gain(dt, p[c.VEL_D_CUTOFF])
+    for i in range(3):
+        acc = nav[_NAV_ACC + i]
+        if math.isfinite(acc):
+            s[c.ACC_FILTERED + i] += alpha * (acc - s[c.ACC_FILTERED + i])
+    if p[c.DRAG_CUTOFF] <= 0.0 or s[c.AIRBORNE] == 0.0:
+        s[c.DRAG] = 0.0
+        s[c.DRAG + 1] = 0.0
+        return
+    w, x, y, z = nav[0], nav[1], nav[2], nav[3]
+    fx, fy = nav[_NAV_FORCE], nav[_NAV_FORCE + 1]
+    north = (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy
+    east = 2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy
+    if s[c.GROUND_CONTACT] != 0.0:
+        # a sideways force of the ground is no drag: tilting against it would overturn the vehicle
+        north, east = 0.0, 0.0
+    size = math.sqrt(north * north + east * east)
+    if not math.isfinite(size):
+        return
+    if size > _DRAG_MAX_M_S2:
+        north *= _DRAG_MAX_M_S2 / size
+        east *= _DRAG_MAX_M_S2 / size
+    beta = lowpass_gain(dt, p[c.DRAG_CUTOFF])
+    s[c.DRAG] += beta * (north - s[c.DRAG])
+    s[c.DRAG + 1] += beta * (east - s[c.DRAG + 1])
+
+
+@kernel
+def _velocity_setpoint(nav: Array, sp: Array, p: Array, s: Array) -> None:
+    """VEL_SETPOINT from position P and feed-forward, limited; NaN where the velocity isn't controlled."""
+    px, py = 0.0, 0.0  # share of the position loop, which keeps its right of way under the speed limit
+    vx, vy = sp[_VEL], sp[_VEL + 1]
+    ex, ey = sp[_POS] - nav[_NAV_POS], sp[_POS + 1] - nav[_NAV_POS + 1]
+    if math.isfinite(ex):
+        px = p[c.POS_XY_P] * ex
+        vx = vx if math.isfinite(vx) else 0.0
+    elif math.isnan(vx) and math.isnan(sp[_ACC]):
+        vx = 0.0  # not commanded: stand still
+    if math.isfinite(ey):
+        py = p[c.POS_XY_P] * ey
+        vy = vy if math.isfinite(vy) else 0.0
+    elif math.isnan(vy) and math.isnan(sp[_ACC + 1]):
+        vy = 0.0
+    limit = p[c.SPEED_XY_MAX]
+    size = math.sqrt(px * px + py * py)
+    if size > limit:
+        px *= limit / size
+        py *= limit / size
+    fx = vx if math.isfinite(vx) else 0.0
+    fy = vy if math.isfinite(vy) else 0.0
+    if (px + fx) * (px + fx) + (py + fy) * (py + fy) > limit * limit:
+        # largest share k of the feed-forward with |p + k f| = limit
+        ff = fx * fx + fy * fy
+        pf = px * fx + py * fy
+        pp = px * px + py * py
+        k = (-pf + math.sqrt(max(0.0, pf * pf - ff * (pp - limit * limit)))) / max(ff, 1e-9)
+        k = min(1.0, max(0.0, k))
+        fx *= k
+        fy *= k
+    s[c.VEL_SETPOINT] = px + fx if math.isfinite(vx) else math.nan
+    s[c.VEL_SETPOINT + 1] = py + fy if math.isfinite(vy) else math.nan
+
+    vz = sp[_VEL + 2]
+    ez = sp[_POS + 2] - nav[_NAV_POS + 2]
+    if math.isfinite(ez):
+        vz = (vz if math.isfinite(vz) else 0.0) + p[c.POS_Z_P] * ez
+    elif math.isnan(vz) and math.isnan(sp[_ACC + 2]):
+        vz = 0.0
+    if math.isfinite(vz):
+        vz = min(p[c.SPEED_DOWN_MAX], max(-p[c.SPEED_UP_MAX], vz))
+    s[c.VEL_SETPOINT + 2] = vz
+
+
+@kernel
+def _finite_or_zero(value: float) -> float:
+    return value if math.isfinite(value) else 0.0
+
+
+@kernel
+def _acceleration_axis(
+    axis: int, nav: Array, sp: Array, kp: float, kd: float, s: Array
+) -> tuple[float, float, bool]:
+    """(acceleration, velocity error, controlled) of one NED axis."""
+    acc = _finite_or_zero(sp[_ACC + axis])
+    error = s[c.VEL_SETPOINT + axis] - nav[_NAV_VEL + axis]
+    if not math.isfinite(error):
+        s[c.VEL_INTEGRAL + axis] = 0.0
+        return acc, 0.0, False
+    return (
+        acc + kp * error + s[c.VEL_INTEGRAL + axis] - kd * s[c.ACC_FILTERED + axis],
+        error,
+        True,
+    )
+
+
+@kernel
+def vertical_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> float:
+    """Vertical thrust (positive up, normalised, before tilt) from the vertical part of the setpoint."""
+    acc, error, controlled = _acceleration_axis(2, nav, sp, p[c.VEL_Z_P], p[c.VEL_Z_D], s)
+    hover = s[c.HOVER]
+    if entering and s[c.AIRBORNE] != 0.0:
+        # start from the thrust flown so far, so that the switch isn't felt
+        _, _, cos_tilt = body_z_of(nav)
+        present = GRAVITY_M_S2 * (1.0 - s[c.THRUST_GIVEN] * max(0.3, cos_tilt) / hover)
+        s[c.BUMP + 2] = min(5.0, max(-5.0, present - acc))
+    acc += s[c.BUMP + 2]
+    s[c.BUMP + 2] *= math.exp(-dt / _BUMP_TIME_S)
+    s[c.ACC_SETPOINT + 2] = acc
+    up = hover * (1.0 - acc / GRAVITY_M_S2)
+    if controlled:
+        at_min = up <= p[c.THRUST_MIN] and error >= 0.0
+        at_max = up >= p[c.THRUST_MAX] and error <= 0.0
+        # before lift-off only upwards: the ground holds the vehicle back, not a lack of sinking
+        grounded = s[c.AIRBORNE] == 0.0 and error >= 0.0
+        if not (at_min or at_max or grounded):
+            new = s[c.VEL_INTEGRAL + 2] + p[c.VEL_Z_I] * error * dt
+            s[c.VEL_INTEGRAL + 2] = min(GRAVITY_M_S2, max(-GRAVITY_M_S2, new))
+    return min(p[c.THRUST_MAX], max(0.0, up))
+
+
+@kernel
+def trajectory_control(nav: Array, sp: Array, p: Array, s: Array, dt: float, entering: bool) -> None:
+    """One step of the position loop: writes Q_SETPOINT, THRUST_SETPOINT and YAW_RATE_FF."""
+    _velocity_setpoint(nav, sp, p, s)
+    ax, error_x, control_x = _acceleration_axis(0, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)
+    ay, error_y, control_y = _acceleration_axis(1, nav, sp, p[c.VEL_XY_P], p[c.VEL_XY_D], s)
+    hover = s[c.HOVER]
+    thrust_max = p[c.THRUST_MAX]
+    if entering and s[c.AIRBORNE] != 0.0:
+        zx, zy, _ = body_z_of(nav)
+        pull = GRAVITY_M_S2 * s[c.THRUST_GIVEN] / hover
+        s[c.BUMP] = -zx * pull + s[c.DRAG] - ax
+        s[c.BUMP + 1] = -zy * pull + s[c.DRAG + 1] - ay
+    # drag is fought only for a wanted velocity: without one it is what brings the vehicle to rest in the air
+    drag_x, drag_y = s[c.DRAG], s[c.DRAG + 1]
+    if not control_x:
+        drag_x = 0.0
+        s[c.BUMP] = 0.0
+    if not control_y:
+        drag_y = 0.0
+        s[c.BUMP + 1] = 0.0
+    up = vertical_control(nav, sp, p, s, dt, entering)
+    ax += s[c.BUMP]
+    ay += s[c.BUMP + 1]
+    decay = math.exp(-dt / _BUMP_TIME_S)
+    s[c.BUMP] *= decay
+    s[c.BUMP + 1] *= decay
+    s[c.ACC_SETPOINT] = ax
+    s[c.ACC_SETPOINT + 1] = ay
+
+    # horizontal thrust for the wanted acceleration against the measured drag, in units of hover thrust / g
+    wanted_x, wanted_y = ax - drag_x, ay - drag_y
+    tx, ty = hover * wanted_x / GRAVITY_M_S2, hover * wanted_y / GRAVITY_M_S2
+    wanted = math.sqrt(tx * tx + ty * ty)
+    # vertical first, but keep a margin for staying on the path when climbing at full thrust
+    margin = min(wanted, p[c.THRUST_XY_MARGIN] * thrust_max)
+    up = min(up, math.sqrt(thrust_max * thrust_max - margin * margin))
+    room = math.sqrt(max(0.0, thrust_max * thrust_max - up * up))
+    # a tilted vehicle must still push up: below half of hover the tilt is taken as if pushing half
+    room = min(room, math.tan(p[c.TILT_MAX]) * up)
+    given = wanted
+    if wanted > room:
+        given = room
+        tx *= room / wanted
+        ty *= room / wanted
+    scale = GRAVITY_M_S2 / hover
+    missing_x, missing_y = wanted_x - tx * scale, wanted_y - ty * scale
+    if wanted > given:
+        # tracking anti-windup (Visioli; PX4 uses gain 2 / P)
+        back = 2.0 / p[c.VEL_XY_P]
+        error_x -= back * missing_x
+        error_y -= back * missing_y
+    if s[c.AIRBORNE] != 0.0:
+        if control_x:
+            s[c.VEL_INTEGRAL] += p[c.VEL_XY_I] * error_x * dt
+        if control_y:
+            s[c.VEL_INTEGRAL + 1] += p[c.VEL_XY_I] * error_y * dt
+        size = math.sqrt(s[c.VEL_INTEGRAL] ** 2 + s[c.VEL_INTEGRAL + 1] ** 2)
+        if size > GRAVITY_M_S2:
+            s[c.VEL_INTEGRAL] *= GRAVITY_M_S2 / size
+            s[c.VEL_INTEGRAL + 1] *= GRAVITY_M_S2 / size
+    else:
+        s[c.VEL_INTEGRAL] = 0.0
+        s[c.VEL_INTEGRAL + 1] = 0.0
+
+    thrust = math.sqrt(tx * tx + ty * ty + up * up)
+    zx, zy, zz = 0.0, 0.0, 1.0
+    if thrust > 1e-6:
+        zx, zy, zz = -tx / thrust, -ty / thrust, up / thrust
+    s[c.THRUST_SETPOINT] = max(thrust, p[c.THRUST_MIN])
+    yaw = sp[_YAW]
+    if not math.isfinite(yaw):
+        yaw = nav[_NAV_YAW]
+    s[c.YAW_RATE_FF] = _finite_or_zero(sp[_YAW_RATE])
+    quaternion_from_thrust_axis(zx, zy, zz, yaw, s[c.Q_SETPOINT : c.Q_SETPOINT + 4])

@@ -1,0 +1,163 @@
+"""PREFLIGHT_CALIBRATION and the accelerometer calibration dialogue of ArduPilot.
+
+Source: ArduPilot 4.6, GCS_MAVLink and AP_AccelCal: the vehicle requests a position with a COMMAND_LONG
+ACCELCAL_VEHICLE_POS and a text, and a ground station answers with the same command when the vehicle is in it.
+A simulated vehicle can't be turned by hand; it accepts the ground station's answer, and measures for a while.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.services.channel import Source, send_to_all
+from autopilot_bridge.services.commands.handlers import Command, Handler, whole
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+
+_CRITICAL: Final = mavlink.MAV_SEVERITY_CRITICAL
+_NOTICE: Final = mavlink.MAV_SEVERITY_NOTICE
+_INFO: Final = mavlink.MAV_SEVERITY_INFO
+_POSITIONS: Final = (
+    (mavlink.ACCELCAL_VEHICLE_POS_LEVEL, "level"),
+    (mavlink.ACCELCAL_VEHICLE_POS_LEFT, "on its LEFT side"),
+    (mavlink.ACCELCAL_VEHICLE_POS_RIGHT, "on its RIGHT side"),
+    (mavlink.ACCELCAL_VEHICLE_POS_NOSEDOWN, "nose DOWN"),
+    (mavlink.ACCELCAL_VEHICLE_POS_NOSEUP, "nose UP"),
+    (mavlink.ACCELCAL_VEHICLE_POS_BACK, "on its BACK"),
+)
+_MEASURE_US: Final = 1_500_000
+_ASK_AGAIN_US: Final = 1_000_000
+_PATIENCE_US: Final = 300_000_000
+"""Without an answer for this time the calibration ends; otherwise the vehicle could never arm again."""
+_FULL, _TRIM, _SIMPLE, _FORCED = 1, 2, 4, 76  # param5
+_GYRO, _BAROMETER = 1, 1  # param1, param3
+
+
+class ArdupilotCalibration(Microservice):
+    """All calibrations of an ArduPilot vehicle except the compass. They change nothing."""
+
+    coarse_timers = True
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._parts = parts
+        self._commander = parts.commander
+        self._position: int | None = None  # index of the requested position
+        self._measured_us: int | None = None
+        self._asked_us = 0
+        self._begun_us = 0
+
+    @property
+    def commands(self) -> Mapping[int, Handler]:
+        """PREFLIGHT_CALIBRATION, ACCELCAL_VEHICLE_POS, FIXED_MAG_CAL_YAW."""
+        return {
+            mavlink.MAV_CMD_PREFLIGHT_CALIBRATION: self._calibrate,
+            mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS: self._vehicle_position,
+        }
+
+    def handle(self, message: object, source: Source, time_us: int) -> bool:
+        """A COMMAND_ACK stands for "any key": old ground stations confirm a position with it."""
+        if self._position is None or not isinstance(message, mavlink.MAVLink_command_ack_message):
+            return False
+        if message.command in (0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS) and self._measured_us is None:
+            self._measure()
+        return True
+
+    def tick(self, time_us: int) -> None:
+        """Measure; request the next position, and repeat the request."""
+        if self._position is None:
+            return
+        if not self._commander.situation.health.accelerometer:
+            return self._end(mavlink.ACCELCAL_VEHICLE_POS_FAILED, "Calibration FAILED")
+        if self._measured_us is not None:
+            if time_us >= self._measured_us:
+                self._ask(self._position + 1)
+        elif time_us - self._begun_us >= _PATIENCE_US:
+            self._end(mavlink.ACCELCAL_VEHICLE_POS_FAILED, "Calibration FAILED")
+        elif time_us - self._asked_us >= _ASK_AGAIN_US:
+            self._send(_POSITIONS[self._position][0])
+
+    def _calibrate(self, command: Command, source: Source) -> Result:
+        if self._commander.armed:
+            self._parts.announce(_NOTICE, "Disarm to allow calibration")
+            return Result.FAILED
+        asked = (command.p1, command.p2, command.p3, command.p4, command.x, command.y, command.z)
+        gyro, _, barometer, _, accelerometer, *_ = (whole(value, 0) or 0 for value in asked)
+        if gyro == _GYRO:
+            return self._if_healthy(self._commander.situation.health.gyro)
+        if barometer == _BAROMETER:
+            return self._pressure()
+        if accelerometer == _FULL:
+            self._ask(0)
+            return Result.ACCEPTED
+        if accelerometer == _TRIM:
+            return self._trim()
+        if accelerometer in (_SIMPLE, _FORCED):
+            return self._if_healthy(self._commander.situation.health.accelerometer)
+        return Result.UNSUPPORTED
+
+    @staticmethod
+    def _if_healthy(healthy: bool) -> Result:
+        return Result.ACCEPTED if healthy else Result.FAILED
+
+    def _pressure(self) -> Result:
+        health = self._commander.situation.health
+        if not health.barometer:
+            return Result.FAILED
+        self._parts.announce(_INFO, "Calibrating barometer")
+        self._parts.announce(_INFO, "Barometer 1 calibration complete")
+        if health.has_airspeed:
+            self._parts.announce(_INFO, "Airspeed calibration started")
+        return Result.ACCEPTED
+
+    def _trim(self) -> Result:
+        """Trim the level attitude; fails when the vehicle is tilted by more than 10 degrees."""
+        roll, pitch, _ = self._commander.context.nav[nav.EULER_RAD].tolist()
+        if not self._commander.situation.health.accelerometer:
+            return Result.FAILED
+        if not max(abs(roll), abs(pitch)) <= math.radians(10.0):
+            self._parts.announce(_INFO, "trim over maximum of 10 degrees")
+            return Result.FAILED
+        self._parts.announce(_INFO, f"Trim OK: roll={roll:.2f} pitch={pitch:.2f} yaw=0.00")
+        return Result.ACCEPTED
+
+    # the accelerometer, one position after the other
+
+    def _vehicle_position(self, command: Command, source: Source) -> Result:
+        """ACCELCAL_VEHICLE_POS: the vehicle is in the requested position."""
+        if self._position is None or self._measured_us is not None:
+            return Result.FAILED
+        if whole(command.p1) != _POSITIONS[self._position][0]:
+            return Result.FAILED
+        self._measure()
+        return Result.ACCEPTED
+
+    def _measure(self) -> None:
+        self._measured_us = self._commander.time_us + _MEASURE_US
+
+    def _ask(self, index: int) -> None:
+        if index == len(_POSITIONS):
+            return self._end(mavlink.ACCELCAL_VEHICLE_POS_SUCCESS, "Calibration successful")
+        position, words = _POSITIONS[index]
+        self._position, self._measured_us = index, None
+        self._begun_us = self._commander.time_us
+        self._commander.situation.calibrating = True
+        self._parts.announce(_CRITICAL, f"Place vehicle {words} and press any key.")
+        self._send(position)
+
+    def _send(self, position: int) -> None:
+        self._asked_us = self._commander.time_us
+        send_to_all(
+            self._parts.broadcast,
+            mavlink.MAVLink_command_long_message(
+                0, 0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS, 0, float(position), *(0.0,) * 6
+            ),
+        )
+
+    def _end(self, outcome: int, text: str) -> None:
+        self._position = None
+        self._commander.situation.calibrating = False
+        self._parts.announce(_CRITICAL, text)
+        self._send(outcome)

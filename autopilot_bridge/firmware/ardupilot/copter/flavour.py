@@ -1,0 +1,160 @@
+"""ArduCopter 4.6.3 (docs/firmware/ardupilot.md, sections 1, 3 and 6)."""
+
+from types import MappingProxyType
+from typing import Final
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
+from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.control.multicopter import MulticopterController
+from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
+from autopilot_bridge.firmware.ardupilot.copter import mapping as ardupilot_mapping
+from autopilot_bridge.firmware.ardupilot.copter import modes as ardupilot_modes
+from autopilot_bridge.firmware.ardupilot.copter.parameters import ARDUPILOT_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.copter.texts import notices
+from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
+from autopilot_bridge.firmware.gps_source import ardupilot_gps_source
+from autopilot_bridge.firmware.mapping import airframe_overrides
+from autopilot_bridge.firmware.texts import Notice, Severity
+from autopilot_bridge.flight.multicopter.land_detector import LandDetector
+from autopilot_bridge.flight.plan_rules import ARDUCOPTER_PLANS
+from autopilot_bridge.services.channel import AddressRule, ardupilot_address_rule
+from flightsim.airframe import AirframeKind
+
+_FLOWN: Final = frozenset(
+    {
+        FlightMode.STABILIZED,
+        FlightMode.ACRO,
+        FlightMode.ALTITUDE,
+        FlightMode.MISSION,
+        FlightMode.GUIDED,
+        FlightMode.HOLD,
+        FlightMode.RETURN,
+        FlightMode.CIRCLE,
+        FlightMode.LAND,
+        FlightMode.POSHOLD,
+        FlightMode.BRAKE,
+        FlightMode.GUIDED_NOGPS,
+        FlightMode.FOLLOW,
+    }
+)
+_GROUND_ONLY: Final = frozenset(
+    {
+        FlightMode.DRIFT,
+        FlightMode.THROW,
+        FlightMode.AVOID,
+        FlightMode.SMART_RETURN,
+        FlightMode.ZIGZAG,
+    }
+)
+"""Accepted on the ground as the firmware does; not flown here, so not armed in or entered in flight."""
+
+POLICY: Final = CommanderPolicy(
+    boot_mode=FlightMode.STABILIZED,
+    heartbeat_start_s=0.0,
+    boot_s=3.0,
+    armable_s=23.4,
+    position_ready_s=41.5,
+    home_s=19.9,
+    armable_modes=frozenset(
+        {
+            FlightMode.STABILIZED,
+            FlightMode.ACRO,
+            FlightMode.ALTITUDE,
+            FlightMode.GUIDED,
+            FlightMode.HOLD,
+            FlightMode.POSHOLD,
+            FlightMode.GUIDED_NOGPS,
+        }
+    ),
+    ground_modes=_FLOWN | _GROUND_ONLY,
+    flown_modes=_FLOWN,
+    kept_after_disarm=frozenset(),
+    takeoff_mode=None,
+    reposition_mode=FlightMode.GUIDED,
+    failsafe_disarms_landed=True,
+    mission_return_is_mode=False,
+    mission_waits_for_start=True,
+    mission_first_item=1,
+    manual_control_always=True,
+    recovers=False,
+    fallback_land=FlightMode.LAND,
+    critical_on_warning=True,
+    active_when_landed=False,
+    standby_when_armable=False,
+    preflight_disarm_extra_s=0.0,
+    disarm_landed_everywhere=False,
+    prearm_report_s=30.0,
+    arming_denied=Result.FAILED,
+    mode_denied=Result.FAILED,
+    disarm_in_air_denied=Result.FAILED,
+    gcs_needed_to_arm=False,
+    mission_restart=MissionRestart.AT_DISARM,
+    force_arm_skips_checks=True,
+    fence_in_status=True,
+    plans=ARDUCOPTER_PLANS,
+)
+
+IDENTITY: Final = Identity(
+    product="ArduCopter V4.6.3 (3fc7011a)",
+    capabilities=0xFBEF,
+    flight_sw_version=0x040603FF,
+    middleware_sw_version=0,
+    os_sw_version=0,
+    board_version=0,
+    vendor_id=0,
+    product_id=0,
+    uid=0,
+    flight_custom_version=b"3fc7011a",
+    uid2=b"flightstack-sitl".ljust(18, b"\0"),
+)
+
+
+def _command_address(system_id: int) -> AddressRule:
+    return ardupilot_address_rule(system_id)
+
+
+ARDUPILOT: Final = Flavour(
+    name="ardupilot",
+    kind=AirframeKind.MULTICOPTER,
+    autopilot=3,  # MAV_AUTOPILOT_ARDUPILOTMEGA
+    vehicle_type=2,  # MAV_TYPE_QUADROTOR
+    custom_modes=ardupilot_modes.CUSTOM_MODES,
+    mode_names=ardupilot_modes.MODE_NAMES,
+    base_mode=ardupilot_modes.base_mode,
+    policy=POLICY,
+    notices=notices,
+    banner=(
+        Notice(Severity.INFO, IDENTITY.product),
+        Notice(Severity.INFO, "flightstack SITL"),
+        Notice(Severity.INFO, "Frame: QUAD/X"),
+    ),
+    identity=IDENTITY,
+    command_address=_command_address,
+    parameter_definitions=lambda: ARDUPILOT_PARAMETERS,
+    airframe=airframe_overrides(MulticopterParameters(), ardupilot_mapping.CONTROLLER, ARDUPILOT_PARAMETERS),
+    airframe_of=None,
+    launch_parameters=MappingProxyType({}),
+    sensor_bits=SensorBits(
+        present=0x5371FC2F,
+        enabled=0x52619C2F,
+        enabled_armed=0x5361FC2F,
+        health=0x57719C2F,
+        health_armed=0x5771FC2F,
+    ),
+    has_airspeed=False,
+    controller=MulticopterController,
+    vehicle_tasks=MulticopterTasks,
+    land_detector=LandDetector,
+    commander_parameters=ardupilot_mapping.commander_parameters,
+    flight_parameters=ardupilot_mapping.flight_parameters,
+    controller_parameters=ardupilot_mapping.controller_parameters,
+    navigation_parameters=ardupilot_mapping.navigation_parameters,
+    text_needs_heartbeat=True,
+    heartbeat_on_mode_change=True,
+    sends_events=False,
+    bytewise_parameters=False,
+    reboot_starts_again=True,
+    gps_source=ardupilot_gps_source,
+)

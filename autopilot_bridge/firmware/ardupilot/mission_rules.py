@@ -1,0 +1,190 @@
+"""ArduPilot's rules for mission items: commands, frames and how items are read back."""
+
+from dataclasses import replace
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.mission_wire import GEODETIC_FRAMES, GLOBAL_FRAMES, RELATIVE_FRAMES
+from autopilot_bridge.services.plans.rules import (
+    check_fence,
+    check_finite,
+    check_params,
+    check_position,
+    check_rally,
+    check_special,
+)
+
+POSITION_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TURNS,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_CONTINUE_AND_CHANGE_ALT,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+        mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,
+        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+        mavlink.MAV_CMD_NAV_VTOL_LAND,
+        mavlink.MAV_CMD_DO_SET_HOME,
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_RETURN_PATH_START,
+        mavlink.MAV_CMD_DO_GO_AROUND,
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+    )
+)
+"""Mission commands with a position."""
+
+PLAIN_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        mavlink.MAV_CMD_NAV_DELAY,
+        mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
+        mavlink.MAV_CMD_CONDITION_DELAY,
+        mavlink.MAV_CMD_CONDITION_DISTANCE,
+        mavlink.MAV_CMD_CONDITION_YAW,
+        mavlink.MAV_CMD_DO_JUMP,
+        mavlink.MAV_CMD_JUMP_TAG,
+        mavlink.MAV_CMD_DO_JUMP_TAG,
+        mavlink.MAV_CMD_DO_CHANGE_SPEED,
+        mavlink.MAV_CMD_DO_SET_RELAY,
+        mavlink.MAV_CMD_DO_REPEAT_RELAY,
+        mavlink.MAV_CMD_DO_SET_SERVO,
+        mavlink.MAV_CMD_DO_REPEAT_SERVO,
+        mavlink.MAV_CMD_DO_SET_REVERSE,
+        mavlink.MAV_CMD_DO_SET_ROI_NONE,
+        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        mavlink.MAV_CMD_DO_FENCE_ENABLE,
+        mavlink.MAV_CMD_DO_PARACHUTE,
+        mavlink.MAV_CMD_DO_GRIPPER,
+        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,
+        mavlink.MAV_CMD_DO_SPRAYER,
+        mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
+        mavlink.MAV_CMD_DO_AUX_FUNCTION,
+        mavlink.MAV_CMD_DO_ENGINE_CONTROL,
+        mavlink.MAV_CMD_SET_CAMERA_ZOOM,
+        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
+        mavlink.MAV_CMD_SET_CAMERA_SOURCE,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_DO_WINCH,
+    )
+)
+"""Mission commands without a position; their frame is not checked.
+
+The firmware supports some more that are not flown here, so they are refused: NAV_GUIDED_ENABLE with
+DO_GUIDED_LIMITS, NAV_SCRIPT_TIME, NAV_ATTITUDE_TIME, NAV_PAYLOAD_PLACE, DO_INVERTED_FLIGHT.
+"""
+
+PASSED_OVER: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_SET_YAW_SPEED,
+        mavlink.MAV_CMD_DO_SET_REVERSE,
+        mavlink.MAV_CMD_DO_PARACHUTE,
+        mavlink.MAV_CMD_DO_SPRAYER,
+        mavlink.MAV_CMD_DO_SEND_SCRIPT_MESSAGE,
+        mavlink.MAV_CMD_DO_ENGINE_CONTROL,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
+        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,  # for planes
+    )
+)
+"""Accepted and skipped on vehicles without the device, as in the firmware."""
+
+AIRCRAFT_REFUSED: Final = frozenset((mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT,))
+"""Items that aircraft refuse."""
+
+_MARKERS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_RETURN_PATH_START,
+        mavlink.MAV_CMD_DO_GO_AROUND,
+    )
+)
+"""Commands whose position is optional: ground stations send them in MAV_FRAME_MISSION."""
+
+_PLACE_OPTIONAL: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_RETURN_PATH_START,
+        mavlink.MAV_CMD_DO_GO_AROUND,
+    )
+)
+"""Ground stations send these without a position, in MAV_FRAME_MISSION (QGroundControl's landing pattern)."""
+
+_YAW_IN_PARAM4: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+    )
+)
+
+
+class ArdupilotItemRules:
+    """`ItemRules` of ArduPilot 4.6.
+
+    Args:
+        aircraft: for ArduPlane.
+    """
+
+    def __init__(self, *, aircraft: bool = False) -> None:
+        self._refused = AIRCRAFT_REFUSED if aircraft else frozenset()
+
+    def check(self, item: MissionItem, mission_type: MissionType, seq: int, count: int) -> int:
+        if mission_type is MissionType.FENCE:
+            return check_fence(item)
+        if mission_type is MissionType.RALLY:
+            return check_rally(item)
+        if seq == 0:  # home: its uploaded values are replaced
+            return int(mavlink.MAV_MISSION_ACCEPTED)
+        if item.command in self._refused:
+            return int(mavlink.MAV_MISSION_UNSUPPORTED)
+        placeless = item.command in _MARKERS and item.frame == mavlink.MAV_FRAME_MISSION
+        if item.command in POSITION_COMMANDS and not placeless:
+            if item.frame not in GEODETIC_FRAMES and not _without_place(item):
+                return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+            result = self._check_params(item) or check_position(item)
+        elif item.command in PLAIN_COMMANDS or placeless:
+            result = self._check_params(item) or check_finite(item)
+        else:
+            return int(mavlink.MAV_MISSION_UNSUPPORTED)
+        return result or check_special(item, seq, count)
+
+    def stored(self, item: MissionItem) -> MissionItem:
+        return replace(item, frame=mavlink.MAV_FRAME_GLOBAL) if _without_place(item) else item
+
+    def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
+        if item.frame not in GEODETIC_FRAMES:
+            return replace(item, frame=mavlink.MAV_FRAME_GLOBAL, x=0.0, y=0.0)
+        if item.command in PLAIN_COMMANDS or item.frame in GLOBAL_FRAMES:
+            frame = mavlink.MAV_FRAME_GLOBAL
+        elif item.frame in RELATIVE_FRAMES:
+            frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+        else:
+            frame = mavlink.MAV_FRAME_GLOBAL_TERRAIN_ALT
+        return replace(item, frame=frame)
+
+    @staticmethod
+    def _check_params(item: MissionItem) -> int:
+        if item.command == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW:  # NaN: no angle, or no rate
+            return check_params(item, nan_allowed=(True, True, True, True))
+        vtol_land = item.command == mavlink.MAV_CMD_NAV_VTOL_LAND
+        yaw_may_be_nan = vtol_land or item.command in _YAW_IN_PARAM4
+        return check_params(item, nan_allowed=(False, False, vtol_land, yaw_may_be_nan))
+
+
+def _without_place(item: MissionItem) -> bool:
+    return item.frame == mavlink.MAV_FRAME_MISSION and item.command in _PLACE_OPTIONAL

@@ -1,0 +1,147 @@
+"""ArduPlane 4.6.3 (docs/firmware/ardupilot.md, sections 1, 3 and 7)."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Final
+
+from autopilot_bridge.commander.events import SystemStatus
+from autopilot_bridge.commander.fixed_wing_tasks import FixedWingTasks
+from autopilot_bridge.commander.modes import MODE_NEEDS, FlightMode, Need
+from autopilot_bridge.commander.policy import CommanderPolicy
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.control.fixed_wing import FixedWingController
+from autopilot_bridge.firmware.ardupilot.copter.flavour import ARDUPILOT
+from autopilot_bridge.firmware.ardupilot.plane import mapping as ardupilot_plane_mapping
+from autopilot_bridge.firmware.ardupilot.plane import modes as ardupilot_plane_modes
+from autopilot_bridge.firmware.ardupilot.plane.parameters import ARDUPILOT_PLANE_PARAMETERS
+from autopilot_bridge.firmware.ardupilot.plane.texts import notices
+from autopilot_bridge.firmware.flavour import SensorBits
+from autopilot_bridge.firmware.texts import Notice, Severity
+from autopilot_bridge.flight.fixed_wing import LandDetector
+from autopilot_bridge.flight.plan_rules import ARDUPLANE_PLANS
+from flightsim.airframe import AirframeKind, LaunchKind
+
+_FLOWN: Final = frozenset(
+    {
+        FlightMode.MANUAL,
+        FlightMode.CIRCLE,
+        FlightMode.STABILIZED,
+        FlightMode.TRAINING,
+        FlightMode.ACRO,
+        FlightMode.FBWA,
+        FlightMode.FBWB,
+        FlightMode.CRUISE,
+        FlightMode.AUTOTUNE,
+        FlightMode.MISSION,
+        FlightMode.RETURN,
+        FlightMode.HOLD,
+        FlightMode.TAKEOFF,
+        FlightMode.AVOID,
+        FlightMode.GUIDED,
+    }
+)
+_NOT_ARMABLE: Final = frozenset({FlightMode.RETURN, FlightMode.HOLD, FlightMode.CIRCLE, FlightMode.AVOID})
+
+MODE_NEEDS_BY_DEAD_RECKONING: Final[Mapping[FlightMode, Need]] = MappingProxyType(
+    {mode: needs & ~(Need.POSITION | Need.MISSION) for mode, needs in MODE_NEEDS.items()}
+)
+"""ArduPlane refuses no mode in flight without a position: it then continues by dead reckoning."""
+
+POLICY: Final = CommanderPolicy(
+    boot_mode=FlightMode.MANUAL,
+    heartbeat_start_s=0.0,
+    boot_s=1.7,
+    armable_s=1.7,
+    position_ready_s=20.4,
+    home_s=19.4,
+    armable_modes=_FLOWN - _NOT_ARMABLE,
+    ground_modes=_FLOWN,
+    flown_modes=_FLOWN,
+    kept_after_disarm=frozenset(),
+    takeoff_mode=None,
+    reposition_mode=FlightMode.GUIDED,
+    mission_return_is_mode=True,
+    mission_waits_for_start=False,
+    mission_first_item=1,
+    manual_control_always=True,
+    recovers=False,
+    fallback_land=None,
+    critical_on_warning=True,
+    active_when_landed=False,
+    standby_when_armable=False,
+    preflight_disarm_extra_s=0.0,
+    disarm_landed_everywhere=False,
+    prearm_report_s=30.0,
+    arming_denied=Result.FAILED,
+    mode_denied=Result.FAILED,
+    disarm_in_air_denied=Result.FAILED,
+    gcs_needed_to_arm=False,
+    force_arm_skips_checks=True,
+    mode_needs=MODE_NEEDS_BY_DEAD_RECKONING,
+    position_needed_to_arm=True,
+    initialising_mode=FlightMode.INITIALISING,
+    boot_status=SystemStatus.CALIBRATING,
+    takeoff_by_command=False,
+    orbit_mode=FlightMode.HOLD,
+    failsafe_lasts=True,
+    landing_ignores_links=True,
+    radio_restores_mode=True,
+    ground_speed_apart=True,
+    mission_end_mode=FlightMode.RETURN,
+    landing_blocks_arming=True,
+    fence_in_status=True,
+    plans=ARDUPLANE_PLANS,
+    fence_bounds_targets=False,
+)
+
+IDENTITY: Final = replace(
+    ARDUPILOT.identity,
+    product="ArduPlane V4.6.3 (3fc7011a)",
+    capabilities=0xF36F,
+    flight_sw_version=0x040603FF,
+)
+
+LAUNCH_PARAMETERS: Final[Mapping[LaunchKind, Mapping[str, float]]] = MappingProxyType(
+    {
+        LaunchKind.RUNWAY: MappingProxyType({"TKOFF_THR_MINACC": 0.0, "TKOFF_THR_DELAY": 2.0}),
+        LaunchKind.CATAPULT: MappingProxyType({"TKOFF_THR_MINACC": 15.0, "TKOFF_THR_DELAY": 2.0}),
+        LaunchKind.HAND: MappingProxyType({"TKOFF_THR_MINACC": 9.0, "TKOFF_THR_DELAY": 2.0}),
+    }
+)
+
+ARDUPILOT_PLANE: Final = replace(
+    ARDUPILOT,
+    kind=AirframeKind.FIXED_WING,
+    vehicle_type=1,  # MAV_TYPE_FIXED_WING
+    custom_modes=ardupilot_plane_modes.CUSTOM_MODES,
+    mode_names=ardupilot_plane_modes.MODE_NAMES,
+    base_mode=ardupilot_plane_modes.base_mode,
+    policy=POLICY,
+    notices=notices,
+    banner=(
+        Notice(Severity.INFO, IDENTITY.product),
+        Notice(Severity.INFO, "flightstack SITL"),
+    ),
+    identity=IDENTITY,
+    parameter_definitions=lambda: ARDUPILOT_PLANE_PARAMETERS,
+    airframe=MappingProxyType({}),
+    airframe_of=ardupilot_plane_mapping.airframe_overrides,
+    launch_parameters=LAUNCH_PARAMETERS,
+    sensor_bits=SensorBits(
+        present=0x1361FC3F,
+        enabled=0x1261803F,
+        enabled_armed=0x1361FC3F,
+        health=0x1331803F,
+        health_armed=0x1331FC3F,
+    ),
+    has_airspeed=True,
+    controller=FixedWingController,
+    vehicle_tasks=FixedWingTasks,
+    land_detector=LandDetector,
+    commander_parameters=ardupilot_plane_mapping.commander_parameters,
+    flight_parameters=ardupilot_plane_mapping.flight_parameters,
+    controller_parameters=ardupilot_plane_mapping.controller_parameters,
+    navigation_parameters=ardupilot_plane_mapping.navigation_parameters,
+    text_needs_heartbeat=False,
+)

@@ -1,0 +1,145 @@
+"""PX4 v1.16.1 for a multicopter (docs/firmware/px4.md, sections 3 to 9)."""
+
+from types import MappingProxyType
+from typing import Final
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.multicopter_tasks import MulticopterTasks
+from autopilot_bridge.commander.policy import CommanderPolicy, MissionRestart
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.control.multicopter import MulticopterController
+from autopilot_bridge.control.multicopter.parameters import MulticopterParameters
+from autopilot_bridge.firmware.flavour import Flavour, Identity, SensorBits
+from autopilot_bridge.firmware.mapping import airframe_overrides
+from autopilot_bridge.firmware.px4.copter import mapping as px4_mapping
+from autopilot_bridge.firmware.px4.copter import modes as px4_modes
+from autopilot_bridge.firmware.px4.copter.parameters import PX4_PARAMETERS
+from autopilot_bridge.firmware.px4.copter.texts import notices
+from autopilot_bridge.flight.multicopter.land_detector import LandDetector
+from autopilot_bridge.services.channel import AddressRule
+from flightsim.airframe import AirframeKind
+
+_AUTOPILOT_COMPONENT: Final = 1
+
+_SELECTABLE: Final = frozenset(
+    {
+        FlightMode.MANUAL,
+        FlightMode.STABILIZED,
+        FlightMode.ACRO,
+        FlightMode.ALTITUDE,
+        FlightMode.POSITION,
+        FlightMode.POSITION_SLOW,
+        FlightMode.HOLD,
+        FlightMode.TAKEOFF,
+        FlightMode.MISSION,
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.FOLLOW,
+        FlightMode.PRECISION_LAND,
+        FlightMode.ORBIT,
+        FlightMode.OFFBOARD,
+    }
+)
+_PREVENT_ARMING: Final = frozenset(
+    {
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.PRECISION_LAND,
+        FlightMode.FOLLOW,
+        FlightMode.ORBIT,
+        FlightMode.DESCEND,
+    }
+)
+
+POLICY: Final = CommanderPolicy(
+    boot_mode=FlightMode.HOLD,
+    heartbeat_start_s=1.1,
+    boot_s=2.1,
+    armable_s=3.66,
+    position_ready_s=3.66,
+    home_s=3.03,
+    armable_modes=_SELECTABLE - _PREVENT_ARMING,
+    ground_modes=_SELECTABLE,
+    flown_modes=_SELECTABLE,
+    kept_after_disarm=_SELECTABLE - _PREVENT_ARMING,
+    takeoff_mode=FlightMode.TAKEOFF,
+    reposition_mode=FlightMode.HOLD,
+    mission_return_is_mode=True,
+    mission_waits_for_start=False,
+    mission_first_item=0,
+    manual_control_always=False,
+    recovers=True,
+    fallback_land=FlightMode.DESCEND,
+    critical_on_warning=False,
+    active_when_landed=True,
+    standby_when_armable=True,
+    preflight_disarm_extra_s=1.0,
+    disarm_landed_everywhere=True,
+    prearm_report_s=0.0,
+    arming_denied=Result.TEMPORARILY_REJECTED,
+    mode_denied=Result.TEMPORARILY_REJECTED,
+    disarm_in_air_denied=Result.TEMPORARILY_REJECTED,
+    gcs_needed_to_arm=True,
+    force_arm_skips_checks=False,
+    gps_shown_when_used=True,
+    mission_end_mode=FlightMode.HOLD,
+    mission_restart=MissionRestart.AFTER_LAST_ITEM,
+)
+
+IDENTITY: Final = Identity(
+    product="PX4 Autopilot v1.16.1",
+    capabilities=0xE8FF,
+    flight_sw_version=0x011001FF,
+    middleware_sw_version=0x011001FF,
+    os_sw_version=0,
+    board_version=1,
+    vendor_id=0,
+    product_id=0,
+    uid=5283920058631409231,
+    flight_custom_version=(bytes.fromhex("94cb2012") + bytes(4))[::-1],
+    uid2=bytes(18),
+)
+
+
+def _command_address(system_id: int) -> AddressRule:
+    return AddressRule(system_id=system_id, component_ids=frozenset({_AUTOPILOT_COMPONENT}), any_system=False)
+
+
+PX4: Final = Flavour(
+    name="px4",
+    kind=AirframeKind.MULTICOPTER,
+    autopilot=12,  # MAV_AUTOPILOT_PX4
+    vehicle_type=2,  # MAV_TYPE_QUADROTOR
+    custom_modes=px4_modes.CUSTOM_MODES,
+    mode_names=px4_modes.MODE_NAMES,
+    base_mode=px4_modes.base_mode,
+    listed_modes=px4_modes.LISTED_MODES,
+    policy=POLICY,
+    notices=notices,
+    banner=(),
+    identity=IDENTITY,
+    command_address=_command_address,
+    parameter_definitions=lambda: PX4_PARAMETERS,
+    airframe=airframe_overrides(MulticopterParameters(), px4_mapping.CONTROLLER, PX4_PARAMETERS),
+    airframe_of=None,
+    launch_parameters=MappingProxyType({}),
+    sensor_bits=SensorBits(
+        present=0x0300402F,
+        enabled=0x0301402F,
+        enabled_armed=0x0301402F,
+        health=0x1320C83F,
+        health_armed=0x1320C83F,
+    ),
+    has_airspeed=False,
+    controller=MulticopterController,
+    vehicle_tasks=MulticopterTasks,
+    land_detector=LandDetector,
+    commander_parameters=px4_mapping.commander_parameters,
+    flight_parameters=px4_mapping.flight_parameters,
+    controller_parameters=px4_mapping.controller_parameters,
+    navigation_parameters=px4_mapping.navigation_parameters,
+    text_needs_heartbeat=False,
+    heartbeat_on_mode_change=False,
+    sends_events=True,
+    bytewise_parameters=True,
+)

@@ -1,0 +1,161 @@
+"""PX4 multicopter modes: custom_mode numbers, names and base_mode (docs/firmware/px4.md, section 4)."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.modes import STICK_MODES, FlightMode
+from autopilot_bridge.firmware.flavour import ListedMode, ModeDisplay
+
+MAIN_MANUAL: Final = 1
+MAIN_ALTITUDE: Final = 2
+MAIN_POSITION: Final = 3
+MAIN_AUTO: Final = 4
+MAIN_ACRO: Final = 5
+MAIN_OFFBOARD: Final = 6
+MAIN_STABILIZED: Final = 7
+MAIN_TERMINATION: Final = 10
+
+_CUSTOM: Final = 0x01
+_AUTO: Final = 0x04
+_GUIDED: Final = 0x08
+_STABILIZE: Final = 0x10
+_MANUAL_INPUT: Final = 0x40
+_ARMED: Final = 0x80
+
+
+def custom_mode(main: int, sub: int = 0) -> int:
+    """HEARTBEAT.custom_mode of a PX4 main and sub mode."""
+    return main << 16 | sub << 24
+
+
+CUSTOM_MODES: Final[Mapping[FlightMode, int]] = MappingProxyType(
+    {
+        FlightMode.MANUAL: custom_mode(MAIN_MANUAL),
+        FlightMode.ALTITUDE: custom_mode(MAIN_ALTITUDE),
+        FlightMode.POSITION: custom_mode(MAIN_POSITION),
+        FlightMode.ORBIT: custom_mode(MAIN_POSITION, 1),
+        FlightMode.POSITION_SLOW: custom_mode(MAIN_POSITION, 2),
+        FlightMode.TAKEOFF: custom_mode(MAIN_AUTO, 2),
+        FlightMode.HOLD: custom_mode(MAIN_AUTO, 3),
+        FlightMode.MISSION: custom_mode(MAIN_AUTO, 4),
+        FlightMode.RETURN: custom_mode(MAIN_AUTO, 5),
+        FlightMode.LAND: custom_mode(MAIN_AUTO, 6),
+        FlightMode.DESCEND: custom_mode(MAIN_AUTO, 6),  # shown as AUTO.LAND
+        FlightMode.FOLLOW: custom_mode(MAIN_AUTO, 8),
+        FlightMode.PRECISION_LAND: custom_mode(MAIN_AUTO, 9),
+        FlightMode.ACRO: custom_mode(MAIN_ACRO),
+        FlightMode.OFFBOARD: custom_mode(MAIN_OFFBOARD),
+        FlightMode.STABILIZED: custom_mode(MAIN_STABILIZED),
+        FlightMode.TERMINATION: custom_mode(MAIN_TERMINATION),
+    }
+)
+
+MODE_NAMES: Final[Mapping[FlightMode, str]] = MappingProxyType(
+    {
+        FlightMode.MANUAL: "Manual",
+        FlightMode.ALTITUDE: "Altitude",
+        FlightMode.POSITION: "Position",
+        FlightMode.ORBIT: "Orbit",
+        FlightMode.POSITION_SLOW: "Position Slow",
+        FlightMode.TAKEOFF: "Takeoff",
+        FlightMode.HOLD: "Hold",
+        FlightMode.MISSION: "Mission",
+        FlightMode.RETURN: "Return",
+        FlightMode.LAND: "Land",
+        FlightMode.DESCEND: "Descend",
+        FlightMode.FOLLOW: "Follow Target",
+        FlightMode.PRECISION_LAND: "Precision Landing",
+        FlightMode.ACRO: "Acro",
+        FlightMode.OFFBOARD: "Offboard",
+        FlightMode.STABILIZED: "Stabilized",
+        FlightMode.TERMINATION: "Termination",
+    }
+)
+
+_ADVANCED: Final = mavlink.MAV_MODE_PROPERTY_ADVANCED
+_NOT_SELECTABLE: Final = mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+
+
+def _own(name: str, main: int, sub: int = 0, properties: int = _ADVANCED) -> ListedMode:
+    return ListedMode(custom_mode(main, sub), name, 0, properties)
+
+
+def _standard(standard_mode: int, main: int, sub: int = 0, properties: int = _ADVANCED) -> ListedMode:
+    return ListedMode(custom_mode(main, sub), "", standard_mode, properties)
+
+
+LISTED_MODES: Final = (
+    _own("Manual", MAIN_MANUAL),
+    _standard(mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD, MAIN_ALTITUDE, properties=0),
+    _standard(mavlink.MAV_STANDARD_MODE_POSITION_HOLD, MAIN_POSITION, properties=0),
+    _standard(mavlink.MAV_STANDARD_MODE_MISSION, MAIN_AUTO, 4),
+    _own("Hold", MAIN_AUTO, 3),
+    _standard(mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY, MAIN_AUTO, 5),
+    _own("Position Slow", MAIN_POSITION, 2),
+    _own("Acro", MAIN_ACRO),
+    _own("Termination", MAIN_TERMINATION, properties=_ADVANCED | _NOT_SELECTABLE),
+    _own("Offboard", MAIN_OFFBOARD),
+    _own("Stabilized", MAIN_STABILIZED),
+    _standard(mavlink.MAV_STANDARD_MODE_TAKEOFF, MAIN_AUTO, 2),
+    _standard(mavlink.MAV_STANDARD_MODE_LAND, MAIN_AUTO, 6),
+    _own("Follow Target", MAIN_AUTO, 8),
+    _own("Precision Landing", MAIN_AUTO, 9),
+    _standard(mavlink.MAV_STANDARD_MODE_ORBIT, MAIN_POSITION, 1),
+    _own("VTOL Takeoff", MAIN_AUTO, 10),
+    *(_own("(Mode not available)", MAIN_AUTO, sub, _NOT_SELECTABLE) for sub in range(11, 19)),
+)
+"""AVAILABLE_MODES of a multicopter, as PX4 1.16.1 sends it; the last eight are for external modes."""
+
+_AUTO_SUB_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
+    {
+        0: FlightMode.MISSION,
+        2: FlightMode.TAKEOFF,
+        3: FlightMode.HOLD,
+        4: FlightMode.MISSION,
+        5: FlightMode.RETURN,
+        6: FlightMode.LAND,
+        8: FlightMode.FOLLOW,
+        9: FlightMode.PRECISION_LAND,
+    }
+)
+_MAIN_MODES: Final[Mapping[int, FlightMode]] = MappingProxyType(
+    {
+        MAIN_MANUAL: FlightMode.MANUAL,
+        MAIN_ALTITUDE: FlightMode.ALTITUDE,
+        MAIN_ACRO: FlightMode.ACRO,
+        MAIN_OFFBOARD: FlightMode.OFFBOARD,
+        MAIN_STABILIZED: FlightMode.STABILIZED,
+    }
+)
+
+
+def commanded_mode(main: int, sub: int) -> FlightMode | None:
+    """The mode that DO_SET_MODE or SET_MODE requests; None when no mode has these numbers.
+
+    Orbit is entered by DO_ORBIT only: its sub mode selects plain Position. Termination can't be commanded.
+    """
+    if main == MAIN_AUTO:
+        return _AUTO_SUB_MODES.get(sub)
+    if main == MAIN_POSITION:
+        return FlightMode.POSITION_SLOW if sub == 2 else FlightMode.POSITION
+    return _MAIN_MODES.get(main)
+
+
+def base_mode(display: ModeDisplay) -> int:
+    """HEARTBEAT.base_mode."""
+    bits = _CUSTOM | (_ARMED if display.armed else 0)
+    mode = display.mode
+    if mode is FlightMode.ACRO:
+        return bits | _MANUAL_INPUT
+    if mode in STICK_MODES:
+        return bits | _MANUAL_INPUT | _STABILIZE
+    if mode is FlightMode.OFFBOARD:
+        return bits | (_STABILIZE if display.attitude_setpoints else 0)
+    if mode in (FlightMode.ORBIT, FlightMode.FOLLOW):
+        return bits | _STABILIZE
+    if mode is FlightMode.TERMINATION:
+        return bits
+    return bits | _STABILIZE | _GUIDED | _AUTO

@@ -1,0 +1,174 @@
+"""PX4's rules for mission items: commands, frames, how an item is stored and read back."""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.mission_plan import MissionItem, MissionType
+from autopilot_bridge.mission_wire import GLOBAL_FRAMES, RELATIVE_FRAMES
+from autopilot_bridge.services.plans.rules import (
+    ACCEPTED,
+    CIRCLE_COMMANDS,
+    POLYGON_COMMANDS,
+    check_fence,
+    check_finite,
+    check_params,
+    check_position,
+    check_rally,
+    check_special,
+)
+
+POSITION_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_NAV_WAYPOINT,
+        mavlink.MAV_CMD_NAV_LOITER_UNLIM,
+        mavlink.MAV_CMD_NAV_LOITER_TIME,
+        mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
+        mavlink.MAV_CMD_NAV_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+        mavlink.MAV_CMD_NAV_VTOL_TAKEOFF,
+        mavlink.MAV_CMD_NAV_VTOL_LAND,
+    )
+)
+"""Mission commands accepted in a global frame."""
+
+PLAIN_COMMANDS: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_JUMP,
+        mavlink.MAV_CMD_NAV_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_WINCH,
+        mavlink.MAV_CMD_DO_GRIPPER,
+        mavlink.MAV_CMD_DO_CHANGE_SPEED,
+        mavlink.MAV_CMD_DO_SET_HOME,
+        mavlink.MAV_CMD_DO_LAND_START,
+        mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_MOUNT_CONFIGURE,
+        mavlink.MAV_CMD_DO_MOUNT_CONTROL,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+        mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE,
+        mavlink.MAV_CMD_SET_CAMERA_FOCUS,
+        mavlink.MAV_CMD_SET_CAMERA_MODE,
+        mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+        mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+        mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+        mavlink.MAV_CMD_DO_CONTROL_VIDEO,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_NAV_DELAY,
+        mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
+        mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
+        mavlink.MAV_CMD_DO_SET_ROI_NONE,
+        mavlink.MAV_CMD_CONDITION_DELAY,
+        mavlink.MAV_CMD_CONDITION_DISTANCE,
+        mavlink.MAV_CMD_DO_SET_ACTUATOR,
+        mavlink.MAV_CMD_DO_AUTOTUNE_ENABLE,
+        mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+    )
+)
+"""Mission commands accepted in MAV_FRAME_MISSION.
+
+The firmware supports CONDITION_GATE and OBLIQUE_SURVEY too, which are not flown here, so they are refused.
+"""
+
+PASSED_OVER: Final = frozenset(
+    (
+        mavlink.MAV_CMD_CONDITION_DELAY,
+        mavlink.MAV_CMD_CONDITION_DISTANCE,
+        mavlink.MAV_CMD_DO_VTOL_TRANSITION,
+        mavlink.MAV_CMD_DO_WINCH,
+    )
+)
+"""Accepted and skipped, as in the firmware."""
+
+_POSITION_FRAMES: Final = GLOBAL_FRAMES | RELATIVE_FRAMES
+_UNSET_EVERYWHERE: Final = (True, True, True, True)
+
+
+class Px4ItemRules:
+    """`ItemRules` of PX4 1.16."""
+
+    def check(self, item: MissionItem, mission_type: MissionType, seq: int, count: int) -> int:
+        if item.frame not in _POSITION_FRAMES and item.frame != mavlink.MAV_FRAME_MISSION:
+            return int(mavlink.MAV_MISSION_UNSUPPORTED_FRAME)
+        if mission_type is MissionType.FENCE:
+            return check_fence(item, empty_circles=True)
+        if mission_type is MissionType.RALLY:
+            return check_rally(item)
+        if item.frame == mavlink.MAV_FRAME_MISSION:
+            if item.command not in PLAIN_COMMANDS:
+                return int(mavlink.MAV_MISSION_UNSUPPORTED)
+            result = check_finite(item)
+        else:
+            if item.command not in POSITION_COMMANDS:
+                return int(mavlink.MAV_MISSION_UNSUPPORTED)
+            result = check_params(item, nan_allowed=_UNSET_EVERYWHERE) or check_position(item)
+        return result or check_special(item, seq, count) or self._check_roi(item)
+
+    def stored(self, item: MissionItem) -> MissionItem:
+        """Only the parameters that PX4 stores of an item with a position; the others read back as 0."""
+        if item.frame == mavlink.MAV_FRAME_MISSION:
+            return item
+        p1 = p2 = p3 = p4 = 0.0
+        match item.command:
+            case mavlink.MAV_CMD_NAV_WAYPOINT:
+                p1, p2, p4 = _number(item.param1), _number(item.param2), _heading(item.param4)
+            case mavlink.MAV_CMD_NAV_LOITER_UNLIM:
+                p3, p4 = _number(item.param3), _heading(item.param4)
+            case mavlink.MAV_CMD_NAV_LOITER_TIME:
+                p1, p2 = _number(item.param1), float(item.param2 > 0.0)
+                p3, p4 = _number(item.param3), float(item.param4 > 0.0)
+            case mavlink.MAV_CMD_NAV_LAND:
+                p2, p4 = float(int(_number(item.param2))), _heading(item.param4)
+            case (
+                mavlink.MAV_CMD_NAV_TAKEOFF | mavlink.MAV_CMD_NAV_VTOL_TAKEOFF | mavlink.MAV_CMD_NAV_VTOL_LAND
+            ):
+                p4 = _heading(item.param4)
+            case mavlink.MAV_CMD_NAV_LOITER_TO_ALT:
+                p1, p2, p4 = float(item.param1 > 0.0), _number(item.param2), float(item.param4 > 0.0)
+            case mavlink.MAV_CMD_NAV_ROI | mavlink.MAV_CMD_DO_SET_ROI:
+                p1 = item.param1
+        if item.command in POLYGON_COMMANDS:
+            p1 = float(round(item.param1))
+        elif item.command in CIRCLE_COMMANDS:
+            p1 = item.param1
+        return replace(item, param1=p1, param2=p2, param3=p3, param4=p4)
+
+    def read_back(self, item: MissionItem, *, as_int: bool) -> MissionItem:
+        if item.frame in RELATIVE_FRAMES:
+            frame = (
+                mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT if as_int else mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+            )
+        elif item.frame in GLOBAL_FRAMES:
+            frame = mavlink.MAV_FRAME_GLOBAL_INT if as_int else mavlink.MAV_FRAME_GLOBAL
+        else:
+            return item
+        return replace(item, frame=frame)
+
+    @staticmethod
+    def _check_roi(item: MissionItem) -> int:
+        if item.command not in (mavlink.MAV_CMD_NAV_ROI, mavlink.MAV_CMD_DO_SET_ROI):
+            return int(ACCEPTED)
+        allowed = (
+            (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_WPNEXT, mavlink.MAV_ROI_WPINDEX)
+            if item.frame == mavlink.MAV_FRAME_MISSION
+            else (mavlink.MAV_ROI_NONE, mavlink.MAV_ROI_LOCATION)
+        )
+        return int(ACCEPTED if item.param1 in allowed else mavlink.MAV_MISSION_INVALID_PARAM1)
+
+
+def _number(value: float) -> float:
+    return 0.0 if math.isnan(value) else value
+
+
+def _heading(degrees: float) -> float:
+    """Heading in 0..360 deg; NaN (keep or follow the course) stays."""
+    return degrees % 360.0

@@ -1,0 +1,1 @@
+"""PX4 on a fixed wing."""

@@ -1,0 +1,88 @@
+"""PX4 v1.16.1 for a fixed wing (docs/firmware/px4.md, sections 3 to 9)."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Final
+
+from autopilot_bridge.commander.fixed_wing_tasks import FixedWingTasks
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.control.fixed_wing import FixedWingController
+from autopilot_bridge.firmware.flavour import SensorBits
+from autopilot_bridge.firmware.px4.copter.flavour import POLICY as MULTICOPTER_POLICY
+from autopilot_bridge.firmware.px4.copter.flavour import PX4
+from autopilot_bridge.firmware.px4.plane import mapping as px4_plane_mapping
+from autopilot_bridge.firmware.px4.plane import modes as px4_plane_modes
+from autopilot_bridge.firmware.px4.plane.parameters import PX4_PLANE_PARAMETERS
+from autopilot_bridge.firmware.px4.plane.texts import notices
+from autopilot_bridge.flight.fixed_wing import LandDetector
+from flightsim.airframe import AirframeKind, LaunchKind
+
+_SELECTABLE: Final = frozenset(
+    {
+        FlightMode.MANUAL,
+        FlightMode.STABILIZED,
+        FlightMode.ACRO,
+        FlightMode.ALTITUDE,
+        FlightMode.POSITION,
+        FlightMode.HOLD,
+        FlightMode.TAKEOFF,
+        FlightMode.MISSION,
+        FlightMode.RETURN,
+        FlightMode.LAND,
+        FlightMode.FOLLOW,
+        FlightMode.OFFBOARD,
+    }
+)
+_PREVENT_ARMING: Final = frozenset(
+    {FlightMode.RETURN, FlightMode.LAND, FlightMode.FOLLOW, FlightMode.DESCEND}
+)
+
+POLICY: Final = replace(
+    MULTICOPTER_POLICY,
+    armable_modes=_SELECTABLE - _PREVENT_ARMING,
+    ground_modes=_SELECTABLE,
+    flown_modes=_SELECTABLE - {FlightMode.FOLLOW},  # an aircraft follows no target
+    kept_after_disarm=_SELECTABLE - _PREVENT_ARMING,
+    preflight_disarm_extra_s=0.0,
+    orbit_mode=FlightMode.HOLD,  # Orbit is a multicopter's mode; an aircraft circles in Hold
+)
+
+LAUNCH_PARAMETERS: Final[Mapping[LaunchKind, Mapping[str, float]]] = MappingProxyType(
+    {
+        LaunchKind.RUNWAY: MappingProxyType({"RWTO_TKOFF": 1.0, "FW_LAUN_DETCN_ON": 0.0}),
+        LaunchKind.CATAPULT: MappingProxyType({"RWTO_TKOFF": 0.0, "FW_LAUN_DETCN_ON": 1.0}),
+        LaunchKind.HAND: MappingProxyType({"RWTO_TKOFF": 0.0, "FW_LAUN_DETCN_ON": 1.0}),
+    }
+)
+
+PX4_PLANE: Final = replace(
+    PX4,
+    kind=AirframeKind.FIXED_WING,
+    vehicle_type=1,  # MAV_TYPE_FIXED_WING
+    custom_modes=px4_plane_modes.CUSTOM_MODES,
+    mode_names=px4_plane_modes.MODE_NAMES,
+    base_mode=px4_plane_modes.base_mode,
+    listed_modes=px4_plane_modes.LISTED_MODES,
+    policy=POLICY,
+    notices=notices,
+    parameter_definitions=lambda: PX4_PLANE_PARAMETERS,
+    airframe=MappingProxyType({}),
+    airframe_of=px4_plane_mapping.airframe_overrides,
+    launch_parameters=LAUNCH_PARAMETERS,
+    sensor_bits=SensorBits(  # as the recorded flight of the aircraft shows them
+        present=0x0300403F,
+        enabled=0x0301403F,
+        enabled_armed=0x0301403F,
+        health=0x1320C83F,
+        health_armed=0x1320C83F,
+    ),
+    has_airspeed=True,
+    controller=FixedWingController,
+    vehicle_tasks=FixedWingTasks,
+    land_detector=LandDetector,
+    commander_parameters=px4_plane_mapping.commander_parameters,
+    flight_parameters=px4_plane_mapping.flight_parameters,
+    controller_parameters=px4_plane_mapping.controller_parameters,
+    navigation_parameters=px4_plane_mapping.navigation_parameters,
+)

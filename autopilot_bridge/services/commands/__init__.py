@@ -1,0 +1,1 @@
+"""The MAVLink command protocol and the commands that both firmwares support."""

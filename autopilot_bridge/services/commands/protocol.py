@@ -1,0 +1,103 @@
+"""The MAVLink command protocol, autopilot side: COMMAND_LONG, COMMAND_INT, SET_MODE, acknowledgements."""
+
+from collections.abc import Mapping
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander import Commander
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.firmware.ardupilot.copter.commands import ArduCopterCommands
+from autopilot_bridge.firmware.ardupilot.plane.commands import ArduPlaneCommands
+from autopilot_bridge.firmware.px4.commands import Px4Commands
+from autopilot_bridge.firmware.px4.plane.commands import Px4PlaneCommands
+from autopilot_bridge.services.channel import NOBODY, AddressRule, MavlinkMessage, Source
+from autopilot_bridge.services.commands.handlers import (
+    Command,
+    CommandHandlers,
+    CommandHooks,
+    Handler,
+    command_from_message,
+)
+from autopilot_bridge.services.vehicle_class import is_aircraft
+
+_COMMANDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT})
+_SET_MODE: Final = mavlink.MAVLINK_MSG_ID_SET_MODE
+_CANCEL: Final = 80  # COMMAND_CANCEL; not every release of the dialect has it
+_MULTICOPTERS: Final[Mapping[str, type[CommandHandlers]]] = {
+    "px4": Px4Commands,
+    "ardupilot": ArduCopterCommands,
+}
+_AIRCRAFT: Final[Mapping[str, type[CommandHandlers]]] = {
+    "px4": Px4PlaneCommands,
+    "ardupilot": ArduPlaneCommands,
+}
+
+
+class CommandService:
+    """Executes commands and acknowledges them, on the requesting channel only.
+
+    Args:
+        handlers: the flavour's commands.
+        address: the target ids of this autopilot.
+        more: commands of other services, by MAV_CMD; they take precedence over the flavour's own commands.
+    """
+
+    def __init__(
+        self, handlers: CommandHandlers, address: AddressRule, more: Mapping[int, Handler] | None = None
+    ) -> None:
+        self._handlers = handlers
+        self._address = address
+        self._more = dict(more or {})
+
+    @classmethod
+    def for_flavour(
+        cls,
+        name: str,
+        commander: Commander,
+        hooks: CommandHooks,
+        address: AddressRule,
+        more: Mapping[int, Handler] | None = None,
+    ) -> "CommandService":
+        """The command service of a flavour, by name, for the commander's class of vehicle."""
+        handlers = _AIRCRAFT if is_aircraft(commander) else _MULTICOPTERS
+        return cls(handlers[name](commander, hooks), address, more)
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Handle COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL or SET_MODE; never raises on contents."""
+        message_id = message.get_msgId()
+        if message_id in _COMMANDS:
+            if self._address.accepts(message):
+                self._execute(message, source)
+            return True
+        if message_id == _SET_MODE:
+            if self._address.accepts(message):
+                result = self._handlers.set_mode_message(message.base_mode, message.custom_mode)
+                if result is not None:
+                    _acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
+            return True
+        return bool(message_id == _CANCEL)  # no command here takes long enough to be cancelled
+
+    def knows(self, command: int) -> bool:
+        """A handler for this MAV_CMD exists."""
+        return command in self._more or command in self._handlers.table
+
+    def carry_out(self, command: Command, source: Source | None = None) -> Result | None:
+        """Execute a command without an acknowledgement; without a source, replies are dropped."""
+        asker = NOBODY if source is None else source
+        handler = self._more.get(command.id)
+        return self._handlers.execute(command, asker) if handler is None else handler(command, asker)
+
+    def _execute(self, message: MavlinkMessage, source: Source) -> None:
+        command = command_from_message(message)
+        if command.id in self._handlers.double_ack:
+            _acknowledge(command.id, Result.ACCEPTED, source)
+        result = self.carry_out(command, source)
+        if result is not None:
+            _acknowledge(command.id, result, source)
+
+
+def _acknowledge(command: int, result: Result, source: Source) -> None:
+    source.channel.send(
+        mavlink.MAVLink_command_ack_message(command, int(result), 0, 0, source.system_id, source.component_id)
+    )

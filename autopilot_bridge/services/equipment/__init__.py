@@ -1,0 +1,1 @@
+"""The vehicle's equipment: actuators, and commands for camera and gimbal."""

@@ -1,0 +1,245 @@
+"""Commands for camera and gimbal that clients send to the autopilot, which forwards them.
+
+ArduPilot forwards the commands that its camera and mount libraries support, and acknowledges at once (4.6
+AP_Camera, AP_Mount). PX4's gimbal manager and camera trigger do the same for their commands. Clients address
+a camera with its own component id directly (PX4 1.16 gimbal, camera_trigger; Commander.cpp leaves these
+commands to them, and nothing answers when they do not run). A device counts as present once its heartbeat has
+been received.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from autopilot_bridge.commander.modes import FlightMode
+from autopilot_bridge.commander.verdict import Result
+from autopilot_bridge.flight.parameters import FlightParameters
+from autopilot_bridge.flight.region_of_interest import roi_of
+from autopilot_bridge.mission_plan import MissionItem
+from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.commands.handlers import Command, Handler
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from autopilot_bridge.services.plans.equipment import GIMBAL_COMMANDS
+
+_CAMERA: Final = int(mavlink.MAV_COMP_ID_CAMERA)
+_GIMBAL: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
+_CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
+_NONE: Final = mavlink.MAV_CMD_DO_SET_ROI_NONE
+_NEXT_WAYPOINT: Final = mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
+_PRESENT_US: Final = 5_000_000
+_NOBODY: Final = (0, 0)
+_TAKE, _GIVE_UP = -2.0, -3.0
+
+_TRIGGER: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+        mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+    )
+)
+_PX4_TRIGGER: Final = _TRIGGER | {
+    mavlink.MAV_CMD_DO_TRIGGER_CONTROL,
+    mavlink.MAV_CMD_DO_SET_CAM_TRIGG_INTERVAL,
+}
+_ARDUPILOT_CAMERA: Final = _TRIGGER | {
+    mavlink.MAV_CMD_SET_CAMERA_ZOOM,
+    mavlink.MAV_CMD_SET_CAMERA_FOCUS,
+    mavlink.MAV_CMD_IMAGE_START_CAPTURE,
+    mavlink.MAV_CMD_IMAGE_STOP_CAPTURE,
+    mavlink.MAV_CMD_VIDEO_START_CAPTURE,
+    mavlink.MAV_CMD_VIDEO_STOP_CAPTURE,
+    mavlink.MAV_CMD_CAMERA_TRACK_POINT,
+    mavlink.MAV_CMD_CAMERA_TRACK_RECTANGLE,
+    mavlink.MAV_CMD_CAMERA_STOP_TRACKING,
+}
+_ROI: Final = frozenset(
+    (
+        mavlink.MAV_CMD_DO_SET_ROI,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+        mavlink.MAV_CMD_DO_SET_ROI_SYSID,
+        _NONE,
+    )
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PayloadPolicy:
+    """How a firmware handles commands for its payload.
+
+    Attributes:
+        camera: commands that it forwards to a camera.
+        absent: its answer while the device is not present; None: no answer.
+        nose_modes: modes in which a commanded region of interest turns a multicopter's nose, and whether the
+            nose follows during every manoeuvre of the mode (else as the mission defines).
+        kinds_of_roi: param1 of DO_SET_ROI is the kind of target, and the next waypoint is a possible target;
+            else the target is always a position.
+        bad_place: the answer to a region of interest at an invalid position.
+    """
+
+    camera: frozenset[int]
+    absent: Result | None
+    nose_modes: Mapping[FlightMode, bool]
+    kinds_of_roi: bool
+    bad_place: Result
+
+
+PX4_PAYLOAD: Final = PayloadPolicy(
+    camera=_PX4_TRIGGER,
+    absent=None,
+    nose_modes={FlightMode.MISSION: False},  # mission_base.cpp: heading_sp_update
+    kinds_of_roi=True,
+    bad_place=Result.DENIED,
+)
+ARDUPILOT_PAYLOAD: Final = PayloadPolicy(
+    camera=_ARDUPILOT_CAMERA,
+    absent=Result.UNSUPPORTED,
+    nose_modes={FlightMode.MISSION: False, FlightMode.GUIDED: True},  # autoyaw.cpp: set_roi
+    kinds_of_roi=False,
+    bad_place=Result.FAILED,
+)
+
+
+class PayloadCommands(Microservice):
+    """Forwards commands to camera and gimbal.
+
+    Args:
+        parts: of the autopilot.
+    """
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._parts = parts
+        self._policy = PX4_PAYLOAD if parts.flavour.name == "px4" else ARDUPILOT_PAYLOAD
+        self._heard_us: dict[int, int] = {}
+        self._in_control: frozenset[tuple[int, int]] = frozenset()
+
+    @property
+    def commands(self) -> Mapping[int, Handler]:
+        """The forwarded commands. Regions of interest are accepted without a gimbal too."""
+        return {
+            **dict.fromkeys(self._policy.camera, self._to_camera),
+            **dict.fromkeys(GIMBAL_COMMANDS, self._to_gimbal),
+            **dict.fromkeys(_ROI, self._look),
+            **({_NEXT_WAYPOINT: self._look} if self._policy.kinds_of_roi else {}),
+        }
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Record the devices of this vehicle, and the client in control of the gimbal."""
+        if source.system_id == self._parts.system_id and source.component_id in (_CAMERA, _GIMBAL):
+            kind = message.get_msgId()
+            if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+                self._heard_us[source.component_id] = time_us
+            elif kind == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS:
+                primary = (message.primary_control_sysid, message.primary_control_compid)
+                secondary = (message.secondary_control_sysid, message.secondary_control_compid)
+                self._in_control = frozenset() if primary == _NOBODY else frozenset((primary, secondary))
+        return False
+
+    def _is_there(self, component: int) -> bool:
+        heard_us = self._heard_us.get(component)
+        return heard_us is not None and self._parts.commander.time_us - heard_us < _PRESENT_US
+
+    def _may_point(self, source: Source) -> bool:
+        return not self._in_control or (source.system_id, source.component_id) in self._in_control
+
+    def _to_camera(self, command: Command, source: Source) -> Result | None:
+        if not self._is_there(_CAMERA):
+            return self._policy.absent
+        self._pass_on(_CAMERA, command)
+        return Result.ACCEPTED
+
+    def _to_gimbal(self, command: Command, source: Source) -> Result | None:
+        if not self._is_there(_GIMBAL):
+            return self._policy.absent
+        if command.id == _CONFIGURE:
+            command = self._configured(command, source)
+        elif not self._may_point(source):
+            return Result.DENIED
+        self._pass_on(_GIMBAL, command)
+        return Result.ACCEPTED
+
+    def _look(self, command: Command, source: Source) -> Result | None:
+        item = _roi_item(command, kinds=self._policy.kinds_of_roi)
+        if item is not None and not (abs(item.x) <= 90.0 and abs(item.y) <= 180.0):
+            return self._policy.bad_place
+        if self._is_there(_GIMBAL) and command.id != _NEXT_WAYPOINT:
+            if not self._may_point(source):
+                return Result.DENIED
+            self._pass_on(_GIMBAL, command)
+        elif item is not None:
+            self._turn_nose(item)
+        return Result.ACCEPTED
+
+    def _turn_nose(self, item: MissionItem) -> None:
+        commander = self._parts.commander
+        context, mode = commander.context, commander.mode
+        if not commander.armed or mode not in self._policy.nose_modes:
+            return
+        if isinstance(context.parameters, FlightParameters) and context.multicopter.nose_follows_roi:
+            context.look_at(roi_of(item, context), nose=self._policy.nose_modes[mode])
+
+    def _configured(self, command: Command, source: Source) -> Command:
+        """Values -2 and -3 refer to the client itself, not to the autopilot that forwards its command."""
+        asker = (source.system_id, source.component_id)
+        pairs = [(command.p1, command.p2), (command.p3, command.p4)]
+        for index, pair in enumerate(pairs):
+            if _TAKE in pair:
+                pairs[index] = (float(asker[0]), float(asker[1]))
+            elif _GIVE_UP in pair:
+                pairs[index] = (0.0, 0.0) if asker in self._in_control else (-1.0, -1.0)
+        (p1, p2), (p3, p4) = pairs
+        return command._replace(p1=p1, p2=p2, p3=p3, p4=p4)
+
+    def _pass_on(self, component: int, command: Command) -> None:
+        send_to_all(self._parts.broadcast, forwarded(command, self._parts.system_id, component))
+
+
+def _roi_item(command: Command, *, kinds: bool) -> MissionItem | None:
+    """A region of interest as a mission item; None: it is not a position (another vehicle).
+
+    0/0 ends it, as in ArduPilot.
+    """
+    if command.id == mavlink.MAV_CMD_DO_SET_ROI_SYSID:
+        return None
+    by_kind = command.id == mavlink.MAV_CMD_DO_SET_ROI and kinds
+    kind = command.p1 if by_kind else 0.0
+    nowhere = command.x == 0.0 and command.y == 0.0
+    placeless = nowhere and command.id == mavlink.MAV_CMD_DO_SET_ROI_LOCATION
+    number = _NONE if placeless else command.id
+    without_place = number in (_NONE, _NEXT_WAYPOINT) or (by_kind and kind != mavlink.MAV_ROI_LOCATION)
+    return MissionItem(
+        command=number,
+        frame=mavlink.MAV_FRAME_GLOBAL if command.frame is None else command.frame,
+        param1=kind,
+        param2=command.p2,
+        x=0.0 if without_place else command.x,
+        y=0.0 if without_place else command.y,
+        z=command.z if math.isfinite(command.z) else 0.0,
+    )
+
+
+def forwarded(command: Command, system_id: int, component: int) -> MavlinkMessage:
+    """The message that forwards a command, in the form (LONG or INT) in which it came."""
+    first = (command.p1, command.p2, command.p3, command.p4)
+    if command.frame is None:
+        return mavlink.MAVLink_command_long_message(
+            system_id, component, command.id, 0, *first, command.x, command.y, command.z
+        )
+    return mavlink.MAVLink_command_int_message(
+        system_id,
+        component,
+        command.frame,
+        command.id,
+        0,
+        0,
+        *first,
+        _e7(command.x),
+        _e7(command.y),
+        command.z,
+    )
+
+
+def _e7(degrees: float) -> int:
+    scaled = round(degrees * 1e7) if math.isfinite(degrees) else 0
+    return max(-(2**31), min(2**31 - 1, scaled))

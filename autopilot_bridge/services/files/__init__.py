@@ -1,0 +1,1 @@
+"""MAVLink FTP and logs: the files on the vehicle's memory card."""

@@ -1,0 +1,1 @@
+"""What clients and devices send to the autopilot: setpoints, sticks, positions, targets, obstacles."""

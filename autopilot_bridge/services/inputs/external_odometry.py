@@ -1,0 +1,307 @@
+"""External odometry into the navigation filter: visual odometry and motion capture by messages.
+
+Sources: MAVLink common.xml (ODOMETRY, VISION_POSITION_ESTIMATE and its kin, SET_GPS_GLOBAL_ORIGIN); PX4 1.16
+`mavlink_receiver` takes ODOMETRY, VISION_POSITION_ESTIMATE and ATT_POS_MOCAP; ArduPilot 4.6 takes
+the others too, once VISO_TYPE configures a sender.
+
+A time stamp in vehicle time (synchronised by TIMESYNC) is the sample's time of measurement. For a time stamp
+of any other clock, the time of arrival and the delay parameter are used.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from autopilot_bridge.firmware.mapping import integer
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.navigation.external import (
+    POSITION_M,
+    Q_LOCAL_FROM_FRD,
+    SAMPLE_SIZE,
+    VELOCITY_M_S,
+    ExternalFrame,
+    ExternalSample,
+)
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.inputs.time_stamps import in_vehicle_time
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.foundation.vectors import Quaternion, conjugate, from_euler, product
+
+Array = NDArray[np.float64]
+
+_VIO: Final = 6  # FAILURE_UNIT_SENSOR_VIO
+_AUTOPILOT: Final = 1
+_HALF: Final = math.sqrt(0.5)
+_UNKNOWN3: Final = (math.nan, math.nan, math.nan)
+_POSE_DIAGONAL: Final = (0, 6, 11)  # of an upper triangle of 6 x 6, by rows
+_POSE_YAW: Final = 20
+_VELOCITY_DIAGONAL: Final = (0, 4, 8)
+
+_NED_FROM_ENU: Final = (0.0, _HALF, _HALF, 0.0)
+_FRD_FROM_FLU: Final = (0.0, 1.0, 0.0, 0.0)
+_SAME: Final = (1.0, 0.0, 0.0, 0.0)
+
+_POSE_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion, Quaternion]]] = {
+    mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME, _SAME),
+    mavlink.MAV_FRAME_LOCAL_ENU: (ExternalFrame.NED, _NED_FROM_ENU, _FRD_FROM_FLU),
+    mavlink.MAV_FRAME_LOCAL_FRD: (ExternalFrame.LOCAL_FRD, _SAME, _SAME),
+    mavlink.MAV_FRAME_LOCAL_FLU: (ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU, _FRD_FROM_FLU),
+}
+"""By ODOMETRY.frame_id: our frame, our axes from the message's axes, and our body axes from the message's."""
+
+_VELOCITY_FRAMES: Final[Mapping[int, tuple[ExternalFrame, Quaternion]]] = {
+    mavlink.MAV_FRAME_LOCAL_NED: (ExternalFrame.NED, _SAME),
+    mavlink.MAV_FRAME_LOCAL_ENU: (ExternalFrame.NED, _NED_FROM_ENU),
+    mavlink.MAV_FRAME_LOCAL_FRD: (ExternalFrame.LOCAL_FRD, _SAME),
+    mavlink.MAV_FRAME_LOCAL_FLU: (ExternalFrame.LOCAL_FRD, _FRD_FROM_FLU),
+    mavlink.MAV_FRAME_BODY_NED: (ExternalFrame.BODY_FRD, _SAME),
+    mavlink.MAV_FRAME_BODY_FRD: (ExternalFrame.BODY_FRD, _SAME),
+    mavlink.MAV_FRAME_BODY_OFFSET_NED: (ExternalFrame.BODY_FRD, _SAME),
+}
+"""The same by ODOMETRY.child_frame_id."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExternalPolicy:
+    """What one firmware accepts.
+
+    Attributes:
+        messages: ids of the messages that it uses.
+        pose_frames, velocity_frames: the frames of ODOMETRY that it accepts.
+        enabled: returns whether it uses external odometry at all, from its parameters.
+        local_frame: the frame of messages without a frame field, and of every pose where `one_frame`.
+        one_frame: the frame of an ODOMETRY's pose is not distinguished any further.
+    """
+
+    messages: frozenset[int]
+    pose_frames: frozenset[int]
+    velocity_frames: frozenset[int]
+    enabled: Callable[[ParameterStore], bool]
+    local_frame: Callable[[ParameterStore], ExternalFrame]
+    one_frame: bool
+
+
+def _ardupilot_frame(store: ParameterStore) -> ExternalFrame:
+    """ArduPilot takes every frame as NED; if it uses the sender's heading, that is a separate frame."""
+    yaw_source = integer(store, "EK3_SRC1_YAW", 1)
+    return ExternalFrame.LOCAL_FRD if yaw_source == EXTERNAL_NAV_SOURCE else ExternalFrame.NED
+
+
+EXTERNAL_NAV_SOURCE: Final = 6
+"""Value ExternalNav of EK3_SRC1_*."""
+
+POLICIES: Final[Mapping[str, ExternalPolicy]] = {
+    "px4": ExternalPolicy(
+        messages=frozenset(
+            {
+                mavlink.MAVLINK_MSG_ID_ODOMETRY,
+                mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
+                mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP,
+            }
+        ),
+        pose_frames=frozenset(_POSE_FRAMES),
+        velocity_frames=frozenset(_VELOCITY_FRAMES),
+        enabled=lambda store: True,
+        local_frame=lambda store: ExternalFrame.NED,
+        one_frame=False,
+    ),
+    "ardupilot": ExternalPolicy(
+        messages=frozenset(
+            {
+                mavlink.MAVLINK_MSG_ID_ODOMETRY,
+                mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE,
+                mavlink.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE,
+                mavlink.MAVLINK_MSG_ID_VICON_POSITION_ESTIMATE,
+                mavlink.MAVLINK_MSG_ID_GLOBAL_VISION_POSITION_ESTIMATE,
+                mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP,
+            }
+        ),
+        pose_frames=frozenset({mavlink.MAV_FRAME_LOCAL_FRD}),
+        velocity_frames=frozenset({mavlink.MAV_FRAME_BODY_FRD}),
+        enabled=lambda store: integer(store, "VISO_TYPE", 0) != 0,
+        local_frame=_ardupilot_frame,
+        one_frame=True,
+    ),
+}
+
+
+class ExternalOdometryService(Microservice):
+    """Converts messages into samples of the navigation filter, and sets its origin.
+
+    Attributes:
+        wrong_frames: number of messages in frames that are not accepted.
+    """
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._navigation = parts.navigation
+        self._parameters = parts.parameters
+        self._broadcast = parts.broadcast
+        self._system_id = parts.system_id
+        self._simulation = parts.simulation
+        self._policy = POLICIES[parts.flavour.name]
+        self.wrong_frames = 0
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Handle one message. Another vehicle's own ODOMETRY that arrives here is ignored."""
+        message_id = message.get_msgId()
+        if message_id == mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN:
+            self._set_origin(message, time_us)
+            return True
+        if message_id not in _READERS:
+            return False
+        if message_id not in self._policy.messages or not self._policy.enabled(self._parameters):
+            return True
+        if source.component_id == _AUTOPILOT and source.system_id != self._system_id:
+            return True
+        sample = _READERS[message_id](self, message, time_us)
+        if sample is None:
+            self.wrong_frames += 1
+        elif self._simulation is None or self._simulation.spoil(_VIO, sample.values):
+            self._navigation.take_external(sample)
+        return True
+
+    def _set_origin(self, message: MavlinkMessage, time_us: int) -> None:
+        """SET_GPS_GLOBAL_ORIGIN: accepted once; positions refer to it from then on."""
+        if self._navigation.frame is not None or message.target_system != self._system_id:
+            return
+        lat_deg, lon_deg, alt_m = message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3
+        if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0 and abs(alt_m) < 1e5):
+            return
+        self._navigation.set_origin(GeodeticPosition(lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m))
+        send_to_all(
+            self._broadcast,
+            mavlink.MAVLink_gps_global_origin_message(
+                message.latitude, message.longitude, message.altitude, time_us
+            ),
+        )
+
+    # messages
+
+    def _odometry(self, message: MavlinkMessage, time_us: int) -> ExternalSample | None:
+        """ODOMETRY (331)."""
+        policy = self._policy
+        pose, twist = int(message.frame_id), int(message.child_frame_id)
+        if pose not in policy.pose_frames or twist not in policy.velocity_frames:
+            return None
+        frame, local, body = _POSE_FRAMES[pose]
+        velocity_frame, velocity_local = _VELOCITY_FRAMES[twist]
+        values = np.full(SAMPLE_SIZE, math.nan)
+        values[POSITION_M] = _rotated(local, (message.x, message.y, message.z))
+        values[Q_LOCAL_FROM_FRD] = _changed(local, message.q, body)
+        values[VELOCITY_M_S] = _rotated(velocity_local, (message.vx, message.vy, message.vz))
+        return ExternalSample(
+            time_us=in_vehicle_time(int(message.time_usec), time_us),
+            values=values,
+            frame=policy.local_frame(self._parameters) if policy.one_frame else frame,
+            velocity_frame=velocity_frame,
+            position_variance_m2=_diagonal(message.pose_covariance, _POSE_DIAGONAL),
+            velocity_variance_m2_s2=_diagonal(message.velocity_covariance, _POSE_DIAGONAL),
+            yaw_variance_rad2=_entry(message.pose_covariance, _POSE_YAW),
+            reset_counter=int(message.reset_counter),
+            quality=int(message.quality),
+        )
+
+    def _pose(self, message: MavlinkMessage, time_us: int) -> ExternalSample:
+        """VISION_POSITION_ESTIMATE (102), GLOBAL_VISION_POSITION_ESTIMATE (101), VICON_... (104)."""
+        values = np.full(SAMPLE_SIZE, math.nan)
+        values[POSITION_M] = (message.x, message.y, message.z)
+        angles = (message.roll, message.pitch, message.yaw)
+        if all(abs(angle) < 100.0 for angle in angles):
+            values[Q_LOCAL_FROM_FRD] = from_euler(*angles)
+        return self._local(
+            values,
+            in_vehicle_time(int(message.usec), time_us),
+            _diagonal(message.covariance, _POSE_DIAGONAL),
+            _entry(message.covariance, _POSE_YAW),
+            int(getattr(message, "reset_counter", 0)),
+        )
+
+    def _mocap(self, message: MavlinkMessage, time_us: int) -> ExternalSample:
+        """ATT_POS_MOCAP (138)."""
+        values = np.full(SAMPLE_SIZE, math.nan)
+        values[POSITION_M] = (message.x, message.y, message.z)
+        values[Q_LOCAL_FROM_FRD] = message.q
+        return self._local(
+            values,
+            in_vehicle_time(int(message.time_usec), time_us),
+            _diagonal(message.covariance, _POSE_DIAGONAL),
+            _entry(message.covariance, _POSE_YAW),
+            0,
+        )
+
+    def _speed(self, message: MavlinkMessage, time_us: int) -> ExternalSample:
+        """VISION_SPEED_ESTIMATE (103)."""
+        frame = self._policy.local_frame(self._parameters)
+        values = np.full(SAMPLE_SIZE, math.nan)
+        values[VELOCITY_M_S] = (message.x, message.y, message.z)
+        return ExternalSample(
+            time_us=in_vehicle_time(int(message.usec), time_us),
+            values=values,
+            frame=frame,
+            velocity_frame=frame,
+            position_variance_m2=_UNKNOWN3,
+            velocity_variance_m2_s2=_diagonal(message.covariance, _VELOCITY_DIAGONAL),
+            yaw_variance_rad2=math.nan,
+            reset_counter=int(getattr(message, "reset_counter", 0)),
+        )
+
+    def _local(
+        self,
+        values: Array,
+        time_us: int,
+        position_variance_m2: tuple[float, float, float],
+        yaw_variance_rad2: float,
+        reset_counter: int,
+    ) -> ExternalSample:
+        frame = self._policy.local_frame(self._parameters)
+        return ExternalSample(
+            time_us=time_us,
+            values=values,
+            frame=frame,
+            velocity_frame=frame,
+            position_variance_m2=position_variance_m2,
+            velocity_variance_m2_s2=_UNKNOWN3,
+            yaw_variance_rad2=yaw_variance_rad2,
+            reset_counter=reset_counter,
+        )
+
+
+_Reader = Callable[[ExternalOdometryService, MavlinkMessage, int], ExternalSample | None]
+_READERS: Final[Mapping[int, _Reader]] = {
+    mavlink.MAVLINK_MSG_ID_ODOMETRY: ExternalOdometryService._odometry,
+    mavlink.MAVLINK_MSG_ID_VISION_POSITION_ESTIMATE: ExternalOdometryService._pose,
+    mavlink.MAVLINK_MSG_ID_GLOBAL_VISION_POSITION_ESTIMATE: ExternalOdometryService._pose,
+    mavlink.MAVLINK_MSG_ID_VICON_POSITION_ESTIMATE: ExternalOdometryService._pose,
+    mavlink.MAVLINK_MSG_ID_ATT_POS_MOCAP: ExternalOdometryService._mocap,
+    mavlink.MAVLINK_MSG_ID_VISION_SPEED_ESTIMATE: ExternalOdometryService._speed,
+}
+
+
+def _entry(covariance: list[float], index: int) -> float:
+    """One element of the covariance; NaN in the first element means that no covariance is given."""
+    return float(covariance[index]) if math.isfinite(covariance[0]) else math.nan
+
+
+def _diagonal(covariance: list[float], indices: tuple[int, int, int]) -> tuple[float, float, float]:
+    x, y, z = (_entry(covariance, index) for index in indices)
+    return x, y, z
+
+
+def _rotated(q: Quaternion, vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A vector in other axes; used only for the changes of axes above."""
+    x, y, z = vector
+    if q is _NED_FROM_ENU:
+        return y, x, -z
+    return (x, -y, -z) if q is _FRD_FROM_FLU else (x, y, z)
+
+
+def _changed(local: Quaternion, q: list[float], body: Quaternion) -> Quaternion:
+    """An attitude between other axes: local q body^-1."""
+    w, x, y, z = q
+    return product(product(local, (w, x, y, z)), conjugate(body))

@@ -1,0 +1,164 @@
+"""Fixes of an external GPS receiver: GPS_INPUT and HIL_GPS, as ArduPilot accepts them with GPS1_TYPE 14.
+
+They replace the onboard receiver from boot on, and pass the same checks as its fixes. A value that is missing
+in a message is unknown: missing accuracies are derived from the dilutions of precision; without a velocity
+the filter uses positions only; without dilutions of precision the fix is not good enough.
+
+Source: MAVLink common.xml (GPS_INPUT 232, HIL_GPS 113); ArduPilot 4.6 AP_GPS_MAV.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+from autopilot_bridge.firmware.gps_source import GpsSource
+from autopilot_bridge.firmware.mapping import clamp, number
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+from flightsim import interface as i
+
+_FIX_3D: Final = 3
+_LAST_FIX_TYPE: Final = mavlink.GPS_FIX_TYPE_PPP
+_WEEK_MS: Final = 604_800_000
+_LATEST_US: Final = 500_000
+_DRIFT_US: Final = 20
+"""Increase of the assumed shortest delay with each message, because clocks drift."""
+_DRIVER_DELAY_MS: Final = 200.0
+_MAX_DELAY_MS: Final = 250.0
+_UNKNOWN_DOP: Final = 99.99
+_UNKNOWN_ACCURACY_M: Final = 99.0
+_RANGE_ERROR_M: Final = 1.0
+"""Multiplied by a dilution of precision, this is the accuracy of a fix that was sent without one."""
+_SPEED_ACCURACY_M_S: Final = 0.3
+_MAX_ALT_M: Final = 1e5
+_MAX_SPEED_M_S: Final = 400.0
+_UNKNOWN_SATELLITES: Final = 255
+
+
+class GpsInputService(Microservice):
+    """Writes fixes received by messages in the place of the onboard receiver's samples.
+
+    Attributes:
+        taken: number of accepted fixes.
+        refused: number of messages with invalid values.
+    """
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._reading = parts.readings.gps
+        self._parameters = parts.parameters
+        self._listens = parts.flavour.gps_source(parts.parameters) is GpsSource.MESSAGES
+        self._offset_us: int | None = None  # vehicle time minus sender's time, at the shortest delay
+        self.taken = self.refused = 0
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Handle one fix. Only the first receiver (`gps_id`) exists."""
+        reader = _READERS.get(message.get_msgId())
+        if reader is None:
+            return False
+        if not self._listens or getattr(message, "gps_id", 0) != 0:
+            return True
+        values = reader(message)
+        if values is None:
+            self.refused += 1
+            return True
+        delay_ms = number(self._parameters, "GPS1_DELAY_MS", 0.0)
+        delay_ms = clamp(delay_ms if delay_ms > 0.0 else _DRIVER_DELAY_MS, 1.0, _MAX_DELAY_MS)
+        measured_us = self._sent_us(message, values, time_us) - round(1e3 * delay_ms)
+        if measured_us > self._reading.time_us:
+            self._reading.values[:] = values
+            self._reading.time_us = measured_us
+            self.taken += 1
+        return True
+
+    def _sent_us(self, message: MavlinkMessage, values: list[float], time_us: int) -> int:
+        """The send time of a fix from its GPS time, which removes the variation of the transport delay."""
+        week = int(getattr(message, "time_week", 0))
+        if week == 0 or values[i.GPS_FIX_TYPE] < _FIX_3D:
+            return time_us
+        stamp_us = 1000 * (week * _WEEK_MS + int(message.time_week_ms))
+        offset_us = time_us - stamp_us
+        if self._offset_us is None or not -_LATEST_US < offset_us - self._offset_us < _LATEST_US:
+            self._offset_us = offset_us  # the first message, or another clock
+        else:
+            self._offset_us = min(self._offset_us + _DRIFT_US, offset_us)
+        return stamp_us + self._offset_us
+
+
+def _gps_input(message: MavlinkMessage) -> list[float] | None:
+    """The values of a GPS_INPUT; None: not a fix."""
+    ignored = int(message.ignore_flags)
+
+    def said(flag: int, value: float) -> float:
+        return math.nan if ignored & flag else float(value)
+
+    unmoved = bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_HORIZ)
+    no_climb = unmoved or bool(ignored & mavlink.GPS_INPUT_IGNORE_FLAG_VEL_VERT)
+    told = (message.vn, message.ve, message.vd)[: 0 if unmoved else 2 if no_climb else 3]
+    if not all(abs(part) < _MAX_SPEED_M_S for part in told):
+        return None
+    return _fix(
+        message,
+        alt_m=0.0 if ignored & mavlink.GPS_INPUT_IGNORE_FLAG_ALT else float(message.alt),
+        velocity=(*told, math.nan, math.nan, math.nan)[:3],
+        hdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_HDOP, message.hdop),
+        vdop=said(mavlink.GPS_INPUT_IGNORE_FLAG_VDOP, message.vdop),
+        eph_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_HORIZONTAL_ACCURACY, message.horiz_accuracy),
+        epv_m=said(mavlink.GPS_INPUT_IGNORE_FLAG_VERTICAL_ACCURACY, message.vert_accuracy),
+        speed_accuracy_m_s=said(mavlink.GPS_INPUT_IGNORE_FLAG_SPEED_ACCURACY, message.speed_accuracy),
+    )
+
+
+def _hil_gps(message: MavlinkMessage) -> list[float] | None:
+    """The values of a HIL_GPS, which has integers."""
+    return _fix(
+        message,
+        alt_m=message.alt * 1e-3,
+        velocity=(message.vn * 0.01, message.ve * 0.01, message.vd * 0.01),
+        hdop=message.eph * 0.01,
+        vdop=message.epv * 0.01,
+    )
+
+
+def _fix(
+    message: Any,
+    *,
+    alt_m: float,
+    velocity: tuple[float, ...],
+    hdop: float,
+    vdop: float,
+    eph_m: float = math.nan,
+    epv_m: float = math.nan,
+    speed_accuracy_m_s: float = math.nan,
+) -> list[float] | None:
+    """A sample as in `flightsim.interface`; NaN: value not sent. None: invalid values."""
+    fix_type, satellites = int(message.fix_type), int(message.satellites_visible)
+    if fix_type > _LAST_FIX_TYPE or not abs(alt_m) < _MAX_ALT_M:
+        return None
+    hdop, vdop = _least(hdop, _UNKNOWN_DOP), _least(vdop, _UNKNOWN_DOP)
+    values = [0.0] * i.GPS_SIZE
+    values[i.GPS_LAT_DEG] = message.lat * 1e-7
+    values[i.GPS_LON_DEG] = message.lon * 1e-7
+    values[i.GPS_ALT_M] = alt_m
+    values[i.GPS_VEL_NED_M_S] = velocity
+    values[i.GPS_EPH_M] = min(_least(eph_m, _RANGE_ERROR_M * hdop), _UNKNOWN_ACCURACY_M)
+    values[i.GPS_EPV_M] = min(_least(epv_m, _RANGE_ERROR_M * vdop), _UNKNOWN_ACCURACY_M)
+    values[i.GPS_SPEED_ACCURACY_M_S] = min(
+        _least(speed_accuracy_m_s, _SPEED_ACCURACY_M_S), _UNKNOWN_ACCURACY_M
+    )
+    values[i.GPS_FIX_TYPE] = float(fix_type)
+    values[i.GPS_SATELLITES] = 0.0 if satellites == _UNKNOWN_SATELLITES else float(satellites)
+    values[i.GPS_HDOP], values[i.GPS_VDOP] = min(hdop, _UNKNOWN_DOP), min(vdop, _UNKNOWN_DOP)
+    return values
+
+
+def _least(said: float, otherwise: float) -> float:
+    """The received value if it is valid, else the other one."""
+    return said if said > 0.0 else otherwise
+
+
+_Reader = Callable[[MavlinkMessage], list[float] | None]
+_READERS: Final[dict[int, _Reader]] = {
+    mavlink.MAVLINK_MSG_ID_GPS_INPUT: _gps_input,
+    mavlink.MAVLINK_MSG_ID_HIL_GPS: _hil_gps,
+}

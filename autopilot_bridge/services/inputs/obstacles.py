@@ -1,0 +1,108 @@
+"""OBSTACLE_DISTANCE and DISTANCE_SENSOR: obstacles around the vehicle, for avoidance.
+
+Sources: MAVLink common.xml; PX4 1.16 accepts OBSTACLE_DISTANCE in BODY_FRD (or relative to north)
+and horizontal DISTANCE_SENSORs; ArduPilot 4.6 accepts both, with PRX1_TYPE 2.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Final
+
+import numpy as np
+
+from autopilot_bridge.firmware.mapping import integer
+from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
+from autopilot_bridge.mavlink import dialect as mavlink
+from autopilot_bridge.navigation import layout as nav
+from autopilot_bridge.parameters import ParameterStore
+from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.microservice import AutopilotParts, Microservice
+
+_OBSTACLES: Final = mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
+_SENSOR: Final = mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR
+_AVOIDANCE: Final = int(mavlink.FAILURE_UNIT_SYSTEM_AVOIDANCE)
+_UNKNOWN_CM: Final = 65535
+_AUTOPILOT: Final = 1
+_SENSOR_WIDTH_RAD: Final = math.radians(30.0)
+_HORIZONTAL: Final = range(mavlink.MAV_SENSOR_ROTATION_NONE, mavlink.MAV_SENSOR_ROTATION_YAW_315 + 1)
+_MAV_TYPE_PROXIMITY: Final = 2  # PRX1_TYPE
+
+_LISTENS: Final[Mapping[str, Callable[[ParameterStore], bool]]] = {
+    "px4": lambda store: True,
+    "ardupilot": lambda store: integer(store, "PRX1_TYPE", 0) == _MAV_TYPE_PROXIMITY,
+}
+
+
+class ObstacleService(Microservice):
+    """Keeps `surroundings.obstacles` up to date.
+
+    Attributes:
+        refused: number of messages without usable content.
+    """
+
+    def __init__(self, parts: AutopilotParts) -> None:
+        self._context = parts.commander.context
+        self._parameters = parts.parameters
+        self._simulation = parts.simulation
+        self._system_id = parts.system_id
+        self._listens = _LISTENS[parts.flavour.name]
+        self.refused = 0
+
+    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+        """Handle one message; a DISTANCE_SENSOR of another vehicle is ignored."""
+        message_id = message.get_msgId()
+        if message_id not in (_OBSTACLES, _SENSOR):
+            return False
+        if not self._listens(self._parameters) or source.component_id == _AUTOPILOT:
+            return True
+        usable = self._circle(message, time_us) if message_id == _OBSTACLES else self._beam(message, time_us)
+        self.refused += not usable
+        return True
+
+    def _circle(self, message: MavlinkMessage, time_us: int) -> bool:
+        """OBSTACLE_DISTANCE (330)."""
+        frame = message.frame
+        if frame not in (mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_BODY_FRD):
+            return False
+        step_rad = math.radians(abs(message.increment_f) or float(message.increment))
+        if not math.radians(0.5) <= step_rad <= math.tau:
+            return False
+        if message.increment_f < 0.0:
+            step_rad = -step_rad
+        first_rad = math.radians(message.angle_offset) if abs(message.angle_offset) <= 720.0 else math.nan
+        if math.isnan(first_rad):
+            return False
+        if frame != mavlink.MAV_FRAME_BODY_FRD:
+            first_rad -= float(self._context.nav[nav.EULER_RAD][2])
+        values = np.array(message.distances, dtype=np.float64)[:SECTORS]
+        told = values != _UNKNOWN_CM
+        values *= 0.01
+        if self._simulation is not None and not self._simulation.spoil(_AVOIDANCE, values):
+            return True
+        nearest_m, reach_m = message.min_distance * 0.01, message.max_distance * 0.01
+        obstacles = self._context.surroundings.obstacles
+        count = min(SECTORS, math.ceil(math.tau / abs(step_rad) - 1e-6))
+        for k in np.flatnonzero(told[:count]).tolist():
+            distance_m = max(nearest_m, float(values[k]))
+            if reach_m > 0.0 and distance_m > reach_m:
+                distance_m = math.inf
+            obstacles.take(first_rad + k * step_rad, abs(step_rad), distance_m, time_us)
+        return True
+
+    def _beam(self, message: MavlinkMessage, time_us: int) -> bool:
+        """DISTANCE_SENSOR (132) in one of the eight horizontal directions."""
+        if message.orientation not in _HORIZONTAL:
+            return False
+        reach_m, distance_m = message.max_distance * 0.01, message.current_distance * 0.01
+        if distance_m < message.min_distance * 0.01:
+            return False
+        direction_rad = (message.orientation - mavlink.MAV_SENSOR_ROTATION_NONE) * math.pi / 4.0
+        width = float(message.horizontal_fov)
+        width = width if 0.01 < width < math.tau else _SENSOR_WIDTH_RAD
+        self._context.surroundings.obstacles.take(
+            direction_rad,
+            max(SECTOR_RAD, width),
+            math.inf if distance_m >= reach_m else distance_m,
+            time_us,
+        )
+        return True

@@ -1,0 +1,1 @@
+"""The MAVLink parameter protocol, and parameters that persist."""

@@ -1,0 +1,109 @@
+"""The file of stored parameters on a vehicle's memory card."""
+
+import contextlib
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
+
+from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS, CardLayout
+from autopilot_bridge.parameter_files import (
+    QGC_SUFFIX,
+    format_mavproxy,
+    format_qgc,
+    parse_untyped_parameters,
+)
+from autopilot_bridge.parameters import ParameterError, ParameterStore
+from autopilot_bridge.storage import FileStore
+from autopilot_bridge.storage.card import MemoryCard
+from autopilot_bridge.storage.files import exists, make_directories, read_whole, replace_whole
+
+
+class StoredParameters:
+    """The file of stored parameters, and the values that the parameters have without it.
+
+    Args:
+        store: the vehicle's parameters before anything was loaded.
+        files: the memory card.
+        layout: the file's place on the card.
+        system_id: written to the file.
+
+    Attributes:
+        damaged: why the file could not be read; None: it could be read, or there is none.
+    """
+
+    def __init__(
+        self, store: ParameterStore, files: FileStore, layout: CardLayout, *, system_id: int
+    ) -> None:
+        self._store = store
+        self._files = files
+        self._path = layout.parameters
+        self._system_id = system_id
+        self._initial: Mapping[str, float] = MappingProxyType(store.as_dict())
+        self._reference = self._initial  # values that equal these are not stored
+        self.damaged: str | None = None
+
+    def load(self, *, without: Collection[str] = ()) -> None:
+        """Load the stored values, except those in `without`; invalid values are skipped."""
+        if not exists(self._files, self._path):
+            return
+        try:
+            text = read_whole(self._files, self._path).decode("utf-8")
+            values = parse_untyped_parameters(text, source=self._path[-1])
+        except (OSError, UnicodeDecodeError, ParameterError) as failure:
+            self.damaged = str(failure)
+            with contextlib.suppress(OSError):  # kept, so that a user can repair it
+                self._files.rename(self._path, (*self._path[:-1], f"{self._path[-1]}.damaged"))
+            return
+        for name, value in values.items():
+            if name in self._store and name not in without:
+                with contextlib.suppress(ParameterError):
+                    self._store.set(name, value, check_range=False)
+
+    def save(self) -> None:
+        """Store the values that differ from those at the start.
+
+        Raises:
+            OSError: the card is full; the old file is kept.
+        """
+        reference = self._reference
+        values = {name: value for name, value in self._store.as_dict().items() if value != reference[name]}
+        if self._path[-1].endswith(QGC_SUFFIX):
+            text = format_qgc(values, self._store.definitions, system_id=self._system_id)
+        else:
+            text = format_mavproxy(values)
+        make_directories(self._files, self._path[:-1])
+        replace_whole(self._files, self._path, text.encode())
+
+    def erase(self) -> None:
+        """Delete the stored values; the values in use do not change, and are not stored again.
+
+        Raises:
+            OSError: the card can't be written.
+        """
+        if exists(self._files, self._path):
+            self._files.remove(self._path)
+        self._reference = MappingProxyType(self._store.as_dict())
+
+    def reset(self, prefixes: tuple[str, ...] = ("",)) -> None:
+        """Set parameters to the values without a card: those of the airframe and the command line."""
+        for name, value in self._initial.items():
+            if name.startswith(prefixes):
+                self._store.set(name, value, check_range=False)
+
+
+def boot_parameters(
+    store: ParameterStore,
+    card: MemoryCard,
+    flavour_name: str,
+    *,
+    system_id: int,
+    given: Collection[str],
+) -> StoredParameters:
+    """Load the values on a card into the parameters of an autopilot that boots.
+
+    At the first boot of a run, the `given` values (from the command line) take precedence over the stored
+    ones; at a reboot the stored values take precedence over all, because clients may have changed them since.
+    """
+    stored = StoredParameters(store, card.files, CARD_LAYOUTS[flavour_name], system_id=system_id)
+    stored.load(without=() if card.boots else given)
+    card.boots += 1
+    return stored

@@ -1,0 +1,1 @@
+"""The MAVLink mission protocol: missions, geofences and rally points."""

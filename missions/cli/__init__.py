@@ -1,0 +1,1 @@
+"""The command line `flightstack`: options, texts and exit codes."""

@@ -1,0 +1,270 @@
+"""`flightstack fly`: flies a mission with one command."""
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from missions.cli.confirm import confirmation
+from missions.cli.fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
+from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, tell
+from missions.cli.mission_command import FlightOption, Scope
+from missions.cli.signing import key_from, key_option, warn_if_open
+from missions.cli.types import SECONDS, SPEEDUP
+
+if TYPE_CHECKING:
+    from missions.cli.mission_command import MissionCommand
+    from missions.mission import Mission
+    from missions.runs.session import RunRequest
+
+_link = partial(flight_option, group="Vehicles")
+_world = partial(flight_option, group="The embedded SITL", scope=Scope.EMBEDDED)
+_elsewhere = partial(flight_option, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
+_flight = partial(flight_option, group="The flight")
+_estimator = partial(flight_option, group="An estimator beside it")
+_results = partial(flight_option, group="Results")
+
+_FORECAST_HEIGHT_M: Final = 100.0  # lower limit; above it the wind of a profile increases little
+
+
+@click.command(cls=FlyCommand, context_settings={"show_default": True})
+@click.argument("mission")
+@_link("--vehicles", type=click.IntRange(1, 250), help="Team size. [default: 1, or one per --connect]")
+@_link("--connect", multiple=True, metavar="URL", help="A vehicle elsewhere: udpin:0.0.0.0:14550, serial:...")
+@_link(
+    "--system-id",
+    multiple=True,
+    type=click.IntRange(1, 255),
+    metavar="ID",
+    help="Of the vehicle, where several are on its link; one for each --connect. [default: the first]",
+)
+@_world(
+    "--autopilot",
+    type=click.Choice(["px4", "ardupilot"]),
+    help="Its firmware's ways. [default: px4, or what a mission file is for]",
+)
+@_world(
+    "--model",
+    multiple=True,
+    metavar="NAME|PATH",
+    help="Its vehicle; one for all of a team, or one for each (repeat, or A,B,C). "
+    "[default: iris, or an aircraft where the mission needs one]",
+)
+@_world(
+    "--launch",
+    type=click.Choice(["runway", "catapult", "hand"]),
+    help="How aircraft get into the air. [default: as described with the model]",
+)
+@_world("--home", help="lat,lon,alt[,heading]. [default: the firmware's own]")
+@_world("--seed", type=click.IntRange(min=0), default=0, help="One seed makes one flight.")
+@_world(
+    "--wind",
+    metavar="SPEED[@FROM]",
+    help="Wind of the day, m/s at 10 m above ground, and degrees it comes from; turns are planned for it, "
+    "unless --expect-wind says otherwise. [default: 0; orbit: 4 from north; occupancy: 5 from west]",
+)
+@_world(
+    "--wind-profile",
+    type=click.Choice(["log", "power", "uniform"]),
+    default="log",
+    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
+)
+@_world(
+    "--turbulence",
+    type=click.Choice(["none", "light", "moderate", "severe"]),
+    help="[default: none; orbit, occupancy: light]",
+)
+@_world(
+    "--gps",
+    type=click.Choice(["differential", "standalone"]),
+    help="Receiver: decimetres with corrections, or metres that wander without. [default: differential]",
+)
+@_flight(
+    "--expect-wind",
+    type=float,
+    help="Forecast: wind to plan turns for, m/s, at the height of the flight. [default: --wind where it is "
+    "given, as it is at 100 m or the mission's altitude, else 5]",
+)
+@_world("--speedup", type=SPEEDUP, help="At most this fast. [default: no limit]")
+@_flight("--params", metavar="FILE", help="Autopilot parameters to set (NAME VALUE lines, .parm, .params).")
+@_results("--out", type=click.Path(path_type=Path), help="Run folder. [default: runs/MISSION-N]")
+@_flight(
+    "--on-failure",
+    type=click.Choice(["return", "land", "hold"]),
+    default="return",
+    help="Or on Ctrl-C, SIGTERM, SIGHUP.",
+)
+@_elsewhere(
+    "--yes", is_flag=True, help="With a real vehicle: fly without asking, when nothing is found against it."
+)
+@_elsewhere(
+    "--check",
+    is_flag=True,
+    help="Look at the vehicle and ask before the flight, on links of this machine too.",
+)
+@_elsewhere(
+    "--regain",
+    type=SECONDS,
+    help="So long a lost link may take to come back, s. [default: 60]",
+)
+@_flight(
+    "--max-error",
+    type=float,
+    metavar="M",
+    help="Fail when the path error exceeds it anywhere in a pattern, m.",
+)
+@_link("--onboard", is_flag=True, help="Speak as the vehicle's companion computer (191), not as a GCS.")
+@_estimator(
+    "--estimator", metavar="NAME|FILE.py", help="Run beside the flight: attitude, lissajous, target-fusion."
+)
+@_estimator(
+    "--set", "settings", multiple=True, metavar="NAME=VALUE", help="Parameter of the estimator; repeat."
+)
+@_results(
+    "--export-plan",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Don't fly: write the mission that would be uploaded (.plan, .waypoints).",
+)
+@_results("--no-picture", is_flag=True, help="Don't draw track.png.")
+@key_option(cls=FlightOption, group="Vehicles elsewhere (--connect)", scope=Scope.CONNECTED)
+def fly(**given: Any) -> int:
+    """Fly MISSION: lissajous, sector, parallel-sweep, expanding-square, orbit, occupancy, a mission
+    file (.plan, .waypoints), or a Python file of your own.
+
+    `flightstack fly MISSION --help` lists a mission's own options. Your own file has `async def fly(vehicle,
+    options)`. The run folder gets flight.tlog, summary.json and track.png.
+    """
+    from missions.errors import PlanError
+    from missions.runs.ending import signal_of
+
+    refuse_idle_options(click.get_current_context(), connected=bool(given["connect"]))
+    try:
+        return _fly(given)
+    except PlanError as error:
+        raise click.UsageError(str(error)) from error
+    except KeyboardInterrupt as interrupt:
+        click.echo("interrupted", err=True)
+        return KILLED + signal_of(interrupt)
+
+
+def _models(
+    given: tuple[str, ...], mission: "Mission[Any]", vehicles: int | None, connections: int
+) -> list[str]:
+    """The models of the vehicles, one for each."""
+    models = [name.strip() for text in given for name in text.split(",")]
+    if not all(models):
+        raise click.UsageError(
+            f"--model {','.join(given)!r} has a place without a name; give NAME, or NAME,NAME,... for a team"
+        )
+    models = models or [mission.world_defaults.model]
+    count = vehicles or max(1, connections, len(models))
+    return models * count if len(models) == 1 else models
+
+
+def _export(mission: "Mission[Any]", request: "RunRequest", path: Path) -> int:
+    """Write the mission's file instead of flying it."""
+    from missions.plan_files.export import export_plan
+
+    count = export_plan(mission, request, path)
+    click.echo(f"{count} items: {path}")
+    return 0
+
+
+def _fly(given: dict[str, Any]) -> int:
+    from flightsim.wind_profile import WindLaw, WindProfile
+    from missions.library import find_mission
+    from missions.options import check_positive, parameters_from_file, parse_wind
+
+    mission = find_mission(given["mission"])
+    context = click.get_current_context()
+    declared: MissionCommand = context.meta["mission command"]
+    models = _models(given["model"], mission, given["vehicles"], len(given["connect"]))
+    common = {
+        "vehicles": given["vehicles"] or max(1, len(given["connect"]), len(models)),
+        "given": declared.chosen_fields(chosen_names(context)),
+    }
+    options = declared.build(given, common)
+    world = mission.world_defaults
+    wind_speed_m_s, wind_from_deg = parse_wind(world.wind if given["wind"] is None else given["wind"])
+    check_positive(expect_wind=given["expect_wind"] or None, max_error=given["max_error"])
+    if given["system_id"] and len(given["system_id"]) != len(given["connect"]):
+        raise click.UsageError(
+            f"{len(given['system_id'])} --system-id for {len(given['connect'])} --connect; give one for each"
+        )
+    forecast_m_s = given["expect_wind"]
+    if forecast_m_s is None and given["wind"] is not None:
+        profile = WindProfile(law=WindLaw(given["wind_profile"]))
+        forecast_m_s = wind_speed_m_s * profile.factor(max(options.altitude_m, _FORECAST_HEIGHT_M))
+    parameters = {} if given["params"] is None else parameters_from_file(given["params"])
+    if given["out"] is not None and given["out"].is_dir() and any(given["out"].iterdir()):
+        raise click.UsageError(
+            f"{given['out']} is not empty, and nothing is overwritten; choose another --out"
+        )
+
+    terminal = sys.stderr.isatty()
+    if terminal and not given["connect"]:
+        click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
+    from autopilot_bridge.errors import AddressError, BridgeError
+    from missions.errors import MissionError
+    from missions.runs.request import REGAIN_S
+    from missions.runs.session import RunRequest as Request
+    from missions.runs.session import fly as fly_mission
+    from missions.vehicle.adapter import Mode
+    from missions.vehicle.connection import GROUND_STATION, ONBOARD_COMPUTER
+
+    line = ProgressLine()
+    confirm = None
+    if given["connect"]:
+        try:
+            if given["export_plan"] is None:
+                confirm = confirmation(
+                    given["connect"], yes=given["yes"], check=given["check"], screen=line.held
+                )
+        except AddressError as error:
+            raise click.UsageError(str(error)) from error
+    try:
+        key = key_from(given["signing_key"])
+        request = Request(
+            options=options,
+            connect=given["connect"],
+            system_ids=given["system_id"],
+            autopilot=given["autopilot"] or world.autopilot or "px4",
+            model=models,
+            launch=given["launch"],
+            seed=given["seed"],
+            speedup=given["speedup"],
+            wind_speed_m_s=wind_speed_m_s,
+            wind_from_deg=wind_from_deg,
+            wind_profile=given["wind_profile"],
+            turbulence=given["turbulence"] or world.turbulence,
+            gps=given["gps"] or "differential",
+            expected_wind_m_s=forecast_m_s,
+            home=given["home"] or (None if given["connect"] else world.home),
+            parameters=parameters,
+            out=given["out"],
+            picture=not given["no_picture"],
+            identity=ONBOARD_COMPUTER if given["onboard"] else GROUND_STATION,
+            on_failure=Mode(given["on_failure"]),
+            max_error_m=given["max_error"],
+            confirm=confirm,
+            on_open=lambda: warn_if_open(given["connect"], key),
+            regain_s=REGAIN_S if given["regain"] is None else given["regain"],
+            estimator=given["estimator"],
+            estimator_settings=given["settings"],
+            command=" ".join(["flightstack", *sys.argv[1:]]),
+            signing_key=key,
+        )
+        if given["export_plan"] is not None:
+            return _export(mission, request, given["export_plan"])
+        result = fly_mission(mission, request, line if terminal else None)
+    except (AddressError, BridgeError) as error:
+        raise click.UsageError(str(error)) from error
+    except MissionError as error:
+        raise click.ClickException(str(error)) from error
+    finally:
+        leave_closed_terminal()
+        line.end()
+    return tell(result, mission)

@@ -1,0 +1,166 @@
+"""`fly MISSION` as a command: the options of every flight, the mission's own, and their permitted
+combinations.
+"""
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from missions.cli.mission_command import MISSION_GROUP, FlightOption, Scope
+from missions.plan_files.suffixes import SUFFIXES as MISSION_FILES
+
+if TYPE_CHECKING:
+    from missions.cli.mission_command import MissionCommand
+
+_PATTERNS: Final = "missions.cli.pattern_command"
+_MISSIONS: Final[Mapping[str, tuple[str, str]]] = {
+    "lissajous": (_PATTERNS, "LISSAJOUS"),
+    "sector": (_PATTERNS, "SECTOR"),
+    "parallel-sweep": (_PATTERNS, "PARALLEL_SWEEP"),
+    "expanding-square": (_PATTERNS, "EXPANDING_SQUARE"),
+    "orbit": ("missions.cli.orbit_command", "COMMAND"),
+    "occupancy": ("missions.cli.occupancy_command", "COMMAND"),
+}
+_OWN: Final = "a mission of your own"
+_FILE: Final = "a mission file"
+_FILES: Final[Mapping[str, tuple[str, str]]] = {
+    _OWN: ("missions.cli.own_mission_command", "COMMAND"),
+    _FILE: ("missions.cli.mission_file_command", "COMMAND"),
+}
+"""The module in which each mission declares its options."""
+
+
+def _command_of(mission: str) -> "MissionCommand":
+    module, name = {**_MISSIONS, **_FILES}[mission]
+    command: MissionCommand = getattr(importlib.import_module(module), name)
+    return command
+
+
+def _declaring(mission: str) -> str:
+    """Name of the mission whose options apply, from the mission argument of the command line."""
+    if mission in _MISSIONS:
+        return mission
+    return _OWN if mission.endswith(".py") else _FILE
+
+
+def _is_file(name: str) -> bool:
+    return name.endswith(".py") or name.lower().endswith(MISSION_FILES)
+
+
+def _owners(option_name: str) -> list[str]:
+    """The missions that have an option."""
+    return [
+        mission
+        for mission in (*_MISSIONS, *_FILES)
+        if any(option_name in option.opts for option in _command_of(mission).options)
+    ]
+
+
+class FlyCommand(click.Command):
+    """`fly MISSION`: its options are those of every flight and those that the mission declares."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        named = self._mission_named(args)
+        if named is not None:
+            ctx.meta["mission command"] = _command_of(_declaring(named))
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            owners = _owners(error.option_name)
+            if owners and named is not None:
+                raise click.UsageError(
+                    f"{error.option_name} is for {', '.join(owners)}, not for {named}"
+                ) from None
+            raise
+
+    def _mission_named(self, args: list[str]) -> str | None:
+        """The mission among the arguments; values of options are skipped."""
+        valued = {
+            name
+            for parameter in self.params
+            if isinstance(parameter, click.Option) and not parameter.is_flag
+            for name in parameter.opts
+        }
+        words = [a for a, before in zip(args, ["", *args], strict=False) if before not in valued]
+        return next((a for a in words if a in _MISSIONS or _is_file(a)), None)
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        declared = ctx.meta.get("mission command")
+        own = [] if declared is None else list(declared.options)
+        common = super().get_params(ctx)
+        return [common[0], *own, *common[1:]]
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        declared = ctx.meta.get("mission command")
+        if declared is None:
+            super().format_help_text(ctx, formatter)
+            return
+        formatter.write_paragraph()
+        with formatter.indentation():
+            for paragraph in declared.help.split("\n\n"):
+                formatter.write_text(paragraph)
+                formatter.write_paragraph()
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options under the headings of their groups, the mission's own first."""
+        groups: dict[str, list[tuple[str, str]]] = {MISSION_GROUP: []}
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
+            if record is not None:
+                group = parameter.group if isinstance(parameter, FlightOption) else "Other"
+                groups.setdefault(group, []).append(record)
+        for group, records in groups.items():
+            if records:
+                with formatter.section(group):
+                    formatter.write_dl(records)
+
+
+def flight_option(
+    *declarations: str, **attributes: Any
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Decorator for an option of every flight."""
+    return click.option(*declarations, cls=FlightOption, **attributes)
+
+
+def chosen_names(context: click.Context) -> frozenset[str]:
+    """Names of the options that the user specified on the command line."""
+    return frozenset(
+        name
+        for name in context.params
+        if context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
+    )
+
+
+def refuse_idle_options(context: click.Context, *, connected: bool) -> None:
+    """Refuse options on the command line that would have no effect on this flight.
+
+    Options of other missions are refused by the parser. This function refuses options of the embedded SITL
+    when vehicles are connected by links, options for connected vehicles with the embedded SITL, and options
+    that another option replaces.
+
+    Raises:
+        click.UsageError: the message names the options and their use.
+    """
+    chosen = chosen_names(context)
+    options = {
+        p.name: p for p in context.command.get_params(context) if isinstance(p, FlightOption) and p.name
+    }
+    given = [options[name] for name in sorted(chosen & options.keys(), key=list(options).index)]
+    idle = Scope.EMBEDDED if connected else Scope.CONNECTED
+    names = ", ".join(option.opts[0] for option in given if option.scope is idle)
+    if names and connected:
+        raise click.UsageError(
+            f"{names}: of the embedded SITL only, has no effect with --connect; leave it out"
+        )
+    if names:
+        raise click.UsageError(f"{names}: for vehicles elsewhere; give --connect too, or leave it out")
+    for option in given:
+        for name in option.replaces:
+            if name in chosen:
+                replaced = options[name].opts[0]
+                raise click.UsageError(
+                    f"{replaced}: has no effect beside {option.opts[0]}, which replaces it; leave one of "
+                    "them out"
+                )

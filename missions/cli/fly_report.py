@@ -1,0 +1,182 @@
+"""Output of `flightstack fly`: a progress line on a terminal, and the result of the run at the end."""
+
+import math
+import os
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+if TYPE_CHECKING:
+    from missions.mission import Mission
+    from missions.runs.session import Flight, RunResult
+
+_FAILED: Final = 1
+_PACE_S: Final = 5.0
+_PACE_LEAST_S: Final = 0.5
+KILLED: Final = 128
+"""Added to the signal's number: the exit code by which shells report that a signal ended a command."""
+
+
+def leave_closed_terminal() -> None:
+    """When the terminal is closed (SIGHUP), discard all further output, so that writing does not fail."""
+    for descriptor in (1, 2):
+        try:
+            os.write(descriptor, b"")
+        except OSError:
+            nobody = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nobody, descriptor)
+            os.close(nobody)
+
+
+class ProgressLine:
+    """The progress line on a terminal. It shows nothing in a pipe, and nothing while it is paused."""
+
+    def __init__(self) -> None:
+        self._width = 0
+        self._held = False
+        self._last_wall_s = -math.inf
+        self._pace = Pace()
+
+    def __call__(self, flight: "Flight") -> None:
+        from autopilot_bridge.clock.pacing import wall_time_s
+        from missions.vehicle.telemetry import Position
+
+        now_s = wall_time_s()
+        if self._held or now_s - self._last_wall_s < 0.1 or flight.clock is None:
+            return
+        self._last_wall_s = now_s
+        time_s = flight.elapsed_s
+        factor = self._pace.factor(now_s, time_s)
+        heard = [vehicle for vehicle in flight.vehicles if vehicle.notes.system_id]
+        mode, height, progress = "waiting", "", 0.0
+        if heard:
+            mode = "/".join(dict.fromkeys(vehicle.mode for vehicle in heard))
+            if any(vehicle.link_lost for vehicle in heard):
+                mode = "LINK LOST"
+            positions = [vehicle.latest(Position) for vehicle in heard]
+            height = "/".join(f"{p.height_m:.1f}" for p in positions if p) + " m"
+            progress = sum(vehicle.notes.progress for vehicle in heard) / len(heard)
+        speed = "" if factor is None else f"x{factor:.1f}"
+        text = f"{time_s:8.1f} s  {speed:<7} {mode:<10} {height:>8}  {100.0 * progress:3.0f} %"
+        click.echo(f"\r{text:<{self._width}}", nl=False, err=True)
+        self._width = len(text)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Context in which other code writes to the terminal: the progress line is erased and not shown."""
+        if self._width:
+            click.echo(f"\r{'':<{self._width}}\r", nl=False, err=True)
+        self._width, self._held = 0, True
+        try:
+            yield
+        finally:
+            self._held = False
+
+    def end(self) -> None:
+        """End the progress line."""
+        if self._width:
+            click.echo("", err=True)
+            self._width = 0
+
+
+class Pace:
+    """Ratio of vehicle time to wall time over the last seconds."""
+
+    def __init__(self) -> None:
+        self._looks: deque[tuple[float, float]] = deque()
+
+    def factor(self, wall_s: float, vehicle_s: float) -> float | None:
+        """Vehicle seconds per wall second; None while too few values are known.
+
+        Args:
+            wall_s, vehicle_s: present time of both clocks. When the vehicle's time is reset, the measurement
+                restarts.
+        """
+        looks = self._looks
+        if looks and vehicle_s < looks[-1][1]:
+            looks.clear()
+        looks.append((wall_s, vehicle_s))
+        while len(looks) > 2 and wall_s - looks[1][0] >= _PACE_S:
+            looks.popleft()
+        passed_s = wall_s - looks[0][0]
+        return None if passed_s < _PACE_LEAST_S else (vehicle_s - looks[0][1]) / passed_s
+
+
+def tell(result: "RunResult", mission: "Mission[Any]") -> int:
+    """Print the result of a run; returns the exit code."""
+    from missions.runs.run_folder import POOR, wind_words
+
+    summary = result.summary
+    if result.outcome == "interrupted":
+        click.echo(f"flightstack: {result.reason}; the log is in {result.folder}", err=True)
+        return KILLED + result.signal
+    if result.outcome == "failed":
+        _warn(summary)
+        click.echo(f"flightstack: mission {summary['mission']} failed: {result.reason}", err=True)
+        click.echo(f"failed: see {result.folder}")
+        return _FAILED
+    _warn(summary)
+    click.echo(
+        f"{result.outcome}: {summary['mission']} with {summary['autopilot']}, "
+        f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.1f} s, "
+        f"{summary['speedup']:.3g} times real time"
+    )
+    if "wind" in summary:
+        click.echo(wind_words(summary["wind"]))
+    if summary["path_rms_error_m"] is not None:
+        reference = summary["vehicles"][0]["error_reference"]
+        click.echo(
+            f"path error {summary['path_rms_error_m']:.2f} m RMS, "
+            f"{summary['path_max_error_m']:.2f} m at most ({reference})"
+        )
+    for block in summary["vehicles"]:
+        if "waypoints" in block:
+            w = block["waypoints"]
+            whose = f"vehicle {block['system_id']}: " if len(summary["vehicles"]) > 1 else ""
+            click.echo(
+                f"{whose}waypoints passed within {w['acceptance_m']:g} m: {w['passed']} of {w['count']}"
+            )
+    for told in mission.said(summary):
+        click.echo(told)
+    for block in summary["vehicles"]:
+        if block["tracking"] == POOR:
+            click.echo(
+                f"poor tracking: vehicle {block['system_id']} was {block['path_max_error_m']:.1f} m off the "
+                f"path at most, more than the acceptance radius of {block['acceptance_m']:g} m"
+            )
+    click.echo(f"run: {result.folder}")
+    return _tell_estimator(summary["estimator"]) if "estimator" in summary else 0
+
+
+def _tell_estimator(summary: Mapping[str, Any]) -> int:
+    """Print the result of the flight's estimator; returns the exit code."""
+    from missions.estimation.report import warnings_of
+
+    name = summary["estimator"]
+    for block in summary["vehicles"]:
+        for subject in block["subjects"]:
+            errors = [
+                f"{key.removesuffix(f'_rms_{unit}')} {subject[key]:.2f} {unit}"
+                for unit in ("deg", "m")
+                for key in subject
+                if key.endswith(f"_rms_{unit}")
+            ]
+            told = f": {', '.join(errors)} RMS off {subject['reference']}" if errors else ""
+            click.echo(
+                f"{summary['estimator']}, {subject['subject']}: {subject['estimates']} estimates{told}"
+            )
+    for warning in warnings_of(summary):
+        click.echo(f"flightstack: {name}: {warning}", err=True)
+    if summary["outcome"] == "completed":
+        return 0
+    click.echo(f"flightstack: {name}: {summary['reason']}; results are partial", err=True)
+    return _FAILED
+
+
+def _warn(summary: Mapping[str, Any]) -> None:
+    for block in summary["vehicles"]:
+        for warning in block["warnings"]:
+            click.echo(f"warning: vehicle {block['system_id']}: {warning}", err=True)

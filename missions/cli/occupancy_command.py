@@ -1,0 +1,160 @@
+"""The command-line options of the search with an occupancy map."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import click
+
+from missions.cli.mission_command import Given, MissionCommand, Scope, option
+
+
+def _build(given: Given, common: Mapping[str, Any]) -> Any:
+    from missions.occupancy.options import OccupancyOptions
+    from missions.options import parse_pair
+
+    if given["connect"] and given["map"] is None:
+        raise click.UsageError(
+            "a search needs the published magnetic map of its place; give it with --map FILE "
+            "(numpy .npz, format flightstack-magnetic-map-1)"
+        )
+    width_m, height_m = parse_pair(given["size"], "--size", "x,")
+    along_m, across_m = parse_pair(given["sigma"], "--sigma", "x,")
+    return OccupancyOptions(
+        **common,
+        altitude_m=given["altitude"],
+        separation_m=given["separation"],
+        rate_hz=given["rate"],
+        width_m=width_m,
+        height_m=height_m,
+        area_ne_m=_place("--area", given["area"]) or (0.0, 0.0),
+        cell_m=given["cell"],
+        neighbourhood=given["neighbourhood"],
+        heading_penalty=given["heading_penalty"],
+        detection_probability=given["detection_probability"],
+        detection_range_m=given["detection_range"],
+        threshold_nt=given["threshold"],
+        noise_nt=given["noise"],
+        map_error_nt=given["map_error"],
+        confirmations=given["confirmations"],
+        raise_radius_m=given["raise_radius"],
+        search_time_s=given["search_time"],
+        speed_m_s=given["speed"],
+        map_file=given["map"],
+        target_ne_m=_place("--target", given["target"]),
+        amplitude_nt=given["amplitude"],
+        sigma_along_m=along_m,
+        sigma_across_m=across_m,
+        moment_a_m2=given["moment"],
+        depth_m=given["depth"],
+    )
+
+
+def _place(name: str, text: str | None) -> tuple[float, float] | None:
+    from missions.options import parse_pair
+
+    if text is None:
+        return None
+    if "," not in text:
+        raise click.UsageError(
+            f"{name} {text!r} is not a place; give NORTH,EAST in metres, for example 300,-150"
+        )
+    return parse_pair(text, name, ",")
+
+
+COMMAND: Final = MissionCommand(
+    help=(
+        "Search a magnetic map for a target, as a team with one occupancy map.\n\n"
+        "Each vehicle carries a survey magnetometer, flies headings from cell to cell in its own layer of "
+        "altitude, and all return when the target is found or the search time is over. Places are metres "
+        "from the map's home."
+    ),
+    options=(
+        option(
+            "--size", default="2400", help="Of the searched area, m: SIDE or WIDTHxHEIGHT (east x north)."
+        ),
+        option("--area", metavar="NORTH,EAST", help="Centre of the area, m. [default: the map's home]"),
+        option("--cell", type=float, default=200.0, help="Side of a cell, m."),
+        option("--neighbourhood", type=int, default=1, help="Cells a decision looks at, in each direction."),
+        option(
+            "--heading-penalty",
+            type=float,
+            help="For a turn by 180 degrees, in mean prior scores. [default: 0.2; multicopters: 0.05]",
+        ),
+        option(
+            "--detection-probability", type=float, default=0.95, help="Of a target by a pass right over it."
+        ),
+        option(
+            "--detection-range", type=float, default=80.0, help="Sideways fall-off of that, one sigma, m."
+        ),
+        option("--threshold", type=float, default=3.0, help="Reading less map beyond it is an anomaly, nT."),
+        option("--noise", type=float, default=0.5, help="Of reading less map, one sigma, nT."),
+        option(
+            "--map-error",
+            type=float,
+            help="Of the published map, one sigma, nT. [default: as the map states it, else 1]",
+        ),
+        option("--confirmations", type=int, default=2, help="Passes that must see an anomaly at one place."),
+        option("--raise-radius", type=float, default=300.0, help="Scores are raised around anomalies, m."),
+        option("--search-time", type=float, default=900.0, help="Give up after so many seconds."),
+        option("--altitude", type=float, default=80.0, help="Of the lowest layer, above home, m."),
+        option("--separation", type=float, default=15.0, help="Between the layers of a team, m."),
+        option(
+            "--speed",
+            type=float,
+            help="Airspeed of an aircraft, ground speed of a multicopter, m/s. [default: its own; 10]",
+        ),
+        option("--rate", type=float, default=25.0, help="Setpoints per second of a multicopter."),
+        option(
+            "--map",
+            metavar="FILE",
+            help="Published magnetic map (.npz). [default: the embedded world makes one from --seed]",
+        ),
+        option(
+            "--target",
+            scope=Scope.EMBEDDED,
+            metavar="NORTH,EAST",
+            help="Where the embedded world's target is, m. [default: drawn from --seed]",
+        ),
+        option(
+            "--amplitude",
+            scope=Scope.EMBEDDED,
+            type=float,
+            default=30.0,
+            help="Of that target's anomaly, nT.",
+        ),
+        option(
+            "--moment",
+            scope=Scope.EMBEDDED,
+            type=float,
+            help="Dipole moment of that target, A m2, along the Earth's field, in place of a Gaussian.",
+        ),
+        option(
+            "--depth",
+            scope=Scope.EMBEDDED,
+            type=float,
+            default=10.0,
+            help="Of a target with a moment, below home, m.",
+        ),
+        option(
+            "--sigma", scope=Scope.EMBEDDED, default="80x60", help="Its extent, m: one sigma along x across."
+        ),
+    ),
+    build=_build,
+    fields=MappingProxyType(
+        {
+            "size": ("width_m", "height_m"),
+            "area": ("area_ne_m",),
+            "threshold": ("threshold_nt",),
+            "noise": ("noise_nt",),
+            "map_error": ("map_error_nt",),
+            "moment": ("moment_a_m2",),
+            "depth": ("depth_m",),
+            "rate": ("rate_hz",),
+            "map": ("map_file",),
+            "target": ("target_ne_m",),
+            "amplitude": ("amplitude_nt",),
+            "sigma": ("sigma_along_m", "sigma_across_m"),
+        }
+    ),
+)

@@ -1,0 +1,116 @@
+"""The command-line options of the orbit."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import click
+
+from missions.cli.mission_command import Given, MissionCommand, Scope, option
+
+
+def _degrees(name: str, value: float) -> float:
+    if not math.isfinite(value):
+        raise click.UsageError(f"--{name} {value} is not a direction; give degrees, such as 90")
+    return math.radians(value)
+
+
+def _place(text: str) -> tuple[float, float]:
+    north, comma, east = text.partition(",")
+    try:
+        place = float(north), float(east)
+    except ValueError:
+        place = math.nan, math.nan
+    if not comma or not all(map(math.isfinite, place)):
+        raise click.UsageError(
+            f"--target {text!r} is not NORTH,EAST in metres from home, for example 500,300"
+        )
+    return place
+
+
+def _build(given: Given, common: Mapping[str, Any]) -> Any:
+    from missions.orbit.options import AttitudeFrom, GpsOff, OrbitOptions
+    from missions.scenario import TargetMotion
+
+    heading, motion = given["entry_heading"], given["target_motion"]
+    return OrbitOptions(
+        **common,
+        altitude_m=given["altitude"],
+        separation_m=given["separation"],
+        radius_m=given["radius"],
+        direction=1 if given["direction"] == "cw" else -1,
+        duration_s=given["duration"],
+        airspeed_m_s=given["airspeed"],
+        target_ne_m=_place(given["target"]),
+        target_speed_m_s=given["target_speed"],
+        target_heading_rad=_degrees("target-heading", given["target_heading"]),
+        target_motion=None if motion is None else TargetMotion(motion),
+        target_ground_m=given["target_ground"],
+        entry_bearing_rad=_degrees("entry-bearing", given["entry_bearing"]),
+        entry_distance_m=given["entry_distance"],
+        entry_heading_rad=None if heading is None else _degrees("entry-heading", heading),
+        gps_fault=not given["no_gps_fault"],
+        gps_off=GpsOff(given["gps_off"]),
+        lost_limit_s=given["lost_limit"],
+        attitude=AttitudeFrom(given["attitude"]),
+    )
+
+
+COMMAND: Final = MissionCommand(
+    help=(
+        "Circle a target on the ground without GPS, by roll commands from what a gimballed camera sees.\n\n"
+        "An aircraft takes off, flies to the entry with GPS, loses it there (MAV_CMD_INJECT_FAILURE), "
+        "orbits, gets "
+        "GPS back and lands."
+    ),
+    options=(
+        option("--radius", type=float, default=150.0, help="Of the orbit, m, horizontal."),
+        option("--direction", type=click.Choice(["cw", "ccw"]), default="cw", help="Seen from above."),
+        option("--duration", type=float, default=600.0, help="On the orbit, s."),
+        option("--altitude", type=float, default=100.0, help="Above home, m."),
+        option("--airspeed", type=float, help="m/s. [default: the aircraft's own]"),
+        option(
+            "--target",
+            default="500,300",
+            metavar="NORTH,EAST",
+            help="Where the target is at the beginning, m from home, as reported before the flight.",
+        ),
+        option("--target-speed", type=float, default=0.0, help="Of the target, m/s."),
+        option("--target-heading", type=float, default=0.0, help="It moves there, degrees."),
+        option(
+            "--target-motion",
+            scope=Scope.EMBEDDED,
+            type=click.Choice(["static", "straight", "circle", "random-walk"]),
+            help="How it moves: one that wanders stays within 100 m. [default: straight on, or static]",
+        ),
+        option("--target-ground", type=float, default=0.0, help="Height of its ground above home, m."),
+        option(
+            "--entry-bearing", type=float, default=180.0, help="GPS is lost there: from the target, degrees."
+        ),
+        option("--entry-distance", type=float, default=400.0, help="And so far from it, m."),
+        option(
+            "--entry-heading", type=float, help="Of the nose there, degrees. [default: towards the target]"
+        ),
+        option("--no-gps-fault", is_flag=True, help="Leave GPS on; the orbit doesn't use it."),
+        option(
+            "--gps-off",
+            type=click.Choice(["auto", "failure", "parameter"]),
+            default="auto",
+            help="How GPS is switched off: by MAV_CMD_INJECT_FAILURE, by a parameter that is restored "
+            "afterwards, or by what a simulator takes.",
+        ),
+        option(
+            "--lost-limit", type=float, default=30.0, help="Give up when the target is unseen so long, s."
+        ),
+        option(
+            "--attitude",
+            type=click.Choice(["autopilot", "filter"]),
+            default="autopilot",
+            help="Roll and pitch to fly with: the autopilot's, or our own filter's (docs/attitude.md).",
+        ),
+        option("--separation", type=float, default=20.0, help="Between the altitudes of a team, m."),
+    ),
+    build=_build,
+    fields=MappingProxyType({}),
+)

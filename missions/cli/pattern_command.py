@@ -1,0 +1,166 @@
+"""The command-line options of the search patterns."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import click
+
+from missions.cli.mission_command import FlightOption, Given, MissionCommand, option
+
+_WINGS: Final = " Aircraft: {}."
+
+
+def ratio_of(text: str) -> tuple[float, float]:
+    """Parse "3:4"; a single number is the ratio to one."""
+    from missions.options import parse_pair
+
+    x, y = parse_pair(text, "--ratio", ":/,")
+    if not any(mark in text for mark in ":/,"):
+        y = 1.0
+    for frequency in (x, y):
+        if frequency <= 0.0:
+            raise click.UsageError(f"--ratio {text}: frequency {frequency:g} is not above 0; try --ratio 3:4")
+    return x, y
+
+
+def _shape(given: Given) -> dict[str, Any]:
+    """Options that apply to only one pattern."""
+    from missions.options import parse_pair
+
+    if "pattern" not in given:
+        shape = {"heading_rad": math.radians(given["heading"])}
+        return shape | ({"spacing_m": given["spacing"]} if "spacing" in given else {})
+    phase_x_deg = phase_y_deg = None
+    if given["phase"] is not None:
+        phase_x_deg, phase_y_deg = parse_pair(given["phase"], "--phase", ",")
+        if "," not in given["phase"]:
+            phase_y_deg = 0.0  # a single number is the difference of the two phases
+    return {
+        "pattern": given["pattern"],
+        "ratio": None if given["ratio"] is None else ratio_of(given["ratio"]),
+        "phase_x_rad": None if phase_x_deg is None else math.radians(phase_x_deg),
+        "phase_y_rad": None if phase_y_deg is None else math.radians(phase_y_deg),
+        "period_s": given["period"],
+    }
+
+
+def _build(given: Given, common: Mapping[str, Any]) -> Any:
+    from missions.options import FlightOptions, Via, parse_pair
+
+    width_m, height_m = parse_pair(given["size"], "--size", "x,")
+    if given["amplitude_x"] is not None:
+        width_m = 2.0 * given["amplitude_x"]
+    if given["amplitude_y"] is not None:
+        height_m = 2.0 * given["amplitude_y"]
+    return FlightOptions(
+        **common,
+        **_shape(given),
+        altitude_m=given["altitude"],
+        separation_m=given["separation"],
+        rate_hz=given["rate"],
+        width_m=width_m,
+        height_m=height_m,
+        speed_m_s=given["speed"],
+        periods=given["periods"],
+        search_time_s=given["search_time"],
+        via=Via(given["via"]),
+        acceptance_m=given["acceptance"],
+    )
+
+
+_LISSAJOUS: Final = (
+    option(
+        "--pattern",
+        default="L3",
+        help="Lissajous pattern: L1 (circle), L2, L3, L4." + _WINGS.format("L2"),
+    ),
+    option(
+        "--ratio",
+        replaces=("pattern",),
+        help="Frequencies X:Y of a Lissajous pattern of your own, e.g. 3:4 or 1.4.",
+    ),
+    option("--phase", help="Phases of x and y, degrees: X,Y or their difference."),
+    option("--period", type=float, replaces=("speed",), help="Seconds once round, in place of --speed."),
+)
+_HEADING: Final = (option("--heading", type=float, default=0.0, help="First leg, degrees."),)
+_SPACING: Final = (
+    option(
+        "--spacing",
+        type=float,
+        default=10.0,
+        help="Track spacing, m." + _WINGS.format("what its turns need"),
+    ),
+)
+_EVERY: Final = (
+    option(
+        "--size",
+        default="100",
+        help="Size of the pattern, m: SIDE or WIDTHxHEIGHT (east x north)."
+        + _WINGS.format("1000 or more, as its turns need"),
+    ),
+    option(
+        "--amplitude-x", type=float, replaces=("size",), help="Half the width, m (east), in place of --size."
+    ),
+    option("--amplitude-y", type=float, replaces=("size",), help="Half the height, m (north)."),
+    option("--altitude", type=float, default=10.0, help="Above home, m." + _WINGS.format("100")),
+    option(
+        "--speed",
+        type=float,
+        default=5.0,
+        help="Ground speed, m/s; of an aircraft, airspeed." + _WINGS.format("its own"),
+    ),
+    option("--periods", type=float, default=1.0, help="Times round."),
+    option(
+        "--search-time",
+        type=float,
+        replaces=("periods",),
+        help="Repeat the pattern for so many seconds, in place of --periods.",
+    ),
+    option(
+        "--via",
+        type=click.Choice(["waypoints", "setpoints"]),
+        default="waypoints",
+        help="By an uploaded mission, or by streamed setpoints."
+        + _WINGS.format("setpoints, which follow the curve more closely"),
+    ),
+    option(
+        "--acceptance",
+        type=float,
+        default=2.0,
+        help="Waypoint acceptance radius, m." + _WINGS.format("by its speed"),
+    ),
+    option("--rate", type=float, default=25.0, help="Setpoints per second."),
+    option(
+        "--separation",
+        type=float,
+        default=4.0,
+        help="Between the altitudes of a team, m." + _WINGS.format("20"),
+    ),
+)
+
+
+def _pattern(help_text: str, own: tuple[FlightOption, ...]) -> MissionCommand:
+    return MissionCommand(
+        help=help_text,
+        options=(*own, *_EVERY),
+        build=_build,
+        fields=MappingProxyType(
+            {
+                "size": ("width_m", "height_m"),
+                "amplitude_x": ("width_m",),
+                "amplitude_y": ("height_m",),
+                "ratio": ("ratio", "pattern"),
+                "rate": ("rate_hz",),
+            }
+        ),
+    )
+
+
+LISSAJOUS: Final = _pattern(
+    "Fly a Lissajous pattern, east by one frequency and north by another.", _LISSAJOUS
+)
+SECTOR: Final = _pattern("Fly a sector search (IAMSAR) around a point.", _HEADING)
+PARALLEL_SWEEP: Final = _pattern("Fly a parallel sweep search (IAMSAR).", _HEADING + _SPACING)
+EXPANDING_SQUARE: Final = _pattern("Fly an expanding square search (IAMSAR).", _HEADING + _SPACING)

@@ -1,0 +1,315 @@
+"""`flightstack sitl`: simulated vehicles for external clients."""
+
+import contextlib
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from autopilot_bridge.errors import BridgeError, TlogError
+from missions.cli.losses import Losses
+from missions.cli.scenario import scenario_of
+from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
+from missions.cli.storage import VehicleCards, storage_option
+from missions.cli.types import SLOWEST, FiniteRange
+from missions.cli.video import start_video, video_options
+from missions.runs.end_requests import EndRequests
+
+if TYPE_CHECKING:
+    from autopilot_bridge.sitl import Port, Sitl
+
+_LOG_RATE_HZ = 4
+_FAILED = 1
+_LOGGER = 255, 190  # MAV_COMP_ID_MISSIONPLANNER of a ground station
+
+
+def _ports(links: tuple[str, ...], gcs_links: tuple[str, ...]) -> "list[Port]":
+    """Links from the options; empty: the default links of the flavour are opened."""
+    from autopilot_bridge.links import parse_address
+    from autopilot_bridge.sitl import Port
+
+    chosen = [Port(parse_address(link), "onboard") for link in links]
+    chosen += [Port(parse_address(link), "gcs") for link in gcs_links]
+    return chosen
+
+
+def _loss_times(autopilot: str, speedup: float) -> dict[str, float]:
+    """Timeout parameters, stretched so that clients, which run in wall time, have as long to answer as at
+    speedup 1.
+
+    PX4's own SITL stretches these when it runs faster (docs/firmware/px4.md, section 2); ArduPilot's does
+    not.
+    """
+    if autopilot != "px4" or speedup <= 1.0:
+        return {}
+    return {
+        "COM_DL_LOSS_T": min(round(10.0 * speedup), 300),
+        "COM_RC_LOSS_T": min(speedup, 35.0),
+        "COM_OF_LOSS_T": min(speedup, 60.0),
+        "COM_OBC_LOSS_T": min(5.0 * speedup, 60.0),
+    }
+
+
+def _request_streams() -> bytes:
+    """Request for all of ArduPilot's streams from every vehicle, at the rate that MAVProxy requests."""
+    from autopilot_bridge.mavlink import FrameEncoder, dialect
+
+    request = dialect.MAVLink_request_data_stream_message(0, 0, dialect.MAV_DATA_STREAM_ALL, _LOG_RATE_HZ, 1)
+    return FrameEncoder(*_LOGGER).encode(request)
+
+
+@contextlib.contextmanager
+def _recording(world: "Sitl", path: str, autopilot: str, losses: Losses) -> Iterator[None]:
+    """Write a new log of the vehicles' messages until the context ends or the file can no longer be written.
+
+    Raises:
+        TlogError: the file exists or can't be made.
+    """
+    from autopilot_bridge.sitl import PacketLog
+
+    recorder = PacketLog(path)
+    for listener in world.record(recorder, losses.log_ended):
+        if autopilot == "ardupilot":  # it sends only what was requested
+            listener.send(_request_streams())
+    try:
+        yield
+    finally:
+        try:
+            recorder.close()
+        except TlogError as error:
+            losses.log_ended(str(error))
+
+
+@click.command()
+@click.option("--autopilot", type=click.Choice(["px4", "ardupilot"]), default="px4", show_default=True)
+@click.option(
+    "--model",
+    multiple=True,
+    metavar="NAME|PATH",
+    help="One of our models, or a path; for all, or one for each (repeat, or A,B,C). [default: iris]",
+)
+@click.option(
+    "--launch",
+    type=click.Choice(["runway", "catapult", "hand"]),
+    help="How aircraft get into the air. [default: as described with the model]",
+)
+@click.option("--count", type=click.IntRange(1, 250), default=1, show_default=True, help="Vehicles.")
+@click.option(
+    "--speedup",
+    type=FiniteRange(min=0.0, max=1e6),
+    default=1.0,
+    show_default=True,
+    help="Simulated seconds per wall second; 0: as fast as possible.",
+)
+@click.option(
+    "--link",
+    "links",
+    multiple=True,
+    help="Link with onboard streams instead of the usual ports; with --count, all vehicles share it.",
+)
+@click.option("--gcs-link", "gcs_links", multiple=True, help="Link with ground-station streams.")
+@click.option("--home", help="lat,lon,alt[,heading]; default: where the firmware's own SITL stands.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--wind",
+    default="0",
+    show_default=True,
+    help="Speed in m/s at 10 m above ground, with @DEG where it comes from.",
+)
+@click.option(
+    "--wind-profile",
+    type=click.Choice(["log", "power", "uniform"]),
+    default="log",
+    show_default=True,
+    help="Wind over height: logarithmic over open ground, power law of 1/7, or the same everywhere.",
+)
+@click.option(
+    "--turbulence",
+    type=click.Choice(["none", "light", "moderate", "severe"]),
+    default="none",
+    show_default=True,
+)
+@click.option(
+    "--gps",
+    type=click.Choice(["differential", "standalone"]),
+    default="differential",
+    show_default=True,
+    help="Receiver: decimetres with corrections, or metres that wander without.",
+)
+@click.option("--camera", is_flag=True, help="Every vehicle carries a camera on a gimbal.")
+@click.option(
+    "--target",
+    "targets",
+    multiple=True,
+    metavar="NORTH,EAST[,SPEED,HEADING]",
+    help="A target on the ground for cameras: m from home, m/s and degrees. Repeat for more.",
+)
+@click.option(
+    "--map",
+    "map_file",
+    metavar="FILE",
+    help="Magnetic map (.npz, as `fly occupancy` publishes it); every vehicle carries a survey magnetometer.",
+)
+@click.option(
+    "--map-target", metavar="NORTH,EAST", help="A target's magnetic signature there, m from the map's home."
+)
+@key_option()
+@click.option(
+    "--unsigned",
+    type=click.Choice(["none", "serial", "local", "all"]),
+    default="serial",
+    show_default=True,
+    help="Which links take unsigned frames while there is a key: none, serial ones, this machine's too, all.",
+)
+@click.option(
+    "--signing-store",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Keep keys that clients set, and times, over restarts.",
+)
+@video_options
+@storage_option
+@click.option("--params", type=click.Path(dir_okay=False), help="Parameter file (.params or .parm).")
+@click.option("--log", metavar="FILE", help="New .tlog for what the vehicles say, and the truth.")
+@click.option("--no-wait", is_flag=True, help="ArduPilot: don't wait for a client on the first port.")
+@click.option(
+    "--duration", type=FiniteRange(min=0.0, max=1e9), help="Stop after so many seconds of vehicle time."
+)
+def sitl(
+    autopilot: str,
+    model: tuple[str, ...],
+    launch: str | None,
+    count: int,
+    speedup: float,
+    links: tuple[str, ...],
+    gcs_links: tuple[str, ...],
+    home: str | None,
+    seed: int,
+    wind: str,
+    wind_profile: str,
+    turbulence: str,
+    gps: str,
+    camera: bool,
+    targets: tuple[str, ...],
+    map_file: str | None,
+    map_target: str | None,
+    video: str | None,
+    pictures: Path | None,
+    signing_key: Path | None,
+    unsigned: str,
+    signing_store: Path | None,
+    storage: str | None,
+    params: str | None,
+    log: str | None,
+    no_wait: bool,
+    duration: float | None,
+) -> int:
+    """Simulated vehicles (SITL) for external clients: QGroundControl, MAVSDK, MAVProxy, DroneKit, mavutil.
+
+    Opens the ports that clients of the firmware use by default, prints them, and runs until Ctrl-C.
+
+    Exit codes: 0 stopped, 1 the log, a picture or the signing keys could not be written, 2 usage,
+    130 interrupted while it started.
+    """
+    if 0.0 < speedup < SLOWEST:
+        raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
+    from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
+    from autopilot_bridge.sitl import (
+        PaceReport,
+        Sitl,
+        SitlConfiguration,
+        SitlServer,
+        compile_flight_code,
+        parse_home,
+        team,
+    )
+    from autopilot_bridge.sitl.configuration import HOMES
+    from flightsim.environment import Environment
+    from flightsim.vehicle import VehicleDivergedError
+    from flightsim.wind_profile import WindLaw, WindProfile
+    from missions.embedded.scenario import equipped
+    from missions.options import parameters_from_file, parse_wind
+
+    models = [name for text in model for name in text.split(",") if name] or ["iris"]
+    count = len(models) if count == 1 else count
+    losses = Losses()
+    with EndRequests() as ending, contextlib.ExitStack() as at_end:
+        try:
+            ports = _ports(links, gcs_links)
+            signing = vehicle_signing(signing_key, unsigned, signing_store, on_failure=losses.keys_not_stored)
+            wind_speed_m_s, wind_from_deg = parse_wind(wind)
+            place = None if home is None else parse_home(home)
+            heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
+            configuration = SitlConfiguration(
+                vehicles=team(
+                    count,
+                    model=models[0] if len(models) == 1 else models,
+                    flavour=autopilot,
+                    launch=launch,
+                    heading_deg=heading_deg,
+                    gps=gps,
+                    parameters={
+                        **_loss_times(autopilot, speedup),
+                        **({} if params is None else parameters_from_file(params)),
+                    },
+                ),
+                home=place,
+                environment=Environment.from_wind(
+                    speed_m_s=wind_speed_m_s,
+                    from_deg=wind_from_deg,
+                    profile=WindProfile(law=WindLaw(wind_profile)),
+                    turbulence=turbulence,
+                ),
+                seed=seed,
+                unix_epoch_us=unix_time_us(),  # its clients use calendar time
+            )
+            memory = VehicleCards(storage, count)
+            at_end.callback(memory.close)
+            equipment = equipped(configuration, scenario_of(camera, targets, map_file, map_target))
+            click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
+            world = Sitl(equipment, signing=signing, cards=memory.cards)
+            compile_flight_code(world.configuration.vehicles)
+            server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
+            pictured = start_video(world, video, pictures, losses.picture_lost)
+            if pictured is not None:
+                at_end.callback(pictured.close)
+            if count > 1 and ports:
+                opened = server.open([()] * count, shared=ports)
+            else:
+                opened = server.open([ports] if ports else None)
+            at_end.callback(world.close)
+            ending.remember()
+            if log is not None:  # created last, when no other check can still fail
+                at_end.enter_context(_recording(world, log, autopilot, losses))
+        except (ValueError, OSError, BridgeError) as error:
+            raise click.UsageError(str(error)) from error
+        for vehicle, port, address in opened:
+            system_id = vehicle.specification.system_id
+            kind = f"{autopilot} {vehicle.specification.model}"
+            how = signed_how(signing, port.address)
+            click.echo(f"vehicle {system_id} ({kind}): {address} {port.role}{how}")
+        for named in dict.fromkeys(port.address for _, port, _ in opened):
+            warn_if_unsigned(named, signing)
+        for uri in () if pictured is None else pictured.uris:
+            click.echo(f"video: {uri}")
+        click.echo("ready, Ctrl-C ends it")
+
+        def report(pace: PaceReport) -> None:
+            click.echo(f"\r{pace.time_us * 1e-6:10.1f} s  x{pace.speedup:<6.2f}", nl=False, err=True)
+
+        if autopilot == "ardupilot" and not ports and not no_wait:
+            click.echo(f"waiting for a client on {opened[0][2]}", err=True)
+            server.wait_for_client(lambda: ending.asked)
+        try:
+            server.run(
+                lambda: ending.asked,
+                report=report if sys.stderr.isatty() else None,
+                until_us=None if duration is None else round(duration * 1e6),
+            )
+        except VehicleDivergedError as error:
+            raise click.ClickException(f"the simulation ended: {error}") from error
+    lost = f", {server.slipped_s:.1f} s behind real time" if server.slipped_s > 0.05 else ""
+    click.echo(f"stopped at {world.time_us * 1e-6:.1f} s of vehicle time{lost}")
+    return _FAILED if losses.any else 0

@@ -1,0 +1,1 @@
+"""The search patterns as missions."""

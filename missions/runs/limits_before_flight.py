@@ -1,0 +1,166 @@
+"""Checks that are possible before a vehicle was received, and the options as one vehicle flies them."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from missions.errors import PlanError
+from missions.kind import VehicleKind
+from missions.mission import Mission
+from missions.runs.vehicle_opening import Stage
+from missions.options import MissionOptions
+from missions.planning.limits import WIDEST_FIXED_WING_LIMITS, WIDEST_LIMITS, FixedWingLimits, Limits
+from missions.runs.request import RunRequest
+from missions.vehicle.link_view import ADAPTERS
+
+_WIDEST: Mapping[VehicleKind, Limits] = {
+    VehicleKind.MULTICOPTER: WIDEST_LIMITS,
+    VehicleKind.FIXED_WING: WIDEST_FIXED_WING_LIMITS,
+}
+
+
+def vehicle_options(options: MissionOptions, index: int) -> MissionOptions:
+    """The options of one vehicle of a team."""
+    return replace(options, index=index)
+
+
+def adapted(
+    mission: Mission[Any], options: MissionOptions, limits: Limits, ground_alt_m: float
+) -> tuple[MissionOptions, Limits]:
+    """The options as one vehicle flies them, and its limits at the altitude of the flight.
+
+    Args:
+        mission: the mission to be flown.
+        options: options of this vehicle.
+        limits: limits of this vehicle.
+        ground_alt_m: altitude of its home above mean sea level.
+    """
+    if not isinstance(limits, FixedWingLimits):
+        return mission.adapted(options, limits), limits
+    limits = _at(limits, ground_alt_m + options.own_altitude_m)
+    limits = _at(limits, ground_alt_m + mission.adapted(options, limits).own_altitude_m)
+    return mission.adapted(options, limits), limits
+
+
+def _at(limits: FixedWingLimits, alt_m: float) -> FixedWingLimits:
+    return replace(limits, air_altitude_m=alt_m if math.isfinite(alt_m) else 0.0)
+
+
+def check_request(mission: Mission[Any], request: RunRequest) -> None:
+    """Refuse a request that no vehicle of the kind could fly, before anything is started.
+
+    A request that every aircraft would refuse is checked with the limits of the requested aircraft, so that
+    the advice in the error is right for it.
+
+    Raises:
+        PlanError: names the reason and the option to change.
+    """
+    if not request.connect and len(request.models) != request.options.vehicles:
+        raise PlanError(
+            f"{len(request.models)} models for {request.options.vehicles} vehicles; "
+            "give one for all, or one for each"
+        )
+    for index in range(request.options.vehicles):
+        own = vehicle_options(request.options, index)
+        if request.connect:
+            _check_any(mission, request, own)
+            continue
+        limits = _kind_limits(request, request.models[index])
+        try:
+            mission.check(mission.adapted(own, limits), limits)
+        except PlanError:
+            if isinstance(limits, FixedWingLimits):
+                _check_aircraft(mission, request, index)
+            raise
+
+
+def check_stage(mission: Mission[Any], request: RunRequest, stage: Stage) -> None:
+    """Refuse what the vehicles of an embedded world can't fly. Their parameters and their place are known."""
+    if stage.parameters is None or stage.home is None:
+        return
+    for index, model in enumerate(request.models):
+        adapter = ADAPTERS[request.autopilot, _kind(model)]()
+        limits = adapter.limits(stage.parameters(index, list(adapter.limiting_parameters)))
+        mission.check_place(
+            _check_with(mission, request, index, limits, stage.home.alt_m), limits, stage.home
+        )
+
+
+def _check_aircraft(mission: Mission[Any], request: RunRequest, index: int) -> None:
+    """Check with the limits of one embedded aircraft, without creating the world that the mission needs."""
+    from missions.embedded import EmbeddedConfiguration, open_embedded
+
+    try:
+        sitl = open_embedded(
+            EmbeddedConfiguration(
+                model=request.models[index],
+                flavour=request.autopilot,
+                parameters=request.parameters,
+                home=request.home,
+            )
+        )
+    except ValueError as error:
+        raise PlanError(str(error)) from error
+    try:
+        adapter = ADAPTERS[request.autopilot, VehicleKind.FIXED_WING]()
+        limits = adapter.limits(sitl.parameters(0, list(adapter.limiting_parameters)))
+        ground_alt_m = sitl.home.alt_m
+    finally:
+        sitl.close()
+        sitl.loop.close()
+    _check_with(mission, request, index, limits, ground_alt_m)
+
+
+def _check_with(
+    mission: Mission[Any], request: RunRequest, index: int, limits: Limits, ground_alt_m: float
+) -> MissionOptions:
+    """Check one vehicle with its own limits; returns its options."""
+    if isinstance(limits, FixedWingLimits):
+        limits = replace(limits, wind_m_s=request.planning_wind_m_s)
+    own, limits = adapted(mission, vehicle_options(request.options, index), limits, ground_alt_m)
+    mission.check(own, limits)
+    return own
+
+
+def _check_any(mission: Mission[Any], request: RunRequest, options: MissionOptions) -> None:
+    """For a vehicle that is not embedded not even the kind is known yet: refuse what no kind could fly."""
+    refusals = []
+    for kind in mission.kinds:
+        limits = _WIDEST[kind]
+        # the airspeed of the widest limits belongs to no aircraft: each aircraft's own check decides about
+        # wind
+        try:
+            mission.check(mission.adapted(options, limits), limits)
+        except PlanError as refusal:
+            refusals.append(refusal)
+        else:
+            return
+    raise PlanError(f"{refusals[0]} (that is for any vehicle; the limits of this one may ask for more)")
+
+
+def _kind(model: str) -> VehicleKind:
+    from missions.embedded import model_kind
+
+    try:
+        return model_kind(model)
+    except ValueError as error:
+        raise PlanError(str(error)) from error
+
+
+def _kind_limits(request: RunRequest, model: str) -> Limits:
+    """Limits from the firmware's defaults and the specified parameters. For a fixed wing the widest limits
+    are returned, because its own limits come with the aircraft.
+    """
+    kind = _kind(model)
+    if kind is VehicleKind.FIXED_WING:
+        return WIDEST_FIXED_WING_LIMITS
+    if (request.autopilot, kind) not in ADAPTERS:
+        return WIDEST_LIMITS
+    adapter = ADAPTERS[request.autopilot, kind]()
+    given: Mapping[str, float] = request.parameters
+    names: Sequence[str] = list(adapter.limiting_parameters)
+    for name in names:
+        if not given.get(name, 1.0) > 0.0:
+            raise PlanError(f"parameter {name} = {given[name]:g} is not possible; it must be more than 0")
+    return adapter.limits({name: given[name] for name in names if name in given})

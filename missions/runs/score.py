@@ -1,0 +1,302 @@
+"""Scores of how well a flight followed the commanded path, from the recorded frames.
+
+The reference is the truth (HIL_STATE_QUATERNION from any component of the system) when it is recorded,
+otherwise the autopilot's own estimate. The commanded path starts at the true position of the vehicle when it
+was armed, because that is the user's "home": a constant error of the receiver at the start moves home and
+path by the same amount. The same errors with home as the vehicle reports it are given as `..._absolute_m`.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.euler import euler_from_quaternions
+from missions.notes import PATTERN, FlightNotes
+from missions.runs.records import FlightRecords
+from missions.runs.waypoint_passes import waypoint_misses_m
+
+Array = NDArray[np.float64]
+
+_BACK_M: Final = 3.0  # distance back along the path within which the nearest point is searched
+_AHEAD_M: Final = 15.0
+_IN_FLIGHT_M: Final = 0.5
+_LEVEL_M: Final = 0.01
+_TRUTH_ATTITUDE: Final = ("attitude_quaternion",)
+_TARGET_ATTITUDE: Final = ("q",)
+_EULER_ANGLES: Final = ("roll", "pitch", "yaw")
+_SHORTEST_QUATERNION: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Track:
+    """A flown track: vehicle time and NED from a path's origin.
+
+    Attributes:
+        time_s: (n,).
+        pos_ned_m: (n, 3).
+        yaw_rad: (n,).
+    """
+
+    time_s: Array
+    pos_ned_m: Array
+    yaw_rad: Array
+
+    def between(self, start_us: int, end_us: int) -> "Track":
+        """The part between two vehicle times."""
+        kept = (self.time_s >= start_us * 1e-6) & (self.time_s <= end_us * 1e-6)
+        return Track(time_s=self.time_s[kept], pos_ned_m=self.pos_ned_m[kept], yaw_rad=self.yaw_rad[kept])
+
+    @property
+    def length_m(self) -> float:
+        """Distance flown, from at most 10 points a second, so that noise does not increase it."""
+        if len(self.time_s) < 2:
+            return 0.0
+        step_s = float(np.median(np.diff(self.time_s)))
+        stride = max(1, round(0.1 / max(step_s, 1e-3)))
+        return float(np.linalg.norm(np.diff(self.pos_ned_m[::stride], axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightScore:
+    """The data of one vehicle's flight for the summary and the picture. None: not measured.
+
+    Attributes:
+        truth, estimate: tracks; times strictly increasing.
+        error_time_s, error_m: times, and distances of the reference track to the commanded path, during the
+            pattern.
+        reference: "truth" or "estimate".
+        altitude_rms_error_m: error of the height only, along a level pattern.
+        messages_not_finite: number of messages that were left out because their attitude is invalid: NaN,
+            infinite, or a quaternion of zero length.
+    """
+
+    truth: Track | None
+    estimate: Track | None
+    error_time_s: Array
+    error_m: Array
+    reference: str
+    distance_m: float
+    path_rms_error_m: float | None
+    path_max_error_m: float | None
+    path_rms_error_absolute_m: float | None
+    path_rms_error_estimate_m: float | None
+    max_attitude_error_deg: float | None
+    max_attitude_tracking_error_deg: float | None
+    waypoint_misses_m: tuple[float, ...]
+    altitude_rms_error_m: float | None = None
+    messages_not_finite: int = 0
+
+
+def score(records: FlightRecords, notes: FlightNotes) -> FlightScore:
+    """Score one vehicle's flight."""
+    system_id = notes.system_id
+    commanded = notes.commanded
+    truth_table, truth_bad = _usable(records.table("HIL_STATE_QUATERNION", system_id), _TRUTH_ATTITUDE)
+    attitude, attitude_bad = _usable(records.table("ATTITUDE", system_id, 1), _EULER_ANGLES)
+    target, target_bad = _usable(records.table("ATTITUDE_TARGET", system_id, 1), _TARGET_ATTITUDE)
+    truth_table = _in_time_order(truth_table, "time_usec")
+    attitude = _in_time_order(attitude, "time_boot_ms")
+    target = _in_time_order(target, "time_boot_ms")
+    estimate_table = _in_time_order(records.table("GLOBAL_POSITION_INT", system_id, 1), "time_boot_ms")
+    origin = commanded.origin if commanded else _first_place(truth_table, estimate_table)
+    absolute = _track(truth_table, origin, "time_usec", 1e-6) if origin is not None else None
+    estimate = _estimate_track(estimate_table, origin, attitude) if origin is not None else None
+    truth, moved = None, np.zeros(3)
+    if absolute is not None and notes.phases:
+        start = int(np.searchsorted(absolute.time_s, notes.phases[0].start_us * 1e-6))
+        moved = absolute.pos_ned_m[min(start, len(absolute.time_s) - 1)].copy()
+        truth = Track(time_s=absolute.time_s, pos_ned_m=absolute.pos_ned_m - moved, yaw_rad=absolute.yaw_rad)
+    elif absolute is not None:
+        truth = absolute
+    reference = truth if truth is not None else estimate
+    phase = notes.phase(PATTERN)
+    nothing = np.zeros(0)
+    error_time, error = nothing, nothing
+    misses: tuple[float, ...] = ()
+    absolute_rms = estimate_rms = altitude_rms = None
+    if commanded is not None and phase is not None and reference is not None:
+        window = (phase.start_us, phase.end_us)
+        pattern = reference.between(*window)
+        error_time, error = pattern.time_s, path_errors_m(commanded.points_ned_m, pattern.pos_ned_m)
+        down = commanded.points_ned_m[:, 2]
+        if len(down) and np.ptp(down) < _LEVEL_M:
+            altitude_rms = _rms(pattern.pos_ned_m[:, 2] - down[0])
+        misses = waypoint_misses_m(commanded, pattern.pos_ned_m)
+        if absolute is not None:
+            flat = absolute.between(*window).pos_ned_m - np.array([0.0, 0.0, moved[2]])
+            absolute_rms = _rms(path_errors_m(commanded.points_ned_m, flat))
+        if estimate is not None:
+            own = estimate.between(*window).pos_ned_m
+            estimate_rms = _rms(path_errors_m(commanded.points_ned_m, own))
+    return FlightScore(
+        truth=truth,
+        estimate=estimate,
+        error_time_s=error_time,
+        error_m=error,
+        reference="truth" if truth is not None else "estimate",
+        distance_m=_distance_m(reference, notes),
+        path_rms_error_m=_rms(error),
+        path_max_error_m=float(error.max()) if len(error) else None,
+        path_rms_error_absolute_m=absolute_rms,
+        path_rms_error_estimate_m=estimate_rms,
+        max_attitude_error_deg=_attitude_error_deg(truth_table, attitude, reference),
+        max_attitude_tracking_error_deg=_tracking_error_deg(target, attitude, reference),
+        waypoint_misses_m=misses,
+        altitude_rms_error_m=altitude_rms,
+        messages_not_finite=truth_bad + attitude_bad + target_bad,
+    )
+
+
+def path_errors_m(path_ned_m: Array, track_ned_m: Array) -> Array:
+    """Distance (n,) from each track point to the path, following the path onwards.
+
+    The nearest point is searched near the previous one, from 3 m back to 15 m ahead (more when the error is
+    large), so that at a crossing of the path the other branch is not used.
+    """
+    if len(path_ned_m) < 2 or not len(track_ned_m):
+        return np.zeros(0)
+    from missions.runs.path_distance import follow_path
+
+    errors = np.empty(len(track_ned_m))
+    path, track = np.ascontiguousarray(path_ned_m), np.ascontiguousarray(track_ned_m)
+    follow_path(path, track, _BACK_M, _AHEAD_M, errors)
+    return errors
+
+
+def _rms(values: Array) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+
+
+def _usable(table: NDArray[np.void], names: tuple[str, ...]) -> tuple[NDArray[np.void], int]:
+    """Rows with a valid attitude (three angles, or a quaternion), and the number of the other rows."""
+    values = np.column_stack([table[name].astype(np.float64) for name in names])
+    kept: NDArray[np.bool_] = np.all(np.isfinite(values), axis=1)
+    if len(names) == 1:
+        kept &= np.linalg.norm(np.where(kept[:, None], values, 0.0), axis=1) > _SHORTEST_QUATERNION
+    return table[kept], int(np.count_nonzero(~kept))
+
+
+def _in_time_order(table: NDArray[np.void], field: str) -> NDArray[np.void]:
+    """Rows with strictly increasing time: late and repeated ones are left out."""
+    if not len(table):
+        return table
+    times = table[field].astype(np.int64)
+    newest = np.maximum.accumulate(times)
+    kept = np.concatenate(([True], times[1:] > newest[:-1]))
+    return table[kept]
+
+
+def _first_place(*tables: NDArray[np.void]) -> GeodeticPosition | None:
+    for table in tables:
+        if len(table):
+            row = table[0]
+            return GeodeticPosition(
+                lat_deg=row["lat"] * 1e-7, lon_deg=row["lon"] * 1e-7, alt_m=row["alt"] * 1e-3
+            )
+    return None
+
+
+def _positions(table: NDArray[np.void], origin: GeodeticPosition) -> Array:
+    frame = LocalFrame(origin)
+    n0, e0, _ = frame.ned_from_geodetic(origin.lat_deg + 1e-3, origin.lon_deg + 1e-3, 0.0)
+    north = (table["lat"] * 1e-7 - origin.lat_deg) * n0 * 1e3
+    east = (table["lon"] * 1e-7 - origin.lon_deg) * e0 * 1e3
+    return np.column_stack((north, east, origin.alt_m - table["alt"] * 1e-3))
+
+
+def _track(table: NDArray[np.void], origin: GeodeticPosition, field: str, scale: float) -> Track | None:
+    if not len(table):
+        return None
+    return Track(
+        time_s=table[field] * scale,
+        pos_ned_m=_positions(table, origin),
+        yaw_rad=euler_from_quaternions(table["attitude_quaternion"])[2],
+    )
+
+
+def _estimate_track(
+    table: NDArray[np.void], origin: GeodeticPosition, attitude: NDArray[np.void]
+) -> Track | None:
+    if not len(table):
+        return None
+    position = _positions(table, origin)
+    position[:, 2] = -table["relative_alt"] * 1e-3
+    time_s = table["time_boot_ms"] * 1e-3
+    if len(attitude):
+        yaw = np.interp(time_s, attitude["time_boot_ms"] * 1e-3, np.unwrap(attitude["yaw"]))
+    else:
+        yaw = np.where(table["hdg"] == 0xFFFF, 0.0, np.radians(table["hdg"] * 0.01))
+    return Track(time_s=time_s, pos_ned_m=position, yaw_rad=yaw)
+
+
+def _distance_m(track: Track | None, notes: FlightNotes) -> float:
+    if track is None or not notes.phases:
+        return 0.0
+    return track.between(notes.phases[0].start_us, notes.phases[-1].end_us).length_m
+
+
+def _airborne(times_s: Array, track: Track | None) -> NDArray[np.bool_]:
+    if track is None:
+        return np.ones(len(times_s), dtype=bool)
+    height = -np.interp(times_s, track.time_s, track.pos_ned_m[:, 2])
+    return height > _IN_FLIGHT_M
+
+
+def _quaternions(attitude: NDArray[np.void]) -> Array:
+    """q_ned_from_frd (n, 4) of ATTITUDE messages."""
+    halves = [0.5 * attitude[name].astype(np.float64) for name in ("roll", "pitch", "yaw")]
+    (cr, cp, cy), (sr, sp, sy) = map(np.cos, halves), map(np.sin, halves)
+    return np.column_stack(
+        (
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        )
+    )
+
+
+def _largest_angle_deg(
+    times_s: Array, q: Array, other_times_s: Array, other_q: Array, track: Track | None
+) -> float | None:
+    """Largest angle between two attitude histories in flight; the second is interpolated."""
+    kept = _airborne(times_s, track) & (times_s >= other_times_s[0]) & (times_s <= other_times_s[-1])
+    if not kept.any():
+        return None
+    signs = np.concatenate(
+        ([1.0], np.cumprod(np.where((other_q[1:] * other_q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)))
+    )
+    continuous = other_q * signs[:, None]
+    at = np.column_stack([np.interp(times_s[kept], other_times_s, c) for c in continuous.T])
+    at /= np.linalg.norm(at, axis=1)[:, None]
+    dot = np.clip(np.abs((at * q[kept]).sum(axis=1)), 0.0, 1.0)
+    return float(np.degrees(2.0 * np.arccos(dot)).max())
+
+
+def _attitude_error_deg(truth: Any, attitude: Any, track: Track | None) -> float | None:
+    """Largest angle between the autopilot's attitude and the true one, in flight."""
+    if len(truth) < 2 or len(attitude) < 2:
+        return None
+    return _largest_angle_deg(
+        attitude["time_boot_ms"] * 1e-3,
+        _quaternions(attitude),
+        truth["time_usec"] * 1e-6,
+        truth["attitude_quaternion"].astype(np.float64),
+        track,
+    )
+
+
+def _tracking_error_deg(target: Any, attitude: Any, track: Track | None) -> float | None:
+    """Largest angle between the controller's attitude setpoint and the autopilot's attitude, in flight."""
+    if len(target) < 2 or len(attitude) < 2:
+        return None
+    return _largest_angle_deg(
+        target["time_boot_ms"] * 1e-3,
+        target["q"].astype(np.float64),
+        attitude["time_boot_ms"] * 1e-3,
+        _quaternions(attitude),
+        track,
+    )

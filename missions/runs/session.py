@@ -1,0 +1,415 @@
+"""One run from beginning to end: a world or links, the mission on it, and the run folder.
+
+This module opens the world or the links, starts the event loop, and reads the wall clock.
+"""
+
+import asyncio
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from contextlib import AsyncExitStack
+from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from autopilot_bridge.clock import Clock, unix_time_us
+from autopilot_bridge.clock.pacing import wall_time_s
+from autopilot_bridge.errors import BridgeError
+from missions.runs.claimed_folder import claim_folder
+from missions.vehicle.connection import Connection, Recorder
+from missions.runs.ending import EndingSignals, signal_of
+from missions.errors import MissionError, PlanError
+from missions.estimation.in_flight import estimators_of
+from missions.runs.limits_before_flight import adapted, check_request, check_stage, vehicle_options
+from missions.mission import Debriefing, Mission
+from missions.notes import FlightNotes
+from missions.runs.vehicle_opening import Stage, open_vehicles, open_world
+from missions.options import MissionOptions
+from missions.runs.records import FlightRecorder, FlightRecords
+from missions.runs.request import RunRequest
+from missions.runs.run_folder import (
+    PICTURE_NAME,
+    how_left,
+    replace_summary,
+    team_figures,
+    vehicle_summary,
+    versions,
+    whole,
+    wind_words,
+    write_summary,
+)
+from missions.runs.signing import client_signing, require_key
+from missions.runs.concurrency import together
+from missions.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from missions.estimation.embedded import FlightEstimators
+    from missions.runs.score import FlightScore
+
+__all__ = ["COMPLETED", "FAILED", "INTERRUPTED", "Flight", "RunRequest", "RunResult", "fly"]
+
+COMPLETED: Final = "completed"
+FAILED: Final = "failed"
+INTERRUPTED: Final = "interrupted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunResult:
+    """The result of a run.
+
+    Attributes:
+        outcome: "completed", "failed" or "interrupted".
+        reason: why it failed; "" otherwise.
+        folder: the run folder.
+        summary: contents of `summary.json`.
+        signal: the signal that interrupted it; 0: none.
+    """
+
+    outcome: str
+    reason: str
+    folder: Path
+    summary: Mapping[str, Any]
+    signal: int = 0
+
+
+class Flight:
+    """The state of a run in progress, for displays of progress.
+
+    Attributes:
+        vehicles: the vehicles, as soon as they are created.
+        recorder: recorder of all sent and received frames.
+        elsewhere: the vehicles are connected by links, not embedded.
+        started_wall_s: wall clock when the run began.
+        started_us: vehicle time when the run began: the boot of an embedded vehicle, else the time when the
+            vehicle was first received.
+    """
+
+    def __init__(self) -> None:
+        self.vehicles: list[Vehicle] = []
+        self.clock: Clock | None = None
+        self.started_wall_s = wall_time_s()
+        self.started_us = 0
+        self.elsewhere = False
+        self.recorder: FlightRecorder | None = None
+
+    @property
+    def elapsed_s(self) -> float:
+        """Vehicle time since the run began: since the boot of an embedded vehicle, else since its first
+        message.
+        """
+        if self.clock is None:
+            return 0.0
+        begun_us = self.vehicles[0].first_heard_us if self.elsewhere else self.started_us
+        return max(0, self.clock.time_us - begun_us) * 1e-6
+
+    def require_log(self) -> None:
+        """Make sure that all frames received so far are in the log.
+
+        Raises:
+            MissionError: the log cannot be written.
+        """
+        if self.recorder is not None:
+            self.recorder.flush()
+            if self.recorder.failure:
+                raise MissionError(f"{self.recorder.failure}; nothing was flown")
+
+
+ProgressListener = Callable[[Flight], None]
+"""Called each second of vehicle time."""
+
+
+def fly(mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None = None) -> RunResult:
+    """Fly a mission and write its run folder. Blocks until the run is finished.
+
+    A mission that fails or is interrupted (Ctrl-C; in the main thread also SIGTERM and SIGHUP) leaves its
+    vehicles safe, and still returns a result and writes a complete log.
+
+    Raises:
+        KeyboardInterrupt: the run was interrupted before it began, or while its results were written.
+        PlanError: the request can't be flown; nothing was started.
+        MissionError: a file of the embedded world cannot be written; nothing was started.
+        BridgeError: a link can't be opened.
+    """
+    with EndingSignals() as ending:
+        return _fly_interruptible(mission, request, on_progress, ending)
+
+
+def _fly_interruptible(
+    mission: Mission[Any], request: RunRequest, on_progress: ProgressListener | None, ending: EndingSignals
+) -> RunResult:
+    check_request(mission, request)
+    if request.connect and len(request.connect) != request.options.vehicles:
+        raise PlanError(
+            f"{len(request.connect)} connections for {request.options.vehicles} vehicles; "
+            "give --connect once for each vehicle"
+        )
+    estimators = estimators_of(request, mission.estimator_settings(request.options))
+    claimed = claim_folder(request.out, mission.name)
+    folder = claimed.path
+    stage = None
+    try:
+        stage = open_vehicles(request) if request.connect else open_world(mission, request, claimed)
+        request.on_open()
+        check_stage(mission, request, stage)
+    except BaseException:
+        if stage is not None:
+            stage.close()
+            stage.loop.close()
+        claimed.give_back()
+        raise
+    flight = Flight()
+    outcome, reason, by_signal = COMPLETED, "", 0
+    try:
+        recorder = FlightRecorder(claimed.log, epoch_us=stage.epoch_us, unix_time_us=unix_time_us)
+        flight.recorder = recorder
+        heard_by = recorder if estimators is None else estimators.around(recorder)
+        stage.on_truth(heard_by.record_truth)
+        try:
+            ending.run(_fly(mission, request, stage, heard_by, flight, estimators, on_progress), stage.loop)
+        except KeyboardInterrupt as interrupt:
+            outcome, reason, by_signal = INTERRUPTED, INTERRUPTED, signal_of(interrupt)
+        except (MissionError, PlanError, BridgeError) as error:
+            outcome, reason = FAILED, "; ".join((str(error), *getattr(error, "__notes__", ())))
+        finally:
+            recorder.close()
+    finally:
+        stage.close()
+        stage.loop.close()
+    sim_time_s = max(0, stage.time_us() - flight.started_us) * 1e-6
+    wall_s = wall_time_s() - flight.started_wall_s
+    debriefing = _debrief(mission, request, recorder.records, flight)
+    blocks = [vehicle_summary(n, s) for n, s in debriefing.flights]
+    if outcome == COMPLETED:
+        reason = mission.verdict(debriefing, request.max_error_m) or _missed_check(request, blocks)
+        if recorder.failure:
+            reason = "; ".join(filter(None, (reason, f"{recorder.failure}; it was flown on without a log")))
+        outcome = FAILED if reason else COMPLETED
+    elif outcome == INTERRUPTED and how_left(blocks):
+        reason = f"{INTERRUPTED}; {how_left(blocks)}"
+    summary = _summary(mission, request, debriefing, blocks, outcome, reason, sim_time_s, wall_s)
+    if estimators is not None:
+        summary["estimator"] = estimators.report(folder, picture=request.picture, wall_time_s=wall_s).summary
+    written = False
+    try:
+        write_summary(folder, summary)
+        written = True
+        if request.picture and debriefing.flights:
+            with whole(folder / PICTURE_NAME):
+                mission.draw(folder / PICTURE_NAME, title(mission, debriefing, summary), debriefing)
+    except OSError as error:
+        missed = f"can't write all of {folder}: {error.strerror or error}; check the disk"
+        outcome, reason = FAILED, "; ".join(filter(None, (reason, missed)))
+        summary |= {"outcome": outcome, "reason": reason}
+        if written:
+            replace_summary(folder, summary)
+    return RunResult(outcome=outcome, reason=reason, folder=folder, summary=summary, signal=by_signal)
+
+
+async def _fly(
+    mission: Mission[Any],
+    request: RunRequest,
+    stage: Stage,
+    recorder: Recorder,
+    flight: Flight,
+    estimators: "FlightEstimators | None",
+    on_progress: ProgressListener | None,
+) -> None:
+    async with AsyncExitStack() as stack:
+        system_ids: Sequence[int | None] = request.system_ids or [None] * len(stage.links)
+        for number, (link, clock, system_id) in enumerate(
+            zip(stage.links, stage.clocks, system_ids, strict=True)
+        ):
+            connection = Connection(
+                link,
+                clock,
+                recorder,
+                identity=request.identity,
+                vehicle_system_id=system_id,
+                signing=client_signing(request.signing_key, link_id=number & 0xFF),
+            )
+            await stack.enter_async_context(connection)
+            flight.vehicles.append(Vehicle(connection, system_id))
+        flight.clock = clock = stage.clocks[0]
+        flight.elsewhere = bool(request.connect)
+        if estimators is not None:
+            await stack.enter_async_context(estimators.on_board(flight.vehicles, stage.links, clock))
+        reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
+        try:
+            await together([_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles])
+            flight.require_log()
+            await _fly_all(mission, flight.vehicles, request)
+        finally:
+            for vehicle in flight.vehicles:
+                vehicle.notes.end(vehicle.clock.stamp_us)
+            if request.connect:
+                flight.started_us = flight.vehicles[0].first_heard_us
+            reporter.cancel()
+            await asyncio.gather(reporter, return_exceptions=True)
+
+
+async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest, flight: Flight) -> None:
+    wanted = request.system_ids[flight.vehicles.index(vehicle)] if request.system_ids else None
+    try:
+        await vehicle.wait_heartbeat()
+    except MissionError as error:
+        where = f" on {', '.join(request.connect)}" if request.connect else ""
+        which = "" if wanted is None else f" with system id {wanted}"
+        others = ", ".join(map(str, vehicle.connection.autopilots_heard))
+        heard = f" (received: vehicle {others})" if others else ""
+        signing = vehicle.connection.signing
+        if signing is not None and signing.counters.refused_frames:
+            heard += f" (refused by the signing key: {signing.counters.reasons})"
+        asked = "is it on, and sending there?"
+        if request.connect and request.signing_key is None and not others:
+            asked += " Does it ask for signatures (--signing-key)?"
+        raise MissionError(f"no vehicle{which} was received{where}{heard}: {error}; {asked}") from error
+    vehicle.notes.system_id = vehicle.system_id
+    vehicle.regain_s = request.regain_s if request.connect else 0.0
+    vehicle.notes.autopilot = vehicle.autopilot
+    vehicle.notes.kind = str(vehicle.kind)
+    if request.connect:
+        await require_key(request, vehicle)
+        await vehicle.set_parameters(request.parameters)
+    await vehicle.wait_ready(leave_mission=mission.commands)
+
+
+async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: RunRequest) -> None:
+    centre = vehicles[0].home if len(vehicles) > 1 else request.options.centre
+    options: list[MissionOptions] = []
+    for index, vehicle in enumerate(vehicles):
+        vehicle.forecast_wind_m_s = request.planning_wind_m_s
+        limits, home = await vehicle.limits(), vehicle.home
+        asked = replace(vehicle_options(request.options, index), centre=centre)
+        own, _ = adapted(mission, asked, limits, home.alt_m)
+        options.append(own)
+        vehicle.notes.options = own
+    if request.confirm is not None:
+        from missions.preflight.before_flight import confirmed, look
+
+        looks = [await look(vehicle, mission, own) for vehicle, own in zip(vehicles, options, strict=True)]
+        await confirmed(looks, request.confirm)
+    if not mission.commands:
+        await together([mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)])
+        return
+    if not mission.together:
+        await together(
+            [
+                _fly_one(mission.fly(vehicle, own), vehicle, request)
+                for vehicle, own in zip(vehicles, options, strict=True)
+            ]
+        )
+        return
+    flying = mission.fly_team(vehicles, options)
+    for vehicle in vehicles:
+        flying = _fly_one(flying, vehicle, request)
+    await flying
+
+
+async def _fly_one(flying: Coroutine[Any, Any, None], vehicle: Vehicle, request: RunRequest) -> None:
+    vehicle.notes.begin("flight", vehicle.clock.stamp_us)  # until the mission begins its own phase
+    async with vehicle.safe_on_exit(request.on_failure):
+        await flying
+        if vehicle.armed:
+            raise MissionError(
+                f"the mission ended with the vehicle armed; it was commanded to {request.on_failure}. "
+                "End a mission with return_to_launch() or land()"
+            )
+        vehicle.notes.progress = 1.0
+
+
+async def _report(flight: Flight, on_progress: ProgressListener | None) -> None:
+    while on_progress is not None and flight.clock is not None:
+        on_progress(flight)
+        await flight.clock.sleep(1.0)
+
+
+def _debrief(
+    mission: Mission[Any], request: RunRequest, records: FlightRecords, flight: Flight
+) -> Debriefing:
+    from missions.runs.score import score
+
+    notes = [vehicle.notes for vehicle in flight.vehicles if vehicle.notes.system_id]
+    flights: list[tuple[FlightNotes, FlightScore]] = [(n, score(records, n)) for n in notes]
+    options = notes[0].options if notes and notes[0].options is not None else request.options
+    return Debriefing(records=records, flights=flights, options=options)
+
+
+def _missed_check(request: RunRequest, blocks: list[dict[str, Any]]) -> str:
+    """The check that a completed flight has failed, as text; "" if none."""
+    most_m = request.max_error_m
+    for block in blocks:
+        error_m = block["path_max_error_m"]
+        if most_m is None:
+            break
+        if error_m is None:
+            return f"vehicle {block['system_id']} flew no path whose error --max-error could limit"
+        if error_m > most_m:
+            return (
+                f"the path error of vehicle {block['system_id']} was {error_m:.2f} m at most, more than "
+                f"--max-error {most_m:g} m"
+            )
+    return ""
+
+
+def _summary(
+    mission: Mission[Any],
+    request: RunRequest,
+    debriefing: Debriefing,
+    blocks: list[dict[str, Any]],
+    outcome: str,
+    reason: str,
+    sim_time_s: float,
+    wall_time: float,
+) -> dict[str, Any]:
+    notes = [n for n, _ in debriefing.flights]
+    options = {
+        key: str(value) if isinstance(value, StrEnum) else value
+        for key, value in asdict(replace(debriefing.options, arguments={}, centre=None, given=None)).items()
+        if value is not None
+    }
+    remote = bool(request.connect)
+    models = dict.fromkeys(request.models)
+    summary: dict[str, Any] = {
+        "mission": mission.name,
+        "vehicle": "remote" if remote else ",".join(models),
+        "autopilot": notes[0].autopilot if notes else request.autopilot,
+        "seed": None if remote else request.seed,
+        "outcome": outcome,
+        "reason": reason,
+        "sim_time_s": round(sim_time_s, 6),
+        "wall_time_s": round(wall_time, 3),
+        "speedup": round(sim_time_s / max(wall_time, 1e-9), 2),
+        **team_figures(blocks),
+        **mission.figures(debriefing),
+        "vehicles": blocks,
+        "message_counts": debriefing.records.message_counts,
+        "versions": versions(),
+        "options": options | {"arguments": dict(request.options.arguments)},
+        "parameters": dict(request.parameters),
+        "connect": list(request.connect),
+        "command": request.command,
+    }
+    summary["planned_wind_m_s"] = request.planning_wind_m_s
+    if not remote:
+        summary["wind"] = {
+            "speed_m_s": request.wind_speed_m_s,
+            "from_deg": request.wind_from_deg,
+            "profile": request.wind_profile,
+            "turbulence": request.turbulence,
+        }
+        summary["gps"] = request.gps
+    return summary
+
+
+def title(mission: Mission[Any], debriefing: Debriefing, summary: Mapping[str, Any]) -> str:
+    """Title of the picture of a run: mission, result, and wind if known."""
+    parts = [mission.title(debriefing.options), summary["autopilot"]]
+    rms = summary["path_rms_error_m"]
+    figures = f"{summary['distance_m']:.0f} m in {summary['sim_time_s']:.0f} s"
+    if rms is not None:
+        figures += f", path error {rms:.2f} m RMS, {summary['path_max_error_m']:.2f} m at most"
+    if summary["outcome"] != COMPLETED:
+        figures += f" ({summary['outcome']})"
+    lines = [", ".join(parts), figures]
+    if "wind" in summary:
+        lines.append(wind_words(summary["wind"]))
+    return "\n".join(lines)

@@ -1,0 +1,344 @@
+"""A link as a mission sees it: the newest message of each kind, streams of messages, and waiting for one.
+
+Several hundred messages a second arrive, and a mission uses few of them. A frame that no task waits for costs
+two dictionary operations; it is decoded only when it is requested.
+"""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Final, Protocol, Self
+
+from autopilot_bridge.clock import Clock, TelemetryClock
+from autopilot_bridge.mavlink import (
+    Frame,
+    FrameEncoder,
+    Intake,
+    LinkSigning,
+    MAVLinkMessage,
+    decode,
+    definition,
+    dialect,
+)
+from autopilot_bridge.mavlink.signing import SETUP_SIGNING
+from missions.errors import LinkClosed
+from missions.vehicle.peers import NewestFrames
+
+if TYPE_CHECKING:
+    from autopilot_bridge.links import Link
+
+AUTOPILOT_COMPONENT: Final = 1
+GROUND_STATION: Final = (255, 190)
+"""System and component id of a mission on the ground (MAV_COMP_ID_MISSIONPLANNER, as in ground stations)."""
+ONBOARD_COMPUTER: Final = (1, 191)
+"""System and component id of a mission on board of system 1."""
+
+_HEARTBEAT_PERIOD_S: Final = 1.0
+_STREAM_LIMIT: Final = 4096
+_AT_ONCE: Final = 64  # largest number of messages that are read in a row without giving other tasks a turn
+_TIMESTAMPED: Final = {2: 8, 30: 0, 31: 0, 32: 0, 33: 0}  # message id: offset of time_boot_ms in the payload
+_POLL_S: Final = 0.002  # for links without a file descriptor
+
+
+class Recorder(Protocol):
+    """Receives all frames of a connection, in both directions."""
+
+    def record(self, frame: bytes, time_us: int) -> None:
+        """Process one frame that was sent or received at a vehicle time."""
+        ...
+
+
+Listener = Callable[[Frame], None]
+
+
+class Connection:
+    """MAVLink over one link, for asyncio tasks on vehicle time.
+
+    Nothing is opened, sent or started before `start` (or `async with`).
+
+    Args:
+        link: an open link; the connection closes it. One that calls `on_receive` (memory) is not polled.
+        clock: vehicle time; a `TelemetryClock` is fed from the vehicle's timestamps.
+        recorder: receives every frame of both directions.
+        identity: system and component id of this client.
+        vehicle_system_id: of the vehicle whose time the clock follows; None: the first autopilot received.
+        signing: signs sent frames, and drops received frames that it does not accept. None: no signing.
+
+    Attributes:
+        parsers: one for each of the newest peers; their counters account for every byte ever received.
+        signing: as passed to the constructor.
+    """
+
+    def __init__(
+        self,
+        link: "Link",
+        clock: Clock,
+        recorder: Recorder | None = None,
+        *,
+        identity: tuple[int, int] = GROUND_STATION,
+        vehicle_system_id: int | None = None,
+        signing: LinkSigning | None = None,
+    ) -> None:
+        self.clock = clock
+        self.signing = signing
+        self.parsers: Intake[object] = Intake(None if signing is None else signing.admit)
+        self.system_id, self.component_id = identity
+        self._link = link
+        self._forget = getattr(link, "forget", None)
+        self._recorder = recorder
+        self._encoder = FrameEncoder(*identity)
+        self._newest = NewestFrames()
+        self._listeners: dict[int, list[Listener]] = {}
+        self._observed = clock if isinstance(clock, TelemetryClock) else None
+        self._clock_source = vehicle_system_id
+        self._tasks: list[asyncio.Task[None]] = []
+        self._watched: list[int] = []
+        self._closed = False
+
+    async def __aenter__(self) -> Self:
+        self.start()
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    def start(self) -> None:
+        """Start receiving, and sending a HEARTBEAT each second of vehicle time."""
+        loop = asyncio.get_running_loop()
+        self._watched = list(self._link.filenos())
+        for fileno in self._watched:
+            loop.add_reader(fileno, self._drain)
+        self._drain()
+        if hasattr(self._link, "on_receive"):
+            self._link.on_receive = lambda data: self._on_bytes(None, data)
+        else:
+            self._tasks.append(loop.create_task(self._keep_looking_after_link()))
+        self._tasks.append(loop.create_task(self._keep_sending_heartbeats()))
+
+    async def close(self) -> None:
+        """Stop receiving and sending, and close the link."""
+        if self._closed:
+            return
+        self._closed = True
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._unwatch()
+        self._link.close()
+
+    def _unwatch(self) -> None:
+        loop = asyncio.get_running_loop()
+        for fileno in self._watched:
+            loop.remove_reader(fileno)
+        self._watched = []
+
+    # receiving
+
+    def _drain(self) -> None:
+        for peer, data in self._link.receive():
+            self._on_bytes(peer, data)
+            if self._forget is not None and not self.parsers.understood(peer):
+                self._forget(peer)  # an unknown peer on a server's port must not receive commands
+
+    def _on_bytes(self, peer: object, data: bytes) -> None:
+        frames = self.parsers.parse(peer, data)
+        if frames:
+            self._on_frames(frames)
+
+    def _on_frames(self, frames: list[Frame]) -> None:
+        time_us = self.clock.time_us
+        put, listeners, recorder = self._newest.put, self._listeners, self._recorder
+        for frame in frames:
+            message_id = frame.message_id
+            put(frame)
+            if self._observed is not None and message_id in _TIMESTAMPED:
+                time_us = self._observe(frame)
+            if recorder is not None and message_id != SETUP_SIGNING:  # a log contains no keys
+                recorder.record(frame.raw, time_us)
+            if message_id in listeners:
+                for listener in tuple(listeners[message_id]):
+                    listener(frame)
+
+    def _observe(self, frame: Frame) -> int:
+        """Set the clock from the messages of the vehicle's autopilot."""
+        assert self._observed is not None
+        if frame.component_id == AUTOPILOT_COMPONENT:
+            if self._clock_source is None:
+                self._clock_source = frame.system_id
+            if frame.system_id == self._clock_source:
+                offset = _TIMESTAMPED[frame.message_id]
+                self._observed.observe(int.from_bytes(frame.payload[offset : offset + 4], "little") * 1000)
+        return self._observed.time_us
+
+    async def _keep_looking_after_link(self) -> None:
+        """Poll links whose descriptors change (servers, reconnecting clients) or that have none."""
+        loop = asyncio.get_running_loop()
+        while True:
+            current = list(self._link.filenos())
+            if current != self._watched:
+                self._unwatch()
+                for fileno in current:
+                    loop.add_reader(fileno, self._drain)
+                self._watched = current
+            self._drain()
+            await asyncio.sleep(0.05 if current else _POLL_S)
+
+    # sending
+
+    def speak_as(self, system_id: int, component_id: int) -> None:
+        """Change the sender ids: a process on board learns its system id from the vehicle."""
+        if (system_id, component_id) != (self.system_id, self.component_id):
+            self.system_id, self.component_id = system_id, component_id
+            self._encoder = FrameEncoder(system_id, component_id)
+
+    def send(self, message: MAVLinkMessage) -> None:
+        """Send one message with the connection's own ids.
+
+        Raises:
+            LinkClosed: the connection was closed.
+        """
+        if self._closed:
+            raise LinkClosed("the connection to the vehicle is closed")
+        data = self._encoder.encode(message)
+        if self.signing is not None and self.signing.signs:
+            data = self.signing.sign(data)
+        if self._recorder is not None and type(message).id != SETUP_SIGNING:
+            self._recorder.record(data, self.clock.time_us)
+        self._link.send(data)
+
+    async def _keep_sending_heartbeats(self) -> None:
+        message = dialect.MAVLink_heartbeat_message(
+            dialect.MAV_TYPE_GCS
+            if self.component_id == GROUND_STATION[1]
+            else dialect.MAV_TYPE_ONBOARD_CONTROLLER,
+            dialect.MAV_AUTOPILOT_INVALID,
+            0,
+            0,
+            dialect.MAV_STATE_ACTIVE,
+            3,
+        )
+        while True:
+            self.send(message)
+            await self.clock.sleep(_HEARTBEAT_PERIOD_S)
+
+    # looking and waiting
+
+    def latest(
+        self, name: str, system_id: int, component_id: int = AUTOPILOT_COMPONENT
+    ) -> MAVLinkMessage | None:
+        """Newest message of a name from one component, or None."""
+        return self._newest.latest((system_id, component_id), definition(name).message_id)
+
+    @property
+    def autopilots_heard(self) -> list[int]:
+        """System ids of the autopilots received on this link, in ascending order."""
+        return sorted(s for s, component in self._newest.components if component == AUTOPILOT_COMPONENT)
+
+    def newest(self, system_id: int, component_id: int = AUTOPILOT_COMPONENT) -> Mapping[int, Frame]:
+        """The present newest frame of each message from one component, by message id."""
+        return self._newest.of((system_id, component_id))
+
+    @property
+    def bytes_per_s(self) -> float | None:
+        """Capacity of the link in bytes per second; None: not known, or a network."""
+        capacity: float | None = getattr(self._link, "bytes_per_s", None)
+        return capacity
+
+    def keep(self, system_id: int) -> None:
+        """Keep this system's autopilot among the newest messages, however many other systems are received."""
+        self._newest.keep((system_id, AUTOPILOT_COMPONENT))
+
+    def listen(self, name: str, listener: Listener) -> Callable[[], None]:
+        """Call `listener` with each frame of a message name; returns a function that ends this."""
+        message_id = definition(name).message_id
+        self._listeners.setdefault(message_id, []).append(listener)
+
+        def stop() -> None:
+            listeners = self._listeners.get(message_id, [])
+            if listener in listeners:
+                listeners.remove(listener)
+            if not listeners:
+                self._listeners.pop(message_id, None)
+
+        return stop
+
+    def messages(
+        self, *names: str, system_id: int | None = None, component_id: int | None = None
+    ) -> "MessageStream":
+        """Stream of the messages with these names: `async for message in connection.messages("ATTITUDE")`.
+
+        The stream begins with the first message that arrives after this call.
+        """
+        return MessageStream(self, names, system_id, component_id)
+
+
+class MessageStream:
+    """Decoded messages as they arrive, in order. Close it, or use it as a context manager.
+
+    Attributes:
+        dropped: number of messages lost because the reader was more than 4096 messages behind.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        names: Iterable[str],
+        system_id: int | None,
+        component_id: int | None,
+    ) -> None:
+        self._queue: deque[Frame] = deque()
+        self._waiting: asyncio.Future[None] | None = None
+        self._system_id, self._component_id = system_id, component_id
+        self._stops = [connection.listen(name, self._on_frame) for name in names]
+        self._at_once = 0
+        self.dropped = 0
+
+    def _on_frame(self, frame: Frame) -> None:
+        if self._system_id is not None and frame.system_id != self._system_id:
+            return
+        if self._component_id is not None and frame.component_id != self._component_id:
+            return
+        if len(self._queue) >= _STREAM_LIMIT:
+            self._queue.popleft()
+            self.dropped += 1
+        self._queue.append(frame)
+        if self._waiting is not None and not self._waiting.done():
+            self._waiting.set_result(None)
+
+    def __aiter__(self) -> "MessageStream":
+        return self
+
+    async def __anext__(self) -> Any:
+        self._at_once += 1
+        if self._queue and self._at_once >= _AT_ONCE:  # a full queue must not keep other tasks from running
+            self._at_once = 0
+            await asyncio.sleep(0)
+        while not self._queue:
+            self._at_once = 0
+            self._waiting = asyncio.get_running_loop().create_future()
+            try:
+                await self._waiting
+            finally:
+                self._waiting = None
+        return decode(self._queue.popleft())
+
+    def take(self) -> MAVLinkMessage | None:
+        """The next message if one has arrived, else None; does not wait."""
+        return decode(self._queue.popleft()) if self._queue else None
+
+    def close(self) -> None:
+        """Stop receiving messages."""
+        for stop in self._stops:
+            stop()
+        self._stops = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
