@@ -170,8 +170,8 @@ def _slots_of(kind: Any) -> int:
 def source_stamp(function: Callable[..., Any]) -> str:
     """Digest of all that the machine code of a function is made of, the same in every process.
 
-    These are its module, its byte code, the values of the globals and module attributes it names, and, in the same way,
-    the kernels it calls; also the version of Numba.
+    These are its module, its byte code, the values of the globals and module attributes it names, and, in
+    the same way, the kernels it calls; also the version of Numba.
 
     Raises:
         TypeError: a global that the function names is of a kind that cannot be distinguished by its value.

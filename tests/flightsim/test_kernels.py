@@ -91,7 +91,7 @@ def test_an_edit_anywhere_below_changes_the_stamp(
 
 
 def test_a_kernel_that_moves_to_another_module_changes_the_stamp(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Numba's code names the module of each kernel in it; code that names a missing module can't be loaded."""
+    """Numba's code names the modules of its kernels; with the name of a missing module it can't be loaded."""
     moved = {
         "layout": SOURCES["layout"],
         "moved": SOURCES["inner"],
