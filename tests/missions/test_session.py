@@ -22,9 +22,10 @@ from missions.cli import fly as cli_fly
 from missions.cli.main import main as cli
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
-from missions.library import MISSIONS, PatternMission, find_mission
+from missions.library import MISSIONS, find_mission
 from missions.mission import Mission
 from missions.options import FlightOptions, Via, parameters_from_file, parse_pair, parse_wind
+from missions.pattern_search.mission import PatternMission
 from missions.runs.records import FlightRecords
 from missions.runs.run_folder import create_run_folder
 from missions.runs.session import RunRequest, fly

@@ -13,8 +13,9 @@ import pytest
 
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from missions.errors import PlanError
-from missions.library import PatternMission, find_mission
+from missions.library import find_mission
 from missions.options import FlightOptions, Via
+from missions.pattern_search.mission import PatternMission
 from missions.pattern_search.wings.entry import with_leads
 from missions.pattern_search.wings.pattern import check_wings
 from missions.pattern_search.wings.setpoints import path_point

@@ -1,0 +1,84 @@
+"""The mission of one search pattern: its curve, its size for the vehicle, and its flight."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from autopilot_bridge.mission_plan import MissionItem
+from missions.errors import PlanError
+from missions.mission import Debriefing, Mission
+from missions.options import FlightOptions
+from missions.outline import Outline
+from missions.pattern_search.flight import (
+    check_pattern,
+    fly_pattern,
+    pattern_frequencies,
+    pattern_items,
+    pattern_outline,
+)
+from missions.patterns import Curve
+from missions.planning.limits import FixedWingLimits, Limits
+from missions.vehicle.vehicle import Vehicle
+
+CurveMaker = Callable[[FlightOptions], Curve]
+Sizing = Callable[[FlightOptions, FixedWingLimits], FlightOptions]
+
+
+class PatternMission(Mission[FlightOptions]):
+    """A mission that flies one search pattern.
+
+    Args:
+        name: name for users and for file names.
+        make_curve: creates the pattern from options.
+        size: gives values to size options that the user did not specify, so that a fixed-wing aircraft can
+            fly the turns.
+    """
+
+    def __init__(self, name: str, make_curve: CurveMaker, size: Sizing) -> None:
+        self.name = name
+        self._make_curve = make_curve
+        self._size = size
+
+    def adapted(self, options: FlightOptions, limits: Limits) -> FlightOptions:
+        options = options.for_vehicle(limits)
+        return self._size(options, limits) if isinstance(limits, FixedWingLimits) else options
+
+    def check(self, options: FlightOptions, limits: Limits) -> None:
+        for name in options.arguments:
+            raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
+        check_pattern(self.curve(options), options, limits)
+
+    def curve(self, options: FlightOptions) -> Curve:
+        """The pattern around its centre, with the requested number of passes."""
+        return self._make_curve(options)
+
+    async def plan_items(self, vehicle: Vehicle, options: FlightOptions) -> Sequence[MissionItem]:
+        return await pattern_items(vehicle, options, self.curve(options))
+
+    async def outline(self, vehicle: Vehicle, options: FlightOptions) -> Outline:
+        return pattern_outline(vehicle, options, self.curve(options))
+
+    async def fly(self, vehicle: Vehicle, options: FlightOptions) -> None:
+        await fly_pattern(vehicle, options, self.curve(options))
+
+    def estimator_settings(self, options: FlightOptions) -> Mapping[str, float]:
+        if options.period_s is None:
+            return {}  # at constant speed the motion is not harmonic
+        x_rad_s, y_rad_s = pattern_frequencies(self.curve(options), options.period_s)
+        return {"omega_x_rad_s": x_rad_s, "omega_y_rad_s": y_rad_s}
+
+    def figures(self, debriefing: Debriefing) -> Mapping[str, Any]:
+        assert isinstance(debriefing.options, FlightOptions)
+        return self.estimator_settings(debriefing.options)
+
+    def said(self, summary: Mapping[str, Any]) -> Sequence[str]:
+        if "omega_x_rad_s" not in summary:
+            return ()
+        x, y = summary["omega_x_rad_s"], summary["omega_y_rad_s"]
+        return (f"frequencies: omega_x_rad_s={x:.6g} (east), omega_y_rad_s={y:.6g} (north)",)
+
+    def title(self, options: FlightOptions) -> str:
+        parts = [self.name]
+        if self.name == "lissajous":
+            parts.append(options.pattern if options.ratio is None else "{:g}:{:g}".format(*options.ratio))
+        parts += [f"{options.width_m:g} m x {options.height_m:g} m", f"via {options.via}"]
+        return ", ".join(parts)
