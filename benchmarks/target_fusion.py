@@ -46,9 +46,9 @@ from missions.options import FlightOptions, Via
 from missions.pattern_search.flight import fly_pattern
 from missions.patterns.curve import Lap
 from missions.patterns.lissajous import Lissajous
-from missions.runs.concurrency import together
 from missions.runs.run_folder import EPOCH_UNIX_US
 from missions.studies.pool import processors, work_through
+from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection
 from missions.vehicle.vehicle import Vehicle
 
@@ -229,7 +229,7 @@ def fly(seed: int, setting: Setting, log: Path | None = None) -> Recorded:
             phases.append((found.start_us, found.end_us))
 
     async def fly_both() -> None:
-        await together([fly_one(0), fly_one(1)])
+        await run_concurrently([fly_one(0), fly_one(1)])
 
     try:
         run(fly_both(), loop)

@@ -16,8 +16,8 @@ from missions.occupancy.search import Search
 from missions.occupancy.steering import Steering, steering
 from missions.occupancy.survey_map import SurveyMap
 from missions.occupancy.traffic import Traffic
-from missions.runs.concurrency import together
 from missions.vehicle.adapter import Mode
+from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.payload import SURVEY_MAGNETOMETER_COMPONENT
 from missions.vehicle.telemetry import Attitude, Position
 
@@ -115,7 +115,7 @@ class SearchTeam:
 
     async def fly(self) -> None:
         """Fly all vehicles."""
-        await together([self._fly_one(index) for index in range(len(self._vehicles))])
+        await run_concurrently([self._fly_one(index) for index in range(len(self._vehicles))])
 
     async def _fly_one(self, index: int) -> None:
         vehicle, own, traffic = self._vehicles[index], self._options[index], self._traffic

@@ -10,9 +10,9 @@ from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
 from missions.errors import MissionError
 from missions.orbit.gps_switch import GpsSwitch
 from missions.orbit.guidance import OrbitCommand, OrbitGuidance, OrbitParameters
-from missions.orbit.look_out import TICK_HZ, LookOut
 from missions.orbit.options import OrbitOptions
 from missions.orbit.score import ORBIT
+from missions.orbit.target_observer import TICK_HZ, TargetObserver
 from missions.orbit.tracker import TargetStatus
 from missions.planning.limits import FixedWingLimits
 from missions.vehicle import telemetry
@@ -37,8 +37,8 @@ class OrbitFlight:
         self._vehicle = vehicle
         self._options = options
         self._limits = limits
-        self._look_out = LookOut(vehicle, options)
-        self._tracker = self._look_out.tracker
+        self._observer = TargetObserver(vehicle, options)
+        self._tracker = self._observer.tracker
         bank_max = min(math.radians(50.0), 0.95 * limits.bank_max_rad)
         self._guidance = OrbitGuidance(
             OrbitParameters(radius_m=options.radius_m, direction=options.direction, bank_max_rad=bank_max)
@@ -81,13 +81,13 @@ class OrbitFlight:
         vehicle.payload.set_gimbal_rate(_GIMBAL_HZ)
         pilot = self._pilot = await vehicle.prepare_piloting()
         await pilot.prepare(options.own_altitude_m, options.airspeed_m_s)
-        stops = self._look_out.listen_to_attitude()
+        stops = self._observer.listen_to_attitude()
         try:
-            await self._look_out.start_filter()
+            await self._observer.start_filter()
             self._begin("takeoff")
             await vehicle.takeoff(options.own_altitude_m)
-            stops += self._look_out.listen_to_payload()
-            looking = asyncio.get_running_loop().create_task(self._look_out.keep_looking(pilot))
+            stops += self._observer.listen_to_payload()
+            looking = asyncio.get_running_loop().create_task(self._observer.keep_looking(pilot))
             try:
                 self._begin("transit")
                 await self._fly_to_entry(looking)
@@ -120,7 +120,7 @@ class OrbitFlight:
             await vehicle.clock.sleep(0.1)
             self._require_flying()
             p, attitude = await vehicle.position(), self._told_attitude()
-            (target_n, target_e), _ = self._look_out.target_ne(self._now_us)
+            (target_n, target_e), _ = self._observer.target_ne(self._now_us)
             n, e, _ = LocalFrame(home).ned_from_geodetic(p.lat_deg, p.lon_deg, p.alt_m)
             away_m = math.hypot(n - target_n, e - target_e)
             bearing = math.atan2(e - target_e, n - target_n)
@@ -134,7 +134,7 @@ class OrbitFlight:
             turned = abs(math.remainder(attitude.yaw_rad - course, math.tau))
             level = abs(p.height_m - options.own_altitude_m) < 8.0
             there = turned < _ENTRY_RAD and off_m < 0.5 * radius_m + 30.0 and level
-            if there and self._look_out.informed:
+            if there and self._observer.informed:
                 reached_us.append(self._now_us)
             elif self._now_us - placed_us > 600_000_000:
                 raise MissionError(
@@ -146,7 +146,7 @@ class OrbitFlight:
 
     async def _circle_for_entry(self, home: GeodeticPosition, course: float, radius_m: float) -> None:
         options = self._options
-        (target_n, target_e), _ = self._look_out.target_ne(self._now_us)
+        (target_n, target_e), _ = self._observer.target_ne(self._now_us)
         right = course + 0.5 * math.pi
         north = target_n + options.entry_distance_m * math.cos(options.entry_bearing_rad)
         east = target_e + options.entry_distance_m * math.sin(options.entry_bearing_rad)
@@ -172,7 +172,7 @@ class OrbitFlight:
         self._require_air_data()
         try:
             await self._lose_gps()
-            self._look_out.with_gps = False
+            self._observer.with_gps = False
             self._tracker.count_anew()  # the target may have been out of sight on the way here
             async with vehicle.guided(TICK_HZ) as guided:
                 entered_us = self._now_us
@@ -196,7 +196,7 @@ class OrbitFlight:
                 back_us = self._now_us + round(_GPS_BACK_S * 1e6)
                 await guided.follow(lambda _t: self._fly_on(entered_us) if self._now_us < back_us else None)
         except BaseException:
-            if not self._look_out.with_gps:
+            if not self._observer.with_gps:
                 with suppress(MissionError):  # the first error is reported
                     await self._regain_gps()
             raise
@@ -240,7 +240,7 @@ class OrbitFlight:
         # Without inertial messages no target is seen either, and the flight ends by `lost_limit_s`; until
         # then
         # the autopilot's roll is better than an old one.
-        own = self._look_out.filter
+        own = self._observer.filter
         filtered_rad = None if own is None else own.roll_rad(stamp_us)
         roll_rad = attitude.roll_rad if filtered_rad is None else filtered_rad
         command = self._guidance.command(tracker.state(stamp_us), attitude.yaw_rad, roll_rad)
@@ -290,7 +290,7 @@ class OrbitFlight:
 
     async def _regain_gps(self) -> None:
         """Switch GPS on and wait for a fix (which the receiver may have had all the time)."""
-        vehicle, self._look_out.with_gps = self._vehicle, True
+        vehicle, self._observer.with_gps = self._vehicle, True
         notes = vehicle.notes
         if self._radii:
             notes.marks["radius_estimate_mean_m"] = fmean(self._radii)
@@ -309,4 +309,4 @@ def _raise_if_ended(task: "asyncio.Task[None]") -> None:
     """Raise the reason why a task that should continue has ended."""
     if task.done():
         task.result()
-        raise MissionError("the mission's own look-out has ended")
+        raise MissionError("the observation of the target has ended")

@@ -38,7 +38,7 @@ from missions.runs.run_folder import (
     write_summary,
 )
 from missions.runs.signing import client_signing, require_key
-from missions.runs.concurrency import together
+from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -234,7 +234,7 @@ async def _fly(
             await stack.enter_async_context(estimators.on_board(flight.vehicles, stage.links, clock))
         reporter = asyncio.get_running_loop().create_task(_report(flight, on_progress))
         try:
-            await together([_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles])
+            await run_concurrently([_prepare(mission, vehicle, request, flight) for vehicle in flight.vehicles])
             flight.require_log()
             await _fly_all(mission, flight.vehicles, request)
         finally:
@@ -288,10 +288,10 @@ async def _fly_all(mission: Mission[Any], vehicles: Sequence[Vehicle], request: 
         looks = [await look(vehicle, mission, own) for vehicle, own in zip(vehicles, options, strict=True)]
         await confirmed(looks, request.confirm)
     if not mission.commands:
-        await together([mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)])
+        await run_concurrently([mission.fly(vehicle, own) for vehicle, own in zip(vehicles, options, strict=True)])
         return
     if not mission.together:
-        await together(
+        await run_concurrently(
             [
                 _fly_one(mission.fly(vehicle, own), vehicle, request)
                 for vehicle, own in zip(vehicles, options, strict=True)

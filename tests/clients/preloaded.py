@@ -21,7 +21,7 @@ for name in (
     "missions.estimation.live",
     "missions.library",
     "missions.runs.picture",
-    "missions.runs.concurrency",
+    "missions.vehicle.concurrency",
     "missions.vehicle_client.doctor",
     "missions.vehicle_client.logs",
 ):

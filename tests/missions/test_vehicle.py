@@ -11,8 +11,8 @@ from autopilot_bridge.links import memory_pair
 from autopilot_bridge.mavlink import FrameEncoder, dialect
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import CommandRejected, MissionError, VehicleTimeout
-from missions.runs.concurrency import together
 from missions.vehicle import Mode, Setpoint, Vehicle
+from missions.vehicle.concurrency import run_concurrently
 from missions.vehicle.connection import Connection
 from missions.vehicle.telemetry import (
     Attitude,
@@ -468,5 +468,5 @@ def test_what_else_failed_side_by_side_hangs_on_the_first_error():
         raise MissionError(text)
 
     with pytest.raises(MissionError, match="first") as caught:
-        asyncio.run(together([fails("first"), fails("second")]))
+        asyncio.run(run_concurrently([fails("first"), fails("second")]))
     assert caught.value.__notes__ == ["also failed: second"]

@@ -8,7 +8,7 @@ from autopilot_bridge.errors import BridgeError
 from missions.errors import MissionError, PlanError
 
 
-async def together(coroutines: Iterable[Coroutine[Any, Any, None]]) -> None:
+async def run_concurrently(coroutines: Iterable[Coroutine[Any, Any, None]]) -> None:
     """Run all coroutines. The first failure cancels the others and is raised.
 
     Other failures that happen before all have ended are added to the raised error as notes (PEP 678).

@@ -25,7 +25,7 @@ _INERTIAL_HZ: Final = (25.0, 40.0)
 _FILTER_START_S: Final = 5.0
 
 
-class LookOut:
+class TargetObserver:
     """Observes the target from one vehicle.
 
     Attributes:
