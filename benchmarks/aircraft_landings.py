@@ -20,10 +20,11 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.mission_plan import MissionItem
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, SitlVehicle, VehicleSpecification
+from autopilot_bridge.sitl import Sitl, SitlVehicle
 from flightsim import truth as t
 from flightsim.environment import Environment, Turbulence
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 GLIDE_SLOPE_RAD = math.radians(5.0)
 HEIGHT_M = 40.0  # where the slope begins
@@ -95,13 +96,13 @@ def plan_of(vehicle: SitlVehicle, course_rad: float) -> tuple[tuple[MissionItem,
 def land(case: Case) -> Touch:
     """Fly it."""
     flavour = case.flavour
-    specification = VehicleSpecification(flavour=flavour, model=case.model)
-    configuration = SitlConfiguration(vehicles=(specification,), seed=case.seed)
+    specification = VehicleSpec(autopilot=flavour, model=case.model)
+    configuration = WorldSpec(vehicles=(specification,), seed=case.seed)
     heading_deg = configuration.place.heading_deg
     environment = Environment.from_wind(
         speed_m_s=case.wind_m_s, from_deg=heading_deg + case.wind_from_deg, turbulence=case.turbulence
     )
-    sitl = Sitl(SitlConfiguration(vehicles=(specification,), seed=case.seed, environment=environment))
+    sitl = Sitl(WorldSpec(vehicles=(specification,), seed=case.seed, air=environment))
     try:
         return fly(sitl, case, math.radians(heading_deg))
     finally:

@@ -22,9 +22,10 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Verdict
 from autopilot_bridge.mission_plan import MissionItem
-from autopilot_bridge.sitl import PacketLog, Sitl, SitlConfiguration, SitlVehicle, team
+from autopilot_bridge.sitl import PacketLog, Sitl, SitlVehicle
 from flightsim.airframe import AirframeKind, load_airframe
 from flightsim.foundation.geodesy import LocalFrame
+from flightsim.world_spec import WorldSpec, team
 
 PHYSICS_RATE_HZ = 250
 NO_LANDING_NEEDED = {"MIS_TKO_LAND_REQ": 0.0}  # else PX4 refuses an aircraft this mission without end
@@ -68,9 +69,7 @@ class Flight:
         endless = flavour == "px4" and load_airframe(model).kind is AirframeKind.FIXED_WING
         parameters = NO_LANDING_NEEDED if endless else {}
         self.sitl = Sitl(
-            SitlConfiguration(
-                vehicles=team(vehicles, model=model, flavour=flavour, parameters=parameters), seed=1
-            )
+            WorldSpec(vehicles=team(vehicles, model=model, autopilot=flavour, parameters=parameters), seed=1)
         )
         self.log = PacketLog(log)
         self.links = self.sitl.record(self.log)
@@ -140,7 +139,7 @@ def repeated(step: Callable[[], object], count: int) -> float:
 
 def jsbsim_alone(model: str, seconds: float) -> float:
     """Simulated seconds per wall second of JSBSim's own `run` on a model."""
-    sitl = Sitl(SitlConfiguration(vehicles=team(1, model=model, flavour="px4", parameters={})))
+    sitl = Sitl(WorldSpec(vehicles=team(1, model=model, autopilot="px4", parameters={})))
     run = sitl.vehicles[0].vehicle._fdm.run  # the bare library call
     return 1e6 / PHYSICS_RATE_HZ / repeated(run, round(seconds * PHYSICS_RATE_HZ))
 

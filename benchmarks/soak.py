@@ -66,24 +66,18 @@ def kind_of(index: int) -> tuple[str, str]:
 
 def serve(vehicles: int, port: int) -> None:
     """Run the vehicles until told to stop; a line of JSON each second tells pace and memory."""
-    from autopilot_bridge.sitl import (
-        PaceReport,
-        Sitl,
-        SitlConfiguration,
-        SitlServer,
-        VehicleSpecification,
-        compile_flight_code,
-    )
+    from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
     from autopilot_bridge.sitl.ports import Port
+    from flightsim.world_spec import VehicleSpec, WorldSpec
 
     specifications = tuple(
-        VehicleSpecification(
-            system_id=k + 1, flavour=kind_of(k)[0], model=kind_of(k)[1], offset_ne_m=(0.0, 40.0 * k)
+        VehicleSpec(
+            system_id=k + 1, autopilot=kind_of(k)[0], model=kind_of(k)[1], offset_ne_m=(0.0, 40.0 * k)
         )
         for k in range(vehicles)
     )
     compile_flight_code(specifications)
-    sitl = Sitl(SitlConfiguration(vehicles=specifications))
+    sitl = Sitl(WorldSpec(vehicles=specifications))
     server = SitlServer(sitl, speedup=1.0, monotonic=time.monotonic)
     server.open(
         [

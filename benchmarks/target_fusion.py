@@ -24,7 +24,7 @@ import numpy as np
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.mavlink import FrameParser, definition
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from autopilot_bridge.tlog import TlogWriter
 from estimators.interface import Estimator
@@ -41,6 +41,7 @@ from flightsim.payload import (
     GroundTargetParameters,
     PayloadParameters,
 )
+from flightsim.world_spec import WorldSpec, team
 from missions.notes import PATTERN
 from missions.options import FlightOptions, Via
 from missions.pattern_search.flight import fly_pattern
@@ -171,19 +172,19 @@ def fly(seed: int, setting: Setting, log: Path | None = None) -> Recorded:
         tag_id=TAG,
     )
     vehicles = tuple(
-        replace(vehicle, payload=payload) for vehicle in team(2, model="iris", flavour="px4", parameters={})
+        replace(vehicle, payload=payload) for vehicle in team(2, model="iris", autopilot="px4", parameters={})
     )
     sitl = Sitl(
-        SitlConfiguration(
+        WorldSpec(
             vehicles=vehicles,
             seed=seed,
             targets=(target,),
-            environment=Environment.from_wind(
+            air=Environment.from_wind(
                 speed_m_s=setting.wind_m_s, from_deg=240.0, turbulence="light" if setting.wind_m_s else "none"
             ),
         )
     )
-    home = sitl.configuration.place
+    home = sitl.spec.place
     frame = LocalFrame(GeodeticPosition(lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt_m=home.alt_m))
     truth: list[tuple[float, float, float]] = []
     parser = FrameParser()

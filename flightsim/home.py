@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
 _WGS84_A_M: Final = 6378137.0
 _WGS84_E2: Final = 6.69437999014e-3
@@ -32,6 +32,24 @@ class Home:
             raise ValueError(f"home altitude {self.alt_m} m is not in -500..9000 m")
         if not -360.0 <= self.heading_deg <= 360.0:
             raise ValueError(f"home heading {self.heading_deg} deg is not in -360..360")
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Home from "lat,lon,alt[,heading]", as ArduPilot's SITL writes it.
+
+        Raises:
+            ValueError: the text has another form, or a number is out of range.
+        """
+        try:
+            numbers = [float(part) for part in text.split(",")]
+        except ValueError:
+            numbers = []
+        if len(numbers) not in (3, 4):
+            raise ValueError(
+                f"home {text!r} is not 'lat,lon,alt[,heading]', for example 47.3977,8.5456,489,0"
+            )
+        heading_deg = numbers[3] if len(numbers) == 4 else 0.0
+        return cls(lat_deg=numbers[0], lon_deg=numbers[1], alt_m=numbers[2], heading_deg=heading_deg)
 
     def offset(self, north_m: float, east_m: float) -> tuple[float, float]:
         """(latitude deg, longitude deg) of a point on the ground near home.

@@ -6,7 +6,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from autopilot_bridge.sitl import VehicleSpecification, compile_flight_code
+from autopilot_bridge.sitl import compile_flight_code
+from flightsim.world_spec import VehicleSpec
 
 try:
     import fcntl
@@ -17,7 +18,7 @@ except ImportError:  # not on Windows: there everybody compiles
 def compile_in_turn() -> None:
     """Compile for every kind of vehicle, or load what somebody else has compiled in the meantime."""
     with _turn():
-        compile_flight_code((VehicleSpecification(), VehicleSpecification(model="aerosonde")))
+        compile_flight_code((VehicleSpec(), VehicleSpec(model="aerosonde")))
 
 
 @contextlib.contextmanager

@@ -1,12 +1,5 @@
 """SITL: the runner that steps worlds and autopilots together, embedded or for clients on real links."""
 
-from autopilot_bridge.sitl.configuration import (
-    HOMES,
-    SitlConfiguration,
-    VehicleSpecification,
-    parse_home,
-    team,
-)
 from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
@@ -16,20 +9,15 @@ from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.sitl.warm_up import compile_flight_code
 
 __all__ = [
-    "HOMES",
     "PaceReport",
     "PacketLog",
     "Port",
     "SigningParameters",
     "SigningStore",
     "Sitl",
-    "SitlConfiguration",
     "SitlServer",
     "SitlVehicle",
     "UnsignedFrom",
-    "VehicleSpecification",
     "compile_flight_code",
     "default_ports",
-    "parse_home",
-    "team",
 ]

@@ -86,7 +86,7 @@ class SitlServer:
             undo.callback(self.sitl.close)
             for index, vehicle in enumerate(self.sitl.vehicles):
                 chosen = (
-                    default_ports(vehicle.specification.flavour, index) if ports is None else ports[index]
+                    default_ports(vehicle.specification.autopilot, index) if ports is None else ports[index]
                 )
                 for port in chosen:
                     link = self._open(port)

@@ -9,15 +9,16 @@ from typing import Final
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
-from autopilot_bridge.sitl.configuration import SitlConfiguration
+from autopilot_bridge.sitl.failures import NEVER_US
 from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.shared_link import SharedLink
 from autopilot_bridge.sitl.signing import SigningParameters
 from autopilot_bridge.sitl.truth import TRUTH_RATE_HZ, TargetTruthEncoder
-from autopilot_bridge.sitl.vehicle import NEVER_US, SitlVehicle
+from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.storage.card import MemoryCard
-from flightsim.payload import GroundTargets
+from flightsim.payload import GroundTargets, MagneticMap, MagneticSpec, magnetic_field_of
 from flightsim.world import World, WorldParameters
+from flightsim.world_spec import WorldSpec
 
 TruthListener = Callable[[int, bytes], None]
 """Called with vehicle time (microseconds) and a truth frame."""
@@ -29,15 +30,16 @@ class Sitl:
     """A world of vehicles under autopilots, advanced step by step.
 
     Args:
-        configuration: the content of the world.
+        spec: the content of the world.
         signing: how the vehicles sign their frames, and which frames they accept.
         cards: the vehicles' memory cards; None: empty cards in memory, without logs.
 
     Attributes:
-        configuration: as given.
+        spec: as given.
         world: vehicles and air.
         vehicles: with sensors, autopilots and links.
         targets: on the ground.
+        published_map: the map that a survey made of the magnetic field; None: there is none.
         shared_links: the links that several vehicles share.
 
     Raises:
@@ -46,31 +48,35 @@ class Sitl:
 
     def __init__(
         self,
-        configuration: SitlConfiguration,
+        spec: WorldSpec,
         *,
         signing: SigningParameters = _NOT_SIGNED,
         cards: Sequence[MemoryCard] | None = None,
     ) -> None:
-        self.configuration = configuration
+        self.spec = spec
         self.world = World(
             WorldParameters(
-                seed=configuration.seed,
-                physics_rate_hz=configuration.physics_rate_hz,
-                home=configuration.place,
-                environment=configuration.environment,
+                seed=spec.seed,
+                physics_rate_hz=spec.physics_rate_hz,
+                home=spec.place,
+                environment=spec.air,
             )
         )
         streams = self.world.streams
-        self.targets = GroundTargets(
-            configuration.targets, seeds=lambda target: streams.child("target", target)
-        )
-        cards = [MemoryCard() for _ in configuration.vehicles] if cards is None else cards
+        self.targets = GroundTargets(spec.targets, seeds=lambda target: streams.child("target", target))
+        field = spec.magnetic_field
+        self.published_map: MagneticMap | None = None
+        if isinstance(field, MagneticSpec):
+            field, self.published_map = magnetic_field_of(
+                field, home=spec.place, seed=spec.seed, decimal_year=spec.air.decimal_year
+            )
+        cards = [MemoryCard() for _ in spec.vehicles] if cards is None else cards
         self.vehicles = tuple(
-            SitlVehicle(specification, index, configuration, self.world, self.targets, signing, card)
-            for index, (specification, card) in enumerate(zip(configuration.vehicles, cards, strict=True))
+            SitlVehicle(vehicle, index, spec, self.world, self.targets, field, signing, card)
+            for index, (vehicle, card) in enumerate(zip(spec.vehicles, cards, strict=True))
         )
         self.shared_links: list[SharedLink] = []
-        self._step_us = 1_000_000 // configuration.physics_rate_hz
+        self._step_us = 1_000_000 // spec.physics_rate_hz
         self._time_us = 0
         self._poll_us = self._step_us
         self._next_poll_us = NEVER_US
@@ -78,7 +84,7 @@ class Sitl:
         self._truth_listeners: list[TruthListener] = []
         self._truth_interval_us = 1_000_000 // TRUTH_RATE_HZ
         self._next_truth_us = NEVER_US
-        self._target_truth = TargetTruthEncoder(self.targets, configuration.place)
+        self._target_truth = TargetTruthEncoder(self.targets, spec.place)
 
     @property
     def time_us(self) -> int:
@@ -186,7 +192,7 @@ class Sitl:
         Returns:
             The client's ends of those links, on which a client can send messages to the vehicles.
         """
-        epoch_us = self.configuration.unix_epoch_us
+        epoch_us = self.spec.unix_epoch_us
         links = [self.connect(index) for index in range(len(self.vehicles))]
         failed = False
 

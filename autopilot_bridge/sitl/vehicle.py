@@ -18,8 +18,7 @@ from autopilot_bridge.mavlink.signing import signing_time
 from autopilot_bridge.payload import PayloadStation
 from autopilot_bridge.services.vehicle_memory import PowerAction
 from autopilot_bridge.sitl.channel import LinkChannel
-from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
-from autopilot_bridge.sitl.failures import FailureInjector
+from autopilot_bridge.sitl.failures import NEVER_US, FailureInjector, FaultSchedule
 from autopilot_bridge.sitl.launch_crew import LaunchCrew
 from autopilot_bridge.sitl.signing import SigningParameters, VehicleSigning
 from autopilot_bridge.sitl.switchboard import Switchboard
@@ -27,7 +26,7 @@ from autopilot_bridge.sitl.truth import TruthEncoder
 from autopilot_bridge.storage.card import MemoryCard
 from flightsim.airframe import Airframe, AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
-from flightsim.payload import GroundTargets, Payload, PayloadParameters
+from flightsim.payload import GroundTargets, MagneticField, Payload, PayloadParameters
 from flightsim.sensors import (
     FIX_AFTER_10_S,
     FIX_AT_BOOT,
@@ -38,11 +37,11 @@ from flightsim.sensors import (
     SensorSuiteParameters,
 )
 from flightsim.world import World
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 if TYPE_CHECKING:
     from flightsim.flight_envelope import FlightEnvelope
 
-NEVER_US: Final = 1 << 62
 REBOOT_US: Final = 1_000_000
 """Time from the shutdown of a rebooting autopilot until it starts again."""
 
@@ -62,11 +61,12 @@ class SitlVehicle:
 
     def __init__(
         self,
-        specification: VehicleSpecification,
+        specification: VehicleSpec,
         index: int,
-        configuration: SitlConfiguration,
+        world_spec: WorldSpec,
         world: World,
         targets: GroundTargets,
+        magnetic_field: MagneticField | None,
         signing: SigningParameters,
         card: MemoryCard,
     ) -> None:
@@ -78,31 +78,33 @@ class SitlVehicle:
         )
         airframe = self.vehicle.airframe
         aircraft = airframe.kind is AirframeKind.FIXED_WING
-        flavour = get_flavour(specification.flavour, airframe.kind)
+        flavour = get_flavour(specification.autopilot, airframe.kind)
         self.sensors = SensorSuite(
             specification.sensors or usual_sensors(specification, aircraft=aircraft),
-            physics_rate_hz=configuration.physics_rate_hz,
+            physics_rate_hz=world_spec.physics_rate_hz,
             truth=self.vehicle.truth,
             seeds=lambda name: streams.child("vehicle", index, "sensor", name),
         )
         self.failures = FailureInjector(self.vehicle, self.sensors)
+        own = [fault for fault in world_spec.faults if fault.vehicle == specification.system_id]
+        self._faults = FaultSchedule(own, self.failures)
         self._new_autopilot = partial(
             Autopilot,
             flavour,
             system_id=specification.system_id,
             readings=self.sensors.readings,
-            physics_rate_hz=configuration.physics_rate_hz,
+            physics_rate_hz=world_spec.physics_rate_hz,
             parameters={
                 **flavour.launch_parameters.get(launch or airframe.launch_kind, {}),
                 **specification.parameters,
             },
-            envelope=_envelope(airframe, configuration) if aircraft else None,
+            envelope=_envelope(airframe, world_spec) if aircraft else None,
             inject_failure=self.failures.inject,
             simulation=self.failures,
             card=card,
             power=self._on_power,
         )
-        self._epoch_us = configuration.unix_epoch_us
+        self._epoch_us = world_spec.unix_epoch_us
         self._starts_again = flavour.reboot_starts_again
         self._boot_us = 0
         self._power: PowerAction | None = None
@@ -117,7 +119,7 @@ class SitlVehicle:
             signing=VehicleSigning(
                 signing,
                 system_id=specification.system_id,
-                clock=lambda: signing_time(configuration.unix_epoch_us + world.time_us),
+                clock=lambda: signing_time(world_spec.unix_epoch_us + world.time_us),
                 armed=lambda: self.autopilot.commander.armed,
             ),
         )
@@ -129,11 +131,11 @@ class SitlVehicle:
                 Payload(
                     specification.payload,
                     truth=self.vehicle.truth,
-                    home=configuration.place,
-                    physics_rate_hz=configuration.physics_rate_hz,
+                    home=world_spec.place,
+                    physics_rate_hz=world_spec.physics_rate_hz,
                     seeds=lambda name: streams.child("vehicle", index, "sensor", name),
                     targets=targets,
-                    magnetic_field=configuration.magnetic_field,
+                    magnetic_field=magnetic_field,
                 )
             )
 
@@ -160,6 +162,8 @@ class SitlVehicle:
         """One physics step, ending at `time_us`."""
         if time_us >= self._power_us:
             self._power_cycle(time_us)
+        if time_us >= self._faults.next_us:
+            self._faults.apply(time_us)
         boot_us = self._boot_us
         self.vehicle.step(self._actuators)
         self.sensors.step(time_us - boot_us)
@@ -222,17 +226,17 @@ class SitlVehicle:
         self.links.take(channel, frames)
 
 
-def usual_sensors(specification: VehicleSpecification, *, aircraft: bool) -> SensorSuiteParameters:
+def usual_sensors(specification: VehicleSpec, *, aircraft: bool) -> SensorSuiteParameters:
     """The sensors of a vehicle of this kind; its receiver starts as in the firmware's own SITL."""
     timeline: tuple[GpsFixStage, ...] = FIX_AT_BOOT
-    if specification.flavour == "ardupilot":
+    if specification.autopilot == "ardupilot":
         timeline = RTK_FIX_AFTER_10_S if specification.gps == "differential" else FIX_AFTER_10_S
     fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
     return fitted(gps=GpsParameters.of(specification.gps, fix_timeline=timeline))
 
 
-def _envelope(airframe: Airframe, configuration: SitlConfiguration) -> "FlightEnvelope":
+def _envelope(airframe: Airframe, world_spec: WorldSpec) -> "FlightEnvelope":
     """The flight envelope of an aircraft, found by trimming its model."""
     from flightsim.flight_envelope import flight_envelope  # imports scipy, which a multicopter does not need
 
-    return flight_envelope(airframe, home=configuration.place, environment=configuration.environment)
+    return flight_envelope(airframe, home=world_spec.place, environment=world_spec.air)

@@ -20,18 +20,18 @@ from autopilot_bridge.navigation.external import (
     ExternalFrame,
     ExternalSample,
 )
-from autopilot_bridge.sitl.configuration import SitlConfiguration, VehicleSpecification
 from autopilot_bridge.sitl.sitl import Sitl
 from autopilot_bridge.telemetry.packet_records import packet_records
 from flightsim.airframe import AirframeKind, load_airframe
 from flightsim.environment import Environment
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 _BOOT_S: Final = 5.0
 _PHASE_S: Final = 2.5
 _MODELS: Final = {AirframeKind.MULTICOPTER: "iris", AirframeKind.FIXED_WING: "aerosonde"}
 
 
-def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpecification(),)) -> None:
+def compile_flight_code(vehicles: Iterable[VehicleSpec] = (VehicleSpec(),)) -> None:
     """Fly a temporary vehicle of each kind through take-off, an approach, a circle, a descent and streams.
 
     Each kind is flown only once in a process.
@@ -48,10 +48,10 @@ def compile_flight_code(vehicles: Iterable[VehicleSpecification] = (VehicleSpeci
 
 @cache
 def _compile(kind: AirframeKind) -> None:
-    specification = VehicleSpecification(model=_MODELS[kind])
+    specification = VehicleSpec(model=_MODELS[kind])
     # turbulence and external position estimates may come at any time of a flight
     air = Environment.from_wind(speed_m_s=2.0, from_deg=0.0, turbulence="light")
-    sitl = Sitl(SitlConfiguration(vehicles=(specification,), environment=air))
+    sitl = Sitl(WorldSpec(vehicles=(specification,), air=air))
     link = sitl.connect(0)
     fly = _fly_aircraft if kind is AirframeKind.FIXED_WING else _fly_multicopter
     fly(sitl)

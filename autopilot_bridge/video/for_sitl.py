@@ -94,5 +94,5 @@ def _scenery(sitl: Sitl) -> Scenery:
     aircraft = any(vehicle.vehicle.airframe.kind is AirframeKind.FIXED_WING for vehicle in sitl.vehicles)
     return Scenery(
         runway_length_m=_RUNWAY_M if aircraft else 0.0,
-        runway_heading_rad=math.radians(sitl.configuration.place.heading_deg),
+        runway_heading_rad=math.radians(sitl.spec.place.heading_deg),
     )

@@ -19,6 +19,12 @@ from flightsim.payload.gimbal import LEVEL, Gimbal, GimbalFlags, GimbalParameter
 from flightsim.payload.home_frame import HomeFrame
 from flightsim.payload.magnetic_field import MagneticField
 from flightsim.payload.magnetic_map import MagneticMap, MagneticMapError
+from flightsim.payload.magnetic_spec import (
+    InducedDipole,
+    MagneticSpec,
+    SignatureSpec,
+    magnetic_field_of,
+)
 from flightsim.payload.main_field import MainField
 from flightsim.payload.payload import Payload, PayloadParameters
 from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
@@ -59,10 +65,12 @@ __all__ = [
     "GroundTargetParameters",
     "GroundTargets",
     "HomeFrame",
+    "InducedDipole",
     "MagneticField",
     "MagneticMap",
     "MagneticMapError",
     "MagneticReading",
+    "MagneticSpec",
     "MainField",
     "Payload",
     "PayloadParameters",
@@ -72,6 +80,7 @@ __all__ = [
     "ResolutionDetection",
     "SeenTargets",
     "Signature",
+    "SignatureSpec",
     "Static",
     "SurveyMagnetometer",
     "SurveyMagnetometerParameters",
@@ -82,6 +91,7 @@ __all__ = [
     "Trajectory",
     "camera_from_gimbal",
     "gimbal_from_camera",
+    "magnetic_field_of",
     "surveyed",
     "synthetic_map",
     "truth_behind",

@@ -216,19 +216,12 @@ def sitl(
     if 0.0 < speedup < SLOWEST:
         raise click.UsageError(f"--speedup {speedup:g} is slower than {SLOWEST:g}; 0 is as fast as possible")
     from autopilot_bridge.clock.pacing import unix_time_us, wall_time_s
-    from autopilot_bridge.sitl import (
-        PaceReport,
-        Sitl,
-        SitlConfiguration,
-        SitlServer,
-        compile_flight_code,
-        parse_home,
-        team,
-    )
-    from autopilot_bridge.sitl.configuration import HOMES
+    from autopilot_bridge.sitl import PaceReport, Sitl, SitlServer, compile_flight_code
     from flightsim.environment import Environment
+    from flightsim.home import Home
     from flightsim.vehicle import VehicleDivergedError
     from flightsim.wind_profile import WindLaw, WindProfile
+    from flightsim.world_spec import HOMES, WorldSpec, team
     from missions.embedded.scenario import equipped
     from missions.options import parameters_from_file, parse_wind
 
@@ -240,13 +233,13 @@ def sitl(
             ports = _ports(links, gcs_links)
             signing = vehicle_signing(signing_key, unsigned, signing_store, on_failure=losses.keys_not_stored)
             wind_speed_m_s, wind_from_deg = parse_wind(wind)
-            place = None if home is None else parse_home(home)
+            place = None if home is None else Home.parse(home)
             heading_deg = HOMES[autopilot].heading_deg if place is None else place.heading_deg
-            configuration = SitlConfiguration(
+            configuration = WorldSpec(
                 vehicles=team(
                     count,
                     model=models[0] if len(models) == 1 else models,
-                    flavour=autopilot,
+                    autopilot=autopilot,
                     launch=launch,
                     heading_deg=heading_deg,
                     gps=gps,
@@ -256,7 +249,7 @@ def sitl(
                     },
                 ),
                 home=place,
-                environment=Environment.from_wind(
+                air=Environment.from_wind(
                     speed_m_s=wind_speed_m_s,
                     from_deg=wind_from_deg,
                     profile=WindProfile(law=WindLaw(wind_profile)),
@@ -270,7 +263,7 @@ def sitl(
             equipment = equipped(configuration, scenario_of(camera, targets, map_file, map_target))
             click.echo("starting (the first start compiles the flight code, half a minute or so)", err=True)
             world = Sitl(equipment, signing=signing, cards=memory.cards)
-            compile_flight_code(world.configuration.vehicles)
+            compile_flight_code(world.spec.vehicles)
             server = SitlServer(world, speedup=speedup or None, monotonic=wall_time_s)
             pictured = start_video(world, video, pictures, losses.picture_lost)
             if pictured is not None:

@@ -6,15 +6,16 @@ from pathlib import Path
 
 from autopilot_bridge.clock import VirtualTimeLoop
 from autopilot_bridge.links import Link
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, parse_home, team
-from autopilot_bridge.sitl.configuration import HOMES
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.sitl import TruthListener
 from flightsim.airframe import load_airframe
 from flightsim.environment import Environment
 from flightsim.foundation.geodesy import GeodeticPosition
+from flightsim.home import Home
 from flightsim.vehicle import VehicleDivergedError
 from flightsim.wind_profile import WindLaw, WindProfile
-from missions.embedded.scenario import equipped
+from flightsim.world_spec import HOMES, WorldSpec, team
+from missions.embedded.scenario import equipped, publish
 from missions.errors import MissionError
 from missions.kind import VehicleKind
 from missions.scenario import Scenario
@@ -78,13 +79,13 @@ class EmbeddedSitl:
     def __init__(self, configuration: EmbeddedConfiguration) -> None:
         flavour = configuration.flavour
         if configuration.home is not None:
-            home = parse_home(configuration.home)
+            home = Home.parse(configuration.home)
         else:
             home = HOMES.get(flavour, HOMES["px4"])
         vehicles = team(
             configuration.vehicles,
             model=configuration.model,
-            flavour=flavour,
+            autopilot=flavour,
             parameters=configuration.parameters,
             launch=configuration.launch,
             heading_deg=home.heading_deg,
@@ -96,14 +97,17 @@ class EmbeddedSitl:
             profile=WindProfile(law=WindLaw(configuration.wind_profile)),
             turbulence=configuration.turbulence,
         )
-        world = SitlConfiguration(
+        world = WorldSpec(
             vehicles=vehicles,
             home=home,
-            environment=environment,
+            air=environment,
             seed=configuration.seed,
             physics_rate_hz=configuration.physics_rate_hz,
         )
         self.sitl = Sitl(equipped(world, configuration.scenario))
+        for path in configuration.scenario.published:
+            assert self.sitl.published_map is not None
+            publish(self.sitl.published_map, path)
         self.links: list[Link] = [self.sitl.connect(index) for index in range(configuration.vehicles)]
         sitl = self.sitl
 
@@ -130,7 +134,7 @@ class EmbeddedSitl:
     @property
     def home(self) -> GeodeticPosition:
         """The home of the vehicles."""
-        place = self.sitl.configuration.place
+        place = self.sitl.spec.place
         return GeodeticPosition(lat_deg=place.lat_deg, lon_deg=place.lon_deg, alt_m=place.alt_m)
 
     @property

@@ -11,7 +11,8 @@ import pytest
 from pymavlink import mavutil
 
 from autopilot_bridge.links import UdpPeer
-from autopilot_bridge.sitl import Port, Sitl, SitlConfiguration, SitlServer, team
+from autopilot_bridge.sitl import Port, Sitl, SitlServer
+from flightsim.world_spec import WorldSpec, team
 from tests.clients.mavproxy_process import Mavproxy
 from tests.clients.mavsdk_waiting import first
 from tests.clients.mavutil_link import mavutil_link
@@ -84,8 +85,8 @@ def test_a_link_each_to_one_port() -> None:
     """As PX4 does with 14550: every vehicle sends there from a port of its own."""
     port = free_port()
     station = GroundStation(f"udpin:127.0.0.1:{port}")
-    vehicles = team(COUNT, model="iris", flavour="px4", parameters={})
-    server = SitlServer(Sitl(SitlConfiguration(vehicles=vehicles)), speedup=4.0, monotonic=time.monotonic)
+    vehicles = team(COUNT, model="iris", autopilot="px4", parameters={})
+    server = SitlServer(Sitl(WorldSpec(vehicles=vehicles)), speedup=4.0, monotonic=time.monotonic)
     server.open([[Port(UdpPeer("127.0.0.1", 0, "127.0.0.1", port), "gcs")] for _ in vehicles])
     stop = threading.Event()
     running = threading.Thread(target=server.run, args=(stop.is_set,))

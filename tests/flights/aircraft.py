@@ -109,13 +109,13 @@ class AircraftFlight(Flight):
 
     def geodetic(self, north_m: float, east_m: float) -> tuple[float, float]:
         """(latitude, longitude) deg of a place given from home."""
-        home = self.sitl.configuration.place
+        home = self.sitl.spec.place
         lat = home.lat_deg + north_m / _METRES_PER_DEG
         return lat, home.lon_deg + east_m / (_METRES_PER_DEG * math.cos(math.radians(home.lat_deg)))
 
     def on_runway(self, along_m: float, right_m: float = 0.0) -> tuple[float, float]:
         """North and east of a place given along the runway that starts at home, and to its right."""
-        heading = math.radians(self.sitl.configuration.place.heading_deg)
+        heading = math.radians(self.sitl.spec.place.heading_deg)
         c, s = math.cos(heading), math.sin(heading)
         return along_m * c - right_m * s, along_m * s + right_m * c
 

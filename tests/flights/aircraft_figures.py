@@ -152,7 +152,7 @@ def fly_plan(flight: AircraftFlight, what: Plan, *, limit_s: float = 600.0) -> M
     standing_m = flight.height_over_home_m  # heights are over the centre of gravity as it stood
     first = 2 + (flight.flavour == "ardupilot")  # the item that ends the first leg between waypoints
     legs = dict(enumerate(zip(what.corners, what.corners[1:], strict=False), start=first))
-    wind = flight.sitl.configuration.environment.wind_ned_m_s[:2]
+    wind = flight.sitl.spec.air.wind_ned_m_s[:2]
     befores = (what.start, *what.corners)
     settled_m = {
         seq: settled_after_m(flight.flavour, befores[seq - first], *leg, wind) for seq, leg in legs.items()
@@ -196,7 +196,7 @@ def fly_plan(flight: AircraftFlight, what: Plan, *, limit_s: float = 600.0) -> M
         flight.sitl.advance()
     else:
         raise AssertionError(f"no touch-down; mode {flight.mode}, {flight.texts[-4:]}")
-    heading = math.radians(flight.sitl.configuration.place.heading_deg)
+    heading = math.radians(flight.sitl.spec.place.heading_deg)
     north, east = last[0] - what.land[0], last[1] - what.land[1]
     figures.touch_along_m = north * math.cos(heading) + east * math.sin(heading)
     figures.touch_across_m = east * math.cos(heading) - north * math.sin(heading)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect
 from autopilot_bridge.navigation import layout
-from autopilot_bridge.sitl.configuration import VehicleSpecification
 from autopilot_bridge.sitl.vehicle import usual_sensors
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.sensors import SensorSuiteParameters
+from flightsim.world_spec import VehicleSpec
 from tests.flights.flight import Flight
 from tests.navigation.bench import attitude_error
 
@@ -67,7 +67,7 @@ class Case:
 
     def sensors(self, flavour: str) -> SensorSuiteParameters:
         """The sensors of a quadrotor."""
-        usual = usual_sensors(VehicleSpecification(flavour=flavour, gps=self.gps), aircraft=False)
+        usual = usual_sensors(VehicleSpec(autopilot=flavour, gps=self.gps), aircraft=False)
         if not self.spoiled:
             return usual
         assert usual.imu is not None and usual.gps is not None

@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, dialect
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.interface import MAX_ACTUATORS
 from flightsim.payload import GroundTargetParameters, PayloadParameters
 from flightsim.sensors import SensorSuiteParameters
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from missions.vehicle.telemetry import StatusTextAssembler
 from tests.rotations import yaw_rad
 
@@ -90,8 +91,8 @@ class Flight:
         targets: tuple[GroundTargetParameters, ...] = (),
         sensors: SensorSuiteParameters | None = None,
     ) -> None:
-        specification = VehicleSpecification(
-            flavour=flavour,
+        specification = VehicleSpec(
+            autopilot=flavour,
             parameters=parameters or {},
             model=model,
             launch=launch,
@@ -99,10 +100,10 @@ class Flight:
             sensors=sensors,
         )
         self.sitl = Sitl(
-            SitlConfiguration(
+            WorldSpec(
                 vehicles=(specification,),
                 seed=seed,
-                environment=environment or Environment(),
+                air=environment or Environment(),
                 targets=targets,
             )
         )
@@ -173,7 +174,7 @@ class Flight:
     @property
     def position_ned_m(self) -> tuple[float, float, float]:
         """True position from home, small angles."""
-        home = self.sitl.configuration.place
+        home = self.sitl.spec.place
         truth = self.truth
         north = (truth[t.LAT_RAD] - math.radians(home.lat_deg)) * _METRES_PER_RAD
         east = (truth[t.LON_RAD] - math.radians(home.lon_deg)) * _METRES_PER_RAD

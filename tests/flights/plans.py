@@ -15,7 +15,7 @@ _METRES_PER_DEG: Final = math.radians(6_371_000.0)
 
 def geodetic(flight: Flight, north_m: float, east_m: float) -> tuple[float, float]:
     """(latitude, longitude) deg of a place given from home."""
-    home = flight.sitl.configuration.place
+    home = flight.sitl.spec.place
     lat = home.lat_deg + north_m / _METRES_PER_DEG
     return lat, home.lon_deg + east_m / (_METRES_PER_DEG * math.cos(math.radians(home.lat_deg)))
 

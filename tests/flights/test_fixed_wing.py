@@ -171,7 +171,7 @@ def test_mission_from_the_ground_to_the_ground(flavour: str) -> None:
     sink_m_s = fly_to_the_ground(flight)
     assert sink_m_s < 2.0
     land = flight.on_runway(60.0)
-    heading = math.radians(flight.sitl.configuration.place.heading_deg)
+    heading = math.radians(flight.sitl.spec.place.heading_deg)
     assert abs(flight.cross_track_m(land, flight.on_runway(61.0))) < 3.0
     turned_rad = (flight.yaw_rad - heading + math.pi) % (2.0 * math.pi) - math.pi
     assert abs(turned_rad) < math.radians(10.0)

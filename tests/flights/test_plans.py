@@ -175,4 +175,4 @@ def test_the_nose_follows_a_region_of_interest(flavour: str) -> None:
     north, east, _ = flight.position_ned_m
     wanted = math.atan2(spot[1] - east, spot[0] - north)
     assert abs(math.remainder(flight.yaw_rad - wanted, 2.0 * math.pi)) < math.radians(12.0)
-    assert geodetic(flight, 0.0, 0.0)[0] == pytest.approx(flight.sitl.configuration.place.lat_deg)
+    assert geodetic(flight, 0.0, 0.0)[0] == pytest.approx(flight.sitl.spec.place.lat_deg)

@@ -71,7 +71,7 @@ class Tracker:
 
 def frame_at_home(flight: Flight) -> LocalFrame:
     """Places of the world, NED from home."""
-    home = flight.sitl.configuration.place
+    home = flight.sitl.spec.place
     return LocalFrame(GeodeticPosition(lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt_m=home.alt_m))
 
 

@@ -18,11 +18,12 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameParser
-from autopilot_bridge.sitl import PacketLog, VehicleSpecification
+from autopilot_bridge.sitl import PacketLog
 from autopilot_bridge.sitl.server import objects_kept
 from autopilot_bridge.sitl.warm_up import compile_flight_code
 from flightsim import truth as t
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
+from flightsim.world_spec import VehicleSpec
 from tests.fuzz.generator import Generator
 from tests.system.flying import Flying
 
@@ -68,7 +69,7 @@ class Campaign:
         self._flavour, self._model, self._seed = flavour, model, seed
         self._wings = model != "iris"
         self._round = 0
-        compile_flight_code((VehicleSpecification(model=model),))
+        compile_flight_code((VehicleSpec(model=model),))
 
     def run(self, count: int, *, told: Callable[[str], None] = lambda text: None) -> Figures:
         """Fire so many messages: five of six in rounds that are harmless."""

@@ -7,7 +7,8 @@ import pytest
 from autopilot_bridge.clock import LoopClock, VirtualTimeLoop, run
 from autopilot_bridge.links import MemoryLink
 from autopilot_bridge.mavlink import DEFINITIONS, FrameParser
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from missions.vehicle.connection import Connection
 from missions.vehicle.stream_room import make_room
 from missions.vehicle.vehicle import Vehicle
@@ -45,7 +46,7 @@ class Line:
 
 def heard(flavour: str, *, told: bool, room: bool) -> tuple[list[str], Counter[str]]:
     """What was slowed down, and what came in ten seconds after."""
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(flavour=flavour),)))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour),)))
     line = Line(sitl.connect(0, bytes_per_s=BAUD_57600), BAUD_57600 if told else None)
 
     async def main() -> list[str]:

@@ -7,8 +7,9 @@ import pytest
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 CARRIED = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
 NOTHING = PayloadParameters()
@@ -19,9 +20,7 @@ class Talk:
     """A client on a memory link."""
 
     def __init__(self, flavour: str, payload: PayloadParameters) -> None:
-        self.sitl = Sitl(
-            SitlConfiguration(vehicles=(VehicleSpecification(flavour=flavour, payload=payload),))
-        )
+        self.sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour, payload=payload),)))
         self.link = self.sitl.connect(0)
         self.encoders = {sender: FrameEncoder(*sender) for sender in (GCS, OTHER)}
         self.parser = FrameParser()
@@ -94,7 +93,7 @@ def test_the_shutter_is_released_through_the_autopilot(talk):
     assert len(talk.of(m.MAVLINK_MSG_ID_CAMERA_IMAGE_CAPTURED, CAMERA_COMPONENT)) == 1
     started = talk.command(m.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0)
     # PX4 leaves cameras with an id of their own to their clients (docs/firmware/px4.md, section 7)
-    px4 = talk.sitl.vehicles[0].specification.flavour == "px4"
+    px4 = talk.sitl.vehicles[0].specification.autopilot == "px4"
     assert started == [m.MAV_RESULT_UNSUPPORTED if px4 else m.MAV_RESULT_ACCEPTED]
 
 

@@ -6,7 +6,7 @@ import pytest
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mavlink import dialect as m
 from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT
-from autopilot_bridge.sitl import HOMES, Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import TARGET_SYSTEM
 from flightsim.payload import (
     CameraParameters,
@@ -18,6 +18,7 @@ from flightsim.payload import (
     PayloadParameters,
     SurveyMagnetometerParameters,
 )
+from flightsim.world_spec import HOMES, VehicleSpec, WorldSpec
 
 CAMERA = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
 TARGET = GroundTargetParameters(
@@ -38,9 +39,7 @@ def frames_after(sitl: Sitl, seconds: float, *links):
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_components_are_heard_and_can_be_spoken_to_over_the_vehicles_link(flavour):
     sitl = Sitl(
-        SitlConfiguration(
-            vehicles=(VehicleSpecification(system_id=4, flavour=flavour, payload=CAMERA),), targets=(TARGET,)
-        )
+        WorldSpec(vehicles=(VehicleSpec(system_id=4, autopilot=flavour, payload=CAMERA),), targets=(TARGET,))
     )
     client, other = sitl.connect(0), sitl.connect(0, role="gcs")
     heard, also = frames_after(sitl, 3.0, client, other)
@@ -64,7 +63,7 @@ def test_components_are_heard_and_can_be_spoken_to_over_the_vehicles_link(flavou
 
 
 def test_targets_are_in_the_truth_and_nowhere_else():
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(payload=CAMERA),), targets=(TARGET,)))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(payload=CAMERA),), targets=(TARGET,)))
     client = sitl.connect(0)
     truth = []
     sitl.on_truth(lambda time_us, frame: truth.append((time_us, frame)))
@@ -86,11 +85,7 @@ def test_magnetometer_measures_the_map():
         north_m=lines, east_m=lines, total_field_nt=np.full((5, 5), 48_123.0), height_m=50.0, home=home
     )
     carried = PayloadParameters(magnetometer=SurveyMagnetometerParameters())
-    sitl = Sitl(
-        SitlConfiguration(
-            vehicles=(VehicleSpecification(payload=carried),), magnetic_field=MagneticField(survey)
-        )
-    )
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(payload=carried),), magnetic_field=MagneticField(survey)))
     client = sitl.connect(0)
     (heard,) = frames_after(sitl, 2.0, client)
     values = [
@@ -103,14 +98,12 @@ def test_magnetometer_measures_the_map():
 def test_magnetometer_without_a_map_is_refused():
     carried = PayloadParameters(magnetometer=SurveyMagnetometerParameters())
     with pytest.raises(ValueError, match="needs a magnetic map"):
-        Sitl(SitlConfiguration(vehicles=(VehicleSpecification(payload=carried),)))
+        Sitl(WorldSpec(vehicles=(VehicleSpec(payload=carried),)))
 
 
 def test_payload_changes_nothing_of_the_autopilots_own_telemetry():
     def telemetry(payload: PayloadParameters) -> list[bytes]:
-        sitl = Sitl(
-            SitlConfiguration(vehicles=(VehicleSpecification(flavour="ardupilot", payload=payload),), seed=3)
-        )
+        sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot="ardupilot", payload=payload),), seed=3))
         link = sitl.connect(0)
         link.send(
             FrameEncoder(255, 190).encode(

@@ -27,10 +27,11 @@ from autopilot_bridge.navigation.external import (
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.inputs.external_odometry import ExternalOdometryService
 from autopilot_bridge.services.inputs.landing_target import LandingTargetService
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from flightsim.airframe import AirframeKind
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import SensorReadings
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.rotations import rotation_matrix
 
 FLAVOURS = ("px4", "ardupilot")
@@ -171,9 +172,7 @@ def test_a_time_stamp_of_another_clock_is_not_used() -> None:
 def vehicle(request: pytest.FixtureRequest) -> Iterator[Any]:
     """On the ground with everything switched on, and its link."""
     parameters = ALL_ON[request.param]
-    sitl = Sitl(
-        SitlConfiguration(vehicles=(VehicleSpecification(flavour=request.param, parameters=parameters),))
-    )
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=request.param, parameters=parameters),)))
     for _ in range(1500):
         sitl.advance()
     yield sitl, sitl.connect(0)

@@ -11,8 +11,9 @@ from autopilot_bridge.flight.plan_reading import CONDITIONS, JUMPS, MARKERS, Com
 from autopilot_bridge.flight.region_of_interest import ROI_COMMANDS
 from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.services.plans.equipment import CAMERA_COMMANDS, GIMBAL_COMMANDS
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from flightsim.airframe import AirframeKind
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 FLOWN = {each for each in Command if each <= Command.NAV_LAST}
 ACTED_ON = {Command.DO_CHANGE_SPEED, Command.DO_SET_HOME}
@@ -54,7 +55,7 @@ def test_what_is_stored_would_be_taken_again(firmware: tuple[str, AirframeKind])
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("model", list(KINDS))
 def test_every_accepted_command_does_something(flavour: str, model: str) -> None:
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(flavour=flavour, model=model),)))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour, model=model),)))
     commands = sitl.vehicles[0].autopilot.commands
     known = FLOWN | ACTED_ON | CONDITIONS | JUMPS | MARKERS | ROI_COMMANDS | CAMERA_COMMANDS | GIMBAL_COMMANDS
     took = accepted(flavour, KINDS[model])

@@ -22,7 +22,8 @@ from autopilot_bridge.services.parameters.protocol import (
     PX4_PARAMETER_POLICY,
     ParameterService,
 )
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 
 class Recorder:
@@ -303,11 +304,7 @@ def test_whatever_arrives_nothing_raises(flavour: str, messages: list[Any]) -> N
 )
 def test_the_ids_of_a_vehicle_are_told_and_stay(flavour: str, name: str, given: int) -> None:
     """A change is answered with the value that is kept, and a text."""
-    sitl = Sitl(
-        SitlConfiguration(
-            vehicles=(VehicleSpecification(flavour=flavour, system_id=3, parameters={name: 9.0}),)
-        )
-    )
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour, system_id=3, parameters={name: 9.0}),)))
     link, parser = sitl.connect(0), FrameParser()
 
     def heard(message: Any, seconds: float) -> list[Any]:

@@ -12,16 +12,11 @@ from autopilot_bridge.links import Reach
 from autopilot_bridge.mavlink import LinkSigning, SigningKey, SigningState
 from autopilot_bridge.mavlink.signing import signing_time
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.sitl import (
-    SigningParameters,
-    Sitl,
-    SitlConfiguration,
-    SitlVehicle,
-    VehicleSpecification,
-)
+from autopilot_bridge.sitl import SigningParameters, Sitl, SitlVehicle
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.payload import MagneticField, PayloadParameters
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from missions.vehicle.connection import Connection
 from missions.vehicle.vehicle import Vehicle
 
@@ -44,14 +39,14 @@ class Flying:
     reach: Reach = Reach.PROCESS
 
     def __post_init__(self) -> None:
-        specification = VehicleSpecification(
-            flavour=self.flavour, parameters=self.parameters, model=self.model, payload=self.payload
+        specification = VehicleSpec(
+            autopilot=self.flavour, parameters=self.parameters, model=self.model, payload=self.payload
         )
         self.sitl = Sitl(
-            SitlConfiguration(
+            WorldSpec(
                 vehicles=(specification,),
                 seed=self.seed,
-                environment=self.environment,
+                air=self.environment,
                 magnetic_field=self.magnetic_field,
             ),
             signing=SigningParameters(key=self.key),
@@ -63,7 +58,7 @@ class Flying:
 
     def now(self) -> int:
         """The vehicle's time, as a timestamp of signatures."""
-        return signing_time(self.sitl.configuration.unix_epoch_us + self.sitl.time_us)
+        return signing_time(self.sitl.spec.unix_epoch_us + self.sitl.time_us)
 
     @property
     def vehicle(self) -> SitlVehicle:
@@ -84,7 +79,7 @@ class Flying:
     @property
     def true_position_m(self) -> tuple[float, float, float]:
         """North and east (small-angle, about where home is), and altitude."""
-        truth, home = self.vehicle.vehicle.truth, self.sitl.configuration.place
+        truth, home = self.vehicle.vehicle.truth, self.sitl.spec.place
         north = (truth[t.LAT_RAD] - math.radians(home.lat_deg)) * 6_371_000.0
         east = (truth[t.LON_RAD] - math.radians(home.lon_deg)) * 6_371_000.0
         return float(north), float(east * math.cos(truth[t.LAT_RAD])), float(truth[t.ALT_M])

@@ -7,9 +7,10 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification, team
+from autopilot_bridge.sitl import Sitl
 from flightsim import truth as t
 from flightsim.airframe import AirframeError, AirframeKind
+from flightsim.world_spec import VehicleSpec, WorldSpec, team
 
 
 def advance(sitl: Sitl, seconds: float) -> None:
@@ -18,14 +19,14 @@ def advance(sitl: Sitl, seconds: float) -> None:
 
 
 def aircraft(**specification: object) -> Sitl:
-    vehicle = VehicleSpecification(model="aerosonde", **specification)  # type: ignore[arg-type]
-    return Sitl(SitlConfiguration(vehicles=(vehicle,), seed=5))
+    vehicle = VehicleSpec(model="aerosonde", **specification)  # type: ignore[arg-type]
+    return Sitl(WorldSpec(vehicles=(vehicle,), seed=5))
 
 
 def test_a_team_of_a_quadrotor_and_two_aircraft() -> None:
-    vehicles = team(3, model=["iris", "aerosonde", "aerosonde"], flavour="px4", parameters={})
+    vehicles = team(3, model=["iris", "aerosonde", "aerosonde"], autopilot="px4", parameters={})
     assert [vehicle.offset_ne_m for vehicle in vehicles] == [(0.0, 0.0), (0.0, 25.0), (0.0, 50.0)]
-    sitl = Sitl(SitlConfiguration(vehicles=vehicles, seed=2))
+    sitl = Sitl(WorldSpec(vehicles=vehicles, seed=2))
     kinds = [vehicle.autopilot.flavour.kind for vehicle in sitl.vehicles]
     assert kinds == [AirframeKind.MULTICOPTER, AirframeKind.FIXED_WING, AirframeKind.FIXED_WING]
     advance(sitl, 6.0)
@@ -39,8 +40,8 @@ def test_a_team_of_a_quadrotor_and_two_aircraft() -> None:
 
 def test_what_stands_beside_an_aircraft_does_not_change_its_flight() -> None:
     def flight(models: list[str]) -> bytes:
-        vehicles = team(len(models), model=models, flavour="px4", parameters={})
-        sitl = Sitl(SitlConfiguration(vehicles=vehicles, seed=2))
+        vehicles = team(len(models), model=models, autopilot="px4", parameters={})
+        sitl = Sitl(WorldSpec(vehicles=vehicles, seed=2))
         advance(sitl, 6.0)
         commander = sitl.vehicles[0].autopilot.commander
         commander.set_mode(FlightMode.TAKEOFF)
@@ -52,21 +53,21 @@ def test_what_stands_beside_an_aircraft_does_not_change_its_flight() -> None:
 
 
 def test_a_row_is_across_the_runway() -> None:
-    row = team(2, model="aerosonde", flavour="px4", parameters={}, heading_deg=90.0)
+    row = team(2, model="aerosonde", autopilot="px4", parameters={}, heading_deg=90.0)
     assert row[1].offset_ne_m == pytest.approx((-25.0, 0.0))
 
 
 @pytest.mark.parametrize("models", [["iris"], ["iris", "iris", "iris"]])
 def test_a_team_needs_a_model_for_each(models: list[str]) -> None:
     with pytest.raises(ValueError, match=f"{len(models)} models for 2 vehicles"):
-        team(2, model=models, flavour="px4", parameters={})
+        team(2, model=models, autopilot="px4", parameters={})
 
 
 def test_unknown_launches_and_models_are_refused() -> None:
     with pytest.raises(ValueError, match="launch 'rocket' is unknown; accepted: runway, catapult, hand"):
-        VehicleSpecification(model="aerosonde", launch="rocket")
+        VehicleSpec(model="aerosonde", launch="rocket")
     with pytest.raises(AirframeError, match="'boeing'"):
-        Sitl(SitlConfiguration(vehicles=(VehicleSpecification(model="boeing"),)))
+        Sitl(WorldSpec(vehicles=(VehicleSpec(model="boeing"),)))
 
 
 @pytest.mark.parametrize(("launch", "detects"), [("runway", 0.0), ("catapult", 1.0), ("hand", 1.0)])
@@ -81,7 +82,7 @@ def test_the_parameters_a_client_reads_are_those_of_the_aircraft() -> None:
     px4 = aircraft().vehicles[0].autopilot
     assert px4.parameters.get("FW_AIRSPD_TRIM") == pytest.approx(25.0)
     assert px4.context.fixed_wing.airspeed_trim_m_s == pytest.approx(25.0)
-    arduplane = aircraft(flavour="ardupilot").vehicles[0].autopilot
+    arduplane = aircraft(autopilot="ardupilot").vehicles[0].autopilot
     assert arduplane.parameters.get("AIRSPEED_CRUISE") == pytest.approx(25.0)
     arduplane.parameters.set("AIRSPEED_CRUISE", 22.0)
     assert arduplane.context.fixed_wing.airspeed_trim_m_s == pytest.approx(22.0)
@@ -106,7 +107,7 @@ def test_motor_and_servo_failures() -> None:
 
 
 def test_a_quadrotors_motor_fails_too() -> None:
-    sitl = Sitl(SitlConfiguration())
+    sitl = Sitl(WorldSpec())
     vehicle = sitl.vehicles[0]
     inject = vehicle.failures.inject
     assert inject(mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_OFF, 3) is Result.ACCEPTED
@@ -117,7 +118,7 @@ def test_a_quadrotors_motor_fails_too() -> None:
 @pytest.mark.slow  # the quick one, with a cub, is in tests/flights/test_aircraft_models.py
 @pytest.mark.parametrize("model", ["c172x"])
 def test_an_aircraft_of_the_jsbsim_package_takes_off_and_circles(model: str) -> None:
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(model=model),), seed=5))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(model=model),), seed=5))
     vehicle = sitl.vehicles[0]
     commander = vehicle.autopilot.commander
     advance(sitl, 6.0)

@@ -5,7 +5,8 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.system.wire_client import Client
 
 GPS, PREARM = mavlink.MAV_SYS_STATUS_SENSOR_GPS, mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -15,8 +16,8 @@ MODELS = {"px4": "iris", "px4-plane": "aerosonde"}
 
 
 def booting(vehicle: str) -> Sitl:
-    specification = VehicleSpecification(flavour="px4", model=MODELS[vehicle])
-    return Sitl(SitlConfiguration(vehicles=(specification,), seed=1))
+    specification = VehicleSpec(autopilot="px4", model=MODELS[vehicle])
+    return Sitl(WorldSpec(vehicles=(specification,), seed=1))
 
 
 def global_position_ok(status: Any) -> bool:

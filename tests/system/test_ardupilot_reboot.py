@@ -6,16 +6,17 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from flightsim import truth as t
 from flightsim.initial_state import InitialState
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.system.wire_client import Client
 
 REBOOT = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
 
 
 def connected(model: str = "iris") -> Client:
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(flavour="ardupilot", model=model),), seed=1))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot="ardupilot", model=model),), seed=1))
     client = Client(sitl)
     client.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     client.run(0.5)

@@ -5,10 +5,11 @@ import math
 import pytest
 
 from autopilot_bridge.mavlink import FrameParser, decode
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.sitl.truth import SIMULATOR_COMPONENT
 from flightsim import truth as t
 from flightsim.initial_state import InitialState
+from flightsim.world_spec import WorldSpec, team
 
 DIVE = InitialState(
     height_m=15.0,
@@ -22,8 +23,8 @@ DIVE = InitialState(
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_a_crash_ends_nothing_but_the_aircraft(flavour: str) -> None:
     def fly(*, crash: bool) -> tuple[Sitl, list[bytes]]:
-        vehicles = team(2, model=["aerosonde", "iris"], flavour=flavour, parameters={})
-        sitl = Sitl(SitlConfiguration(vehicles=vehicles, seed=4))
+        vehicles = team(2, model=["aerosonde", "iris"], autopilot=flavour, parameters={})
+        sitl = Sitl(WorldSpec(vehicles=vehicles, seed=4))
         heard: list[bytes] = []
         sitl.connect(0).on_receive = heard.append
         if crash:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, team
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import WorldSpec, team
 from tests.system.runs import SHORT, fly_all, started
 
 WEATHER = ("--wind", "4@200", "--turbulence", "moderate")
@@ -65,8 +66,8 @@ def test_a_second_vehicle_does_not_change_the_senses_of_the_first() -> None:
     """One random stream per vehicle and sensor: standing, vehicle 1 of a team reads what it reads alone."""
 
     def readings(count: int) -> list[bytes]:
-        vehicles = team(count, model="iris", flavour="px4", parameters={})
-        sitl = Sitl(SitlConfiguration(vehicles=vehicles, seed=7))
+        vehicles = team(count, model="iris", autopilot="px4", parameters={})
+        sitl = Sitl(WorldSpec(vehicles=vehicles, seed=7))
         seen = []
         for _ in range(1000):
             sitl.advance()

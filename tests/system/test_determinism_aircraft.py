@@ -11,7 +11,7 @@ import pytest
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.mavlink import FrameParser
-from autopilot_bridge.sitl import HOMES, Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from flightsim.environment import Environment
 from flightsim.payload import (
     CameraParameters,
@@ -23,6 +23,7 @@ from flightsim.payload import (
     Static,
     SurveyMagnetometerParameters,
 )
+from flightsim.world_spec import HOMES, VehicleSpec, WorldSpec
 from tests.system.runs import Run, started
 
 FLIGHTS = {
@@ -95,21 +96,21 @@ def taken_off(
 ) -> tuple[bytes, bytes]:
     """All that the first aircraft's sensors read and its truth in a take-off, and what its payload said."""
     vehicles = tuple(
-        VehicleSpecification(
+        VehicleSpec(
             system_id=index + 1,
             model=model,
-            flavour=flavour,
+            autopilot=flavour,
             offset_ne_m=(0.0, 30.0 * index),
             payload=payload or PayloadParameters(),
         )
         for index, model in enumerate(models)
     )
     sitl = Sitl(
-        SitlConfiguration(
+        WorldSpec(
             vehicles=vehicles,
             home=HOME,
             seed=seed,
-            environment=GUST,
+            air=GUST,
             targets=tuple(targets),
             magnetic_field=MagneticField(MAP) if payload is not None else None,
         )

@@ -11,10 +11,11 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.links import Impairment, LossyLink
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.services.files.ftp_protocol import MAX_DATA, FtpError, Opcode
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.storage import MemoryStore, Mode, Quota
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import make_directories, read_whole
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 HEADER = struct.Struct("<HBBBBBBI")
 BAD = Impairment(loss=0.05, duplicate=0.05, reorder=0.05, delay_s=0.05, jitter_s=0.2)
@@ -29,7 +30,7 @@ class Station:
         self.files = MemoryStore(Quota(size_bytes=10_000_000, files=100))
         parameters = {"SDLOG_MODE": -1.0}
         self.sitl = Sitl(
-            SitlConfiguration(vehicles=(VehicleSpecification(parameters=parameters),)),
+            WorldSpec(vehicles=(VehicleSpec(parameters=parameters),)),
             cards=[MemoryCard(files=self.files)],
         )
         self.link = LossyLink(

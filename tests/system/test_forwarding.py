@@ -6,7 +6,8 @@ import pytest
 
 from autopilot_bridge.links import MemoryLink
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, dialect
-from autopilot_bridge.sitl import Sitl, SitlConfiguration
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import WorldSpec
 
 
 class Client:
@@ -37,7 +38,7 @@ class Client:
 
 @pytest.fixture
 def sitl() -> Sitl:
-    return Sitl(SitlConfiguration())
+    return Sitl(WorldSpec())
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ import pytest
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, dialect
 from autopilot_bridge.payload import CAMERA_COMPONENT, GIMBAL_COMPONENT, MAGNETOMETER_COMPONENT
-from autopilot_bridge.sitl import HOMES
 from flightsim import truth as t
 from flightsim.environment import Environment
 from flightsim.payload import (
@@ -18,6 +17,7 @@ from flightsim.payload import (
     PayloadParameters,
     SurveyMagnetometerParameters,
 )
+from flightsim.world_spec import HOMES
 from tests.slow import slow_after
 from tests.system.flying import Flying
 from tests.system.hostile import commands, damaged, parameter_sets, random_bytes, valid_frames

@@ -16,10 +16,11 @@ from pymavlink import mavutil
 from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
 from autopilot_bridge.mavlink import Frame, decode, definition
 from autopilot_bridge.services.files.log_book import LogBook
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.folder import FolderStore
 from autopilot_bridge.tlog import TlogReader
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.clients.sitl_process import SitlProcess, free_port, running_sitl
 from tests.system.logs import counts, mavutil_counts, modes
 from tests.system.runs import SHORT, Run, started, wait_until
@@ -123,9 +124,9 @@ def high_up(frame: Frame) -> bool:
 def check_card(folder: Path, flavour: str, parameters: dict[str, float], items: int) -> None:
     """The next boot finds all that was stored, and a log that ends where the process did."""
     files = FolderStore(folder)
-    specification = VehicleSpecification(flavour=flavour)
+    specification = VehicleSpec(autopilot=flavour)
     card = MemoryCard(files=files, logs=True)
-    sitl = Sitl(SitlConfiguration(vehicles=(specification,)), cards=[card])
+    sitl = Sitl(WorldSpec(vehicles=(specification,)), cards=[card])
     autopilot = sitl.vehicles[0].autopilot
     assert {name: autopilot.parameters.get(name) for name in parameters} == parameters
     assert len(autopilot.commander.missions.items) == items

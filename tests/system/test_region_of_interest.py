@@ -21,7 +21,7 @@ class Looking:
     def __init__(self, flavour: str) -> None:
         self.flying = Flying(flavour)
         self.flying.take_off(10.0)
-        self.place = self.flying.sitl.configuration.place
+        self.place = self.flying.sitl.spec.place
         self.link, self.parser = self.flying.sitl.connect(0), FrameParser()
         self.encoder = FrameEncoder(255, 190)
 

@@ -26,7 +26,7 @@ def test_uploads_a_plan(flavour: str) -> None:
 
     items = flying.mission(script, sendings=2)
     assert len(items) == COUNT + 1
-    place = flying.sitl.configuration.place
+    place = flying.sitl.spec.place
     assert [item.x for item in items[1:]] == pytest.approx(
         [place.lat_deg + 1e-6 * k for k in range(COUNT)], abs=2e-5
     )
@@ -39,7 +39,7 @@ def test_takes_off_and_lands(flavour: str) -> None:
     async def script(vehicle: Vehicle) -> float:
         await vehicle.wait_ready()
         await vehicle.takeoff(6.0)
-        height_m = flying.true_position_m[2] - flying.sitl.configuration.place.alt_m
+        height_m = flying.true_position_m[2] - flying.sitl.spec.place.alt_m
         await vehicle.land()
         return height_m
 

@@ -13,7 +13,8 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.links import Reach, SerialLink, SerialPort
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 BAUD = 57600
 OUT_S = 5.0
@@ -43,7 +44,7 @@ class Bench:
 
     def __init__(self, flavour: str, folder: Path) -> None:
         self.cable = Cable(folder / "ttyVehicle")
-        self.sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(flavour=flavour),)))
+        self.sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour),)))
         self.link = SerialLink(
             SerialPort(str(self.cable.name), BAUD), monotonic=lambda: self.sitl.time_us * 1e-6
         )

@@ -9,7 +9,8 @@ from pymavlink.dialects.v20 import all as dialect
 
 from autopilot_bridge.links import Reach, open_link, parse_address
 from autopilot_bridge.mavlink import Frame, FrameEncoder, FrameParser, LinkSigning, SigningKey, SigningState
-from autopilot_bridge.sitl import SigningParameters, Sitl, SitlConfiguration, team
+from autopilot_bridge.sitl import SigningParameters, Sitl
+from flightsim.world_spec import WorldSpec, team
 
 HEARTBEAT, COMMAND, ACK = (
     dialect.MAVLINK_MSG_ID_HEARTBEAT,
@@ -54,8 +55,8 @@ class World:
     """Vehicles, and clients that are told apart."""
 
     def __init__(self, count: int = 1, flavour: str = "px4", **signing: Any) -> None:
-        vehicles = team(count, model="iris", flavour=flavour, parameters={})
-        self.sitl = Sitl(SitlConfiguration(vehicles=vehicles), signing=SigningParameters(**signing))
+        vehicles = team(count, model="iris", autopilot=flavour, parameters={})
+        self.sitl = Sitl(WorldSpec(vehicles=vehicles), signing=SigningParameters(**signing))
         self.sitl.poll_every(self.sitl.step_us)
         self.clients: list[Client] = []
 

@@ -10,17 +10,10 @@ from pymavlink.dialects.v20 import all as dialect
 from autopilot_bridge.links import Reach
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, LinkSigning, SigningKey, SigningState, decode
 from autopilot_bridge.mavlink.signing import MINUTE, Refusal
-from autopilot_bridge.sitl import (
-    PacketLog,
-    SigningParameters,
-    SigningStore,
-    Sitl,
-    SitlConfiguration,
-    UnsignedFrom,
-    VehicleSpecification,
-)
+from autopilot_bridge.sitl import PacketLog, SigningParameters, SigningStore, Sitl, UnsignedFrom
 from autopilot_bridge.tlog import TlogReader
 from flightsim.payload import CameraParameters, GimbalParameters, PayloadParameters
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from missions.vehicle import Vehicle
 from tests.system.flying import Flying, WrappedLink
 from tests.system.hostile import commands, parameter_sets, valid_frames
@@ -78,7 +71,7 @@ def recorded() -> tuple[list[bytes], int]:
 def test_a_signed_session_flies(flavour: str) -> None:
     flying = Flying(flavour, key=KEY, reach=Reach.NETWORK)
     flying.take_off(10.0)
-    assert flying.armed and flying.true_position_m[2] - flying.sitl.configuration.place.alt_m > 9.0
+    assert flying.armed and flying.true_position_m[2] - flying.sitl.spec.place.alt_m > 9.0
 
     async def script(vehicle: Vehicle) -> None:
         await vehicle.return_to_launch()
@@ -169,7 +162,7 @@ def test_an_attacker_changes_nothing_at_all(
     ("reach", "believed"), [(Reach.CABLE, True), (Reach.MACHINE, False), (Reach.NETWORK, False)]
 )
 def test_whoever_gives_a_key_has_it_required_everywhere_but_on_a_cable(reach: Reach, believed: bool) -> None:
-    sitl = Sitl(SitlConfiguration(), signing=SigningParameters(key=KEY))
+    sitl = Sitl(WorldSpec(), signing=SigningParameters(key=KEY))
     link = sitl.connect(0, reach=reach)
     setting = dialect.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 7.0, 9)
     link.send(FrameEncoder(255, 190).encode(setting))
@@ -178,7 +171,7 @@ def test_whoever_gives_a_key_has_it_required_everywhere_but_on_a_cable(reach: Re
 
 
 def test_a_radio_on_the_line_passes_unsigned() -> None:
-    sitl = Sitl(SitlConfiguration(), signing=SigningParameters(key=KEY, unsigned_from=UnsignedFrom.NONE))
+    sitl = Sitl(WorldSpec(), signing=SigningParameters(key=KEY, unsigned_from=UnsignedFrom.NONE))
     for reach, tolerated in ((Reach.CABLE, 1), (Reach.MACHINE, 0), (Reach.NETWORK, 0)):
         link = sitl.connect(0, reach=reach)
         link.send(FrameEncoder(51, 68).encode(dialect.MAVLink_radio_status_message(9, 9, 90, 1, 1, 0, 0)))
@@ -189,7 +182,7 @@ def test_a_radio_on_the_line_passes_unsigned() -> None:
 def test_payload_speaks_under_the_vehicles_key() -> None:
     carried = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
     sitl = Sitl(
-        SitlConfiguration(vehicles=(VehicleSpecification(payload=carried),)),
+        WorldSpec(vehicles=(VehicleSpec(payload=carried),)),
         signing=SigningParameters(key=KEY),
     )
     link, mine = sitl.connect(0, reach=Reach.NETWORK), sitl.connect(0)
@@ -215,7 +208,7 @@ class Keys:
     """A vehicle on the ground, and somebody who brings keys."""
 
     def __init__(self, reach: Reach, **parameters: Any) -> None:
-        self.sitl = Sitl(SitlConfiguration(), signing=SigningParameters(**parameters))
+        self.sitl = Sitl(WorldSpec(), signing=SigningParameters(**parameters))
         self.link = self.sitl.connect(0, reach=reach)
         self.other = self.sitl.connect(0)
         self.texts: list[str] = []

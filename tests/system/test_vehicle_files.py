@@ -10,12 +10,13 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.firmware.ardupilot import mission_files, packed_parameters
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
 from autopilot_bridge.mission_plan import MissionItem, MissionType
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.storage import MemoryStore, Quota
 from autopilot_bridge.storage.card import MemoryCard
 from autopilot_bridge.storage.files import exists, read_whole
 from autopilot_bridge.storage.folder import FolderStore
 from autopilot_bridge.tlog import TlogReader
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 BIG = Quota(size_bytes=50_000_000, files=1000)
 ARM, STORAGE, REBOOT = 400, 245, 246
@@ -27,8 +28,8 @@ class Client:
     """A ground station on a memory link."""
 
     def __init__(self, flavour: str, card: MemoryCard, parameters: dict[str, float] | None = None) -> None:
-        specification = VehicleSpecification(flavour=flavour, parameters=parameters or {})
-        self.sitl = Sitl(SitlConfiguration(vehicles=(specification,)), cards=[card])
+        specification = VehicleSpec(autopilot=flavour, parameters=parameters or {})
+        self.sitl = Sitl(WorldSpec(vehicles=(specification,)), cards=[card])
         self.vehicle = self.sitl.vehicles[0]
         self.link = self.sitl.connect(0)
         self.parser, self.encoder = FrameParser(), FrameEncoder(255, 190)
@@ -87,7 +88,7 @@ class Client:
 
     def fly(self) -> None:
         """Arm, stand, disarm."""
-        self.run(45.0 if self.vehicle.specification.flavour == "ardupilot" else 6.0)
+        self.run(45.0 if self.vehicle.specification.autopilot == "ardupilot" else 6.0)
         assert self.command(ARM, 1) == 0
         self.run(2.0)
         assert self.command(ARM, 0) == 0

@@ -4,16 +4,17 @@ import pytest
 
 from autopilot_bridge.clock.pacing import wall_time_s
 from autopilot_bridge.links import open_link, parse_address
-from autopilot_bridge.sitl import Port, Sitl, SitlConfiguration, SitlServer, VehicleSpecification
+from autopilot_bridge.sitl import Port, Sitl, SitlServer
 from flightsim.payload import CameraParameters, PayloadParameters
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 PORTS = [Port(parse_address("tcpin:127.0.0.1:0"), "gcs"), Port(parse_address("tcpin:127.0.0.1:0"), "gcs")]
 
 
 @pytest.mark.parametrize("payload", [PayloadParameters(), PayloadParameters(camera=CameraParameters())])
 def test_it_goes_on_when_somebody_comes(payload: PayloadParameters) -> None:
-    vehicle = VehicleSpecification(flavour="ardupilot", payload=payload)
-    sitl = Sitl(SitlConfiguration(vehicles=(vehicle,)))
+    vehicle = VehicleSpec(autopilot="ardupilot", payload=payload)
+    sitl = Sitl(WorldSpec(vehicles=(vehicle,)))
     server = SitlServer(sitl, speedup=None, monotonic=wall_time_s)
     with pytest.raises(ValueError, match="no link is open"):
         server.wait_for_client(lambda: True)

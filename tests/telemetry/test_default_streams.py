@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.system.wire_client import WINDOW_S, Client
 
 PX4_ONBOARD_HZ = {
@@ -62,7 +63,7 @@ ONLY_ON_OUR_VEHICLE = {"DISTANCE_SENSOR"}
 
 
 def ready(flavour: str, seconds: float) -> Sitl:
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(flavour=flavour),), seed=1))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour),), seed=1))
     while sitl.time_us < seconds * 1e6:
         sitl.advance()
     return sitl

@@ -4,12 +4,13 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 
 @pytest.mark.parametrize(("flavour", "timeout_s"), [("px4", 1.0), ("ardupilot", 4.0)])
 def test_a_silent_receiver_is_shown_as_none(flavour: str, timeout_s: float) -> None:
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(flavour=flavour),)))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour),)))
     link, parser = sitl.connect(0), FrameParser()
     client = FrameEncoder(255, 190)
 

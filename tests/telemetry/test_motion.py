@@ -6,14 +6,15 @@ import pytest
 
 from autopilot_bridge.mavlink import FrameEncoder, FrameParser, decode, definition
 from autopilot_bridge.navigation import layout
-from autopilot_bridge.sitl import Sitl, SitlConfiguration
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.telemetry.motion import MESSAGES
+from flightsim.world_spec import WorldSpec
 
 
 @pytest.fixture(scope="module")
 def flying() -> Sitl:
     """A vehicle that has booted and knows where it is."""
-    sitl = Sitl(SitlConfiguration(seed=3))
+    sitl = Sitl(WorldSpec(seed=3))
     while sitl.time_us < 8_000_000:
         sitl.advance()
     return sitl
@@ -82,7 +83,7 @@ def test_a_single_bit_makes_a_single_frame(flying: Sitl) -> None:
 
 
 def test_nothing_is_said_before_there_is_an_attitude() -> None:
-    sitl = Sitl(SitlConfiguration())
+    sitl = Sitl(WorldSpec())
     motion = sitl.vehicles[0].autopilot._messages.motion
     local = motion.bits[definition("LOCAL_POSITION_NED").message_id]
     frames = FrameParser().feed(motion.frames(sum(motion.bits.values()), FrameEncoder(1, 1)))

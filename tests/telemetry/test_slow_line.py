@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot_bridge.mavlink import DEFINITIONS, FrameEncoder, FrameParser, MAVLinkMessage, dialect
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.telemetry.line import (
     ARDUPILOT_FLOW_CONTROL,
     LATEST_S,
@@ -18,6 +18,7 @@ from autopilot_bridge.telemetry.line import (
     fit,
     thinned_us,
 )
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 BAUD_57600 = 5760.0
 FLAVOURS = ("px4", "ardupilot")
@@ -27,7 +28,7 @@ class Client:
     """The far end of a line, and what came over it."""
 
     def __init__(self, flavour: str, bytes_per_s: float | None) -> None:
-        self.sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(flavour=flavour),)))
+        self.sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(autopilot=flavour),)))
         self.link = self.sitl.connect(0, bytes_per_s=bytes_per_s)
         self.link.on_receive = self._take
         self.counts: Counter[str] = Counter()

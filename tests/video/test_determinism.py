@@ -4,7 +4,7 @@ from pathlib import Path
 
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink import dialect as m
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.video import VideoParameters
 from autopilot_bridge.video.for_sitl import show_cameras
 from flightsim.payload import (
@@ -14,6 +14,7 @@ from flightsim.payload import (
     PayloadParameters,
     RandomWalk,
 )
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 TARGET = GroundTargetParameters(
     motion=RandomWalk(south_m=-30.0, west_m=-30.0, north_m=30.0, east_m=30.0, speed_m_s=3.0, leg_s=0.7),
@@ -23,11 +24,9 @@ TARGET = GroundTargetParameters(
 
 def flight(tmp_path: Path | None, *, look: bool) -> bytes:
     sitl = Sitl(
-        SitlConfiguration(
+        WorldSpec(
             vehicles=(
-                VehicleSpecification(
-                    payload=PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
-                ),
+                VehicleSpec(payload=PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())),
             ),
             targets=(TARGET,),
             seed=5,

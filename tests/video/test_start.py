@@ -4,10 +4,11 @@ import time
 
 import pytest
 
-from autopilot_bridge.sitl import Sitl, SitlConfiguration, VehicleSpecification
+from autopilot_bridge.sitl import Sitl
 from autopilot_bridge.video import VideoParameters
 from autopilot_bridge.video.for_sitl import show_cameras
 from flightsim.payload import Camera, CameraParameters, CameraView, GimbalParameters, PayloadParameters
+from flightsim.world_spec import VehicleSpec, WorldSpec
 
 DEADLINE_S = 100.0
 
@@ -15,7 +16,7 @@ DEADLINE_S = 100.0
 def test_it_is_ready_before_the_first_player_comes(monkeypatch: pytest.MonkeyPatch) -> None:
     """It makes a picture that nobody asked for, and ends at once with the vehicles."""
     payload = PayloadParameters(gimbal=GimbalParameters(), camera=CameraParameters())
-    sitl = Sitl(SitlConfiguration(vehicles=(VehicleSpecification(payload=payload),)))
+    sitl = Sitl(WorldSpec(vehicles=(VehicleSpec(payload=payload),)))
     looked: list[int] = []
     view = Camera.view
 

@@ -14,9 +14,9 @@ import pytest
 from autopilot_bridge.mavlink import decode, definition
 from autopilot_bridge.tlog import TlogReader
 from flightsim.foundation.geodesy import LocalFrame
-from flightsim.payload import DipoleSignature, MagneticMap
+from flightsim.payload import DipoleSignature, MagneticMap, magnetic_field_of
 from missions.cli.main import main as cli
-from missions.embedded.scenario import magnetic_field_of
+from missions.embedded.scenario import magnetic_spec
 from missions.errors import PlanError
 from missions.occupancy.mission import MAP_NAME, OccupancyMission
 from missions.occupancy.noise_check import require_quiet
@@ -74,11 +74,6 @@ def test_the_folder_holds_map_summary_log_and_picture(found):
     assert (found.folder / "track.png").stat().st_size > 20_000
 
 
-def unpublished(scenario: Scenario) -> Scenario:
-    """The same world, whose map is not written again."""
-    return replace(scenario, survey=replace(scenario.survey, publish_to=None))
-
-
 @pytest.mark.slow
 def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_repeats_itself(found, tmp_path):
     options = replace(SMALL, map_file=str(found.folder / MAP_NAME))
@@ -93,11 +88,10 @@ def test_a_search_with_a_map_that_is_given_has_a_survey_error_of_its_own_and_rep
 
 def true_field(found, options=SMALL, *, target=True):
     """The field of the flown world, made again, with its target or without."""
-    scenario = unpublished(OccupancyMission().scenario(options, Setting(seed=1, folder=found.folder)))
-    if not target:
-        scenario = replace(scenario, survey=replace(scenario.survey, target_ne_m=None))
+    survey = OccupancyMission().scenario(options, Setting(seed=1, folder=found.folder)).survey
+    spec = magnetic_spec(survey if target else replace(survey, target_ne_m=None))
     home = MagneticMap.load(found.folder / MAP_NAME).home
-    return magnetic_field_of(scenario, home=home, seed=1, decimal_year=2026.0)
+    return magnetic_field_of(spec, home=home, seed=1, decimal_year=2026.0)[0]
 
 
 def flown_readings(folder, home, system_id):

@@ -1,0 +1,143 @@
+"""The magnetic field of a world as data, and the field and the published map that it makes."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, TypeAlias
+
+from flightsim.foundation.checks import require_finite, require_positive
+from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.random_streams import RandomStreams
+from flightsim.home import Home
+from flightsim.payload.magnetic_field import MagneticField
+from flightsim.payload.magnetic_map import MagneticMap
+from flightsim.payload.main_field import MainField
+from flightsim.payload.signature import DipoleSignature, GaussianSignature, Signature
+from flightsim.payload.survey import SurveyParameters, surveyed, truth_behind
+from flightsim.payload.synthetic_map import SyntheticMapParameters, synthetic_map
+
+_MAP_SPACING_M: Final = 50.0
+_MAX_DISTANCE_M: Final = 50_000.0  # from home to a published map
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InducedDipole:
+    """A dipole that is magnetised along the Earth's field.
+
+    Attributes:
+        north_m, east_m: place, local NED of the map's home.
+        moment_a_m2: dipole moment.
+        depth_m: below home.
+    """
+
+    north_m: float
+    east_m: float
+    moment_a_m2: float
+    depth_m: float = 10.0
+
+    def __post_init__(self) -> None:
+        require_finite(north_m=self.north_m, east_m=self.east_m, depth_m=self.depth_m)
+        require_positive(moment_a_m2=self.moment_a_m2)
+
+
+SignatureSpec: TypeAlias = GaussianSignature | DipoleSignature | InducedDipole
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MagneticSpec:
+    """The true magnetic field, and the published map that a survey made of it.
+
+    Attributes:
+        map_file: the published map (`MagneticMap.load`); the true field differs from it by the error of a
+            survey. None: both are generated from the seed of the world, around home.
+        width_m, height_m: size of a generated map, east and north.
+        survey_height_m: height above home at which a generated map is valid.
+        signatures: targets in the field; places are local NED of the map's home.
+    """
+
+    map_file: Path | None = None
+    width_m: float = 2000.0
+    height_m: float = 2000.0
+    survey_height_m: float = 100.0
+    signatures: tuple[SignatureSpec, ...] = ()
+
+    def __post_init__(self) -> None:
+        require_positive(width_m=self.width_m, height_m=self.height_m)
+        require_finite(survey_height_m=self.survey_height_m)
+
+
+def magnetic_field_of(
+    spec: MagneticSpec, *, home: Home, seed: int, decimal_year: float
+) -> tuple[MagneticField, MagneticMap]:
+    """The field that magnetometers measure, and its published map.
+
+    Args:
+        spec: the field as data.
+        home: home of the vehicles.
+        seed: of the world.
+        decimal_year: date of the main field.
+
+    Raises:
+        ValueError: the map is unusable or of another place, or a target is outside it.
+    """
+    stream = RandomStreams(seed).child("magnetic_survey")
+    if spec.map_file is not None:
+        published = MagneticMap.load(spec.map_file)
+        _require_here(published, spec.map_file, home)
+        truth = truth_behind(published, SurveyParameters(), seed=stream)
+    else:
+        truth = _generated(spec, home, seed, decimal_year)
+        published = surveyed(truth, SurveyParameters(), seed=stream)
+    signatures = [_resolved(signature, truth, decimal_year) for signature in spec.signatures]
+    return MagneticField(truth, signatures, decimal_year=decimal_year), published
+
+
+def _resolved(signature: SignatureSpec, truth: MagneticMap, decimal_year: float) -> Signature:
+    if not isinstance(signature, InducedDipole):
+        return signature
+    moment = signature.moment_a_m2 * MainField(truth.home, decimal_year).direction_ned
+    return DipoleSignature(
+        north_m=signature.north_m,
+        east_m=signature.east_m,
+        height_m=-signature.depth_m,
+        moment_ned_a_m2=tuple(moment.tolist()),
+    )
+
+
+def _require_here(published: MagneticMap, path: Path, home: Home) -> None:
+    """Refuse a map of a place that is not near home."""
+    frame = LocalFrame(
+        GeodeticPosition(
+            lat_deg=published.home.lat_deg, lon_deg=published.home.lon_deg, alt_m=published.home.alt_m
+        )
+    )
+    north_m, east_m, _ = frame.ned_from_geodetic(home.lat_deg, home.lon_deg, home.alt_m)
+    outside_m = math.hypot(
+        *(
+            max(float(lines[0]) - place_m, place_m - float(lines[-1]), 0.0)
+            for lines, place_m in ((published.north_m, north_m), (published.east_m, east_m))
+        )
+    )
+    if not outside_m <= _MAX_DISTANCE_M:
+        raise ValueError(
+            f"{path} is the magnetic map of another place: its home is {published.home.lat_deg:.6f},"
+            f"{published.home.lon_deg:.6f}, and the vehicles stand at {home.lat_deg:.6f},{home.lon_deg:.6f}, "
+            f"{outside_m / 1000.0:.0f} km from what it covers; choose the map of this place, or another home"
+        )
+
+
+def _generated(spec: MagneticSpec, home: Home, seed: int, decimal_year: float) -> MagneticMap:
+    half_n_m, half_e_m = 0.5 * spec.height_m, 0.5 * spec.width_m
+    return synthetic_map(
+        SyntheticMapParameters(
+            south_m=-half_n_m,
+            north_m=half_n_m,
+            west_m=-half_e_m,
+            east_m=half_e_m,
+            spacing_m=_MAP_SPACING_M,
+            height_m=spec.survey_height_m,
+        ),
+        home=home,
+        seed=RandomStreams(seed).child("magnetic_map"),
+        decimal_year=decimal_year,
+    )
