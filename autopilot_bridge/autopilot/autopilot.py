@@ -29,7 +29,7 @@ from autopilot_bridge.mavlink import Frame, decode
 from autopilot_bridge.mission_plan import MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Service, Source, TimedService
+from autopilot_bridge.services.channel import Service, Source, TimedService, receivers_by_id
 from autopilot_bridge.services.commands.handlers import CommandHooks
 from autopilot_bridge.services.commands.message_interval import MessageIntervalService
 from autopilot_bridge.services.commands.protocol import CommandService
@@ -267,7 +267,7 @@ class Autopilot:
             flavour.command_address(system_id),
             merged(*(more.commands for more in self._more)),
         )
-        self._services: tuple[Service, ...] = (
+        services: tuple[Service, ...] = (
             SetpointService(flavour.name, self.commander),
             self.commands,
             self._parameter_service,
@@ -278,6 +278,8 @@ class Autopilot:
             self.intervals,
             self._texts,
         )
+        self._receivers = receivers_by_id(services)
+        self._followers = tuple(more for more in self._more if type(more).follow is not Microservice.follow)
         self.parameters.subscribe(self._on_parameter)
 
     # interface to the simulator
@@ -327,15 +329,17 @@ class Autopilot:
         """Take one frame from a channel. Contents are untrusted and never raise."""
         if frame.system_id == self.system_id and frame.component_id == _COMPONENT:
             return
+        receivers = self._receivers.get(frame.message_id)
+        if receivers is None:
+            return
         message = decode(frame)
         if self._simulation is not None and self._simulation.deaf_to(getattr(message, "command", None)):
             return
         if frame.message_id not in _ALWAYS_ANSWERED and not self._address.accepts(message):
             return
         source = Source(channel, frame.system_id, frame.component_id)
-        for service in self._services:
-            if service.handle(message, source, self._time_us):
-                return
+        for receiver in receivers:
+            receiver(message, source, self._time_us)
 
     # internal
 
@@ -360,8 +364,8 @@ class Autopilot:
     def _follow(self, event: events.Event) -> None:
         """Pass an event of the vehicle to the other parts of the autopilot."""
         self._texts.tell(event)
-        for more in self._more:
-            more.follow(event)
+        for follower in self._followers:
+            follower.follow(event)
         match event:
             case events.MissionItemReached(index=index):
                 self.missions.item_reached(index)

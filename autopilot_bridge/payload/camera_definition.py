@@ -68,7 +68,7 @@ class CameraDefinition:
         """Handle FTP and PARAM_EXT messages."""
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
-                self._files.handle(message, Source(self, *sender), time_us)
+                self._files.on_transfer(message, Source(self, *sender), time_us)
                 self._next_tick_us = time_us
             case mavlink.MAVLINK_MSG_ID_PARAM_EXT_REQUEST_LIST:
                 self._list = list(range(len(self.settings)))

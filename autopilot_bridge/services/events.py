@@ -26,7 +26,7 @@ from autopilot_bridge.mavlink.event_messages import (
     EventMessage,
     ResponseEventError,
 )
-from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import Broadcast, MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.commands.handlers import Command, Handler
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.telemetry.streams import Builder
@@ -69,10 +69,12 @@ class EventService(Microservice):
     def builders(self) -> Mapping[int, Builder]:
         return {CURRENT_EVENT_SEQUENCE: lambda: (self._sequence, 0)}
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Answer REQUEST_EVENT; ranges may wrap. An event that is no longer kept gets one error reply."""
-        if message.get_msgId() != REQUEST_EVENT:
-            return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        return {REQUEST_EVENT: self._on_request}
+
+    def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        """REQUEST_EVENT: ranges may wrap. An event that is no longer kept gets one error reply."""
         count = (message.last_sequence - message.first_sequence) % _MODULO + 1
         kept = {event.sequence: event for event in self._kept}
         oldest = self._kept[0].sequence if self._kept else self._sequence
@@ -84,7 +86,6 @@ class EventService(Microservice):
                     source.system_id, source.component_id, sequence, oldest, _UNAVAILABLE
                 )
             source.channel.send(event)
-        return True
 
     def tick(self, time_us: int) -> None:
         """Report the checks when they have changed, and when a ground station connects."""

@@ -17,7 +17,7 @@ from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.mission_plan import MissionStore, MissionType
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, Broadcast, Channel, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, Broadcast, Channel, Receiver
 from autopilot_bridge.services.commands.handlers import Command, Handler
 from autopilot_bridge.services.plans.policy import MissionPolicy
 from autopilot_bridge.services.vehicle_memory import VehicleMemory
@@ -89,6 +89,11 @@ class Microservice:
     coarse_timers: ClassVar[bool] = False
 
     @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """The messages that it handles: message id -> method. Read once."""
+        return {}
+
+    @property
     def commands(self) -> Mapping[int, Handler]:
         """The MAV_CMDs that it executes; they take precedence over the flavour's own table. Read once."""
         return {}
@@ -105,10 +110,6 @@ class Microservice:
     def on_demand(self) -> Mapping[int, Callable[[Channel, float], None]]:
         """Messages that are sent on REQUEST_MESSAGE only, with its param2. Read once."""
         return {}
-
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take one message; True when it belonged to this service and no other need see it."""
-        return False
 
     def tick(self, time_us: int) -> None:
         """Timers and queues, at 50 Hz of vehicle time, or at 10 Hz with `coarse_timers`."""

@@ -1,12 +1,13 @@
 """STATUSTEXT: the texts that a ground station shows; long texts are sent in chunks."""
 
+from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import Event
 from autopilot_bridge.firmware.flavour import Flavour
-from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Broadcast, Channel, MavlinkMessage, Receiver, Source
 
 CHUNK_BYTES: Final = 50
 _MAX_CHUNKS: Final = 5
@@ -27,11 +28,13 @@ class StatusTextService:
         self._greeted: set[str] = set()
         self._next_id = 1
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Record the channels that have received a heartbeat; the message is passed on to other services."""
-        if message.get_msgId() == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-            self._greeted.add(source.channel.name)
-        return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """HEARTBEAT: the channels that have received one get texts."""
+        return {mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat}
+
+    def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self._greeted.add(source.channel.name)
 
     def forget(self, channel: Channel) -> None:
         """Forget a channel that was closed."""

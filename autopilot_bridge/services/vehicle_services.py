@@ -8,7 +8,6 @@ from autopilot_bridge.services.equipment.actuators import (
     ArducopterActuators,
     ArduplaneActuators,
     Px4Actuators,
-    Tunes,
 )
 from autopilot_bridge.services.inputs.manual import ManualService
 from autopilot_bridge.services.inputs.traffic import ARDUPILOT_TRAFFIC, PX4_TRAFFIC, TrafficService
@@ -18,14 +17,13 @@ from flightsim.airframe import AirframeKind
 
 def small_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
     """The services of one autopilot."""
-    manual, tunes = ManualService.of(parts), Tunes()
+    manual = ManualService.of(parts)
     if parts.flavour.name == "px4":
         return (
             manual,
             Px4Calibration(parts),
             Px4Actuators(parts),
             TrafficService(parts, PX4_TRAFFIC),
-            tunes,
             AvailableModes(parts.flavour),
         )
     aircraft = parts.flavour.kind is AirframeKind.FIXED_WING
@@ -35,5 +33,4 @@ def small_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
         CompassCalibration(parts),
         ArduplaneActuators(parts) if aircraft else ArducopterActuators(parts),
         TrafficService(parts, ARDUPILOT_TRAFFIC),
-        tunes,
     )

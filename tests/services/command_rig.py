@@ -13,6 +13,7 @@ from autopilot_bridge.services.inputs.setpoints import SetpointService
 from autopilot_bridge.services.plans.geofence import ArdupilotGeofence
 from autopilot_bridge.services.status_text import StatusTextService
 from tests.commander.rig import Rig
+from tests.services.dispatch import deliver
 
 NAN = float("nan")
 
@@ -90,7 +91,7 @@ class ServiceRig(Rig):
 
     def handle(self, message: Any) -> bool:
         services = (self.setpoints, self.manual, self.commands, self.status)
-        return any(service.handle(message, self.source, self.time_us) for service in services)
+        return deliver(message, self.source, self.time_us, *services)
 
     def long(self, command: int, *parameters: float, system: int = 1, component: int = 1) -> list[int]:
         """Results acknowledged for a COMMAND_LONG."""

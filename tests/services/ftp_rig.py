@@ -10,6 +10,7 @@ from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.files.file_transfer import FileTransferService
 from autopilot_bridge.services.files.ftp_protocol import Opcode
 from autopilot_bridge.storage import FileStore, MemoryStore
+from tests.services.dispatch import deliver
 
 HEADER = struct.Struct("<HBBBBBBI")
 TICK_US = 20_000
@@ -77,7 +78,7 @@ class FtpRig:
         link = link or self.link
         message = mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, payload.ljust(251, b"\0"))
         (frame,) = FrameParser().feed(FrameEncoder(client, 190).encode(message))
-        assert self.service.handle(decode(frame), Source(link, client, 190), self.time_us)
+        assert deliver(decode(frame), Source(link, client, 190), self.time_us, self.service)
         return self.take(link)
 
     def ask(self, opcode: int, data: bytes = b"", **more: Any) -> Reply:

@@ -10,6 +10,7 @@ from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.plans.policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
 from flightsim.foundation.geodesy import GeodeticPosition
+from tests.services.dispatch import deliver
 
 HOME = GeodeticPosition(lat_deg=47.39774, lon_deg=8.54559, alt_m=489.4)
 LAT, LON = 473977000, 85456000
@@ -66,7 +67,7 @@ class Vehicle:
 
     def tell(self, message: Any, source: Source | None = None) -> list[Any]:
         source = source or self.gcs
-        assert self.service.handle(message, source, self.time_us)
+        deliver(message, source, self.time_us, self.service)
         return source.channel.take()  # type: ignore[attr-defined]
 
     def tick(self, seconds: float) -> list[tuple[float, Any]]:

@@ -23,6 +23,7 @@ from autopilot_bridge.services.events import KEPT, EventService
 from autopilot_bridge.services.files.component_metadata import GENERAL, ComponentMetadataService
 from autopilot_bridge.services.files.ftp_protocol import crc32
 from tests.services.command_rig import ServiceRig
+from tests.services.dispatch import deliver
 from tests.services.ftp_rig import Link
 
 SUMMARY = struct.Struct("<BQQII")
@@ -42,7 +43,7 @@ class Rig(ServiceRig):
         return found
 
     def request(self, first: int, last: int) -> list[Any]:
-        assert self.service.handle(RequestEvent(1, 1, first, last), Source(self.link, 255, 190), 0)
+        assert deliver(RequestEvent(1, 1, first, last), Source(self.link, 255, 190), 0, self.service)
         return self.sent()
 
 

@@ -33,6 +33,7 @@ from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.interface import SensorReadings
 from flightsim.world_spec import VehicleSpec, WorldSpec
 from tests.rotations import rotation_matrix
+from tests.services.dispatch import deliver
 
 FLAVOURS = ("px4", "ardupilot")
 _UNKNOWN = [math.nan] * 21
@@ -116,7 +117,7 @@ def _euler(roll: float, pitch: float, yaw: float) -> Any:
 def test_px4_takes_four_frames(frame: int, kind: ExternalFrame, position: tuple[float, ...]) -> None:
     service, noted = odometry_service("px4", {})
     message = odometry(frame, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0), stamp_us=900_000)
-    assert service.handle(message, _ELSEWHERE, 1_000_000)
+    assert deliver(message, _ELSEWHERE, 1_000_000, service)
     (sample,) = noted.samples
     assert sample.frame is kind and tuple(sample.values[POSITION_M]) == position
     assert sample.velocity_frame is ExternalFrame.BODY_FRD and tuple(sample.values[VELOCITY_M_S]) == (4, 5, 6)
@@ -128,7 +129,7 @@ def test_an_attitude_in_ros_axes_is_the_same_attitude() -> None:
     """East-north-up from forward-left-up: heading 30 degrees east of north is 60 degrees from east."""
     service, noted = odometry_service("px4", {})
     q = _euler(0.1, -0.2, math.radians(60.0))
-    service.handle(odometry(m.MAV_FRAME_LOCAL_ENU, m.MAV_FRAME_BODY_FRD, q=tuple(q)), _ELSEWHERE, 0)
+    deliver(odometry(m.MAV_FRAME_LOCAL_ENU, m.MAV_FRAME_BODY_FRD, q=tuple(q)), _ELSEWHERE, 0, service)
     wanted = _euler(0.1, 0.2, math.radians(30.0))
     found = noted.samples[0].values[Q_LOCAL_FROM_FRD]
     np.testing.assert_allclose(
@@ -139,29 +140,29 @@ def test_an_attitude_in_ros_axes_is_the_same_attitude() -> None:
 def test_ardupilot_takes_one_frame_and_only_with_viso_type() -> None:
     taken = odometry(m.MAV_FRAME_LOCAL_FRD, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
     off, noted = odometry_service("ardupilot", {})
-    assert off.handle(taken, _ELSEWHERE, 0) and not noted.samples
+    assert deliver(taken, _ELSEWHERE, 0, off) and not noted.samples
     on, noted = odometry_service("ardupilot", {"VISO_TYPE": 1})
     for frame in (m.MAV_FRAME_LOCAL_NED, m.MAV_FRAME_LOCAL_ENU, 99):
-        on.handle(odometry(frame, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0)), _ELSEWHERE, 0)
+        deliver(odometry(frame, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0)), _ELSEWHERE, 0, on)
     assert not noted.samples and on.wrong_frames == 3
-    on.handle(taken, _ELSEWHERE, 0)
+    deliver(taken, _ELSEWHERE, 0, on)
     assert noted.samples[0].frame is ExternalFrame.NED
     external, noted = odometry_service("ardupilot", {"VISO_TYPE": 1, "EK3_SRC1_YAW": 6})
-    external.handle(taken, _ELSEWHERE, 0)
+    deliver(taken, _ELSEWHERE, 0, external)
     assert noted.samples[0].frame is ExternalFrame.LOCAL_FRD
 
 
 def test_the_telemetry_of_another_vehicle_is_not_odometry_of_this_one() -> None:
     service, noted = odometry_service("px4", {})
     message = odometry(m.MAV_FRAME_LOCAL_FRD, m.MAV_FRAME_BODY_FRD, q=(1.0, 0.0, 0.0, 0.0))
-    assert service.handle(message, Source(None, 2, 1), 0) and not noted.samples  # type: ignore[arg-type]
+    assert deliver(message, Source(None, 2, 1), 0, service) and not noted.samples  # type: ignore[arg-type]
 
 
 def test_a_time_stamp_of_another_clock_is_not_used() -> None:
     service, noted = odometry_service("px4", {})
     for stamp in (0, 1_700_000_000_000_000, 4_400_000, 5_100_000):
         message = odometry(m.MAV_FRAME_LOCAL_FRD, m.MAV_FRAME_BODY_FRD, q=(1, 0, 0, 0), stamp_us=stamp)
-        service.handle(message, _ELSEWHERE, 5_000_000)
+        deliver(message, _ELSEWHERE, 5_000_000, service)
     assert [sample.time_us for sample in noted.samples] == [5_000_000] * 4
 
 
@@ -251,7 +252,7 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
     if by_gimbal:  # stabilised, looking straight down, turning with the vehicle
         gimbal_q = _euler(0.0, -0.5 * math.pi, 0.0)
         status = m.MAVLink_gimbal_device_attitude_status_message(0, 0, 1000, 0, gimbal_q, 0.0, 0.0, 0.0, 0)
-        service.handle(status, Source(None, 1, 154), 1_000_000)  # type: ignore[arg-type]
+        deliver(status, Source(None, 1, 154), 1_000_000, service)  # type: ignore[arg-type]
         heading = _euler(0.0, 0.0, attitude[2])
         seen = rotation_matrix(gimbal_q).T @ rotation_matrix(heading).T @ line
         right, down = seen[1] / seen[0], seen[2] / seen[0]
@@ -261,7 +262,7 @@ def test_angles_point_at_the_target(attitude: tuple[float, ...], by_gimbal: bool
     message = m.MAVLink_landing_target_message(
         1_000_000, 0, m.MAV_FRAME_BODY_FRD, math.atan(right), math.atan(down), 0.0, 0.0, 0.0
     )
-    assert service.handle(message, _CAMERA if by_gimbal else _ELSEWHERE, 1_000_000)
+    assert deliver(message, _CAMERA if by_gimbal else _ELSEWHERE, 1_000_000, service)
     track = autopilot.context.surroundings.landing_target
     assert track.place(1_000_000) == pytest.approx((102.0, 51.0), abs=1e-6)
 

@@ -14,6 +14,7 @@ from autopilot_bridge.mission_plan import MissionItem, MissionType
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.plans.policy import ARDUPILOT_MISSION_POLICY, PX4_MISSION_POLICY
 from autopilot_bridge.services.plans.protocol import MissionService, new_stores
+from tests.services.dispatch import deliver
 
 POLICIES = {"px4": PX4_MISSION_POLICY, "ardupilot": ARDUPILOT_MISSION_POLICY}
 TICK_US = 20_000
@@ -147,7 +148,7 @@ def test_never_half_a_plan_and_always_an_end(
     while now_us < GIVE_UP_US:
         now_us += TICK_US
         for message in up.arrived(now_us):
-            service.handle(message, source, now_us)
+            deliver(message, source, now_us, service)
         service.tick(now_us)
         for message in down.arrived(now_us):
             station.handle(message, now_us)
@@ -172,9 +173,9 @@ def test_never_half_a_plan_and_always_an_end(
     down.loss = down.delay_us = 0
     down.twice = 0.0
     down.now_us = now_us
-    service.handle(mavlink.MAVLink_mission_count_message(1, 1, 2), source, now_us)
+    deliver(mavlink.MAVLink_mission_count_message(1, 1, 2), source, now_us, service)
     for seq in range(2):
-        service.handle(GroundStation._item(seq, 30.0), source, now_us)
+        deliver(GroundStation._item(seq, 30.0), source, now_us, service)
     assert down.arrived(now_us)[-1].type == mavlink.MAV_MISSION_ACCEPTED
     assert altitudes(store.items, flavour)[0] == 30.0
 
@@ -243,7 +244,7 @@ def test_whatever_arrives_nothing_raises(flavour: str, traffic: list[tuple[Any, 
     )
     now_us = 0
     for message, first, ticks in traffic:
-        assert service.handle(message, Source(here if first else there, 255, 190), now_us)
+        deliver(message, Source(here if first else there, 255, 190), now_us, service)
         for _ in range(ticks):
             now_us += TICK_US
             service.tick(now_us)

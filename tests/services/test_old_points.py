@@ -12,6 +12,7 @@ from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.plans.protocol import new_stores
 from flightsim.airframe import AirframeKind
+from tests.services.dispatch import deliver
 from tests.services.mission_rig import Recorder
 
 RING = [(47.0, 8.0), (47.0, 8.1), (47.1, 8.1), (47.1, 8.0)]
@@ -28,7 +29,7 @@ class Vehicle:
         self.channel = Recorder("one")
 
     def tell(self, message: Any) -> list[Any]:
-        assert self.service.handle(message, Source(self.channel, 255, 190), 0)
+        assert deliver(message, Source(self.channel, 255, 190), 0, self.service)
         self.service.tick(0)
         return self.channel.take()
 

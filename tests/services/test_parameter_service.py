@@ -24,6 +24,7 @@ from autopilot_bridge.services.parameters.protocol import (
 )
 from autopilot_bridge.sitl import Sitl
 from flightsim.world_spec import VehicleSpec, WorldSpec
+from tests.services.dispatch import deliver
 
 
 class Recorder:
@@ -55,7 +56,7 @@ class Vehicle:
         self.time_us = 0
 
     def tell(self, message: Any) -> list[Any]:
-        assert self.service.handle(message, Source(self.asking, 255, 190), self.time_us)
+        assert deliver(message, Source(self.asking, 255, 190), self.time_us, self.service)
         return self.asking.take()
 
     def read(self, name: str = "", index: int = -1) -> list[Any]:
@@ -243,7 +244,7 @@ def test_changes_by_the_vehicle_are_announced(px4: Vehicle, ardupilot: Vehicle) 
 
 def test_other_messages_are_not_taken(px4: Vehicle) -> None:
     heartbeat = mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 3, 3)
-    assert not px4.service.handle(heartbeat, Source(px4.asking, 255, 190), 0)
+    assert not deliver(heartbeat, Source(px4.asking, 255, 190), 0, px4.service)
 
 
 def test_address_rules() -> None:

@@ -13,6 +13,7 @@ from autopilot_bridge.services.commands.protocol import CommandService
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.vehicle_services import small_services
 from tests.services.command_rig import ServiceRig
+from tests.services.dispatch import deliver
 from tests.services.plane_rig import PlaneRig
 
 CALIBRATE = mavlink.MAV_CMD_PREFLIGHT_CALIBRATION
@@ -51,7 +52,7 @@ class Vehicle:
 
     def hear(self, message: Any, component: int = 190) -> None:
         source = self.rig.source._replace(component_id=component)
-        assert any(service.handle(message, source, self.rig.time_us) for service in self.services)
+        assert deliver(message, source, self.rig.time_us, *self.services)
 
     def run(self, seconds: float, each: Any = None) -> None:
         """Vehicle time, with the services' timers."""

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import Source, send_to_all
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.commands.handlers import Command, Handler, whole
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 
@@ -57,13 +57,15 @@ class ArdupilotCalibration(Microservice):
             mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS: self._vehicle_position,
         }
 
-    def handle(self, message: object, source: Source, time_us: int) -> bool:
-        """A COMMAND_ACK stands for "any key": old ground stations confirm a position with it."""
-        if self._position is None or not isinstance(message, mavlink.MAVLink_command_ack_message):
-            return False
-        if message.command in (0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS) and self._measured_us is None:
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """COMMAND_ACK stands for "any key": old ground stations confirm a position with it."""
+        return {mavlink.MAVLINK_MSG_ID_COMMAND_ACK: self._on_acknowledgement}
+
+    def _on_acknowledgement(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        waiting = self._position is not None and self._measured_us is None
+        if waiting and message.command in (0, mavlink.MAV_CMD_ACCELCAL_VEHICLE_POS):
             self._measure()
-        return True
 
     def tick(self, time_us: int) -> None:
         """Measure; request the next position, and repeat the request."""

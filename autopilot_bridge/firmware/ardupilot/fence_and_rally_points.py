@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.plans.messages import plan_checksum
 
@@ -75,11 +75,13 @@ class OldPoints(Microservice):
         """Build the service of an autopilot."""
         return cls(parts.parameters, parts.stores, parts.announce)
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one of the four messages."""
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """The four messages."""
+        return dict.fromkeys(_NAMES, self._on_point)
+
+    def _on_point(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         number = message.get_msgId()
-        if number not in _NAMES:
-            return False
         if number not in self._warned:
             self._warned.add(number)
             self._announce(_INFO, f"Received message ({_NAMES[number]}) is deprecated")
@@ -92,7 +94,6 @@ class OldPoints(Microservice):
                 self._take_rally_point(message)
             case mavlink.MAVLINK_MSG_ID_RALLY_FETCH_POINT:
                 self._send_rally_point(message.idx, source)
-        return True
 
     def tick(self, time_us: int) -> None:
         """Update the totals after an upload by the mission protocol."""

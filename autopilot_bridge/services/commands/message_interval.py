@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.mavlink.definitions import DEFINITIONS
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Receiver, Source
 from autopilot_bridge.telemetry.line import MICROSECONDS
 from autopilot_bridge.telemetry.streams import PayloadCache, StreamTable
 
@@ -75,11 +75,13 @@ class MessageIntervalService:
         self._pending: dict[tuple[Channel, int, float], None] = {}  # two equal requests get one answer
         self._time_us = 0
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle REQUEST_DATA_STREAM; the commands come through the methods below."""
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """REQUEST_DATA_STREAM; the commands come through the methods below."""
+        return {mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM: self._on_data_stream}
+
+    def _on_data_stream(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         self._time_us = time_us
-        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_REQUEST_DATA_STREAM:
-            return False
         table = self._tables.get(source.channel.name)
         groups = self._policy.groups
         if table is not None and groups:
@@ -89,7 +91,6 @@ class MessageIntervalService:
             for group in chosen:
                 for message_id in groups.get(group, ()):
                     table.set_default(message_id, interval_us, time_us)
-        return True
 
     def tick(self, time_us: int) -> None:
         """Send what was requested since the last tick: always after the acknowledgement of the request."""

@@ -11,7 +11,7 @@ from autopilot_bridge.firmware.ardupilot.copter.commands import ArduCopterComman
 from autopilot_bridge.firmware.ardupilot.plane.commands import ArduPlaneCommands
 from autopilot_bridge.firmware.px4.commands import Px4Commands
 from autopilot_bridge.firmware.px4.plane.commands import Px4PlaneCommands
-from autopilot_bridge.services.channel import NOBODY, AddressRule, MavlinkMessage, Source
+from autopilot_bridge.services.channel import NOBODY, AddressRule, MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.commands.handlers import (
     Command,
     CommandHandlers,
@@ -21,9 +21,6 @@ from autopilot_bridge.services.commands.handlers import (
 )
 from autopilot_bridge.services.vehicle_class import is_aircraft
 
-_COMMANDS: Final = frozenset({mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_COMMAND_INT})
-_SET_MODE: Final = mavlink.MAVLINK_MSG_ID_SET_MODE
-_CANCEL: Final = 80  # COMMAND_CANCEL; not every release of the dialect has it
 _MULTICOPTERS: Final[Mapping[str, type[CommandHandlers]]] = {
     "px4": Px4Commands,
     "ardupilot": ArduCopterCommands,
@@ -63,20 +60,20 @@ class CommandService:
         handlers = _AIRCRAFT if is_aircraft(commander) else _MULTICOPTERS
         return cls(handlers[name](commander, hooks), address, more)
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle COMMAND_LONG, COMMAND_INT, COMMAND_CANCEL or SET_MODE; never raises on contents."""
-        message_id = message.get_msgId()
-        if message_id in _COMMANDS:
-            if self._address.accepts(message):
-                self._execute(message, source)
-            return True
-        if message_id == _SET_MODE:
-            if self._address.accepts(message):
-                result = self._handlers.set_mode_message(message.base_mode, message.custom_mode)
-                if result is not None:
-                    _acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
-            return True
-        return bool(message_id == _CANCEL)  # no command here takes long enough to be cancelled
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """COMMAND_LONG, COMMAND_INT, SET_MODE. No command takes long enough for a COMMAND_CANCEL."""
+        return {
+            mavlink.MAVLINK_MSG_ID_COMMAND_LONG: self._on_command,
+            mavlink.MAVLINK_MSG_ID_COMMAND_INT: self._on_command,
+            mavlink.MAVLINK_MSG_ID_SET_MODE: self._on_set_mode,
+        }
+
+    def _on_set_mode(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if self._address.accepts(message):
+            result = self._handlers.set_mode_message(message.base_mode, message.custom_mode)
+            if result is not None:
+                _acknowledge(mavlink.MAV_CMD_DO_SET_MODE, result, source)
 
     def knows(self, command: int) -> bool:
         """A handler for this MAV_CMD exists."""
@@ -88,7 +85,9 @@ class CommandService:
         handler = self._more.get(command.id)
         return self._handlers.execute(command, asker) if handler is None else handler(command, asker)
 
-    def _execute(self, message: MavlinkMessage, source: Source) -> None:
+    def _on_command(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if not self._address.accepts(message):
+            return
         command = command_from_message(message)
         if command.id in self._handlers.double_ack:
             _acknowledge(command.id, Result.ACCEPTED, source)

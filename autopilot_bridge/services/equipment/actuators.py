@@ -11,22 +11,13 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import Source
 from autopilot_bridge.services.commands.handlers import Command, Handler, flags, whole
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 
-_PLAY_TUNE: Final = mavlink.MAVLINK_MSG_ID_PLAY_TUNE
 _INFO: Final = mavlink.MAV_SEVERITY_INFO
 _WARNING: Final = mavlink.MAV_SEVERITY_WARNING
 _GRIPPER_ACTIONS: Final = (mavlink.GRIPPER_ACTION_RELEASE, mavlink.GRIPPER_ACTION_GRAB)
-
-
-class Tunes(Microservice):
-    """Accepts tunes and plays nothing. The dialect lacks PLAY_TUNE_V2: that message is dropped as unknown."""
-
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Take PLAY_TUNE."""
-        return bool(message.get_msgId() == _PLAY_TUNE)
 
 
 class Px4Actuators(Microservice):

@@ -19,7 +19,7 @@ from autopilot_bridge.commander.verdict import Result
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.region_of_interest import roi_of
 from autopilot_bridge.mission_plan import MissionItem
-from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.commands.handlers import Command, Handler
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.services.plans.equipment import GIMBAL_COMMANDS
@@ -30,7 +30,7 @@ _CONFIGURE: Final = mavlink.MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE
 _NONE: Final = mavlink.MAV_CMD_DO_SET_ROI_NONE
 _NEXT_WAYPOINT: Final = mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET
 _PRESENT_US: Final = 5_000_000
-_NOBODY: Final = (0, 0)
+_NO_CLIENT: Final = (0, 0)
 _TAKE, _GIVE_UP = -2.0, -3.0
 
 _TRIGGER: Final = frozenset(
@@ -111,7 +111,7 @@ class PayloadCommands(Microservice):
     def __init__(self, parts: AutopilotParts) -> None:
         self._parts = parts
         self._policy = PX4_PAYLOAD if parts.flavour.name == "px4" else ARDUPILOT_PAYLOAD
-        self._heard_us: dict[int, int] = {}
+        self._received_us: dict[int, int] = {}
         self._in_control: frozenset[tuple[int, int]] = frozenset()
 
     @property
@@ -124,21 +124,30 @@ class PayloadCommands(Microservice):
             **({_NEXT_WAYPOINT: self._look} if self._policy.kinds_of_roi else {}),
         }
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Record the devices of this vehicle, and the client in control of the gimbal."""
-        if source.system_id == self._parts.system_id and source.component_id in (_CAMERA, _GIMBAL):
-            kind = message.get_msgId()
-            if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-                self._heard_us[source.component_id] = time_us
-            elif kind == mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS:
-                primary = (message.primary_control_sysid, message.primary_control_compid)
-                secondary = (message.secondary_control_sysid, message.secondary_control_compid)
-                self._in_control = frozenset() if primary == _NOBODY else frozenset((primary, secondary))
-        return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """HEARTBEAT and GIMBAL_MANAGER_STATUS of this vehicle's devices."""
+        return {
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat,
+            mavlink.MAVLINK_MSG_ID_GIMBAL_MANAGER_STATUS: self._on_manager_status,
+        }
+
+    def _is_own(self, source: Source) -> bool:
+        return source.system_id == self._parts.system_id and source.component_id in (_CAMERA, _GIMBAL)
+
+    def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if self._is_own(source):
+            self._received_us[source.component_id] = time_us
+
+    def _on_manager_status(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if self._is_own(source):
+            primary = (message.primary_control_sysid, message.primary_control_compid)
+            secondary = (message.secondary_control_sysid, message.secondary_control_compid)
+            self._in_control = frozenset() if primary == _NO_CLIENT else frozenset((primary, secondary))
 
     def _is_there(self, component: int) -> bool:
-        heard_us = self._heard_us.get(component)
-        return heard_us is not None and self._parts.commander.time_us - heard_us < _PRESENT_US
+        received_us = self._received_us.get(component)
+        return received_us is not None and self._parts.commander.time_us - received_us < _PRESENT_US
 
     def _may_point(self, source: Source) -> bool:
         return not self._in_control or (source.system_id, source.component_id) in self._in_control

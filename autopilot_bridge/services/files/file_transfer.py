@@ -16,7 +16,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, is_congested
 from autopilot_bridge.services.files.ftp_protocol import (
     HEADER,
     MAX_DATA,
@@ -109,14 +109,17 @@ class FileTransferService(Microservice):
             Opcode.CALC_FILE_CRC32: self._checksum,
         }
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle FILE_TRANSFER_PROTOCOL; replies (ACK, NAK) of other systems are ignored."""
-        if message.get_msgId() != mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL:
-            return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """FILE_TRANSFER_PROTOCOL."""
+        return {mavlink.MAVLINK_MSG_ID_FILE_TRANSFER_PROTOCOL: self.on_transfer}
+
+    def on_transfer(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        """Answer a request; replies (ACK, NAK) of other systems are ignored."""
         payload = bytes(message.payload)
         request = parse_request(payload)
         if request.opcode in (Opcode.ACK, Opcode.NAK):
-            return True
+            return
         client = self._clients.client(source, time_us)
         raw = payload[: HEADER.size + request.size]
         reply = client.repeated(raw, time_us)
@@ -126,7 +129,6 @@ class FileTransferService(Microservice):
                 client.remember(raw, reply, time_us)
         if reply is not None:
             _send(client, reply)
-        return True
 
     def tick(self, time_us: int) -> None:
         """Continue bursts and checksums; close idle sessions."""

@@ -8,13 +8,13 @@ Source: MAVLink log download (mavlink.io/en/messages/common.html, LOG_ENTRY, LOG
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import MavlinkMessage, Source, is_congested
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, is_congested
 from autopilot_bridge.services.files.log_book import LogBook, LogFile
 from autopilot_bridge.services.microservice import Microservice
 from autopilot_bridge.storage import OpenFile, VehiclePath
@@ -90,11 +90,15 @@ class LogTransferService(Microservice):
         self._logs: list[LogFile] = []  # as listed, so that the numbers stay valid
         self._downloads: dict[tuple[str, int, int], _Download] = {}
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle the requests of the log protocol."""
-        if message.get_msgId() in _REQUESTS and self._waits:
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """The requests of the log protocol."""
+        return dict.fromkeys(_REQUESTS, self._on_request)
+
+    def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if self._waits:
             self._refuse(source)
-            return True
+            return
         match message.get_msgId():
             case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_LIST:
                 self._list(message, self._download(source, time_us))
@@ -104,9 +108,6 @@ class LogTransferService(Microservice):
                 self._erase()
             case mavlink.MAVLINK_MSG_ID_LOG_REQUEST_END:
                 self._download(source, time_us).close()
-            case _:
-                return False
-        return True
 
     def tick(self, time_us: int) -> None:
         """Send the requested data; forget idle clients."""

@@ -27,7 +27,7 @@ from autopilot_bridge.navigation.external import (
     ExternalSample,
 )
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.inputs.time_stamps import in_vehicle_time
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -147,26 +147,27 @@ class ExternalOdometryService(Microservice):
         self._policy = POLICIES[parts.flavour.name]
         self.wrong_frames = 0
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one message. Another vehicle's own ODOMETRY that arrives here is ignored."""
-        message_id = message.get_msgId()
-        if message_id == mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN:
-            self._set_origin(message, time_us)
-            return True
-        if message_id not in _READERS:
-            return False
-        if message_id not in self._policy.messages or not self._policy.enabled(self._parameters):
-            return True
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """SET_GPS_GLOBAL_ORIGIN, and the messages with odometry that the firmware uses."""
+        return {
+            mavlink.MAVLINK_MSG_ID_SET_GPS_GLOBAL_ORIGIN: self._set_origin,
+            **dict.fromkeys(self._policy.messages, self._on_sample),
+        }
+
+    def _on_sample(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        """Another vehicle's own ODOMETRY that arrives here is ignored."""
+        if not self._policy.enabled(self._parameters):
+            return
         if source.component_id == _AUTOPILOT and source.system_id != self._system_id:
-            return True
-        sample = _READERS[message_id](self, message, time_us)
+            return
+        sample = _READERS[message.get_msgId()](self, message, time_us)
         if sample is None:
             self.wrong_frames += 1
         elif self._simulation is None or self._simulation.spoil(_VIO, sample.values):
             self._navigation.take_external(sample)
-        return True
 
-    def _set_origin(self, message: MavlinkMessage, time_us: int) -> None:
+    def _set_origin(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """SET_GPS_GLOBAL_ORIGIN: accepted once; positions refer to it from then on."""
         if self._navigation.frame is not None or message.target_system != self._system_id:
             return

@@ -5,16 +5,15 @@ FOLL_ENABLE is set, of the system FOLL_SYSID or of the first system received.
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
 
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 
-_FOLLOW: Final = mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET
-_POSITION: Final = mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT
 _AUTOPILOT: Final = 1
 _HAS_POSITION: Final = 1  # of est_capabilities
 _HAS_VELOCITY: Final = 2
@@ -36,15 +35,20 @@ class FollowService(Microservice):
         self._by_position = parts.flavour.name == "ardupilot"
         self.leader_id = 0
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one message; positions are passed on to other services too."""
-        message_id = message.get_msgId()
-        if message_id == _FOLLOW:
-            self._take(message, source, time_us, *_of_follow(message))
-            return True
-        if message_id == _POSITION and self._by_position and source.component_id == _AUTOPILOT:
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """FOLLOW_TARGET, and on ArduPilot GLOBAL_POSITION_INT."""
+        positions = (
+            {mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._on_position} if self._by_position else {}
+        )
+        return {mavlink.MAVLINK_MSG_ID_FOLLOW_TARGET: self._on_follow_target, **positions}
+
+    def _on_follow_target(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self._take(message, source, time_us, *_of_follow(message))
+
+    def _on_position(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if source.component_id == _AUTOPILOT:
             self._take(message, source, time_us, *self._of_position(message))
-        return False
 
     def _take(
         self,

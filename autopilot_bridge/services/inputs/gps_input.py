@@ -8,13 +8,13 @@ Source: MAVLink common.xml (GPS_INPUT 232, HIL_GPS 113); ArduPilot 4.6 AP_GPS_MA
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from autopilot_bridge.firmware.gps_source import GpsSource
 from autopilot_bridge.firmware.mapping import clamp, number
 from autopilot_bridge.mavlink import dialect as mavlink
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from flightsim import interface as i
 
@@ -51,17 +51,19 @@ class GpsInputService(Microservice):
         self._offset_us: int | None = None  # vehicle time minus sender's time, at the shortest delay
         self.taken = self.refused = 0
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one fix. Only the first receiver (`gps_id`) exists."""
-        reader = _READERS.get(message.get_msgId())
-        if reader is None:
-            return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """GPS_INPUT and HIL_GPS."""
+        return dict.fromkeys(_READERS, self._on_fix)
+
+    def _on_fix(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        """Only the first receiver (`gps_id`) exists."""
         if not self._listens or getattr(message, "gps_id", 0) != 0:
-            return True
-        values = reader(message)
+            return
+        values = _READERS[message.get_msgId()](message)
         if values is None:
             self.refused += 1
-            return True
+            return
         delay_ms = number(self._parameters, "GPS1_DELAY_MS", 0.0)
         delay_ms = clamp(delay_ms if delay_ms > 0.0 else _DRIVER_DELAY_MS, 1.0, _MAX_DELAY_MS)
         measured_us = self._sent_us(message, values, time_us) - round(1e3 * delay_ms)
@@ -69,7 +71,6 @@ class GpsInputService(Microservice):
             self._reading.values[:] = values
             self._reading.time_us = measured_us
             self.taken += 1
-        return True
 
     def _sent_us(self, message: MavlinkMessage, values: list[float], time_us: int) -> int:
         """The send time of a fix from its GPS time, which removes the variation of the transport delay."""

@@ -9,6 +9,7 @@ own gimbal reports where it points (GIMBAL_DEVICE_ATTITUDE_STATUS of component 1
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.inputs.time_stamps import in_vehicle_time
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from flightsim.airframe import AirframeKind
@@ -24,8 +25,6 @@ from flightsim.foundation.vectors import from_euler, rotate, yaw_of
 
 Array = NDArray[np.float64]
 
-_TARGET: Final = mavlink.MAVLINK_MSG_ID_LANDING_TARGET
-_GIMBAL: Final = mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS
 _CAMERA_COMPONENT: Final = int(mavlink.MAV_COMP_ID_CAMERA)
 _GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
 _YAW_IN_EARTH: Final = mavlink.GIMBAL_DEVICE_FLAGS_YAW_IN_EARTH_FRAME
@@ -52,24 +51,26 @@ class LandingTargetService(Microservice):
         self._gimbal: deque[tuple[int, Array, bool]] = deque(maxlen=32)
         self.refused = 0
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one message, from the vehicle's own payload or from any other system."""
-        message_id = message.get_msgId()
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """LANDING_TARGET, and GIMBAL_DEVICE_ATTITUDE_STATUS of the vehicle's own gimbal."""
         if not self._lands_there:
-            return False
-        if message_id == _GIMBAL:
-            if source.system_id == self._system_id and source.component_id == _GIMBAL_COMPONENT:
-                self._note_gimbal(message, time_us)
-            return False
-        if message_id != _TARGET:
-            return False
+            return {}
+        return {
+            mavlink.MAVLINK_MSG_ID_LANDING_TARGET: self._on_target,
+            mavlink.MAVLINK_MSG_ID_GIMBAL_DEVICE_ATTITUDE_STATUS: self._on_gimbal,
+        }
+
+    def _on_target(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        """A landing target from the vehicle's own payload or from any other system."""
         place = self._place(message, source, time_us)
         track = self._context.surroundings.landing_target
         if place is None or not track.take(place[0], place[1], sigma_m=place[2]):
             self.refused += 1
-        return True
 
-    def _note_gimbal(self, message: MavlinkMessage, time_us: int) -> None:
+    def _on_gimbal(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if source.system_id != self._system_id or source.component_id != _GIMBAL_COMPONENT:
+            return
         q = np.array(message.q, dtype=np.float64)
         if 0.9 < float(q @ q) < 1.1:  # False for NaN
             in_earth = bool(message.flags & _YAW_IN_EARTH)

@@ -10,7 +10,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.firmware.flavour import Flavour
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.inputs.transmitter import (
     CHANNELS,
     ArmingGesture,
@@ -22,10 +22,6 @@ from autopilot_bridge.services.inputs.transmitter import (
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.telemetry.streams import Builder, Values
 from flightsim.airframe import AirframeKind
-
-_MANUAL: Final = mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL
-_OVERRIDE: Final = mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE
-_HEARTBEAT: Final = mavlink.MAVLINK_MSG_ID_HEARTBEAT
 
 _UNUSED: Final = 65535  # RC_CHANNELS_OVERRIDE: this channel is not changed
 _RELEASE: Final = 0  # back to the radio, for channels 1 to 8
@@ -178,22 +174,14 @@ class ManualService(Microservice):
         """RC_CHANNELS."""
         return {mavlink.MAVLINK_MSG_ID_RC_CHANNELS: self._rc_channels}
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one message; a HEARTBEAT is read and passed on to other services (False)."""
-        message_id = message.get_msgId()
-        if message_id == _HEARTBEAT:
-            if self._is_gcs(message, source):
-                self._commander.pilot.hear_gcs(time_us)
-            return False
-        if message_id == _MANUAL:
-            if message.target in (0, self._system_id) and self._may_steer(source):
-                self._on_manual(message, time_us)
-            return True
-        if message_id == _OVERRIDE:
-            if message.target_system in (0, self._system_id) and self._may_steer(source):
-                self._on_override(message, time_us)
-            return True
-        return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """HEARTBEAT of a ground station, MANUAL_CONTROL, RC_CHANNELS_OVERRIDE."""
+        return {
+            mavlink.MAVLINK_MSG_ID_HEARTBEAT: self._on_heartbeat,
+            mavlink.MAVLINK_MSG_ID_MANUAL_CONTROL: self._on_manual,
+            mavlink.MAVLINK_MSG_ID_RC_CHANNELS_OVERRIDE: self._on_override,
+        }
 
     def tick(self, time_us: int) -> None:
         """Expire overrides; check mode switch and arming gesture once the sticks have been used."""
@@ -207,17 +195,19 @@ class ManualService(Microservice):
             self._switch.tick(time_us)
         self._gesture.tick(time_us)
 
-    def _is_gcs(self, message: MavlinkMessage, source: Source) -> bool:
-        if self._rules.gcs_only:
-            return self._may_steer(source)
-        return bool(message.type == mavlink.MAV_TYPE_GCS)
+    def _on_heartbeat(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        gcs = self._may_steer(source) if self._rules.gcs_only else message.type == mavlink.MAV_TYPE_GCS
+        if gcs:
+            self._commander.pilot.hear_gcs(time_us)
 
     def _may_steer(self, source: Source) -> bool:
         only = self._rules.gcs_only
         return not only or source.system_id == round(self._parameters.get(only))
 
-    def _on_manual(self, message: MavlinkMessage, time_us: int) -> None:
+    def _on_manual(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """MANUAL_CONTROL: x forward, y right, r clockwise in -1000..1000; z throttle in 0..1000."""
+        if message.target not in (0, self._system_id) or not self._may_steer(source):
+            return
         axes = (message.y, message.x, message.z, message.r)
         if self._rules.sticks_are_radio:
             roll, pitch, throttle, yaw = self._axes()
@@ -240,8 +230,10 @@ class ManualService(Microservice):
                 time_us=time_us,
             )
 
-    def _on_override(self, message: MavlinkMessage, time_us: int) -> None:
+    def _on_override(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         """RC_CHANNELS_OVERRIDE: pulses of channels 1 to 18."""
+        if message.target_system not in (0, self._system_id) or not self._may_steer(source):
+            return
         for channel in range(CHANNELS):
             pulse_us = getattr(message, f"chan{channel + 1}_raw")
             first = channel < _FIRST_CHANNELS

@@ -15,7 +15,7 @@ from autopilot_bridge.flight.obstacles import SECTOR_RAD, SECTORS
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 
 _OBSTACLES: Final = mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
@@ -48,16 +48,20 @@ class ObstacleService(Microservice):
         self._listens = _LISTENS[parts.flavour.name]
         self.refused = 0
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one message; a DISTANCE_SENSOR of another vehicle is ignored."""
-        message_id = message.get_msgId()
-        if message_id not in (_OBSTACLES, _SENSOR):
-            return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """OBSTACLE_DISTANCE and DISTANCE_SENSOR."""
+        return {
+            mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE: self._on_obstacles,
+            mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR: self._on_obstacles,
+        }
+
+    def _on_obstacles(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        """A DISTANCE_SENSOR of another vehicle is ignored."""
         if not self._listens(self._parameters) or source.component_id == _AUTOPILOT:
-            return True
-        usable = self._circle(message, time_us) if message_id == _OBSTACLES else self._beam(message, time_us)
-        self.refused += not usable
-        return True
+            return
+        circle = message.get_msgId() == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
+        self.refused += not (self._circle(message, time_us) if circle else self._beam(message, time_us))
 
     def _circle(self, message: MavlinkMessage, time_us: int) -> bool:
         """OBSTACLE_DISTANCE (330)."""

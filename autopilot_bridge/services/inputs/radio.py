@@ -1,10 +1,10 @@
 """RADIO_STATUS: a telemetry radio reports how full its transmit buffer is."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import Channel, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Channel, MavlinkMessage, Receiver, Source
 from autopilot_bridge.telemetry.throttle import StreamThrottle
 
 
@@ -18,12 +18,16 @@ class RadioService:
     def __init__(self, throttle: Callable[[Channel], StreamThrottle | None]) -> None:
         self._throttle = throttle
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
         """RADIO_STATUS (109), and RADIO (166) of older radios."""
-        if message.get_msgId() not in (mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO):
-            return False
+        return {
+            mavlink.MAVLINK_MSG_ID_RADIO_STATUS: self._on_status,
+            mavlink.MAVLINK_MSG_ID_RADIO: self._on_status,
+        }
+
+    def _on_status(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         throttle = self._throttle(source.channel)
         if throttle is not None:
             throttle.radio.heard(message.txbuf, time_us)
             throttle.fit()
-        return True

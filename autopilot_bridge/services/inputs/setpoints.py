@@ -15,7 +15,7 @@ from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.modes import GUIDED_MODES, FlightMode
 from autopilot_bridge.firmware.ardupilot.plane.setpoints import ArduPlaneSetpoints
 from autopilot_bridge.flight.multicopter.guided import GuidedTask
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver
 from autopilot_bridge.services.inputs.setpoint_frames import (
     ACCELERATION_BITS,
     FORCE_BIT,
@@ -35,10 +35,6 @@ from autopilot_bridge.services.inputs.setpoint_frames import (
     yaw_of,
 )
 from autopilot_bridge.services.vehicle_class import is_aircraft
-
-_LOCAL: Final = mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED
-_GLOBAL: Final = mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT
-_ATTITUDE: Final = mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET
 
 _RATE_BITS: Final = (1, 2, 4)  # SET_ATTITUDE_TARGET.type_mask
 _THROTTLE_BIT: Final = 64
@@ -82,18 +78,21 @@ class SetpointService:
         rules = _AIRCRAFT if is_aircraft(commander) else _MULTICOPTERS
         self._rules: SetpointRules = rules[flavour](commander)
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle one setpoint; invalid ones are ignored, as in the flavour."""
-        message_id = message.get_msgId()
-        if message_id == _LOCAL:
-            self._rules.on_local(message, time_us)
-        elif message_id == _GLOBAL:
-            self._rules.on_global(message, time_us)
-        elif message_id == _ATTITUDE:
-            self._rules.on_attitude(message, time_us)
-        else:
-            return False
-        return True
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """The three kinds of setpoints; invalid ones are ignored, as in the flavour."""
+        rules = self._rules
+        return {
+            mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED: (
+                lambda message, source, time_us: rules.on_local(message, time_us)
+            ),
+            mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: (
+                lambda message, source, time_us: rules.on_global(message, time_us)
+            ),
+            mavlink.MAVLINK_MSG_ID_SET_ATTITUDE_TARGET: (
+                lambda message, source, time_us: rules.on_attitude(message, time_us)
+            ),
+        }
 
 
 class Px4Setpoints:

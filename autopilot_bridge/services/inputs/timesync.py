@@ -5,11 +5,12 @@ and the requester's ts1, both in nanoseconds) and ping protocol (target 0/0 is a
 addressed to its sender).
 """
 
+from collections.abc import Mapping
 from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.services.channel import MavlinkMessage, Source
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source
 
 _NS_PER_US: Final = 1000
 _INT64_MAX: Final = 2**63 - 1
@@ -25,19 +26,23 @@ class TimeSyncService:
     def __init__(self, *, answers_ping: bool) -> None:
         self._answers_ping = answers_ping
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_TIMESYNC:
-                if message.tc1 == 0:
-                    now_ns = min(time_us * _NS_PER_US, _INT64_MAX)
-                    source.channel.send(mavlink.MAVLink_timesync_message(now_ns, message.ts1))
-            case mavlink.MAVLINK_MSG_ID_PING:
-                if self._answers_ping and message.target_system == 0 and message.target_component == 0:
-                    source.channel.send(
-                        mavlink.MAVLink_ping_message(
-                            message.time_usec, message.seq, source.system_id, source.component_id
-                        )
-                    )
-            case _:
-                return False
-        return True
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """TIMESYNC and PING."""
+        return {
+            mavlink.MAVLINK_MSG_ID_TIMESYNC: self._on_timesync,
+            mavlink.MAVLINK_MSG_ID_PING: self._on_ping,
+        }
+
+    def _on_timesync(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if message.tc1 == 0:
+            now_ns = min(time_us * _NS_PER_US, _INT64_MAX)
+            source.channel.send(mavlink.MAVLink_timesync_message(now_ns, message.ts1))
+
+    def _on_ping(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if self._answers_ping and message.target_system == 0 and message.target_component == 0:
+            source.channel.send(
+                mavlink.MAVLink_ping_message(
+                    message.time_usec, message.seq, source.system_id, source.component_id
+                )
+            )

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.modes import FlightMode
 from autopilot_bridge.navigation import layout as nav
-from autopilot_bridge.services.channel import MavlinkMessage, Source, send_to_all
+from autopilot_bridge.services.channel import MavlinkMessage, Receiver, Source, send_to_all
 from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 from autopilot_bridge.telemetry.streams import Builder
 
@@ -76,14 +76,16 @@ class TrafficService(Microservice):
         """ADSB_VEHICLE can be requested; it is sent when it is received, whatever the interval."""
         return {_ADSB_VEHICLE: lambda: None}
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        """Handle ADSB_VEHICLE; a report forwarded by another autopilot is not forwarded again."""
-        if message.get_msgId() != _ADSB_VEHICLE:
-            return False
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """ADSB_VEHICLE."""
+        return {_ADSB_VEHICLE: self._on_report}
+
+    def _on_report(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        """A report forwarded by another autopilot is not forwarded again."""
         switched_on = not self._rules.switch or self._parts.parameters.get(self._rules.switch) > 0
         if switched_on and source.component_id != _AUTOPILOT:
             self._take(message, time_us)
-        return True
 
     def _take(self, message: MavlinkMessage, time_us: int) -> None:
         address = message.ICAO_address

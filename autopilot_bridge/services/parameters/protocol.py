@@ -8,7 +8,7 @@ deviate from the document (no answer instead of an error, no range check), their
 import math
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -25,6 +25,7 @@ from autopilot_bridge.services.channel import (
     Broadcast,
     Channel,
     MavlinkMessage,
+    Receiver,
     Source,
     is_congested,
     send_to_all,
@@ -151,17 +152,14 @@ class ParameterService:
             crc = zlib.crc32(packed, zlib.crc32(name.encode(), crc))
         return crc
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ:
-                self._read(message, source.channel)
-            case mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST:
-                self.list_on(source.channel)
-            case mavlink.MAVLINK_MSG_ID_PARAM_SET:
-                self._set(message, source.channel)
-            case _:
-                return False
-        return True
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """PARAM_REQUEST_READ, PARAM_REQUEST_LIST, PARAM_SET."""
+        return {
+            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: self._on_read,
+            mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: self._on_list_request,
+            mavlink.MAVLINK_MSG_ID_PARAM_SET: self._on_set,
+        }
 
     def tick(self, time_us: int) -> None:
         """Send the next parameters of every running list."""
@@ -171,7 +169,11 @@ class ParameterService:
             self._continue_list(listing)
         self._listings = [listing for listing in self._listings if listing.next_index < self._store.count]
 
-    def _read(self, message: MavlinkMessage, channel: Channel) -> None:
+    def _on_list_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self.list_on(source.channel)
+
+    def _on_read(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        channel = source.channel
         if message.param_index >= 0:
             if message.param_index < self._store.count:
                 definition = self._store.by_index(message.param_index)
@@ -206,7 +208,8 @@ class ParameterService:
                 listing.channel.send(self._value_message(definition, index=listing.next_index))
             listing.next_index += 1
 
-    def _set(self, message: MavlinkMessage, channel: Channel) -> None:
+    def _on_set(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        channel = source.channel
         name = _name_of(message)
         if self._policy.hash_parameter and name == HASH_NAME:
             # The ground station has the whole list in its cache: stop sending it.

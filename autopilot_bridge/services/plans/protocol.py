@@ -15,7 +15,7 @@ from autopilot_bridge.firmware.px4.plane.mission_feasibility import AircraftRule
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
 from autopilot_bridge.mission_wire import item_from_message
 from autopilot_bridge.parameters import ParameterStore
-from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Source
+from autopilot_bridge.services.channel import Announce, Broadcast, MavlinkMessage, Receiver, Source
 from autopilot_bridge.services.plans.download import MissionDownloads
 from autopilot_bridge.services.plans.messages import (
     ack_message,
@@ -116,7 +116,6 @@ class MissionService:
         self._judged: tuple[_Judged, tuple[str, ...]] | None = None
         self._rules: AircraftRules | None = None
         self._parameters.subscribe(self._forget_rules)
-        self._last_time_us = 0
 
     @property
     def stores(self) -> Mapping[MissionType, MissionStore]:
@@ -175,42 +174,46 @@ class MissionService:
         store.current = seq
         return True
 
-    def handle(self, message: MavlinkMessage, source: Source, time_us: int) -> bool:
-        self._last_time_us = max(self._last_time_us, time_us)
-        uploader = self._uploads.partner
-        match message.get_msgId():
-            case mavlink.MAVLINK_MSG_ID_MISSION_COUNT:
-                self._report.forget_reached()
-                self._uploads.on_count(message, source, time_us)
-            case mavlink.MAVLINK_MSG_ID_MISSION_ITEM | mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT:
-                if not self._take_guided_item(message, source):
-                    self._uploads.on_item(message, source, time_us)
-            case mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST:
-                self._uploads.on_partial(message, source, time_us)
-            case mavlink.MAVLINK_MSG_ID_MISSION_ACK:
-                self._downloads.on_ack(message, source)
-                self._uploads.on_ack(message, source, time_us)
-            case mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST:
-                self._downloads.on_list(message, source, time_us, uploader=uploader)
-            case mavlink.MAVLINK_MSG_ID_MISSION_REQUEST | mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT:
-                self._downloads.on_request(message, source, time_us, uploader=uploader)
-            case mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL:
-                self._clear(message, source)
-            case mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT:
-                self._on_set_current(message, source)
-            case mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_PARTIAL_LIST:
-                pass  # neither firmware answers
-            case _:
-                return False
-        return True
+    @property
+    def receivers(self) -> Mapping[int, Receiver]:
+        """The mission protocol. Neither firmware answers MISSION_REQUEST_PARTIAL_LIST."""
+        return {
+            mavlink.MAVLINK_MSG_ID_MISSION_COUNT: self._on_count,
+            mavlink.MAVLINK_MSG_ID_MISSION_ITEM: self._on_item,
+            mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: self._on_item,
+            mavlink.MAVLINK_MSG_ID_MISSION_WRITE_PARTIAL_LIST: self._uploads.on_partial,
+            mavlink.MAVLINK_MSG_ID_MISSION_ACK: self._on_ack,
+            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_LIST: self._on_list,
+            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: self._on_request,
+            mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: self._on_request,
+            mavlink.MAVLINK_MSG_ID_MISSION_CLEAR_ALL: self._on_clear,
+            mavlink.MAVLINK_MSG_ID_MISSION_SET_CURRENT: self._on_set_current,
+        }
 
     def tick(self, time_us: int) -> None:
-        self._last_time_us = max(self._last_time_us, time_us)
         self._uploads.tick(time_us)
         self._downloads.tick(time_us)
         self._report.tick(time_us)
 
-    def _clear(self, message: MavlinkMessage, source: Source) -> None:
+    def _on_count(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self._report.forget_reached()
+        self._uploads.on_count(message, source, time_us)
+
+    def _on_item(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        if not self._take_guided_item(message, source):
+            self._uploads.on_item(message, source, time_us)
+
+    def _on_ack(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self._downloads.on_ack(message, source)
+        self._uploads.on_ack(message, source, time_us)
+
+    def _on_list(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self._downloads.on_list(message, source, time_us, uploader=self._uploads.partner)
+
+    def _on_request(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
+        self._downloads.on_request(message, source, time_us, uploader=self._uploads.partner)
+
+    def _on_clear(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         uploader = self._uploads.partner
         mission_type = mission_type_of(message.mission_type)
         if self._policy.clears_all_types:
@@ -236,7 +239,7 @@ class MissionService:
             self._replace(kind, (), 0)
         source.channel.send(ack_message(source, result, message.mission_type))
 
-    def _on_set_current(self, message: MavlinkMessage, source: Source) -> None:
+    def _on_set_current(self, message: MavlinkMessage, source: Source, time_us: int) -> None:
         uploader = self._uploads.partner
         texts = self._policy.texts
         session = self._sessions.of(source.channel)
