@@ -28,8 +28,13 @@ from flightsim.interface import SensorReadings
 class Simulation(Protocol):
     """The simulated world of an autopilot, if there is one: it makes received data fail."""
 
-    def attend(self, parts: "AutopilotParts") -> None:
-        """An autopilot has booted."""
+    def attend(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:
+        """An autopilot has booted.
+
+        Args:
+            store: its parameters, of which some act on the simulated world.
+            lose_radio: interrupts (True) or restores (False) the pilot's stick input.
+        """
         ...
 
     def spoil(self, unit: int, values: NDArray[np.float64]) -> bool:

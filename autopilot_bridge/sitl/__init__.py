@@ -1,5 +1,13 @@
 """SITL: the runner that steps worlds and autopilots together, embedded or for clients on real links."""
 
+from autopilot_bridge.sitl.backend import (
+    AutopilotBackend,
+    BackendLinks,
+    BackendMaker,
+    BackendSetup,
+    EmulatedBackend,
+    emulated,
+)
 from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.ports import Port, default_ports
 from autopilot_bridge.sitl.server import PaceReport, SitlServer
@@ -9,6 +17,11 @@ from autopilot_bridge.sitl.vehicle import SitlVehicle
 from autopilot_bridge.sitl.warm_up import compile_flight_code
 
 __all__ = [
+    "AutopilotBackend",
+    "BackendLinks",
+    "BackendMaker",
+    "BackendSetup",
+    "EmulatedBackend",
     "PaceReport",
     "PacketLog",
     "Port",
@@ -20,4 +33,5 @@ __all__ = [
     "UnsignedFrom",
     "compile_flight_code",
     "default_ports",
+    "emulated",
 ]

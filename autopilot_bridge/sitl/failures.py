@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.commander import Commander
 from autopilot_bridge.commander.verdict import Result
-from autopilot_bridge.services.microservice import AutopilotParts
+from autopilot_bridge.parameters import ParameterStore
 from autopilot_bridge.sitl.entry_units import ENTRY_UNITS
 from autopilot_bridge.sitl.simulator_parameters import SimulatorParameters
 from flightsim.airframe import AirframeKind, Role
@@ -52,13 +51,13 @@ class FailureInjector:
         sensors: its sensors.
     """
 
-    __slots__ = ("_commander", "_deaf", "_entries", "_others", "_sensors", "_vehicle")
+    __slots__ = ("_deaf", "_entries", "_lose_radio", "_others", "_sensors", "_vehicle")
 
     def __init__(self, vehicle: Vehicle, sensors: SensorSuite) -> None:
         self._vehicle = vehicle
         self._sensors = sensors
         self._deaf = False
-        self._commander: Commander | None = None
+        self._lose_radio: Callable[[bool], None] | None = None
         self._others: Mapping[int, Callable[[int, int], bool]] = {
             mavlink.FAILURE_UNIT_SYSTEM_MOTOR: self._motor,
             mavlink.FAILURE_UNIT_SYSTEM_SERVO: self._servo,
@@ -70,13 +69,13 @@ class FailureInjector:
             for unit in ENTRY_UNITS
         }
 
-    def attend(self, parts: AutopilotParts) -> None:
-        """An autopilot has booted: use its pilot input and its parameters from now on."""
-        self._commander = parts.commander
+    def attend(self, store: ParameterStore, lose_radio: Callable[[bool], None]) -> None:
+        """An autopilot has booted: use its parameters and its pilot input from now on."""
+        self._lose_radio = lose_radio
         self._deaf = False
         parameters = SimulatorParameters(self._vehicle, self._sensors, self.fail_radio, self.weaken_motors)
-        parts.parameters.subscribe(lambda name, value: parameters.changed(parts.parameters, name))
-        parameters.apply(parts.parameters)
+        store.subscribe(lambda name, value: parameters.changed(store, name))
+        parameters.apply(store)
 
     def inject(self, unit: int, failure: int, instance: int) -> Result:
         """Switch a failure on or off; UNSUPPORTED for a unit or a failure that the vehicle does not have."""
@@ -130,8 +129,8 @@ class FailureInjector:
 
     def fail_radio(self, failed: bool) -> None:
         """Interrupt or restore the pilot's stick input."""
-        if self._commander is not None:
-            self._commander.pilot.lose_signal(failed, self._commander.time_us)
+        if self._lose_radio is not None:
+            self._lose_radio(failed)
 
     # actuators
 

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from autopilot_bridge.commander import Commander
+from autopilot_bridge.sitl.backend import AutopilotBackend, ReportsLiftOff
 from flightsim.vehicle import Vehicle
 
 LAUNCH_DELAY_S: Final = 3.0
@@ -18,15 +18,16 @@ class LaunchCrew:
 
     Args:
         vehicle: the aircraft on its launcher.
-        commander: of its autopilot.
+        backend: its autopilot. One that does not report when it lifts off is launched when it is armed.
         step_us: length of a physics step.
     """
 
-    __slots__ = ("_commander", "_look_us", "_next_us", "_ready_since_us", "_vehicle")
+    __slots__ = ("_backend", "_lift_off", "_look_us", "_next_us", "_ready_since_us", "_vehicle")
 
-    def __init__(self, vehicle: Vehicle, commander: Commander, *, step_us: int) -> None:
+    def __init__(self, vehicle: Vehicle, backend: AutopilotBackend, *, step_us: int) -> None:
         self._vehicle = vehicle
-        self._commander = commander
+        self._backend = backend
+        self._lift_off = backend if isinstance(backend, ReportsLiftOff) else None
         self._look_us = _SLOW_STEPS * step_us
         self._next_us = 0
         self._ready_since_us: int | None = None
@@ -36,8 +37,8 @@ class LaunchCrew:
         if time_us < self._next_us:
             return False
         self._next_us = time_us + self._look_us
-        commander = self._commander
-        if not (commander.armed and commander.tasks.lifting_off):
+        lift_off = self._lift_off
+        if not (self._backend.armed and (lift_off is None or lift_off.lifting_off)):
             self._ready_since_us = None
             return False
         if self._ready_since_us is None:

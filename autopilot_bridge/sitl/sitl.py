@@ -9,6 +9,7 @@ from typing import Final
 
 from autopilot_bridge.errors import TlogError
 from autopilot_bridge.links import Link, MemoryLink, Reach, memory_pair
+from autopilot_bridge.sitl.backend import BackendMaker, emulated
 from autopilot_bridge.sitl.failures import NEVER_US
 from autopilot_bridge.sitl.packet_log import PacketLog
 from autopilot_bridge.sitl.shared_link import SharedLink
@@ -33,6 +34,7 @@ class Sitl:
         spec: the content of the world.
         signing: how the vehicles sign their frames, and which frames they accept.
         cards: the vehicles' memory cards; None: empty cards in memory, without logs.
+        backend: makes the autopilot of each vehicle.
 
     Attributes:
         spec: as given.
@@ -52,6 +54,7 @@ class Sitl:
         *,
         signing: SigningParameters = _NOT_SIGNED,
         cards: Sequence[MemoryCard] | None = None,
+        backend: BackendMaker = emulated,
     ) -> None:
         self.spec = spec
         self.world = World(
@@ -72,7 +75,7 @@ class Sitl:
             )
         cards = [MemoryCard() for _ in spec.vehicles] if cards is None else cards
         self.vehicles = tuple(
-            SitlVehicle(vehicle, index, spec, self.world, self.targets, field, signing, card)
+            SitlVehicle(vehicle, index, spec, self.world, self.targets, field, signing, card, backend)
             for index, (vehicle, card) in enumerate(zip(spec.vehicles, cards, strict=True))
         )
         self.shared_links: list[SharedLink] = []
@@ -221,6 +224,6 @@ class Sitl:
     def close(self) -> None:
         """Close every link, and the open files of the autopilots."""
         for vehicle in self.vehicles:
-            vehicle.autopilot.close()
+            vehicle.backend.close()
             for channel in list(vehicle.channels):
                 vehicle.close(channel)

@@ -8,11 +8,11 @@ it goes to the autopilot, which may answer for it (ArduPilot).
 from collections.abc import Sequence
 from typing import Final
 
-from autopilot_bridge.autopilot import Autopilot
 from autopilot_bridge.links import Link, MemoryLink, PeerId, Reach
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.mavlink.signing import SETUP_SIGNING
 from autopilot_bridge.routing import LoopGuard, Router
+from autopilot_bridge.sitl.backend import BackendLinks
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.signing import VehicleSigning, told
 from autopilot_bridge.telemetry.line import LineBudget
@@ -24,7 +24,7 @@ class Switchboard:
     """The open links of one vehicle.
 
     Args:
-        autopilot: receives and sends on all of them.
+        autopilot: receives and sends on all of them; None: it has links of its own.
         system_id: the vehicle's.
         signing: keys of the vehicle.
 
@@ -34,11 +34,11 @@ class Switchboard:
         signing: as given.
     """
 
-    def __init__(self, autopilot: Autopilot, *, system_id: int, signing: VehicleSigning) -> None:
+    def __init__(self, autopilot: BackendLinks | None, *, system_id: int, signing: VehicleSigning) -> None:
         self.channels: list[LinkChannel] = []
         self.echoes = 0
         self.signing = signing
-        self._autopilot: Autopilot | None = autopilot
+        self._autopilot = autopilot
         self._roles: dict[LinkChannel, str] = {}
         self._system_id = system_id
         self._router: Router[LinkChannel] = Router()
@@ -87,7 +87,7 @@ class Switchboard:
         del self._reach[channel], self._roles[channel]
         channel.link.close()
 
-    def restart(self, autopilot: Autopilot | None) -> None:
+    def restart(self, autopilot: BackendLinks | None) -> None:
         """Connect the links to an autopilot that starts; None: there is no autopilot, and nothing answers."""
         self._autopilot = autopilot
         if autopilot is not None:

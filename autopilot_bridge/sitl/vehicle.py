@@ -6,17 +6,17 @@ payload.
 
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from autopilot_bridge.autopilot import Autopilot
-from autopilot_bridge.firmware import get_flavour
 from autopilot_bridge.links import Link, Reach, memory_pair
 from autopilot_bridge.mavlink import Frame
 from autopilot_bridge.mavlink.signing import signing_time
 from autopilot_bridge.payload import PayloadStation
 from autopilot_bridge.services.vehicle_memory import PowerAction
+from autopilot_bridge.sitl.backend import BackendMaker, BackendSetup, EmulatedBackend, ReadsParameters
 from autopilot_bridge.sitl.channel import LinkChannel
 from autopilot_bridge.sitl.failures import NEVER_US, FailureInjector, FaultSchedule
 from autopilot_bridge.sitl.launch_crew import LaunchCrew
@@ -24,8 +24,9 @@ from autopilot_bridge.sitl.signing import SigningParameters, VehicleSigning
 from autopilot_bridge.sitl.switchboard import Switchboard
 from autopilot_bridge.sitl.truth import TruthEncoder
 from autopilot_bridge.storage.card import MemoryCard
-from flightsim.airframe import Airframe, AirframeKind, LaunchKind
+from flightsim.airframe import AirframeKind, LaunchKind
 from flightsim.initial_state import InitialState
+from flightsim.interface import MAX_ACTUATORS
 from flightsim.payload import GroundTargets, MagneticField, Payload, PayloadParameters
 from flightsim.sensors import (
     FIX_AFTER_10_S,
@@ -39,9 +40,6 @@ from flightsim.sensors import (
 from flightsim.world import World
 from flightsim.world_spec import VehicleSpec, WorldSpec
 
-if TYPE_CHECKING:
-    from flightsim.flight_envelope import FlightEnvelope
-
 REBOOT_US: Final = 1_000_000
 """Time from the shutdown of a rebooting autopilot until it starts again."""
 
@@ -53,7 +51,7 @@ class SitlVehicle:
         vehicle: the JSBSim vehicle.
         sensors: its sensor suite; `sensors.faults` switches failures.
         failures: executes MAV_CMD_INJECT_FAILURE.
-        autopilot: the emulated autopilot.
+        backend: its autopilot.
         payload: its payload, as MAVLink components on a separate link; None: no payload.
         links: its open links with their peers, and its signing key.
         crashed: the vehicle has crashed; clients were informed.
@@ -69,6 +67,7 @@ class SitlVehicle:
         magnetic_field: MagneticField | None,
         signing: SigningParameters,
         card: MemoryCard,
+        backend: BackendMaker,
     ) -> None:
         streams = world.streams
         self.specification = specification
@@ -78,7 +77,6 @@ class SitlVehicle:
         )
         airframe = self.vehicle.airframe
         aircraft = airframe.kind is AirframeKind.FIXED_WING
-        flavour = get_flavour(specification.autopilot, airframe.kind)
         self.sensors = SensorSuite(
             specification.sensors or usual_sensors(specification, aircraft=aircraft),
             physics_rate_hz=world_spec.physics_rate_hz,
@@ -88,39 +86,37 @@ class SitlVehicle:
         self.failures = FailureInjector(self.vehicle, self.sensors)
         own = [fault for fault in world_spec.faults if fault.vehicle == specification.system_id]
         self._faults = FaultSchedule(own, self.failures)
-        self._new_autopilot = partial(
-            Autopilot,
-            flavour,
-            system_id=specification.system_id,
-            readings=self.sensors.readings,
-            physics_rate_hz=world_spec.physics_rate_hz,
-            parameters={
-                **flavour.launch_parameters.get(launch or airframe.launch_kind, {}),
-                **specification.parameters,
-            },
-            envelope=_envelope(airframe, world_spec) if aircraft else None,
-            inject_failure=self.failures.inject,
-            simulation=self.failures,
-            card=card,
-            power=self._on_power,
-        )
         self._epoch_us = world_spec.unix_epoch_us
-        self._starts_again = flavour.reboot_starts_again
         self._boot_us = 0
         self._power: PowerAction | None = None
         self._power_us = NEVER_US  # time of the shutdown or the boot
-        self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us)
-        self._actuators = self.autopilot.actuators  # written in place
+        self._starts_again = False  # the vehicle too, at the boot
+        self._boot = backend(
+            BackendSetup(
+                vehicle=specification,
+                world=world_spec,
+                airframe=airframe,
+                readings=self.sensors.readings,
+                failures=self.failures,
+                card=card,
+                power=self._on_power,
+            )
+        )
+        self._off = np.zeros(MAX_ACTUATORS)
+        self._actuators = self._off
         self._crew_of = partial(LaunchCrew, self.vehicle, step_us=world.step_us)
-        self._crew = None if self.vehicle.launcher is None else self._crew_of(self.autopilot.commander)
+        self._crew: LaunchCrew | None = None
+        self.backend = self._boot(self._epoch_us)
+        if self.vehicle.launcher is not None:
+            self._crew = self._crew_of(self.backend)
         self.links = Switchboard(
-            self.autopilot,
+            self.backend.links,
             system_id=specification.system_id,
             signing=VehicleSigning(
                 signing,
                 system_id=specification.system_id,
                 clock=lambda: signing_time(world_spec.unix_epoch_us + world.time_us),
-                armed=lambda: self.autopilot.commander.armed,
+                armed=lambda: self.backend.armed,
             ),
         )
         self.crashed = False
@@ -149,6 +145,21 @@ class SitlVehicle:
         self.payload = station
 
     @property
+    def autopilot(self) -> Autopilot:
+        """The emulated autopilot.
+
+        Raises:
+            TypeError: the vehicle has another backend.
+        """
+        if not isinstance(self.backend, EmulatedBackend):
+            raise TypeError(f"the autopilot of vehicle {self.specification.system_id} is not emulated")
+        return self.backend.autopilot
+
+    def parameter_values(self, names: Sequence[str]) -> dict[str, float]:
+        """Parameters of its autopilot, read without a message; names that it does not have are left out."""
+        return self.backend.parameter_values(names) if isinstance(self.backend, ReadsParameters) else {}
+
+    @property
     def channels(self) -> list[LinkChannel]:
         """Its open links."""
         return self.links.channels
@@ -168,7 +179,7 @@ class SitlVehicle:
         self.vehicle.step(self._actuators)
         self.sensors.step(time_us - boot_us)
         if time_us > boot_us:
-            self.autopilot.step(time_us - boot_us)
+            self._actuators = self.backend.step(time_us - boot_us)
         if self.payload is not None:
             self.payload.step(time_us)
         if self._crew is not None and self._crew.watch(time_us):
@@ -178,18 +189,17 @@ class SitlVehicle:
             text = self.truth_encoder.encode_text(f"Simulator: {self.vehicle.crash}")
             self.links.send_to_all(text)
 
-    def _on_power(self, action: PowerAction) -> None:
-        self._power, self._power_us = action, 0
+    def _on_power(self, action: PowerAction, starts_again: bool) -> None:
+        self._power, self._power_us, self._starts_again = action, 0, starts_again
 
     def _power_cycle(self, time_us: int) -> None:
         """Shut the autopilot down, to boot after `REBOOT_US` unless it is to stay down; or boot it."""
         if self._power is None:
             self._boot_us, self._power_us = time_us, NEVER_US
-            self.autopilot = self._new_autopilot(unix_epoch_us=self._epoch_us + time_us)
-            self._actuators = self.autopilot.actuators
-            self.links.restart(self.autopilot)
+            self.backend = self._boot(self._epoch_us + time_us)
+            self.links.restart(self.backend.links)
             if self._crew is not None or (self._starts_again and self.vehicle.launcher is not None):
-                self._crew = self._crew_of(self.autopilot.commander)
+                self._crew = self._crew_of(self.backend)
             return
         again = self._power is PowerAction.REBOOT
         self._boot_us = self._power_us = time_us + REBOOT_US if again else NEVER_US
@@ -197,8 +207,8 @@ class SitlVehicle:
         if again and self._starts_again:
             self.vehicle.reset()
             self.crashed = False
-        self._actuators = np.zeros_like(self._actuators)
-        self.autopilot.close()
+        self._actuators = self._off
+        self.backend.close()
         self.links.restart(None)
 
     def open(
@@ -233,10 +243,3 @@ def usual_sensors(specification: VehicleSpec, *, aircraft: bool) -> SensorSuiteP
         timeline = RTK_FIX_AFTER_10_S if specification.gps == "differential" else FIX_AFTER_10_S
     fitted = SensorSuiteParameters.fixed_wing if aircraft else SensorSuiteParameters
     return fitted(gps=GpsParameters.of(specification.gps, fix_timeline=timeline))
-
-
-def _envelope(airframe: Airframe, world_spec: WorldSpec) -> "FlightEnvelope":
-    """The flight envelope of an aircraft, found by trimming its model."""
-    from flightsim.flight_envelope import flight_envelope  # imports scipy, which a multicopter does not need
-
-    return flight_envelope(airframe, home=world_spec.place, environment=world_spec.air)

@@ -128,8 +128,7 @@ class EmbeddedSitl:
         """Parameter values of a vehicle's autopilot, as it would send them; names it does not have are left
         out.
         """
-        store = self.sitl.vehicles[index].autopilot.parameters
-        return {name: store.get(name) for name in names if name in store}
+        return self.sitl.vehicles[index].parameter_values(names)
 
     @property
     def home(self) -> GeodeticPosition:

@@ -11,7 +11,10 @@ from autopilot_bridge.services.microservice import AutopilotParts, Microservice
 def incoming_services(parts: AutopilotParts) -> tuple[Microservice, ...]:
     """The services of one autopilot; a simulated world is connected to the autopilot first."""
     if parts.simulation is not None:
-        parts.simulation.attend(parts)
+        commander = parts.commander
+        parts.simulation.attend(
+            parts.parameters, lambda failed: commander.pilot.lose_signal(failed, commander.time_us)
+        )
     return (
         ExternalOdometryService(parts),
         GpsInputService(parts),
