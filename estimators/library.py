@@ -143,7 +143,7 @@ def parameters_from(found: type[Estimator[Any]], settings: Iterable[str]) -> Any
         name, equals, text = setting.partition("=")
         name = name.strip().replace("-", "_")
         if not (name and equals):
-            raise EstimatorError(f"--set {setting!r} is not NAME=VALUE")
+            raise EstimatorError(f"`settings` {setting!r} is not NAME=VALUE")
         if name not in kinds:
             accepted = ", ".join(kinds) if kinds else "none"
             raise EstimatorError(f"{found.NAME} has no parameter {name!r}; there are: {accepted}")

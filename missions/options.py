@@ -35,12 +35,10 @@ class Via(StrEnum):
 
 
 def check_positive(**options: float | None) -> None:
-    """Refuse specified options that are not above 0; names are those of the command line with _ in place of
-    -.
-    """
+    """Refuse specified options that are not above 0; their names are those of the fields."""
     for name, value in options.items():
         if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise PlanError(f"--{name.replace('_', '-')} {value:g} is not possible; ask for more than 0")
+            raise PlanError(f"`{name}` {value:g} is not possible; ask for more than 0")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,11 +67,13 @@ class MissionOptions:
     given: frozenset[str] | None = None
 
     def __post_init__(self) -> None:
-        check_positive(separation=self.separation_m)
+        check_positive(separation_m=self.separation_m)
         if not 2.5 <= self.rate_hz <= 100.0:
-            raise PlanError(f"--rate {self.rate_hz:g} Hz is not in 2.5..100 Hz, what keeps a vehicle guided")
+            raise PlanError(
+                f"`rate_hz` {self.rate_hz:g} Hz is not in 2.5..100 Hz, what keeps a vehicle guided"
+            )
         if not 1 <= self.vehicles <= 250:
-            raise PlanError(f"--vehicles {self.vehicles} is not in 1..250")
+            raise PlanError(f"`vehicles` {self.vehicles} is not in 1..250")
 
     @property
     def own_altitude_m(self) -> float:
@@ -140,35 +140,33 @@ class FlightOptions(MissionOptions):
     def __post_init__(self) -> None:
         super(FlightOptions, self).__post_init__()
         check_positive(
-            speed=self.speed_m_s,
+            speed_m_s=self.speed_m_s,
             periods=self.periods,
-            acceptance=self.acceptance_m,
-            spacing=self.spacing_m,
-            search_time=self.search_time_s,
-            period=self.period_s,
+            acceptance_m=self.acceptance_m,
+            spacing_m=self.spacing_m,
+            search_time_s=self.search_time_s,
+            period_s=self.period_s,
         )
         for name, bounded, lowest, highest, unit in (
-            ("--periods", self.periods, 0.0, MAX_PERIODS, ""),
-            ("--search-time", self.search_time_s, 0.0, MAX_SEARCH_TIME_S, " s"),
-            ("--speed", self.speed_m_s, MIN_SPEED_M_S, MAX_SPEED_M_S, " m/s"),
-            ("--acceptance", self.acceptance_m, MIN_ACCEPTANCE_M, MAX_ACCEPTANCE_M, " m"),
+            ("periods", self.periods, 0.0, MAX_PERIODS, ""),
+            ("search_time_s", self.search_time_s, 0.0, MAX_SEARCH_TIME_S, " s"),
+            ("speed_m_s", self.speed_m_s, MIN_SPEED_M_S, MAX_SPEED_M_S, " m/s"),
+            ("acceptance_m", self.acceptance_m, MIN_ACCEPTANCE_M, MAX_ACCEPTANCE_M, " m"),
         ):
             if bounded is not None and not lowest <= bounded <= highest:
-                raise PlanError(f"{name} {bounded:g}{unit} is not in {lowest:g}..{highest:g}{unit}")
-        for side_m in (self.width_m, self.height_m):
+                raise PlanError(f"`{name}` {bounded:g}{unit} is not in {lowest:g}..{highest:g}{unit}")
+        for name, side_m in (("width_m", self.width_m), ("height_m", self.height_m)):
             if 0.0 < side_m < MIN_SIDE_M:
                 raise PlanError(
-                    f"--size {side_m:g} m is too small to be flown; ask for {MIN_SIDE_M:g} m or more"
+                    f"`{name}` {side_m:g} m is too small to be flown; ask for {MIN_SIDE_M:g} m or more"
                 )
-        for phase_rad in (self.phase_x_rad, self.phase_y_rad):
+        for name, phase_rad in (("phase_x_rad", self.phase_x_rad), ("phase_y_rad", self.phase_y_rad)):
             if phase_rad is not None and not abs(phase_rad) <= MAX_PHASE_RAD:
-                raise PlanError(f"--phase {math.degrees(phase_rad):g} is not in -3600..3600 degrees")
+                raise PlanError(f"`{name}` {math.degrees(phase_rad):g} degrees is not in -3600..3600 degrees")
         if not math.isfinite(self.heading_rad):
-            raise PlanError(
-                f"--heading {math.degrees(self.heading_rad):g} is not a direction; give degrees, such as 90"
-            )
+            raise PlanError(f"`heading_rad` {self.heading_rad} is not a direction; give a finite angle")
         if self.period_s is not None and self.via is not Via.SETPOINTS:
-            raise PlanError("--period needs --via setpoints: waypoints are flown at a speed, not at times")
+            raise PlanError("`period_s` needs `via=setpoints`: waypoints are flown at a speed, not at times")
 
     def for_vehicle(self, limits: Limits) -> "FlightOptions":
         """Options that were not specified get larger, higher and faster values for a fixed wing than for a

@@ -1,6 +1,7 @@
 """Imports point one way (docs/architecture.md). Read from the sources, so that nothing need be imported."""
 
 import ast
+import re
 from functools import cache
 from pathlib import Path
 
@@ -139,6 +140,31 @@ def test_only_clock_and_shells_know_the_wall_clock():
 def test_kernels_have_the_cache_that_notices_other_modules():
     users = [name for name in MODULES if "numba" in imports_of(name)]
     assert users == ["flightsim.foundation.kernels"]
+
+
+FLAG = re.compile(r"(?<![\w-])--[a-z]")
+
+
+def texts(source):
+    """The string literals of a module, without docstrings."""
+    tree = ast.parse(source)
+    documentation = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    return [
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in documentation
+    ]
+
+
+@pytest.mark.parametrize("name", sorted(name for name in MODULES if not is_in(name, ("missions.cli",))))
+def test_only_the_command_line_knows_options(name):
+    """Errors elsewhere name fields in backquotes; `missions.cli.options` puts the options in their place."""
+    assert [text for text in texts(MODULES[name].read_text(encoding="utf-8")) if FLAG.search(text)] == []
+
+
+def test_the_test_sees_options():
+    found = texts('"""--a"""\nf(f"give --b {x}", "c --- d")')
+    assert [text for text in found if FLAG.search(text)] == ["give --b "]
 
 
 @pytest.mark.parametrize(

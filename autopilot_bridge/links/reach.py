@@ -41,7 +41,7 @@ def open_unsigned(address: Address | str) -> str:
     """The warning for a link that is open to a network and accepts unsigned frames."""
     return (
         f"{address} is open to the network and unsigned: whoever can send there can fly the vehicle; "
-        "give --signing-key FILE, or listen on 127.0.0.1"
+        "give `signing_key` FILE, or listen on 127.0.0.1"
     )
 
 

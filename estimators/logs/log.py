@@ -174,14 +174,14 @@ class Log:
                 recorded in that time, or the boot does not exist.
         """
         clock = self.clock
-        for option, value in (("--from", from_s), ("--to", to_s)):
+        for option, value in (("from_s", from_s), ("to_s", to_s)):
             if value is not None and not (math.isfinite(value) and value >= 0.0):
-                raise LogError(f"{option} {value:g} is no time; give {clock.text}")
+                raise LogError(f"`{option}` {value:g} is no time; give {clock.text}")
         if from_s is not None and to_s is not None and to_s <= from_s:
-            raise LogError(f"--to {to_s:g} is not behind --from {from_s:g}; give a later time")
+            raise LogError(f"`to_s` {to_s:g} is not behind `from_s` {from_s:g}; give a later time")
         boots = int(clock.boot[-1]) + 1
         if boot is not None and not 0 <= boot < boots:
-            raise LogError(f"--boot {boot} is not in {self.path}; it has 0 to {boots - 1}")
+            raise LogError(f"`boot` {boot} is not in {self.path}; it has 0 to {boots - 1}")
         low = -math.inf if from_s is None else from_s * 1e6
         high = math.inf if to_s is None else to_s * 1e6
         timed = (clock.time_us >= low) & (clock.time_us < high)

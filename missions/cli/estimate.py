@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from missions.cli.options import FiniteRange, in_options, report
 from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.types import FiniteRange
 
 if TYPE_CHECKING:
     from missions.estimation.live import LiveProgress
@@ -31,9 +31,9 @@ class _Teller:
             self._told = lacking
             self.end()
             for text in progress.lacking:
-                click.echo(f"flightstack: {text}", err=True)
+                report(text)
             if not lacking:
-                click.echo("flightstack: all that is needed comes now", err=True)
+                report("all that is needed comes now")
         if self._terminal:
             text = f"{progress.time_s:9.1f} s  {progress.estimates} estimates"
             click.echo(f"\r{text:<60}", nl=False, err=True)
@@ -110,15 +110,15 @@ def estimate(**given: Any) -> int:
             teller,
         )
     except (AddressError, BridgeError, EstimatorError, PlanError) as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     finally:
         teller.end()
     for line in table_lines([(given["connect"], result)]):
         click.echo(line)
     for warning in warnings_of(result.summary):
-        click.echo(f"flightstack: {warning}", err=True)
+        report(warning)
     if result.outcome == FAILED:
-        click.echo(f"flightstack: {result.reason}; results in {result.folder} are partial", err=True)
+        report(f"{result.reason}; results in {result.folder} are partial")
         return _FAILED
     samples = result.summary["samples"]
     click.echo(f"{result.outcome}: {samples} estimates; run: {result.folder}")

@@ -11,8 +11,8 @@ from missions.cli.confirm import confirmation
 from missions.cli.fly_command import FlyCommand, chosen_names, flight_option, refuse_idle_options
 from missions.cli.fly_report import KILLED, ProgressLine, leave_closed_terminal, tell
 from missions.cli.mission_command import FlightOption, Scope
+from missions.cli.options import SECONDS, SPEEDUP, in_options
 from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.types import SECONDS, SPEEDUP
 
 if TYPE_CHECKING:
     from missions.cli.mission_command import MissionCommand
@@ -144,7 +144,7 @@ def fly(**given: Any) -> int:
     try:
         return _fly(given)
     except PlanError as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     except KeyboardInterrupt as interrupt:
         click.echo("interrupted", err=True)
         return KILLED + signal_of(interrupt)
@@ -224,7 +224,7 @@ def _fly(given: dict[str, Any]) -> int:
                     given["connect"], yes=given["yes"], check=given["check"], screen=line.held
                 )
         except AddressError as error:
-            raise click.UsageError(str(error)) from error
+            raise click.UsageError(in_options(error)) from error
     try:
         key = key_from(given["signing_key"])
         request = Request(
@@ -261,9 +261,9 @@ def _fly(given: dict[str, Any]) -> int:
             return _export(mission, request, given["export_plan"])
         result = fly_mission(mission, request, line if terminal else None)
     except (AddressError, BridgeError) as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     except MissionError as error:
-        raise click.ClickException(str(error)) from error
+        raise click.ClickException(in_options(error)) from error
     finally:
         leave_closed_terminal()
         line.end()

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from missions.cli.options import report
+
 if TYPE_CHECKING:
     from missions.mission import Mission
     from missions.runs.session import Flight, RunResult
@@ -111,11 +113,11 @@ def tell(result: "RunResult", mission: "Mission[Any]") -> int:
 
     summary = result.summary
     if result.outcome == "interrupted":
-        click.echo(f"flightstack: {result.reason}; the log is in {result.folder}", err=True)
+        report(f"{result.reason}; the log is in {result.folder}")
         return KILLED + result.signal
     if result.outcome == "failed":
         _warn(summary)
-        click.echo(f"flightstack: mission {summary['mission']} failed: {result.reason}", err=True)
+        report(f"mission {summary['mission']} failed: {result.reason}")
         click.echo(f"failed: see {result.folder}")
         return _FAILED
     _warn(summary)
@@ -169,10 +171,10 @@ def _tell_estimator(summary: Mapping[str, Any]) -> int:
                 f"{summary['estimator']}, {subject['subject']}: {subject['estimates']} estimates{told}"
             )
     for warning in warnings_of(summary):
-        click.echo(f"flightstack: {name}: {warning}", err=True)
+        report(f"{name}: {warning}")
     if summary["outcome"] == "completed":
         return 0
-    click.echo(f"flightstack: {name}: {summary['reason']}; results are partial", err=True)
+    report(f"{name}: {summary['reason']}; results are partial")
     return _FAILED
 
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import click
 
 from autopilot_bridge.errors import BridgeError
+from missions.cli.options import FiniteRange, in_options
 from missions.cli.signing import key_from, key_option, warn_if_open
-from missions.cli.types import FiniteRange
 
 if TYPE_CHECKING:
     from estimators.logs import Log
@@ -80,7 +80,7 @@ def _open(path: Path, dialect: str | None) -> "Log":
     try:
         load_dialect(dialect)
     except BridgeError as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     return open_log(path, dialect=dialect)
 
 
@@ -112,14 +112,14 @@ def _select(log: "Log", given: dict[str, Any]) -> "list[Selection]":
     except NothingThere:
         raise  # an error about the content of the log, not about the arguments
     except BridgeError as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
 
 
 def _run(work: Callable[[], None]) -> None:
     try:
         work()
     except BridgeError as error:
-        raise _Failed(str(error)) from error
+        raise _Failed(in_options(error)) from error
 
 
 @click.group()
@@ -222,7 +222,7 @@ def mutate(
         try:
             parsed = [parse_fault(text) for text in faults]
         except BridgeError as error:
-            raise click.UsageError(str(error)) from error
+            raise click.UsageError(in_options(error)) from error
         opened = _open(path, dialect)
         records = mutated_records(opened, _select(opened, given), parsed, seed=seed)
         click.echo(f"written: {out}, {write_records(out, records)} of {len(opened)} messages")
@@ -276,7 +276,7 @@ def play(
             address = parse_address(link)
             key = key_from(signing_key)
         except BridgeError as error:
-            raise click.UsageError(str(error)) from error
+            raise click.UsageError(in_options(error)) from error
         opened = _open(path, dialect)
         selections = _select(opened, given)
         terminal = sys.stderr.isatty()

@@ -1,6 +1,6 @@
 """Data that a running SITL could not write: the log, the signing keys, pictures."""
 
-import click
+from missions.cli.options import report
 
 
 class Losses:
@@ -30,4 +30,4 @@ class Losses:
 
     def _tell(self, text: str) -> None:
         self.any = True
-        click.echo(f"flightstack: {text}", err=True)
+        report(text)

@@ -13,6 +13,7 @@ from typing import Final
 
 import click
 
+from missions.cli.options import report
 from missions.runs.supervision import supervised
 
 _COMMANDS: Final = {
@@ -108,7 +109,7 @@ def run_command_line(arguments: list[str] | None = None) -> int:
         return USAGE
     except click.ClickException as error:
         message = " ".join(error.format_message().split())
-        click.echo(f"flightstack: {message}", err=True)
+        report(message)
         return int(error.exit_code)
     except KeyboardInterrupt:
         click.echo("interrupted", err=True)
@@ -118,7 +119,7 @@ def run_command_line(arguments: list[str] | None = None) -> int:
         if error.filename is None and error.errno in _NOT_WRITTEN:
             _let_go_of_output()
             said = f"can't write the output: {error.strerror}"
-        click.echo(f"flightstack: {said}", err=True)
+        report(said)
         return FAILED
     return result if isinstance(result, int) else DONE
 

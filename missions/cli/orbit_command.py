@@ -8,12 +8,7 @@ from typing import Any, Final
 import click
 
 from missions.cli.mission_command import Given, MissionCommand, Scope, option
-
-
-def _degrees(name: str, value: float) -> float:
-    if not math.isfinite(value):
-        raise click.UsageError(f"--{name} {value} is not a direction; give degrees, such as 90")
-    return math.radians(value)
+from missions.cli.options import radians_of
 
 
 def _place(text: str) -> tuple[float, float]:
@@ -44,12 +39,12 @@ def _build(given: Given, common: Mapping[str, Any]) -> Any:
         airspeed_m_s=given["airspeed"],
         target_ne_m=_place(given["target"]),
         target_speed_m_s=given["target_speed"],
-        target_heading_rad=_degrees("target-heading", given["target_heading"]),
+        target_heading_rad=radians_of("--target-heading", given["target_heading"]),
         target_motion=None if motion is None else TargetMotion(motion),
         target_ground_m=given["target_ground"],
-        entry_bearing_rad=_degrees("entry-bearing", given["entry_bearing"]),
+        entry_bearing_rad=radians_of("--entry-bearing", given["entry_bearing"]),
         entry_distance_m=given["entry_distance"],
-        entry_heading_rad=None if heading is None else _degrees("entry-heading", heading),
+        entry_heading_rad=None if heading is None else radians_of("--entry-heading", heading),
         gps_fault=not given["no_gps_fault"],
         gps_off=GpsOff(given["gps_off"]),
         lost_limit_s=given["lost_limit"],

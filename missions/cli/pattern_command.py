@@ -8,6 +8,7 @@ from typing import Any, Final
 import click
 
 from missions.cli.mission_command import FlightOption, Given, MissionCommand, option
+from missions.cli.options import radians_of
 
 _WINGS: Final = " Aircraft: {}."
 
@@ -30,7 +31,7 @@ def _shape(given: Given) -> dict[str, Any]:
     from missions.options import parse_pair
 
     if "pattern" not in given:
-        shape = {"heading_rad": math.radians(given["heading"])}
+        shape = {"heading_rad": radians_of("--heading", given["heading"])}
         return shape | ({"spacing_m": given["spacing"]} if "spacing" in given else {})
     phase_x_deg = phase_y_deg = None
     if given["phase"] is not None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from missions.cli.types import FiniteRange
+from missions.cli.options import FiniteRange, in_options, report
 
 if TYPE_CHECKING:
     from missions.estimation.report import EstimationResult
@@ -79,11 +79,9 @@ def replay(**given: Any) -> int:
 
     def on_done(label: str, result: "EstimationResult | str") -> None:
         if isinstance(result, str):
-            click.echo(f"flightstack: {result}", err=True)
+            report(result)
         elif failed(result):
-            click.echo(
-                f"flightstack: {label}: {result.reason}; results in {result.folder} are partial", err=True
-            )
+            report(f"{label}: {result.reason}; results in {result.folder} are partial")
         elif terminal and several:
             click.echo(f"{label}: done", err=True)
 
@@ -105,7 +103,7 @@ def replay(**given: Any) -> int:
         check_out(request)
         results = replay_logs(request, on_done)
     except (EstimatorError, LogError, PlanError) as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     done = [(label, result) for label, result in results if isinstance(result, EstimationResult)]
     for line in table_lines(done):
         click.echo(line)
@@ -113,7 +111,7 @@ def replay(**given: Any) -> int:
         for note in notes_of(result.summary):
             click.echo(f"{label}: {note}")
         for warning in warnings_of(result.summary):
-            click.echo(f"flightstack: {label}: {warning}", err=True)
+            report(f"{label}: {warning}")
         samples, speed = result.summary["samples"], result.summary["wall_time_s"]
         click.echo(f"{label}: {result.outcome}, {samples} estimates in {speed:.2f} s; run: {result.folder}")
     return _FAILED if any(failed(result) for _, result in results) else 0

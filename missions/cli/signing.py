@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from missions.cli.options import report
+
 if TYPE_CHECKING:
     from autopilot_bridge.links import Address
     from autopilot_bridge.mavlink import SigningKey
@@ -43,7 +45,7 @@ def warn_if_open(connections: Iterable[str], key: "SigningKey | None") -> None:
 
     for address in map(parse_address, connections) if key is None else ():
         if listens_to_network(address):
-            click.echo(f"flightstack: warning: {open_unsigned(address)}", err=True)
+            report(f"warning: {open_unsigned(address)}")
 
 
 def vehicle_signing(
@@ -90,4 +92,4 @@ def warn_if_unsigned(address: "Address", signing: "SigningParameters") -> None:
     reach = reach_of(address)
     required = signing.key is not None and not POLICIES[signing.unsigned_from][reach].accept_unsigned
     if reach is Reach.NETWORK and not required:
-        click.echo(f"flightstack: warning: {open_unsigned(address)}", err=True)
+        report(f"warning: {open_unsigned(address)}")

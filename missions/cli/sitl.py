@@ -10,10 +10,10 @@ import click
 
 from autopilot_bridge.errors import BridgeError, TlogError
 from missions.cli.losses import Losses
+from missions.cli.options import SLOWEST, FiniteRange, in_options
 from missions.cli.scenario import scenario_of
 from missions.cli.signing import key_option, signed_how, vehicle_signing, warn_if_unsigned
 from missions.cli.storage import VehicleCards, storage_option
-from missions.cli.types import SLOWEST, FiniteRange
 from missions.cli.video import start_video, video_options
 from missions.runs.end_requests import EndRequests
 
@@ -277,7 +277,7 @@ def sitl(
             if log is not None:  # created last, when no other check can still fail
                 at_end.enter_context(_recording(world, log, autopilot, losses))
         except (ValueError, OSError, BridgeError) as error:
-            raise click.UsageError(str(error)) from error
+            raise click.UsageError(in_options(error)) from error
         for vehicle, port, address in opened:
             system_id = vehicle.specification.system_id
             kind = f"{autopilot} {vehicle.specification.model}"

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from missions.cli.options import in_options, report
+
 if TYPE_CHECKING:
     from missions.studies.lissajous_setting import Equations
 
@@ -85,7 +87,7 @@ def lissajous_localization(
     try:
         folder = create_run_folder(out, "lissajous-localization")
     except PlanError as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     return _lissajous_localization(runs, seed, workers, _readings(equations), folder, not no_picture, bar)
 
 
@@ -145,6 +147,6 @@ def _lissajous_localization(
         ) from error
     click.echo(f"run: {folder}")
     if not result.complete:
-        click.echo(f"flightstack: {result.failure or 'interrupted'}; what was done is in {folder}", err=True)
+        report(f"{result.failure or 'interrupted'}; what was done is in {folder}")
         return _FAILED if result.failure else _INTERRUPTED
     return 0

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from missions.cli.options import FiniteRange, in_options
 from missions.cli.question import YES_WORDS, ask, is_yes, somebody_is_there
-from missions.cli.types import FiniteRange
 
 if TYPE_CHECKING:
     from autopilot_bridge.links import Address
@@ -52,7 +52,7 @@ def address(text: str) -> "Address":
     try:
         return parse_address(text, VEHICLE_FORMS)
     except AddressError as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
@@ -64,9 +64,9 @@ def run(work: Coroutine[Any, Any, T]) -> T:
     try:
         return asyncio.run(work)
     except (PlanError, ParameterError) as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     except (MissionError, BridgeError) as error:
-        raise click.ClickException(str(error)) from error
+        raise click.ClickException(in_options(error)) from error
 
 
 def with_client(

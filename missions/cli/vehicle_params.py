@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from missions.cli.options import in_options, report
 from missions.cli.vehicle_link import FAILED, confirm, connected, print_json, with_client
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def list_(pattern: str, **given: Any) -> int:
     kept = {name: value for name, value in values.items() if fnmatch.fnmatchcase(name, pattern.upper())}
     _tell_values(kept, as_json=given["as_json"])
     if not kept:
-        click.echo(f"flightstack: no parameter matches {pattern!r} among {len(values)}", err=True)
+        report(f"no parameter matches {pattern!r} among {len(values)}")
     return 0 if kept else FAILED
 
 
@@ -102,7 +103,7 @@ def save(file: Path, **given: Any) -> int:
         with new_file(file) as part:
             part.write_text(text, encoding="utf-8")
     except LogError as error:
-        raise click.UsageError(str(error)) from error
+        raise click.UsageError(in_options(error)) from error
     if given["as_json"]:
         print_json({"file": str(file), "parameters": count})
     else:
@@ -138,9 +139,9 @@ def load(file: Path, yes: bool, **given: Any) -> int:
     else:
         click.echo(f"{done} {'parameter' if done == 1 else 'parameters'} set")
     for text in refused:
-        click.echo(f"flightstack: {text}", err=True)
+        report(text)
     if unknown:
-        click.echo(f"flightstack: the vehicle has no {', '.join(unknown)}", err=True)
+        report(f"the vehicle has no {', '.join(unknown)}")
     return FAILED if refused or unknown else 0
 
 

@@ -23,7 +23,7 @@ def estimators_of(request: RunRequest, known: Mapping[str, float]) -> "FlightEst
     if request.estimator is None:
         if request.estimator_settings:
             raise PlanError(
-                f"{request.estimator_settings[0]!r} is for an estimator; name one with --estimator"
+                f"{request.estimator_settings[0]!r} is for an estimator; name one with `estimator`"
             )
         return None
     from estimators.errors import EstimatorError

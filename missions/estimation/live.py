@@ -274,7 +274,7 @@ def estimate(
     parameters = parameters_from(found, request.settings)
     address = parse_address(request.connect, VEHICLE_FORMS)
     if isinstance(address, ReplayLog):
-        raise EstimatorError(f"--connect {address}: that is a log; use flightstack replay {address}")
+        raise EstimatorError(f"`connect` {address}: that is a log; use flightstack replay {address}")
 
     def make() -> Estimator[Any]:
         return found(parameters)

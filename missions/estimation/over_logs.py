@@ -157,9 +157,9 @@ def check_out(request: ReplayRequest) -> None:
     if out is None:
         return
     if out.exists() and not out.is_dir():
-        raise PlanError(f"{out} is a file; choose a folder with --out")
+        raise PlanError(f"{out} is a file; choose a folder with `out`")
     if out.is_dir() and any(out.iterdir()):
-        raise PlanError(f"{out} is not empty, and nothing is overwritten; choose another --out")
+        raise PlanError(f"{out} is not empty, and nothing is overwritten; choose another `out`")
 
 
 def failed(result: EstimationResult | str) -> bool:

@@ -27,10 +27,10 @@ class DecisionParameters:
 
     def __post_init__(self) -> None:
         if not 1 <= self.neighbourhood <= 20:
-            raise PlanError(f"--neighbourhood {self.neighbourhood} is not in 1..20 cells")
+            raise PlanError(f"`neighbourhood` {self.neighbourhood} is not in 1..20 cells")
         if not (math.isfinite(self.heading_penalty) and self.heading_penalty > 0.0):
             raise PlanError(
-                f"--heading-penalty {self.heading_penalty:g} is not possible; ask for more than 0"
+                f"`heading_penalty` {self.heading_penalty:g} is not possible; ask for more than 0"
             )
 
 

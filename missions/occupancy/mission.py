@@ -69,7 +69,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
 
     def check(self, options: OccupancyOptions, limits: Limits) -> None:
         for name in options.arguments:
-            raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
+            raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
         check_vehicle(options, limits)
         if options.map_file is not None:
             layout = options.layout
@@ -78,7 +78,7 @@ class OccupancyMission(Mission[OccupancyOptions]):
                 north_m=layout.north_m,
                 west_m=layout.west_m,
                 east_m=layout.east_m,
-                what=f"the searched area (--size {options.width_m:g}x{options.height_m:g})",
+                what=f"the searched area (`width_m, height_m` {options.width_m:g}x{options.height_m:g})",
             )
 
     def check_place(self, options: OccupancyOptions, limits: Limits, home: GeodeticPosition) -> None:
@@ -118,7 +118,9 @@ class OccupancyMission(Mission[OccupancyOptions]):
         elif world is not None:
             map_path = world.map_path
         else:
-            raise PlanError("a search needs the published magnetic map of its place: give it with --map FILE")
+            raise PlanError(
+                "a search needs the published magnetic map of its place: give it with `map_file` FILE"
+            )
         team = SearchTeam(vehicles, options, load_survey_map(map_path))
         self._flown = _Flown(
             first_notes=vehicles[0].notes,

@@ -58,8 +58,8 @@ async def require_quiet(vehicle: "Vehicle", *, threshold_nt: float) -> float:
     noise_nt = white_noise_nt(readings_nt)
     if threshold_nt < LEAST_SIGMAS * noise_nt:
         raise PlanError(
-            f"--threshold {threshold_nt:g} nT is below {LEAST_SIGMAS:g} times the noise of vehicle "
+            f"`threshold_nt` {threshold_nt:g} nT is below {LEAST_SIGMAS:g} times the noise of vehicle "
             f"{vehicle.system_id}'s magnetometer, {noise_nt:.2f} nT: noise would make anomalies; raise "
-            f"--threshold to {math.ceil(10.0 * LEAST_SIGMAS * noise_nt) / 10.0:g} or more"
+            f"`threshold_nt` to {math.ceil(10.0 * LEAST_SIGMAS * noise_nt) / 10.0:g} or more"
         )
     return noise_nt

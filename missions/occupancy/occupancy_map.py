@@ -42,16 +42,16 @@ class GridLayout:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.cell_m) and self.cell_m > 0.0):
-            raise PlanError(f"--cell {self.cell_m:g} m is not possible; ask for more than 0")
+            raise PlanError(f"`cell_m` {self.cell_m:g} m is not possible; ask for more than 0")
         if self.rows < 2 or self.columns < 2:
             raise PlanError(
-                f"--cell {self.cell_m:g} m leaves {self.rows} x {self.columns} cells in the area; "
-                "ask for smaller cells or a larger --size: at least 2 x 2 make a map"
+                f"`cell_m` {self.cell_m:g} m leaves {self.rows} x {self.columns} cells in the area; "
+                "ask for smaller cells or a larger `width_m, height_m`: at least 2 x 2 make a map"
             )
         if self.rows * self.columns > MAX_CELLS:
             raise PlanError(
-                f"--cell {self.cell_m:g} m makes {self.rows * self.columns} cells, more than {MAX_CELLS}; "
-                "ask for larger cells or a smaller --size"
+                f"`cell_m` {self.cell_m:g} m makes {self.rows * self.columns} cells, more than {MAX_CELLS}; "
+                "ask for larger cells or a smaller `width_m, height_m`"
             )
 
     @classmethod
@@ -60,7 +60,7 @@ class GridLayout:
     ) -> "GridLayout":
         """Cells over `width_m` (east) by `height_m` (north) around a centre; partial cells are left out."""
         if not (math.isfinite(cell_m) and cell_m > 0.0):
-            raise PlanError(f"--cell {cell_m:g} m is not possible; ask for more than 0")
+            raise PlanError(f"`cell_m` {cell_m:g} m is not possible; ask for more than 0")
         rows, columns = math.floor(height_m / cell_m + 1e-9), math.floor(width_m / cell_m + 1e-9)
         return cls(
             south_m=centre_ne_m[0] - 0.5 * rows * cell_m,

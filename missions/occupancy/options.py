@@ -84,53 +84,55 @@ class OccupancyOptions(MissionOptions):
     def __post_init__(self) -> None:
         super(OccupancyOptions, self).__post_init__()
         check_positive(
-            altitude=self.altitude_m,
-            search_time=self.search_time_s,
-            noise=self.noise_nt,
-            threshold=self.threshold_nt,
-            speed=self.speed_m_s,
+            altitude_m=self.altitude_m,
+            search_time_s=self.search_time_s,
+            noise_nt=self.noise_nt,
+            threshold_nt=self.threshold_nt,
+            speed_m_s=self.speed_m_s,
         )
-        for side_m in (self.width_m, self.height_m):
+        for name, side_m in (("width_m", self.width_m), ("height_m", self.height_m)):
             if not 0.0 < side_m <= LARGEST_SIDE_M:
                 raise PlanError(
-                    f"--size {side_m:g} m is not possible; ask for more than 0, up to {LARGEST_SIDE_M:g} m"
+                    f"`{name}` {side_m:g} m is not possible; ask for more than 0, up to {LARGEST_SIDE_M:g} m"
                 )
         if not all(math.isfinite(value) for value in self.area_ne_m):
             raise PlanError(
-                f"--area {self.area_ne_m[0]:g},{self.area_ne_m[1]:g} is not a place; give NORTH,EAST"
+                f"`area_ne_m` {self.area_ne_m[0]:g},{self.area_ne_m[1]:g} is not a place; give NORTH,EAST"
             )
         if not self.search_time_s <= MAX_SEARCH_TIME_S:
             raise PlanError(
-                f"--search-time {self.search_time_s:g} s is more than {MAX_SEARCH_TIME_S:g} s, a whole day"
+                f"`search_time_s` {self.search_time_s:g} s is more than {MAX_SEARCH_TIME_S:g} s, a whole day"
             )
         if not self.threshold_nt >= LEAST_SIGMAS * self.noise_nt:
             raise PlanError(
-                f"--threshold {self.threshold_nt:g} nT is below {LEAST_SIGMAS:g} standard deviations of the "
-                f"noise, {LEAST_SIGMAS * self.noise_nt:g} nT: noise would make anomalies; raise --threshold, "
-                "or give the --noise of a better magnetometer"
+                f"`threshold_nt` {self.threshold_nt:g} nT is below {LEAST_SIGMAS:g} standard deviations of "
+                "the "
+                f"noise, {LEAST_SIGMAS * self.noise_nt:g} nT: noise would make anomalies; raise "
+                "`threshold_nt`, "
+                "or give the `noise_nt` of a better magnetometer"
             )
-        for name, value in (("--sigma", self.sigma_along_m), ("--sigma", self.sigma_across_m)):
+        for name, value in (("sigma_along_m", self.sigma_along_m), ("sigma_across_m", self.sigma_across_m)):
             if not (math.isfinite(value) and value > 0.0):
-                raise PlanError(f"{name} {value:g} m of the target is not possible; ask for more than 0")
+                raise PlanError(f"`{name}` {value:g} m of the target is not possible; ask for more than 0")
         if not (math.isfinite(self.amplitude_nt) and abs(self.amplitude_nt) > self.threshold_nt):
             raise PlanError(
-                f"--amplitude {self.amplitude_nt:g} nT of the target is not beyond --threshold "
+                f"`amplitude_nt` {self.amplitude_nt:g} nT of the target is not beyond `threshold_nt` "
                 f"{self.threshold_nt:g} nT: no pass could see it; lower the threshold"
             )
         if self.map_error_nt is not None:
             MapError(sigma_nt=self.map_error_nt)
-        check_positive(moment=self.moment_a_m2)
+        check_positive(moment_a_m2=self.moment_a_m2)
         if not (math.isfinite(self.depth_m) and abs(self.depth_m) <= LARGEST_DEPTH_M):
             raise PlanError(
-                f"--depth {self.depth_m:g} m of the target is not within {LARGEST_DEPTH_M:g} m of home"
+                f"`depth_m` {self.depth_m:g} m of the target is not within {LARGEST_DEPTH_M:g} m of home"
             )
         layout = self.layout  # these constructors refuse impossible values
         _ = self.search_parameters, self.decision_parameters
         if self.target_ne_m is not None and not layout.contains(*self.target_ne_m):
             raise PlanError(
-                f"--target {self.target_ne_m[0]:g},{self.target_ne_m[1]:g} is outside the searched map, "
+                f"`target_ne_m` {self.target_ne_m[0]:g},{self.target_ne_m[1]:g} is outside the searched map, "
                 f"which reaches from north {layout.south_m:g} to {layout.north_m:g} m and east "
-                f"{layout.west_m:g} to {layout.east_m:g} m; move it, or ask for a larger --size"
+                f"{layout.west_m:g} to {layout.east_m:g} m; move it, or ask for a larger `width_m, height_m`"
             )
 
     @property
@@ -202,7 +204,7 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
     if not reach_m <= limits.reach_m:
         raise PlanError(
             f"the searched area reaches {reach_m:.0f} m from the map's home, more than {limits.reach_m:g} m; "
-            "ask for a smaller --size, or an --area nearer to it"
+            "ask for a smaller `width_m, height_m`, or an `area_ne_m` nearer to it"
         )
     speed_m_s = options.speed_m_s
     if speed_m_s is None:
@@ -215,10 +217,10 @@ def check_vehicle(options: OccupancyOptions, limits: Limits) -> None:
     if options.neighbourhood * options.cell_m < radius_m:
         larger_m = 10.0 * math.ceil(0.1 * radius_m / options.neighbourhood)
         raise PlanError(
-            f"--cell {options.cell_m:g} m is too small for an aircraft whose turns have a radius of "
+            f"`cell_m` {options.cell_m:g} m is too small for an aircraft whose turns have a radius of "
             f"{radius_m:.0f} m at {speed_m_s:g} m/s in {limits.wind_m_s:.3g} m/s of wind: the cells "
-            f"beside it are out of reach; ask for --cell {larger_m:g} or more, a larger --neighbourhood, "
-            "or less --speed"
+            f"beside it are out of reach; ask for `cell_m` {larger_m:g} or more, a larger `neighbourhood`, "
+            "or less `speed_m_s`"
         )
 
 
@@ -245,5 +247,5 @@ def check_reach(options: OccupancyOptions, limits: Limits, frame: LocalFrame, ho
         raise PlanError(
             f"the searched area reaches {farthest_m:.0f} m from the vehicle's home, which is at north "
             f"{north_m:.0f} m, east {east_m:.0f} m of the map's home; accepted: up to {limits.reach_m:g} m. "
-            "Choose --area, a smaller --size, or the map of this place"
+            "Choose `area_ne_m`, a smaller `width_m, height_m`, or the map of this place"
         )

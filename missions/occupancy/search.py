@@ -53,10 +53,9 @@ class SearchParameters:
         for name in ("raise_radius_m", "raise_height", "same_place_m", "noise_nt"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
-                option = name.removesuffix("_m").removesuffix("_nt").replace("_", "-")
-                raise PlanError(f"--{option} {value:g} is not more than 0")
+                raise PlanError(f"`{name}` {value:g} is not more than 0")
         if self.confirmations < 1:
-            raise PlanError(f"--confirmations {self.confirmations} is not 1 or more")
+            raise PlanError(f"`confirmations` {self.confirmations} is not 1 or more")
 
 
 @dataclass(slots=True, kw_only=True)

@@ -83,7 +83,7 @@ class SearchTeam:
             north_m=layout.north_m,
             west_m=layout.west_m,
             east_m=layout.east_m,
-            what=f"the searched area (--size {first.width_m:g}x{first.height_m:g})",
+            what=f"the searched area (`width_m, height_m` {first.width_m:g}x{first.height_m:g})",
         )
         self.search = Search(layout, first.search_parameters, [own.decision_parameters for own in options])
         self.searchers = [

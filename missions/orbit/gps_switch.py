@@ -61,12 +61,13 @@ class GpsSwitch:
             return cls(vehicle, values, before)
         names = ", ".join(name for values in _FUSION[firmware] for name in values)
         by_parameter = (
-            "" if way is GpsOff.PARAMETER else f", or with --gps-off parameter ({names}, restored afterwards)"
+            "" if way is GpsOff.PARAMETER else f", or with `gps_off=parameter` ({names}, restored afterwards)"
         )
         allow = ", or allow the command (SYS_FAILURE_EN 1)" if firmware == "px4" and answer else ""
         tried = f"{command_name(_INJECT)}: {answer}" if answer else "it has none of the parameters for it"
         raise MissionError(
-            f"GPS can't be switched off in flight ({tried}); fly with --no-gps-fault to orbit without using "
+            f"GPS can't be switched off in flight ({tried}); fly with `gps_fault=False` to orbit without "
+            "using "
             f"it{by_parameter}{allow}"
         )
 

@@ -23,7 +23,7 @@ class OrbitMission(Mission[OrbitOptions]):
 
     def check(self, options: OrbitOptions, limits: Limits) -> None:
         for name in options.arguments:
-            raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
+            raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
         options.check(limits)
 
     def scenario(self, options: OrbitOptions, setting: Setting) -> Scenario:

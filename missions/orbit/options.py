@@ -86,28 +86,28 @@ class OrbitOptions(MissionOptions):
     def __post_init__(self) -> None:
         super(OrbitOptions, self).__post_init__()
         check_positive(
-            radius=self.radius_m,
-            duration=self.duration_s,
-            airspeed=self.airspeed_m_s,
-            entry_distance=self.entry_distance_m,
-            lost_limit=self.lost_limit_s,
+            radius_m=self.radius_m,
+            duration_s=self.duration_s,
+            airspeed_m_s=self.airspeed_m_s,
+            entry_distance_m=self.entry_distance_m,
+            lost_limit_s=self.lost_limit_s,
         )
         if self.direction not in (-1, 1):
-            raise PlanError(f"--direction {self.direction} is not cw or ccw")
+            raise PlanError(f"`direction` {self.direction} is not 1 (clockwise) or -1")
         if not 0.0 <= self.target_speed_m_s <= 15.0:
-            raise PlanError(f"--target-speed {self.target_speed_m_s:g} m/s is not in 0..15 m/s")
+            raise PlanError(f"`target_speed_m_s` {self.target_speed_m_s:g} m/s is not in 0..15 m/s")
         if not 1.0 <= self.duration_s <= 6 * 3600.0:
-            raise PlanError(f"--duration {self.duration_s:g} s is not in 1..21600 s")
+            raise PlanError(f"`duration_s` {self.duration_s:g} s is not in 1..21600 s")
         if not all(math.isfinite(value) for value in self.target_ne_m):
-            raise PlanError("--target is not a place; give NORTH,EAST in metres from home")
+            raise PlanError("`target_ne_m` is not a place; give NORTH,EAST in metres from home")
         if not math.isfinite(self.target_ground_m):
             raise PlanError(
-                f"--target-ground {self.target_ground_m:g} m is not a height; give metres above home"
+                f"`target_ground_m` {self.target_ground_m:g} m is not a height; give metres above home"
             )
         if self.target_motion not in (None, TargetMotion.STATIC) and self.target_speed_m_s == 0.0:
-            raise PlanError(f"--target-motion {self.target_motion} needs a --target-speed of more than 0")
+            raise PlanError(f"`target_motion` {self.target_motion} needs a `target_speed_m_s` of more than 0")
         if self.target_motion is TargetMotion.STATIC and self.target_speed_m_s > 0.0:
-            raise PlanError("--target-motion static leaves no --target-speed; choose one")
+            raise PlanError("`target_motion=static` leaves no `target_speed_m_s`; choose one")
 
     @property
     def motion(self) -> TargetMotion:
@@ -154,7 +154,7 @@ class OrbitOptions(MissionOptions):
             PlanError: names the reason and what to change.
         """
         if not isinstance(limits, FixedWingLimits):
-            raise PlanError("orbit is flown by aircraft with wings; choose --model aerosonde, or another one")
+            raise PlanError("orbit is flown by aircraft with wings; choose `model=aerosonde`, or another one")
         airspeed_m_s = self.airspeed(limits)
         limits.check_airspeed(airspeed_m_s)
         limits.check_separation(self.separation_m, self.vehicles)
@@ -163,7 +163,7 @@ class OrbitOptions(MissionOptions):
         if not reach_m <= limits.reach_m:
             raise PlanError(
                 f"the entry of the orbit may be {reach_m:.0f} m from home, more than {limits.reach_m:g} m; "
-                "ask for a --target nearer to home, or a smaller --entry-distance"
+                "ask for a `target_ne_m` nearer to home, or a smaller `entry_distance_m`"
             )
         least_m = limits.turn_radius_m(airspeed_m_s, drift_m_s=self.target_speed_m_s)
         if self.radius_m < least_m:
@@ -174,13 +174,13 @@ class OrbitOptions(MissionOptions):
                 f"{self.target_speed_m_s:g} m/s, "
                 f"{math.degrees(limits.bank_max_rad):.0f} degrees of bank ({limits.bank_parameter}) make "
                 "a circle of "
-                f"{least_m:.0f} m or more; ask for --radius {10.0 * math.ceil(0.1 * least_m):g}, or a "
-                "lower --airspeed"
+                f"{least_m:.0f} m or more; ask for `radius_m` {10.0 * math.ceil(0.1 * least_m):g}, or a "
+                "lower `airspeed_m_s`"
             )
         if self.height_over_target_m <= 0.0:
             raise PlanError(
                 f"the target's ground, {self.target_ground_m:g} m above home, is not below the aircraft at "
-                f"{self.own_altitude_m:g} m; change --altitude"
+                f"{self.own_altitude_m:g} m; change `altitude_m`"
             )
         depression = math.atan2(self.height_over_target_m, self.radius_m)
         if depression < LEAST_DEPRESSION_RAD:
@@ -189,8 +189,8 @@ class OrbitOptions(MissionOptions):
                 "would be seen "
                 f"only {math.degrees(depression):.1f} degrees below the horizon, too flat to measure its "
                 "distance; "
-                f"{math.degrees(LEAST_DEPRESSION_RAD):g} are needed: ask for a higher --altitude or a "
-                "smaller --radius"
+                f"{math.degrees(LEAST_DEPRESSION_RAD):g} are needed: ask for a higher `altitude_m` or a "
+                "smaller `radius_m`"
             )
 
     def check_camera(self, limits: FixedWingLimits, pitch_min_rad: float, pitch_max_rad: float) -> None:
@@ -211,7 +211,7 @@ class OrbitOptions(MissionOptions):
                     f"on the orbit the target would be {math.degrees(elevation):.0f} degrees above the "
                     "wing's plane, "
                     f"outside what the camera's gimbal reaches ({math.degrees(pitch_min_rad):.0f} to "
-                    f"{math.degrees(pitch_max_rad):.0f} degrees); change --radius or --altitude"
+                    f"{math.degrees(pitch_max_rad):.0f} degrees); change `radius_m` or `altitude_m`"
                 )
 
 

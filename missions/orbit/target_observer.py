@@ -77,7 +77,7 @@ class TargetObserver:
             if self.filter.newest is not None:
                 return
         raise MissionError(
-            f"the attitude filter receives neither {' nor '.join(_INERTIAL)}; fly with --attitude autopilot; "
+            f"the attitude filter receives neither {' nor '.join(_INERTIAL)}; fly with `attitude=autopilot`; "
             f"{vehicle.heard()}"
         )
 

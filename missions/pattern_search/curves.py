@@ -40,7 +40,8 @@ def _check_length(length_m: float, options: FlightOptions) -> None:
     if length_m > most_m:
         raise PlanError(
             f"the pattern is about {1e-3 * length_m:.4g} km long, more than {1e-3 * most_m:g} km; "
-            "ask for less --periods or --search-time, a smaller --size, a wider --spacing, a simpler --ratio"
+            "ask for less `periods` or `search_time_s`, a smaller `width_m, height_m`, a wider `spacing_m`, "
+            "a simpler `ratio`"
         )
 
 
@@ -55,7 +56,7 @@ def _passes(options: FlightOptions, one_pass_m: float) -> int:
     if options.search_time_s is not None:
         return max(1, math.ceil(options.search_time_s * options.speed_m_s / one_pass_m))
     if not float(options.periods).is_integer():
-        raise PlanError(f"--periods {options.periods:g}: this pattern is flown in whole passes")
+        raise PlanError(f"`periods` {options.periods:g}: this pattern is flown in whole passes")
     return int(options.periods)
 
 
@@ -171,9 +172,9 @@ def _require_room(options: FlightOptions, side_m: float, spacings: float, limits
     spacing_m = spacing_for_turns_m(options.speed_m_s, limits)
     if not options.chosen("spacing_m") and side_m < spacings * spacing_m:
         raise PlanError(
-            f"--size {side_m:g} m has no room for the aircraft's turns: at {options.speed_m_s:g} m/s in "
-            f"{limits.wind_m_s:.3g} m/s of wind tracks must be {spacing_m:g} m apart; ask for "
-            f"--size {spacings * spacing_m:g} or more, or less --speed"
+            f"`width_m, height_m` {side_m:g} m has no room for the aircraft's turns: "
+            f"at {options.speed_m_s:g} m/s in {limits.wind_m_s:.3g} m/s of wind tracks must be "
+            f"{spacing_m:g} m apart; ask for `width_m, height_m` {spacings * spacing_m:g} or more, or less `speed_m_s`"
         )
 
 

@@ -60,7 +60,7 @@ def plan_pattern(curve: Curve, options: FlightOptions, limits: MulticopterLimits
     altitude_m = options.own_altitude_m
     if options.period_s is not None:
         if not is_lissajous(curve):
-            raise PlanError("--period is for lissajous patterns; choose --speed for this one")
+            raise PlanError("`period_s` is for lissajous patterns; choose `speed_m_s` for this one")
         return natural_trajectory(
             curve,
             fundamental_period_s=_fundamental_period_s(curve, options.period_s),

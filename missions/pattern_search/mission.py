@@ -44,7 +44,7 @@ class PatternMission(Mission[FlightOptions]):
 
     def check(self, options: FlightOptions, limits: Limits) -> None:
         for name in options.arguments:
-            raise PlanError(f"--arg {name}: {self.name} takes none; they are for missions of your own")
+            raise PlanError(f"`arguments` {name}: {self.name} takes none; they are for missions of your own")
         check_pattern(self.curve(options), options, limits)
 
     def curve(self, options: FlightOptions) -> Curve:

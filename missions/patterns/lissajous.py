@@ -51,7 +51,7 @@ class Lissajous:
             if not (math.isfinite(value) and value > 0.0):
                 raise PlanError(
                     f"frequency {value:g} of axis {name} is not possible; "
-                    "ask for more than 0, as in --ratio 3:4"
+                    "ask for more than 0, as in `ratio=3:4`"
                 )
         for value in (self.phase_x_rad, self.phase_y_rad):
             if not math.isfinite(value):

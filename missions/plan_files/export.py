@@ -34,12 +34,12 @@ def export_plan(mission: Mission[Any], request: RunRequest, path: Path) -> int:
 
     check_suffix(path)
     if request.options.vehicles > 1:
-        raise PlanError("a mission file is for one vehicle; leave --vehicles out")
+        raise PlanError("a mission file is for one vehicle; leave `vehicles` out")
     if type(mission).plan_items is Mission.plan_items:
         raise PlanError(f"mission {mission.name} is not flown by uploaded waypoints; there is no file of it")
     if request.connect and request.parameters:
         raise PlanError(
-            "parameters are set before a flight, and this is none: leave --params out, or set them first "
+            "parameters are set before a flight, and this is none: leave `parameters` out, or set them first "
             "with flightstack vehicle params load"
         )
     exported = _Exported(mission, path)

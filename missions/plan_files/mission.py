@@ -58,23 +58,23 @@ class FileMission(Mission[FileOptions]):
     def check(self, options: FileOptions, limits: Limits) -> None:
         for name in options.arguments:
             raise PlanError(
-                f"--arg {name}: {self.document.path} takes none; they are for missions of your own"
+                f"`arguments` {name}: {self.document.path} takes none; they are for missions of your own"
             )
         wings = isinstance(limits, FixedWingLimits)
         kind = VehicleKind.FIXED_WING if wings else VehicleKind.MULTICOPTER
         if self.document.kind not in (None, kind):
             raise PlanError(
                 f"{self.document.path} is for a {self.document.kind}, and the vehicle is a {kind}; choose "
-                "another vehicle (--model, --connect), or plan it for this one"
+                "another vehicle (`model`, `connect`), or plan it for this one"
             )
         if wings and not self.document.lands and options.then is None:
             raise PlanError(
-                f"{self.document.path} does not land; add a landing, or say what comes after it: --then land "
-                "(along the runway, at home) or --then return"
+                f"{self.document.path} does not land; add a landing, or say what comes after it: `then=land` "
+                "(along the runway, at home) or `then=return`"
             )
         if options.time_limit_s is None and route_of(self.document, self._plan_home).endless:
             raise PlanError(
-                f"{self.document.path} jumps back for ever; say when it ends with --time-limit SECONDS"
+                f"{self.document.path} jumps back for ever; say when it ends with `time_limit_s` SECONDS"
             )
 
     def check_place(self, options: FileOptions, limits: Limits, home: GeodeticPosition) -> None:

@@ -30,8 +30,8 @@ class FileOptions(MissionOptions):
 
     def __post_init__(self) -> None:
         super(FileOptions, self).__post_init__()
-        check_positive(time_limit=self.time_limit_s)
+        check_positive(time_limit_s=self.time_limit_s)
         if self.time_limit_s is not None and self.time_limit_s > MAX_SEARCH_TIME_S:
-            raise PlanError(f"--time-limit {self.time_limit_s:g} s is more than {MAX_SEARCH_TIME_S:g} s")
+            raise PlanError(f"`time_limit_s` {self.time_limit_s:g} s is more than {MAX_SEARCH_TIME_S:g} s")
         if self.vehicles > 1:
             raise PlanError("a mission file is flown by one vehicle; start the command once for each")

@@ -50,7 +50,7 @@ class _Limits:
         if not self.altitude_min_m <= altitude_m <= self.altitude_max_m:
             raise PlanError(
                 f"altitude {altitude_m:g} m is not in {self.altitude_min_m:g}..{self.altitude_max_m:g} m "
-                "above home; change --altitude"
+                "above home; change `altitude_m`"
             )
 
     def check_separation(self, separation_m: float, vehicles: int) -> None:
@@ -58,7 +58,7 @@ class _Limits:
         if vehicles > 1 and not separation_m >= self.separation_min_m:
             raise PlanError(
                 f"layers of {separation_m:.3g} m are too thin for a team of {vehicles} with such a vehicle; "
-                f"ask for --separation {self.separation_min_m:g} or more, or fewer --vehicles"
+                f"ask for `separation_m` {self.separation_min_m:g} or more, or fewer `vehicles`"
             )
 
     def check_reach(self, distance_m: float) -> None:
@@ -66,7 +66,8 @@ class _Limits:
         if not distance_m <= self.reach_m:
             raise PlanError(
                 f"the pattern reaches {distance_m:.0f} m from home, more than {self.reach_m:g} m; "
-                "ask for a smaller --size or a lower --speed, or for a simpler --pattern (L1)"
+                "ask for a smaller `width_m, height_m` or a lower `speed_m_s`, or for a simpler `pattern` "
+                "(L1)"
             )
 
 
@@ -107,7 +108,7 @@ class MulticopterLimits(_Limits):
         if not (math.isfinite(speed_m_s) and 0.0 < speed_m_s <= self.speed_m_s):
             raise PlanError(
                 f"speed {speed_m_s:g} m/s is not in 0..{self.speed_m_s:g} m/s, the vehicle's range; "
-                "change --speed"
+                "change `speed_m_s`"
             )
 
 

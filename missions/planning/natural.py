@@ -54,7 +54,7 @@ def natural_trajectory(
         raise PlanError(
             f"period {fundamental_period_s:g} s needs {speed:.1f} m/s and {turning:.1f} m/s^2; "
             f"the vehicle has {limits.speed_m_s:g} m/s and {limits.acceleration_m_s2:g} m/s^2: "
-            f"ask for --period {math.ceil(shortest)} or more, or a smaller pattern"
+            f"ask for `period_s` {math.ceil(shortest)} or more, or a smaller pattern"
         )
     ramp_s = max(2.0, 1.5 * speed / (_SHARE_OF_LIMIT * limits.acceleration_m_s2))
     whole_s = curve.end / rate + ramp_s

@@ -233,7 +233,7 @@ def _cut(
             break
     if not kept and not best:
         raise PlanError(
-            f"a search time of {duration_s:g} s is too short to fly anything; ask for more --search-time"
+            f"a search time of {duration_s:g} s is too short to fly anything; ask for more `search_time_s`"
         )
     return kept + best
 

@@ -70,10 +70,10 @@ def check_turns(
         short = _shortest_leg(curve, radius_m, roll_in_m(airspeed_m_s, limits))
         if short[0] > 1.0:
             between_tracks = spacing_m is not None and abs(short[1] - spacing_m) < _SAME * spacing_m
-            change = f"ask for --spacing {_tens(short[0] * short[1]):g}" if between_tracks else ""
+            change = f"ask for `spacing_m` {_tens(short[0] * short[1]):g}" if between_tracks else ""
             raise PlanError(
                 f"a leg of {short[1]:.0f} m is too short to turn at both its ends: the aircraft needs "
-                f"{needs}; {change or _larger(short[0], size_m)}, or lower --speed"
+                f"{needs}; {change or _larger(short[0], size_m)}, or lower `speed_m_s`"
             )
         return radius_m
     tightest_m = smallest_radius_m(curve)
@@ -81,7 +81,7 @@ def check_turns(
         factor = radius_m / tightest_m
         raise PlanError(
             f"the pattern bends with a radius of {tightest_m:.0f} m at its tightest, and the aircraft needs "
-            f"{needs}; {_larger(factor, size_m)}, choose a simpler --ratio or --pattern, or lower --speed"
+            f"{needs}; {_larger(factor, size_m)}, choose a simpler `ratio` or `pattern`, or lower `speed_m_s`"
         )
     return radius_m
 
@@ -97,7 +97,7 @@ def _shortest_leg(curve: Polyline, radius_m: float, ramp_m: float) -> tuple[floa
         if turn > _SHARPEST_RAD:
             raise PlanError(
                 "the pattern turns straight back on its own leg, which an aircraft can't; choose another "
-                "pattern, --periods 1 or a shorter --search-time"
+                "pattern, `periods=1` or a shorter `search_time_s`"
             )
         part = corner_reach_m(turn, radius_m, ramp_m)
         taken[k - 1] += part
@@ -107,9 +107,9 @@ def _shortest_leg(curve: Polyline, radius_m: float, ramp_m: float) -> tuple[floa
 
 def _larger(factor: float, size_m: tuple[float, float] | None) -> str:
     if size_m is None:
-        return f"make --size {_scaled(factor)} times larger"
+        return f"make `width_m, height_m` {_scaled(factor)} times larger"
     width_m, height_m = (_tens(factor * side_m) for side_m in size_m)
-    return f"ask for --size {width_m:g}" + ("" if width_m == height_m else f"x{height_m:g}")
+    return f"ask for `width_m, height_m` {width_m:g}" + ("" if width_m == height_m else f"x{height_m:g}")
 
 
 def _tens(value_m: float) -> float:

@@ -56,7 +56,7 @@ def claim_folder(out: Path | None, mission: str) -> ClaimedFolder:
     except TlogError as error:
         if isinstance(error.__cause__, FileExistsError):  # two runs found it empty at the same time
             raise PlanError(
-                f"another run has begun in {path}, and nothing is overwritten; choose another --out"
+                f"another run has begun in {path}, and nothing is overwritten; choose another `out`"
             ) from error
         _remove_empty(made)
         raise

@@ -40,7 +40,7 @@ def create_run_folder(out: Path | None, mission: str, runs: Path = RUNS) -> Path
         if out is not None:
             out.mkdir(parents=True, exist_ok=True)
             if any(out.iterdir()):
-                raise PlanError(f"{out} is not empty, and nothing is overwritten; choose another --out")
+                raise PlanError(f"{out} is not empty, and nothing is overwritten; choose another `out`")
             return out
         runs.mkdir(parents=True, exist_ok=True)
         number = 1
@@ -53,7 +53,7 @@ def create_run_folder(out: Path | None, mission: str, runs: Path = RUNS) -> Path
                 number += 1
     except OSError as error:
         raise PlanError(
-            f"can't make the run folder {out or runs}: {error.strerror}; choose another --out"
+            f"can't make the run folder {out or runs}: {error.strerror}; choose another `out`"
         ) from error
 
 

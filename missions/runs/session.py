@@ -140,7 +140,7 @@ def _fly_interruptible(
     if request.connect and len(request.connect) != request.options.vehicles:
         raise PlanError(
             f"{len(request.connect)} connections for {request.options.vehicles} vehicles; "
-            "give --connect once for each vehicle"
+            "give `connect` once for each vehicle"
         )
     estimators = estimators_of(request, mission.estimator_settings(request.options))
     claimed = claim_folder(request.out, mission.name)
@@ -260,7 +260,7 @@ async def _prepare(mission: Mission[Any], vehicle: Vehicle, request: RunRequest,
             heard += f" (refused by the signing key: {signing.counters.reasons})"
         asked = "is it on, and sending there?"
         if request.connect and request.signing_key is None and not others:
-            asked += " Does it ask for signatures (--signing-key)?"
+            asked += " Does it ask for signatures (`signing_key`)?"
         raise MissionError(f"no vehicle{which} was received{where}{heard}: {error}; {asked}") from error
     vehicle.notes.system_id = vehicle.system_id
     vehicle.regain_s = request.regain_s if request.connect else 0.0
@@ -341,11 +341,11 @@ def _missed_check(request: RunRequest, blocks: list[dict[str, Any]]) -> str:
         if most_m is None:
             break
         if error_m is None:
-            return f"vehicle {block['system_id']} flew no path whose error --max-error could limit"
+            return f"vehicle {block['system_id']} flew no path whose error `max_error_m` could limit"
         if error_m > most_m:
             return (
                 f"the path error of vehicle {block['system_id']} was {error_m:.2f} m at most, more than "
-                f"--max-error {most_m:g} m"
+                f"`max_error_m` {most_m:g} m"
             )
     return ""
 

@@ -28,9 +28,9 @@ def read_key(path: Path) -> SigningKey:
     try:
         return SigningKey.parse(path.read_bytes())
     except OSError as error:
-        raise SigningKeyError(f"--signing-key {path}: {error.strerror}") from error
+        raise SigningKeyError(f"`signing_key` {path}: {error.strerror}") from error
     except SigningKeyError as error:
-        raise SigningKeyError(f"--signing-key {path}: {error}") from error
+        raise SigningKeyError(f"`signing_key` {path}: {error}") from error
 
 
 def client_signing(key: SigningKey | None, *, link_id: int = 0) -> LinkSigning | None:
@@ -59,5 +59,5 @@ async def require_key(request: "RunRequest", vehicle: "Vehicle") -> None:
     except VehicleTimeout:
         raise VehicleTimeout(
             f"vehicle {vehicle.system_id} signs its messages and does not answer unsigned ones; give its "
-            "key with --signing-key FILE. Nothing was sent to it but a request for its version"
+            "key with `signing_key` FILE. Nothing was sent to it but a request for its version"
         ) from None

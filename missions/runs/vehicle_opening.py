@@ -102,7 +102,7 @@ def open_vehicles(request: RunRequest) -> Stage:
     addresses = [parse_address(text, VEHICLE_FORMS) for text in request.connect]
     for address in addresses:
         if isinstance(address, ReplayLog):
-            raise PlanError(f"--connect {address}: a log can't be flown; give the link of a vehicle")
+            raise PlanError(f"`connect` {address}: a log can't be flown; give the link of a vehicle")
     links: list[Link] = []
     try:
         links.extend(open_link(address) for address in addresses)

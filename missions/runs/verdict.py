@@ -56,7 +56,7 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
     if max_error_m is None and error_m > bound_m:  # the user's own bound is checked separately
         return (
             f"the vehicle was up to {error_m:.1f} m off the commanded path by its own position; accepted: "
-            f"{bound_m:g} m (--max-error)"
+            f"{bound_m:g} m (`max_error_m`)"
         )
     if len(commanded.waypoints_ned_m):
         near_m = max(commanded.acceptance_m + WAYPOINT_SLACK_M[kind], max_error_m or 0.0)
@@ -67,7 +67,7 @@ def path_verdict(notes: FlightNotes, score: "FlightScore", max_error_m: float | 
         return ""
     return (
         f"{len(missed)} % of the commanded path were not flown: the vehicle's own position did not come "
-        f"within {bound_m:g} m of them (--max-error)"
+        f"within {bound_m:g} m of them (`max_error_m`)"
     )
 
 

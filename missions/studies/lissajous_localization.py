@@ -119,7 +119,7 @@ def run_study(request: StudyRequest, on_progress: Callable[[float], None] | None
     except KeyboardInterrupt:
         pass
     except BrokenProcessPool:
-        failure = "a worker process was killed; is there memory for so many (--workers)?"
+        failure = "a worker process was killed; is there memory for so many (`workers`)?"
     return StudyResult(request=request, complete=complete, failure=failure, errors=errors)
 
 

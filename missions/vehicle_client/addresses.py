@@ -34,4 +34,4 @@ def mavsdk_url(address: Address) -> str:
         case SerialPort():
             return f"serial://{Path(address.device).absolute()}:{address.baud}"
         case UdpPeer() | ReplayLog():
-            raise PlanError(f"--connect {address}: not for this command; accepted: {VEHICLE_FORMS}")
+            raise PlanError(f"`connect` {address}: not for this command; accepted: {VEHICLE_FORMS}")

@@ -61,7 +61,7 @@ class LinkQuality:
             )
         if "HEARTBEAT" in self.rates_hz:
             ids = ", ".join(str(system) for system, component in self.components if component == 1)
-            return f"received now: autopilot with system id {ids}; try again, or choose it with --system-id"
+            return f"received now: autopilot with system id {ids}; try again, or choose it with `system_id`"
         names = ", ".join(f"{system}/{component}" for system, component in self.components)
         return f"received were components {names} (system/component), none of them an autopilot's heartbeat"
 

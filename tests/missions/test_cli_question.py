@@ -65,7 +65,7 @@ asyncio.run(flight())
 ERASE = """
 from contextlib import asynccontextmanager
 import missions.vehicle_client.client, missions.vehicle_client.logs
-from missions import cli
+from missions.cli import main as cli
 
 class Client:
     system_id = 1

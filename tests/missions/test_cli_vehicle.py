@@ -11,8 +11,8 @@ import pytest
 
 pytest.importorskip("mavsdk", reason="the MAVSDK client library is not installed")
 
+from missions.cli import main as cli
 from missions.cli import vehicle_params as cli_vehicle_params
-from missions.cli.main import main as cli
 from missions.cli.vehicle import DownloadLine, _verdict
 from missions.cli.vehicle_link import confirm
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
-from missions.cli.main import main as cli
+from missions.cli import main as cli
 from missions.library import find_mission
 from missions.options import FlightOptions
 from missions.runs.ending import AskedToEnd, EndingSignals

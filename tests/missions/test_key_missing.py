@@ -34,7 +34,7 @@ def test_a_vehicle_that_signs_and_does_not_answer_is_refused_before_anything_is_
         received = []
         autopilot.link.on_receive = lambda data: received.extend(FrameParser().feed(data))
         await vehicle.wait_heartbeat()
-        with pytest.raises(VehicleTimeout, match=r"vehicle 1 signs its messages.*--signing-key FILE"):
+        with pytest.raises(VehicleTimeout, match=r"vehicle 1 signs its messages.*`signing_key` FILE"):
             await require_key(REQUEST, vehicle)
         return {frame.message_id for frame in received}
 

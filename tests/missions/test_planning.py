@@ -162,9 +162,9 @@ def test_natural_law_is_harmonic():
 
 
 def test_too_short_a_period_names_one_that_can_be_flown():
-    with pytest.raises(PlanError, match=r"--period (\d+)") as refused:
+    with pytest.raises(PlanError, match=r"`period_s` (\d+)") as refused:
         natural_trajectory(CURVES["L2"], fundamental_period_s=5.0, altitude_m=10.0, limits=LIMITS)
-    possible = float(str(refused.value).split("--period ")[1].split()[0])
+    possible = float(str(refused.value).split("`period_s` ")[1].split()[0])
     natural_trajectory(CURVES["L2"], fundamental_period_s=possible, altitude_m=10.0, limits=LIMITS)
     with pytest.raises(PlanError):
         natural_trajectory(CURVES["L2"], fundamental_period_s=possible - 2.0, altitude_m=10.0, limits=LIMITS)
@@ -173,9 +173,9 @@ def test_too_short_a_period_names_one_that_can_be_flown():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"speed_m_s": 40.0}, r"speed 40 m/s is not in 0\.\.12 m/s.*--speed"),
+        ({"speed_m_s": 40.0}, r"speed 40 m/s is not in 0\.\.12 m/s.*`speed_m_s`"),
         ({"speed_m_s": 0.0}, "speed 0 m/s"),
-        ({"altitude_m": 500.0}, r"altitude 500 m is not in 1\.5\.\.120 m.*--altitude"),
+        ({"altitude_m": 500.0}, r"altitude 500 m is not in 1\.5\.\.120 m.*`altitude_m`"),
         ({"altitude_m": -3.0}, "altitude -3 m"),
         ({"curve": named_lissajous("L1", width_m=2e5, height_m=10.0)}, "reaches 100000 m from home"),
         ({"duration_s": 0.1}, "too short"),

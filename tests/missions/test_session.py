@@ -19,7 +19,7 @@ from pymavlink import mavutil
 from autopilot_bridge.errors import BridgeError, TlogError
 from autopilot_bridge.tlog import TlogReader, TlogWriter
 from missions.cli import fly as cli_fly
-from missions.cli.main import main as cli
+from missions.cli import main as cli
 from missions.errors import MissionError, PlanError
 from missions.kind import VehicleKind
 from missions.library import MISSIONS, find_mission
@@ -271,7 +271,7 @@ def test_a_folder_is_one_run_s_from_its_beginning(embedded, tmp_path, monkeypatc
         monkeypatch.setattr(
             "missions.runs.claimed_folder.create_run_folder", lambda out, name: out
         )  # just empty
-        with pytest.raises(PlanError, match=r"another run has begun in .*; choose another --out") as error:
+        with pytest.raises(PlanError, match=r"another run has begun in .*; choose another `out`") as error:
             fly(find_mission("sector"), request)
         refused.append(error)
 

@@ -55,7 +55,7 @@ def test_a_vehicle_that_stays_where_the_path_begins_has_not_flown_it() -> None:
 
 def test_a_track_beside_the_path_is_outside_the_bound_of_its_kind() -> None:
     text = path_verdict(notes_of(), along(east_m=12.0))
-    assert "up to 12.0 m off the commanded path by its own position; accepted: 10 m (--max-error)" in text
+    assert "up to 12.0 m off the commanded path by its own position; accepted: 10 m (`max_error_m`)" in text
     assert path_verdict(notes_of(kind=VehicleKind.FIXED_WING), along(east_m=12.0)) == ""
     assert path_verdict(notes_of(), along(east_m=12.0), max_error_m=15.0) == ""
 

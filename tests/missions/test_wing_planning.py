@@ -154,13 +154,13 @@ def test_what_is_chosen_stays() -> None:
 @pytest.mark.parametrize(
     ("name", "chosen", "said"),
     [
-        ("lissajous", {"width_m": 300.0, "height_m": 300.0}, "--size [0-9]+, .*--speed"),
-        ("parallel-sweep", {"spacing_m": 60.0}, "--spacing"),
-        ("sector", {"width_m": 200.0, "height_m": 200.0}, "--size [0-9]+, or lower --speed"),
+        ("lissajous", {"width_m": 300.0, "height_m": 300.0}, "`width_m, height_m` [0-9]+, .*`speed_m_s`"),
+        ("parallel-sweep", {"spacing_m": 60.0}, "`spacing_m`"),
+        ("sector", {"width_m": 200.0, "height_m": 200.0}, "`width_m, height_m` [0-9]+, or lower `speed_m_s`"),
         ("lissajous", {"speed_m_s": 60.0}, "35 m/s"),
-        ("lissajous", {"altitude_m": 400.0}, "--altitude"),
+        ("lissajous", {"altitude_m": 400.0}, "`altitude_m`"),
         ("parallel-sweep", {"periods": 2.0}, "straight back"),
-        ("lissajous", {"period_s": 60.0, "via": Via.SETPOINTS}, "--period"),
+        ("lissajous", {"period_s": 60.0, "via": Via.SETPOINTS}, "`period_s`"),
     ],
 )
 def test_what_cannot_be_flown_is_refused_with_what_to_change(
@@ -174,7 +174,7 @@ def test_the_refusal_names_a_size_that_can_be_flown() -> None:
     small = named_lissajous("L3", width_m=800.0, height_m=800.0)
     with pytest.raises(PlanError, match=r"FW_R_LIM") as refusal:
         check_turns(small, 25.0, AEROSONDE)
-    factor = float(str(refusal.value).split("--size ")[1].split(" times")[0])
+    factor = float(str(refusal.value).split("`width_m, height_m` ")[1].split(" times")[0])
     check_turns(named_lissajous("L3", width_m=800.0 * factor, height_m=800.0 * factor), 25.0, AEROSONDE)
 
 
@@ -269,9 +269,9 @@ def test_one_refusal_tells_what_will_be_flown(name: str, chosen: dict[str, Any])
     )
     with pytest.raises(PlanError) as refusal:
         flown(name, limits, **chosen)
-    asked = re.search(r"--(size|spacing) ([0-9.]+)(?:x([0-9.]+))?(?: or more)?,", str(refusal.value))
+    asked = re.search(r"`(width_m, height_m|spacing_m)` ([0-9.]+)(?:x([0-9.]+))?[ ,]", str(refusal.value))
     assert asked is not None, refusal.value
-    if asked[1] == "spacing":
+    if asked[1] == "spacing_m":
         flown(name, limits, **(chosen | {"spacing_m": float(asked[2])}))
         return
     wide_m, high_m = float(asked[2]), float(asked[3] or asked[2])
@@ -290,6 +290,6 @@ def test_a_teams_layers_are_no_thinner_than_a_height_is_held(name: str) -> None:
         if not thin:
             mission.check(options, limits)
             continue
-        with pytest.raises(PlanError, match=r"layers of 9 m are too thin.*--separation 10"):
+        with pytest.raises(PlanError, match=r"layers of 9 m are too thin.*`separation_m` 10"):
             mission.check(options, limits)
         mission.check(mission.adapted(kind(separation_m=separation_m), limits), limits)  # alone

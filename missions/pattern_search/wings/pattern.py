@@ -29,7 +29,7 @@ def check_wings(curve: Curve, options: FlightOptions, limits: FixedWingLimits) -
     """
     if options.period_s is not None:
         raise PlanError(
-            "--period is for vehicles that can fly slowly in bends; choose --speed for an aircraft"
+            "`period_s` is for vehicles that can fly slowly in bends; choose `speed_m_s` for an aircraft"
         )
     limits.check_airspeed(options.speed_m_s)
     limits.check_separation(options.separation_m, options.vehicles)

@@ -283,7 +283,7 @@ def test_times_are_told_on_the_first_vehicles_clock_and_boot(tmp_path):
     order = np.arange(len(log))
     assert log.inside(order, from_s=6.0, to_s=8.0, boot=1).sum() == 8  # both vehicles, two seconds
     assert log.boots_at(6.0, 8.0) == [0, 1]
-    with pytest.raises(LogError, match="--boot 2 is not in"):
+    with pytest.raises(LogError, match="`boot` 2 is not in"):
         log.inside(order, boot=2)
 
 

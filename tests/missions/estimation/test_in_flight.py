@@ -139,7 +139,7 @@ def test_an_estimator_that_fails_does_not_end_the_flight(scripted, tmp_path):
 def test_a_wrong_estimator_is_refused_before_the_flight(scripted, tmp_path):
     with pytest.raises(PlanError, match="'altitude' is not known; there are attitude"):
         flight(tmp_path, estimator="altitude")
-    with pytest.raises(PlanError, match="is for an estimator; name one with --estimator"):
+    with pytest.raises(PlanError, match="is for an estimator; name one with `estimator`"):
         flight(tmp_path, estimator_settings=("weight=1",))
     assert not scripted
     assert not (tmp_path / "run").exists()

@@ -46,10 +46,10 @@ def test_standing_still_detects_nothing():
 @pytest.mark.parametrize(
     ("values", "named"),
     [
-        ({"probability_overhead": 1.0}, "--detection-probability 1"),
-        ({"probability_overhead": math.nan}, "--detection-probability nan"),
-        ({"range_m": 0.0}, "--detection-range 0"),
-        ({"range_m": math.inf}, "--detection-range inf"),
+        ({"probability_overhead": 1.0}, "`detection_probability` 1"),
+        ({"probability_overhead": math.nan}, "`detection_probability` nan"),
+        ({"range_m": 0.0}, "`detection_range_m` 0"),
+        ({"range_m": math.inf}, "`detection_range_m` inf"),
     ],
 )
 def test_bad_models_are_refused_by_name(values, named):
@@ -102,7 +102,7 @@ def test_bad_readings_are_dropped_and_counted():
 
 @pytest.mark.parametrize("threshold_nt", [0.0, -1.0, math.nan, math.inf])
 def test_bad_threshold_is_refused_by_name(threshold_nt):
-    with pytest.raises(PlanError, match="--threshold"):
+    with pytest.raises(PlanError, match="`threshold_nt`"):
         AnomalyDetector(threshold_nt=threshold_nt)
 
 

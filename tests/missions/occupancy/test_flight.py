@@ -15,7 +15,7 @@ from autopilot_bridge.mavlink import decode, definition
 from autopilot_bridge.tlog import TlogReader
 from flightsim.foundation.geodesy import LocalFrame
 from flightsim.payload import DipoleSignature, MagneticMap, magnetic_field_of
-from missions.cli.main import main as cli
+from missions.cli import main as cli
 from missions.embedded.scenario import magnetic_spec
 from missions.errors import PlanError
 from missions.occupancy.mission import MAP_NAME, OccupancyMission
@@ -222,7 +222,7 @@ class Magnetometer:
 
 def test_a_threshold_within_the_noise_is_refused_on_the_ground():
     readings = 48_000.0 + np.random.default_rng(1).normal(0.0, 2.0, 20)
-    with pytest.raises(PlanError, match=r"--threshold 3 nT is below 3 times the noise of vehicle 1"):
+    with pytest.raises(PlanError, match=r"`threshold_nt` 3 nT is below 3 times the noise of vehicle 1"):
         asyncio.run(require_quiet(Magnetometer(readings), threshold_nt=3.0))
     quiet = Magnetometer(0.1 * readings)
     assert asyncio.run(require_quiet(quiet, threshold_nt=3.0)) < 0.5

@@ -68,5 +68,5 @@ def test_a_map_without_error_is_the_threshold_alone() -> None:
 
 @pytest.mark.parametrize("sigma_nt", [-1.0, float("nan"), float("inf")])
 def test_bad_errors_of_maps_are_refused_by_name(sigma_nt: float) -> None:
-    with pytest.raises(PlanError, match="--map-error"):
+    with pytest.raises(PlanError, match="`map_error_nt`"):
         MapError(sigma_nt=sigma_nt)

@@ -73,5 +73,5 @@ def test_a_late_setpoint_makes_no_leap():
 
 
 def test_a_speed_it_does_not_have_is_refused():
-    with pytest.raises(PlanError, match="--speed"):
+    with pytest.raises(PlanError, match="`speed_m_s`"):
         reference(speed_m_s=30.0)

@@ -73,12 +73,12 @@ def test_area_without_data_is_refused_with_what_there_is(tmp_path):
 def test_garbage_is_refused_by_name(tmp_path, content):
     path = tmp_path / "bad.npz"
     path.write_bytes(content)
-    with pytest.raises(PlanError, match=r"--map .*bad\.npz"):
+    with pytest.raises(PlanError, match=r"`map_file` .*bad\.npz"):
         load_survey_map(path)
 
 
 def test_missing_file_is_refused_by_name(tmp_path):
-    with pytest.raises(PlanError, match=r"--map .*nowhere\.npz"):
+    with pytest.raises(PlanError, match=r"`map_file` .*nowhere\.npz"):
         load_survey_map(tmp_path / "nowhere.npz")
 
 

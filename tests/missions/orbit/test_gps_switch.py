@@ -90,9 +90,9 @@ def test_a_filter_that_leaves_gps_out_is_asked_for_and_restored(flown, flavour, 
 @pytest.mark.parametrize(
     ("flavour", "answer", "said"),
     [
-        ("px4", None, "no answer.*--no-gps-fault.*--gps-off parameter .EKF2_GPS_CTRL"),
+        ("px4", None, "no answer.*`gps_fault=False`.*`gps_off=parameter` .EKF2_GPS_CTRL"),
         ("px4", 2, "DENIED.*SYS_FAILURE_EN 1"),
-        ("ardupilot", 3, "UNSUPPORTED.*--no-gps-fault.*EK3_SRC1_POSXY, EK3_SRC1_VELXY"),
+        ("ardupilot", 3, "UNSUPPORTED.*`gps_fault=False`.*EK3_SRC1_POSXY, EK3_SRC1_VELXY"),
     ],
 )
 def test_where_there_is_no_way_the_ground_says_what_to_ask_for(flown, flavour, answer, said) -> None:

@@ -24,9 +24,9 @@ WINGS = FixedWingLimits(
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"radius_m": 80.0}, r"radius 80 m can't be held.*45 degrees of bank \(FW_R_LIM\).*--radius 110"),
+        ({"radius_m": 80.0}, r"radius 80 m can't be held.*45 degrees of bank \(FW_R_LIM\).*`radius_m` 110"),
         ({"radius_m": 125.0, "target_speed_m_s": 10.0}, "around a target that moves at 10 m/s"),
-        ({"radius_m": 2000.0}, "2.9 degrees below the horizon.*--altitude or a smaller --radius"),
+        ({"radius_m": 2000.0}, "2.9 degrees below the horizon.*`altitude_m` or a smaller `radius_m`"),
         ({"airspeed_m_s": 12.0}, "airspeed 12 m/s is not in 18..30 m/s"),
         ({"altitude_m": 500.0}, "altitude 500 m is not in 20..120 m"),
         ({"target_ne_m": (60_000.0, 0.0)}, "60400 m from home, more than"),
@@ -40,7 +40,7 @@ def test_what_can_not_be_flown_is_refused(change, words):
 
 def test_the_defaults_can_be_flown_and_hovering_is_no_orbit():
     OrbitOptions().check(WINGS)
-    with pytest.raises(PlanError, match="choose --model aerosonde"):
+    with pytest.raises(PlanError, match="choose `model=aerosonde`"):
         OrbitOptions().check(MulticopterLimits())
 
 

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import common as mavlink
 
 from flightsim.foundation.geodesy import GeodeticPosition
-from missions.cli.main import main as cli
+from missions.cli import main as cli
 from missions.errors import PlanError
 from missions.kind import VehicleKind
 from missions.plan_files.files import read_mission_file, write_mission_file

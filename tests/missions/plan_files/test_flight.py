@@ -75,12 +75,12 @@ def test_what_can_not_be_flown_is_refused_before_anything_starts(tmp_path: Path)
         fly(find_mission(str(path)), request(path, home="47.0,8.0,400"))
     forever = changed("mission", "items", 4, "params", 1, to=-1)
     endless = write(tmp_path, forever, "b.plan")
-    with pytest.raises(PlanError, match="jumps back for ever; say when it ends with --time-limit"):
+    with pytest.raises(PlanError, match="jumps back for ever; say when it ends with `time_limit_s`"):
         fly(find_mission(str(endless)), request(endless, out=tmp_path / "endless"))
     aircraft = changed("mission", "vehicleType", to=1)
     aircraft["mission"]["items"] = aircraft["mission"]["items"][:3]
     wings = write(tmp_path, aircraft, "c.plan")
-    with pytest.raises(PlanError, match="does not land; add a landing, or say what comes after it: --then"):
+    with pytest.raises(PlanError, match=r"does not land; .* what comes after it: `then=land`"):
         fly(find_mission(str(wings)), request(wings, out=tmp_path / "wings"))
     assert not (tmp_path / "run").exists()
 

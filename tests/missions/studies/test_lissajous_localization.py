@@ -216,7 +216,7 @@ def test_a_killed_worker_keeps_what_is_there(monkeypatch) -> None:
 
     monkeypatch.setattr("missions.studies.lissajous_localization.work_through", two_then_none)
     result = run_study(StudyRequest(runs=2, workers=2, equations=(Equations.CORRECTED,)))
-    assert not result.complete and "--workers" in result.failure
+    assert not result.complete and "`workers`" in result.failure
     assert sum(cell["runs"] == 2.0 for cell in cells_of(result)) == 2
     summary = summary_of(result, 1.0)
     assert summary["outcome"] == "failed" and summary["partial"] and summary["reason"] == result.failure

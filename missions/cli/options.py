@@ -1,0 +1,81 @@
+"""Types of options on the command line, and messages that name fields by the options that set them."""
+
+import math
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, Final
+
+import click
+
+
+class FiniteRange(click.FloatRange):
+    """A range of numbers that excludes infinity and NaN, which would compare as if it were in every range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """The number, or a usage error that names it."""
+        number: float = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
+SLOWEST: Final = 0.001
+SPEEDUP: Final = FiniteRange(min=SLOWEST, max=1e6)
+"""Simulated seconds per wall second."""
+
+SECONDS: Final = FiniteRange(min=0.0, max=86_400.0)
+"""A time of up to a day."""
+
+
+def radians_of(name: str, degrees: float) -> float:
+    """An angle, radians, from an option in degrees."""
+    if not math.isfinite(degrees):
+        raise click.UsageError(f"{name} {degrees} is not a direction; give degrees, such as 90")
+    return math.radians(degrees)
+
+
+_FIELD: Final = re.compile(r"`([a-z]\w*(?:, [a-z]\w*)*)(?:=([\w:]+))?`")
+_UNIT: Final = re.compile(r"_(ne_m|m_s|a_m2|nt|hz|rad|deg|m|s)$")
+_NAMES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "arguments": "--arg",
+        "gps_fault=False": "--no-gps-fault",
+        "height_m": "--size",
+        "map_file": "--map",
+        "parameters": "--params",
+        "phase_x_rad": "--phase",
+        "phase_y_rad": "--phase",
+        "settings": "--set",
+        "sigma_across_m": "--sigma",
+        "sigma_along_m": "--sigma",
+        "width_m": "--size",
+    }
+)
+"""Options of fields that are not the field's name without its unit."""
+
+
+def option_of(field: str) -> str:
+    """The option that sets a field of a request or of a mission's options."""
+    return _NAMES.get(field, "--" + _UNIT.sub("", field).replace("_", "-"))
+
+
+def in_options(message: object) -> str:
+    """A message with the options in place of the fields that it names.
+
+    Errors name fields in backquotes: `` `altitude_m` ``, with a value: `` `via=setpoints` ``, or several
+    fields that one option sets: `` `width_m, height_m` ``.
+    """
+
+    def options(found: re.Match[str]) -> str:
+        names, value = found.groups()
+        if value is None:
+            return " or ".join(dict.fromkeys(map(option_of, names.split(", "))))
+        return _NAMES.get(f"{names}={value}", f"{option_of(names)} {value}")
+
+    return _FIELD.sub(options, str(message))
+
+
+def report(message: object) -> None:
+    """Print one line about the command on stderr."""
+    click.echo(f"flightstack: {in_options(message)}", err=True)

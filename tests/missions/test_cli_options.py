@@ -1,0 +1,62 @@
+"""Errors name fields, and the command line the options that set them."""
+
+import ast
+import re
+from pathlib import Path
+
+import click
+import pytest
+
+from missions.cli.fly_command import _FILES, _MISSIONS, _command_of
+from missions.cli.main import command_line
+from missions.cli.options import in_options
+
+ROOT = Path(__file__).parents[2]
+FIELD = re.compile(r"`[a-z]\w*(?:, [a-z]\w*)*(?:=[\w:]+)?`")
+
+
+@pytest.mark.parametrize(
+    ("message", "shown"),
+    [
+        ("`speed_m_s` 0 is not possible", "--speed 0 is not possible"),
+        ("a smaller `width_m, height_m`, or", "a smaller --size, or"),
+        ("needs `via=setpoints`: or", "needs --via setpoints: or"),
+        ("fly with `gps_fault=False` to", "fly with --no-gps-fault to"),
+        ("as in `ratio=3:4`", "as in --ratio 3:4"),
+        ("`target_ne_m` and `moment_a_m2`", "--target and --moment"),
+        ("neither `async def fly(vehicle, options)` nor", "neither `async def fly(vehicle, options)` nor"),
+    ],
+)
+def test_fields_become_options(message, shown):
+    assert in_options(message) == shown
+
+
+def all_options():
+    found = set()
+    waiting = [command_line.get_command(None, name) for name in command_line.list_commands(None)]
+    waiting += [_command_of(name) for name in (*_MISSIONS, *_FILES)]
+    while waiting:
+        command = waiting.pop()
+        parameters = command.params if isinstance(command, click.Command) else command.options
+        for parameter in parameters:
+            found.update(getattr(parameter, "opts", ()))
+        waiting += getattr(command, "commands", {}).values()
+    return found
+
+
+def test_every_field_that_an_error_names_has_an_option():
+    options, missing, count = all_options(), [], 0
+    for package in ("autopilot_bridge", "estimators", "missions"):
+        for path in sorted(set((ROOT / package).rglob("*.py")) - set((ROOT / "missions/cli").iterdir())):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            documentation = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+            for node in ast.walk(tree):
+                if not (isinstance(node, ast.Constant) and isinstance(node.value, str)):
+                    continue
+                for field in FIELD.findall(node.value) if id(node) not in documentation else ():
+                    shown = re.findall(r"--[a-z-]+", in_options(field))
+                    count += 1
+                    if not shown or not options.issuperset(shown):
+                        missing.append((path.name, field, shown))
+    assert count > 50
+    assert missing == []
