@@ -122,7 +122,8 @@ def _require_here(published: MagneticMap, path: Path, home: Home) -> None:
         raise ValueError(
             f"{path} is the magnetic map of another place: its home is {published.home.lat_deg:.6f},"
             f"{published.home.lon_deg:.6f}, and the vehicles stand at {home.lat_deg:.6f},{home.lon_deg:.6f}, "
-            f"{outside_m / 1000.0:.0f} km from what it covers; choose the map of this place, or another `home`"
+            f"{outside_m / 1000.0:.0f} km from what it covers; choose the map of this place, "
+            "or another `home`"
         )
 
 

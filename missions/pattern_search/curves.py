@@ -174,7 +174,8 @@ def _require_room(options: FlightOptions, side_m: float, spacings: float, limits
         raise PlanError(
             f"`width_m, height_m` {side_m:g} m has no room for the aircraft's turns: "
             f"at {options.speed_m_s:g} m/s in {limits.wind_m_s:.3g} m/s of wind tracks must be "
-            f"{spacing_m:g} m apart; ask for `width_m, height_m` {spacings * spacing_m:g} or more, or less `speed_m_s`"
+            f"{spacing_m:g} m apart; ask for `width_m, height_m` "
+            f"{spacings * spacing_m:g} or more, or less `speed_m_s`"
         )
 
 

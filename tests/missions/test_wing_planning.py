@@ -269,7 +269,8 @@ def test_one_refusal_tells_what_will_be_flown(name: str, chosen: dict[str, Any])
     )
     with pytest.raises(PlanError) as refusal:
         flown(name, limits, **chosen)
-    asked = re.search(r"`(width_m, height_m|spacing_m)` ([0-9.]+)(?:x([0-9.]+))?[ ,]", str(refusal.value))
+    advice = r"`(width_m, height_m|spacing_m)` ([0-9.]+)(?:x([0-9.]+))?(?: or more)?,"
+    asked = re.search(advice, str(refusal.value))
     assert asked is not None, refusal.value
     if asked[1] == "spacing_m":
         flown(name, limits, **(chosen | {"spacing_m": float(asked[2])}))
