@@ -3,9 +3,10 @@
     MPC_XY_CRUISE = { type = "float", default = 5.0, min = 3.0, max = 20.0, unit = "m/s", text = "Speed" }
     "RC#_TRIM" = { type = "float", default = 1500.0, instances = [1, 8], text = "Neutral pulse" }
 
-`type` is int8, int16, int32 or float. With `instances`, `#` in the name stands for each number from the first
-to the last, and `default` may be a list with one value for each. `reboot = true`: a change waits for the next
-boot.
+`type` is int8, int16, int32 or float. `min` and `max` are the range that the firmware documents, and
+`used = [low, high]` is the range that the vehicle acts on where it differs (`ParameterDefinition.used`). With
+`instances`, `#` in the name stands for each number from the first to the last; `default` may be a list with
+one value for each. `reboot = true`: a change waits for the next boot.
 """
 
 import tomllib
@@ -21,7 +22,7 @@ _TYPES: Final = {
     "int32": ParameterType.INT32,
     "float": ParameterType.REAL32,
 }
-_KEYS: Final = frozenset(("type", "default", "min", "max", "unit", "reboot", "instances", "text"))
+_KEYS: Final = frozenset(("type", "default", "min", "max", "used", "unit", "reboot", "instances", "text"))
 
 
 def load_table(file: Traversable) -> tuple[ParameterDefinition, ...]:
@@ -62,6 +63,7 @@ def _definition(name: str, entry: dict[str, Any], default: float) -> ParameterDe
         default=default,
         minimum=entry.get("min"),
         maximum=entry.get("max"),
+        used=None if "used" not in entry else (entry["used"][0], entry["used"][1]),
         unit=entry.get("unit", ""),
         description=entry.get("text", ""),
         reboot_required=entry.get("reboot", False),

@@ -51,6 +51,8 @@ class ParameterDefinition:
         type: storage type; float parameters are single precision.
         default: initial value, in `unit`.
         minimum, maximum: documented range, in `unit`; None where the firmware documents none.
+        used: range of the values that the vehicle acts on, where it differs from the documented one; a stored
+            value beyond it acts as its nearer end.
         unit: as the firmware documents it; empty for plain numbers.
         description: one line.
         reboot_required: a change takes effect after the next boot only.
@@ -61,6 +63,7 @@ class ParameterDefinition:
     default: float
     minimum: float | None = None
     maximum: float | None = None
+    used: tuple[float, float] | None = None
     unit: str = ""
     description: str = ""
     reboot_required: bool = False
@@ -70,6 +73,8 @@ class ParameterDefinition:
             raise ValueError(f"parameter name {self.name!r} is not 1 to {MAX_NAME_LENGTH} ASCII characters")
         if self.minimum is not None and self.maximum is not None and self.minimum > self.maximum:
             raise ValueError(f"{self.name}: minimum {self.minimum} is above maximum {self.maximum}")
+        if self.used is not None and not self.used[0] <= self.used[1]:
+            raise ValueError(f"{self.name}: used {self.used[0]} is above {self.used[1]}")
         self.convert(self.default)
 
     @property
@@ -116,6 +121,15 @@ class ParameterDefinition:
         if whole != value or not low <= whole <= high:
             raise ParameterError(f"{self.name} = {value}: accepted is {self.accepted()}")
         return whole
+
+    def limited(self, value: float) -> float:
+        """`value` within `used`, or within the documented range: a ground station can store anything, and the
+        vehicle must stay flyable.
+        """
+        low, high = self.used or (self.minimum, self.maximum)
+        if high is not None and value > high:
+            return high
+        return low if low is not None and value < low else value
 
     def check_range(self, value: float) -> None:
         """Raise ParameterError when `value` is outside the documented range."""
@@ -193,6 +207,15 @@ class ParameterStore:
             ParameterError: unknown name.
         """
         return self._values[self.index_of(name)]
+
+    def limited(self, name: str) -> float:
+        """Value of a parameter, within what the vehicle acts on (`ParameterDefinition.limited`).
+
+        Raises:
+            ParameterError: unknown name.
+        """
+        index = self.index_of(name)
+        return self._definitions[index].limited(self._values[index])
 
     def set(self, name: str, value: float, *, check_range: bool = True) -> bool:
         """Change a parameter and notify the subscribers; True when the value is new.

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from autopilot_bridge.firmware.mapping import FieldMap, build, clamp, integer, number
+from autopilot_bridge.firmware.mapping import FieldMap, build, integer
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.parameters import ParameterStore
 
@@ -11,22 +11,22 @@ EXTERNAL_NAV: Final = 6
 
 _MS: Final = 1e-3
 _PX4: Final = (
-    FieldMap("position_noise_m", "EKF2_EVP_NOISE", low=0.01, high=100.0),
-    FieldMap("velocity_noise_m_s", "EKF2_EVV_NOISE", low=0.01, high=100.0),
-    FieldMap("yaw_noise_rad", "EKF2_EVA_NOISE", low=0.02, high=3.0),
-    FieldMap("position_gate", "EKF2_EVP_GATE", low=1.0, high=20.0),
-    FieldMap("velocity_gate", "EKF2_EVV_GATE", low=1.0, high=20.0),
-    FieldMap("yaw_gate", "EKF2_HDG_GATE", low=1.0, high=20.0),
-    FieldMap("delay_s", "EKF2_EV_DELAY", _MS, low=0.0, high=0.3),
+    FieldMap("position_noise_m", "EKF2_EVP_NOISE"),
+    FieldMap("velocity_noise_m_s", "EKF2_EVV_NOISE"),
+    FieldMap("yaw_noise_rad", "EKF2_EVA_NOISE"),
+    FieldMap("position_gate", "EKF2_EVP_GATE"),
+    FieldMap("velocity_gate", "EKF2_EVV_GATE"),
+    FieldMap("yaw_gate", "EKF2_HDG_GATE"),
+    FieldMap("delay_s", "EKF2_EV_DELAY", _MS),
 )
 _ARDUPILOT: Final = (
-    FieldMap("position_noise_m", "VISO_POS_M_NSE", low=0.05, high=10.0),
-    FieldMap("velocity_noise_m_s", "VISO_VEL_M_NSE", low=0.05, high=5.0),
-    FieldMap("yaw_noise_rad", "VISO_YAW_M_NSE", low=0.05, high=1.0),
-    FieldMap("position_gate", "EK3_POS_I_GATE", 0.01, low=1.0, high=10.0),
-    FieldMap("velocity_gate", "EK3_VEL_I_GATE", 0.01, low=1.0, high=10.0),
-    FieldMap("delay_s", "VISO_DELAY_MS", _MS, low=0.0, high=0.25),
-    FieldMap("scale", "VISO_SCALE", low=0.1, high=10.0),
+    FieldMap("position_noise_m", "VISO_POS_M_NSE"),
+    FieldMap("velocity_noise_m_s", "VISO_VEL_M_NSE"),
+    FieldMap("yaw_noise_rad", "VISO_YAW_M_NSE"),
+    FieldMap("position_gate", "EK3_POS_I_GATE", 0.01),
+    FieldMap("velocity_gate", "EK3_VEL_I_GATE", 0.01),
+    FieldMap("delay_s", "VISO_DELAY_MS", _MS),
+    FieldMap("scale", "VISO_SCALE"),
 )
 _POSITION: Final = 1
 _HEIGHT: Final = 2
@@ -37,7 +37,7 @@ _VISION: Final = 3  # of EKF2_HGT_REF
 
 def px4_external(store: ParameterStore) -> ExternalParameters:
     """EKF2_EV_*, EKF2_EVA_*, EKF2_EVP_*, EKF2_EVV_*, EKF2_HGT_REF."""
-    control = integer(store, "EKF2_EV_CTRL", 0)
+    control = integer(store, "EKF2_EV_CTRL")
     return build(
         ExternalParameters,
         store,
@@ -46,9 +46,9 @@ def px4_external(store: ParameterStore) -> ExternalParameters:
         use_height=bool(control & _HEIGHT),
         use_velocity=bool(control & _VELOCITY),
         use_yaw=bool(control & _YAW),
-        height_reference=integer(store, "EKF2_HGT_REF", 1) == _VISION,
-        own_noise=integer(store, "EKF2_EV_NOISE_MD", 0) == 1,
-        least_quality=max(0, min(100, integer(store, "EKF2_EV_QMIN", 0))),
+        height_reference=integer(store, "EKF2_HGT_REF") == _VISION,
+        own_noise=integer(store, "EKF2_EV_NOISE_MD") == 1,
+        least_quality=int(store.limited("EKF2_EV_QMIN")),
         offset_frd_m=_offset(store, "EKF2_EV_POS_"),
     )
 
@@ -57,7 +57,7 @@ def ardupilot_external(store: ParameterStore) -> ExternalParameters:
     """VISO_*, EK3_SRC1_*: a source of 6 is ExternalNav."""
 
     def external(name: str) -> bool:
-        return integer(store, name, 0) == EXTERNAL_NAV
+        return integer(store, name) == EXTERNAL_NAV
 
     height = external("EK3_SRC1_POSZ")
     return build(
@@ -69,11 +69,11 @@ def ardupilot_external(store: ParameterStore) -> ExternalParameters:
         use_velocity=external("EK3_SRC1_VELXY"),
         use_yaw=external("EK3_SRC1_YAW"),
         height_reference=height,
-        least_quality=max(0, min(100, integer(store, "VISO_QUAL_MIN", 0))),
+        least_quality=int(store.limited("VISO_QUAL_MIN")),
         offset_frd_m=_offset(store, "VISO_POS_"),
     )
 
 
 def _offset(store: ParameterStore, prefix: str) -> tuple[float, float, float]:
-    x, y, z = (clamp(number(store, prefix + axis, 0.0), -10.0, 10.0) for axis in "XYZ")
+    x, y, z = (store.limited(prefix + axis) for axis in "XYZ")
     return x, y, z

@@ -26,7 +26,7 @@ def own_receiver(store: ParameterStore) -> GpsSource:
 
 def ardupilot_gps_source(store: ParameterStore) -> GpsSource:
     """GPS1_TYPE: 0 none, 14 MAVLink, all others the receiver on board."""
-    kind = integer(store, "GPS1_TYPE", 1)
+    kind = integer(store, "GPS1_TYPE")
     return {_NONE: GpsSource.NONE, _MAV: GpsSource.MESSAGES}.get(kind, GpsSource.SENSOR)
 
 

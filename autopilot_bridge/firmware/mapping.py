@@ -1,4 +1,7 @@
-"""Typed parameters from a firmware's named ones: tables of (field, name, factor, limits)."""
+"""Typed parameters from a firmware's named ones: tables of (field, name, factor).
+
+Defaults and limits are those of the parameter table (`parameters.toml`).
+"""
 
 import math
 from collections.abc import Iterable
@@ -19,14 +22,11 @@ class FieldMap(NamedTuple):
         field: name in the parameter class.
         name: the firmware's name.
         factor: field = parameter x factor (centimetres, degrees, milliseconds).
-        low, high: limits of the field. A ground station can store anything; the vehicle must stay flyable.
     """
 
     field: str
     name: str
     factor: float = 1.0
-    low: float = 1e-3
-    high: float = 1e4
 
 
 class RatioMap(NamedTuple):
@@ -58,12 +58,8 @@ def scaled_values(tuned: object, store: ParameterStore, table: Iterable[RatioMap
 
 
 def field_values(store: ParameterStore, table: Iterable[FieldMap]) -> dict[str, float]:
-    """Field values of every mapped parameter that the store has, clamped."""
-    return {
-        entry.field: clamp(store.get(entry.name) * entry.factor, entry.low, entry.high)
-        for entry in table
-        if entry.name in store
-    }
+    """Field values of every mapped parameter that the store has, within what the vehicle acts on."""
+    return {entry.field: store.limited(entry.name) * entry.factor for entry in table if entry.name in store}
 
 
 def build(cls: type[T], store: ParameterStore, table: Iterable[FieldMap], **fixed: Any) -> T:
@@ -96,14 +92,20 @@ def airframe_overrides(
 
 
 def number(store: ParameterStore, name: str, default: float) -> float:
-    """Value of a parameter, or `default` when this table has none of that name or the value is unusable."""
-    value = store.get(name) if name in store else default
-    return value if math.isfinite(value) else default
+    """Value of a parameter as it is stored, or `default` where the firmware has none of that name."""
+    return store.get(name) if name in store else default
 
 
-def integer(store: ParameterStore, name: str, default: int) -> int:
-    """The same as a whole number."""
-    return int(number(store, name, default))
+def integer(store: ParameterStore, name: str, default: int | None = None) -> int:
+    """Value of a parameter as it is stored, as a whole number.
+
+    Args:
+        default: value where the firmware has no parameter of that name; None: every table has it.
+
+    Raises:
+        ParameterError: unknown name without a `default`.
+    """
+    return int(store.get(name) if default is None else number(store, name, default))
 
 
 def clamp(value: float, low: float, high: float) -> float:

@@ -8,28 +8,28 @@ that walks by `noise x dt` in a step has the random walk `noise x sqrt(dt)`.
 import math
 from typing import Any, Final
 
-from autopilot_bridge.firmware.mapping import FieldMap, clamp, field_values, number
+from autopilot_bridge.firmware.mapping import FieldMap, field_values
 from autopilot_bridge.parameters import ParameterStore
 
 _EK3_STEP_S: Final = 0.012  # EKF_TARGET_DT of ArduPilot 4.6.3
 _VERTICAL_TO_HORIZONTAL: Final = 1.5  # both firmwares: of a receiver's errors
 
 _PX4_FIELDS: Final = (
-    FieldMap("accel_bias_m_s2", "EKF2_ABIAS_INIT", low=1e-3, high=0.5),
-    FieldMap("barometer_noise_m", "EKF2_BARO_NOISE", low=0.01, high=15.0),
-    FieldMap("magnetometer_noise_gauss", "EKF2_MAG_NOISE", low=1e-3, high=1.0),
+    FieldMap("accel_bias_m_s2", "EKF2_ABIAS_INIT"),
+    FieldMap("barometer_noise_m", "EKF2_BARO_NOISE"),
+    FieldMap("magnetometer_noise_gauss", "EKF2_MAG_NOISE"),
 )
 _ARDUPILOT_FIELDS: Final = (
-    FieldMap("barometer_noise_m", "EK3_ALT_M_NSE", low=0.1, high=100.0),
-    FieldMap("magnetometer_noise_gauss", "EK3_MAG_M_NSE", low=1e-3, high=0.5),
+    FieldMap("barometer_noise_m", "EK3_ALT_M_NSE"),
+    FieldMap("magnetometer_noise_gauss", "EK3_MAG_M_NSE"),
 )
 
 
 def px4_noise(store: ParameterStore) -> dict[str, Any]:
     """Fields of `NavigationParameters` from EKF2_GYR_NOISE, EKF2_GPS_P_NOISE, ..."""
-    step_s = clamp(number(store, "EKF2_PREDICT_US", 10000.0) * 1e-6, 1e-3, 2e-2)
-    position_m = clamp(number(store, "EKF2_GPS_P_NOISE", 0.5), 0.01, 10.0)
-    velocity_m_s = clamp(number(store, "EKF2_GPS_V_NOISE", 0.3), 0.01, 5.0)
+    step_s = store.limited("EKF2_PREDICT_US") * 1e-6
+    position_m = store.limited("EKF2_GPS_P_NOISE")
+    velocity_m_s = store.limited("EKF2_GPS_V_NOISE")
     return {
         **field_values(store, _PX4_FIELDS),
         **field_values(
@@ -43,9 +43,9 @@ def px4_noise(store: ParameterStore) -> dict[str, Any]:
 
 def ardupilot_noise(store: ParameterStore) -> dict[str, Any]:
     """Fields of `NavigationParameters` from EK3_GYRO_P_NSE, EK3_POSNE_M_NSE, ..."""
-    position_m = clamp(number(store, "EK3_POSNE_M_NSE", 0.5), 0.1, 10.0)
-    horizontal_m_s = clamp(number(store, "EK3_VELNE_M_NSE", 0.3), 0.05, 5.0)
-    vertical_m_s = clamp(number(store, "EK3_VELD_M_NSE", 0.5), 0.05, 5.0)
+    position_m = store.limited("EK3_POSNE_M_NSE")
+    horizontal_m_s = store.limited("EK3_VELNE_M_NSE")
+    vertical_m_s = store.limited("EK3_VELD_M_NSE")
     return {
         **field_values(store, _ARDUPILOT_FIELDS),
         **field_values(
@@ -60,8 +60,8 @@ def ardupilot_noise(store: ParameterStore) -> dict[str, Any]:
 def _inertial(step_s: float, gyro: str, accel: str, gyro_bias: str, accel_bias: str) -> tuple[FieldMap, ...]:
     root = math.sqrt(step_s)
     return (
-        FieldMap("gyro_noise_rad_s_sqrt_hz", gyro, root, low=1e-5, high=0.1),
-        FieldMap("accel_noise_m_s2_sqrt_hz", accel, root, low=1e-4, high=1.0),
-        FieldMap("gyro_bias_walk_rad_s_sqrt_s", gyro_bias, root, low=1e-7, high=1e-2),
-        FieldMap("accel_bias_walk_m_s2_sqrt_s", accel_bias, root, low=1e-6, high=1e-1),
+        FieldMap("gyro_noise_rad_s_sqrt_hz", gyro, root),
+        FieldMap("accel_noise_m_s2_sqrt_hz", accel, root),
+        FieldMap("gyro_bias_walk_rad_s_sqrt_s", gyro_bias, root),
+        FieldMap("accel_bias_walk_m_s2_sqrt_s", accel_bias, root),
     )

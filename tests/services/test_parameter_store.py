@@ -64,6 +64,33 @@ def test_range_is_optional_but_the_type_is_not() -> None:
         parameters.set("MODE", 128, check_range=False)
 
 
+def test_a_value_out_of_range_acts_as_the_nearest_used_one() -> None:
+    used = ParameterDefinition(
+        name="ANGLE", type=ParameterType.REAL32, default=10.0, minimum=0.0, maximum=90.0, used=(5.0, 85.0)
+    )
+    parameters = ParameterStore((SPEED, MODE, used))
+    for value, angle, speed in ((-500.0, 5.0, 0.0), (2.0, 5.0, 2.0), (86.0, 85.0, 5.0), (4.5, 5.0, 4.5)):
+        parameters.set("ANGLE", value, check_range=False)
+        parameters.set("SPEED", value, check_range=False)
+        assert (parameters.limited("ANGLE"), parameters.limited("SPEED")) == (angle, speed)
+        assert parameters.get("ANGLE") == value
+    with pytest.raises(ParameterError, match="no parameter 'ANGEL'"):
+        parameters.limited("ANGEL")
+    with pytest.raises(ValueError, match="X: used 2 is above 1"):
+        ParameterDefinition(name="X", type=ParameterType.INT8, default=0, used=(2, 1))
+
+
+@pytest.mark.parametrize("flavour", TABLES)
+def test_a_used_range_overlaps_the_documented_one(flavour: str) -> None:
+    limited = [definition for definition in TABLES[flavour] if definition.used is not None]
+    assert len(limited) > 40
+    for definition in limited:
+        assert definition.used is not None
+        low, high = definition.used
+        assert definition.minimum is None or high > definition.minimum, definition.name
+        assert definition.maximum is None or low < definition.maximum, definition.name
+
+
 def test_subscribers_hear_changes_only() -> None:
     parameters = store()
     heard: list[tuple[str, float]] = []

@@ -10,7 +10,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from autopilot_bridge.firmware.mapping import clamp, integer, number
+from autopilot_bridge.firmware.mapping import clamp, integer
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.mission_wire import GLOBAL_FRAMES, is_geodetic
 from autopilot_bridge.parameters import ParameterStore
@@ -47,9 +47,9 @@ class AircraftRules:
     def of(cls, store: ParameterStore) -> "AircraftRules":
         """The rules from a vehicle's parameters."""
         return cls(
-            landing_angle_rad=math.radians(clamp(number(store, "FW_LND_ANG", 5.0), 1.0, 15.0)),
-            loiter_radius_m=clamp(number(store, "NAV_LOITER_RAD", 80.0), 1.0, 1e4),
-            required=integer(store, "MIS_TKO_LAND_REQ", 2),
+            landing_angle_rad=math.radians(clamp(store.get("FW_LND_ANG"), 1.0, 15.0)),
+            loiter_radius_m=clamp(store.get("NAV_LOITER_RAD"), 1.0, 1e4),
+            required=integer(store, "MIS_TKO_LAND_REQ"),
         )
 
 
