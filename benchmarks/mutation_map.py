@@ -32,7 +32,6 @@ PLAIN_TESTS: Final = (
     "tests/estimators/lissajous",
     "tests/estimators/logs",
     "tests/estimators/target_fusion",
-    "tests/navigation/test_earth.py",
     "tests/navigation/test_jacobians.py",
     "tests/navigation/test_mechanisation.py",
     "tests/navigation/test_pitot.py",

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from flightsim.foundation.euler import euler_from_quaternions
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.vectors import euler_from_quaternions, wrap_180, wrap_pi
 
 if TYPE_CHECKING:
     from estimators.logs import Log, Table
@@ -246,7 +246,7 @@ def _placed(lat_deg: Column, lon_deg: Column, frame: LocalFrame | None) -> dict[
     if frame is None:
         return places
     per_lat, per_lon = frame.metres_per_degree
-    east_deg = np.remainder(lon_deg - frame.origin.lon_deg + 180.0, 360.0) - 180.0
+    east_deg = wrap_180(lon_deg - frame.origin.lon_deg)
     return places | {"north_m": per_lat * (lat_deg - frame.origin.lat_deg), "east_m": per_lon * east_deg}
 
 
@@ -275,7 +275,7 @@ def errors(name: str, estimate: Column, reference: Column) -> Column:
     """Estimate minus reference; angles are wrapped to half a turn, but not latitude and longitude."""
     difference = estimate - reference
     if name.endswith("_rad"):
-        return np.remainder(difference + math.pi, 2.0 * math.pi) - math.pi
+        return wrap_pi(difference)
     return difference
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
+from flightsim.foundation.atmosphere import GAS_CONSTANT_J_KG_K, GRAVITY_M_S2
 from flightsim.foundation.rotations import rotate_inverse
 
 Array = NDArray[np.float64]
@@ -28,8 +29,6 @@ NEAR_M: Final = 30.0
 MOVING_M_S: Final = 2.0
 """What stands doesn't crash: contact springs that ring at a slow physics rate are no blow either."""
 
-_GRAVITY_M_S2: Final = 9.80665
-_GAS_CONSTANT: Final = 287.05287  # of dry air, J/(kg K)
 _WRECK_HEIGHT_M: Final = 1.0  # highest place of the centre of gravity of what lies on the ground
 
 
@@ -108,7 +107,7 @@ def lay_down(truth: Array, ground_alt_m: float) -> None:
     """
     height_m = min(max(truth[t.ALT_M] - ground_alt_m, 0.0), _WRECK_HEIGHT_M)
     fallen_m = truth[t.ALT_M] - (ground_alt_m + height_m)
-    scale_height_m = _GAS_CONSTANT * truth[t.TEMPERATURE_K] / _GRAVITY_M_S2
+    scale_height_m = GAS_CONSTANT_J_KG_K * truth[t.TEMPERATURE_K] / GRAVITY_M_S2
     truth[t.PRESSURE_PA] *= math.exp(fallen_m / scale_height_m)
     truth[t.ALT_M] = ground_alt_m + height_m
     truth[t.HEIGHT_ABOVE_GROUND_M] = height_m
@@ -116,7 +115,7 @@ def lay_down(truth: Array, ground_alt_m: float) -> None:
     truth[t.RATES_FRD_RAD_S] = 0.0
     force_frd = np.empty(3)
     rotate_inverse(
-        np.ascontiguousarray(truth[t.Q_NED_FROM_FRD]), np.array([0.0, 0.0, -_GRAVITY_M_S2]), force_frd
+        np.ascontiguousarray(truth[t.Q_NED_FROM_FRD]), np.array([0.0, 0.0, -GRAVITY_M_S2]), force_frd
     )
     truth[t.SPECIFIC_FORCE_FRD_M_S2] = force_frd
     for still in (

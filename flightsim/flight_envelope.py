@@ -16,6 +16,7 @@ import numpy as np
 from flightsim.airframe import Airframe, AirframeError, FlightLimits, Role, load_airframe
 from flightsim.environment import Environment
 from flightsim.flight_figures import FlightEnvelope
+from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
 from flightsim.home import Home
 from flightsim.linear_modes import LinearModel, P, Q, R, U, V, W, linearise
 from flightsim.model_files import content_digest
@@ -24,8 +25,6 @@ from flightsim.wind_tunnel import WindTunnel
 
 __all__ = ["FlightEnvelope", "flight_envelope"]
 
-_G_M_S2: Final = 9.80665
-_SEA_LEVEL_KG_M3: Final = 1.225
 _HEIGHT_M: Final = 100.0
 _STALL_STEP: Final = 0.93
 _STALL_RESOLUTION: Final = 0.01
@@ -125,7 +124,7 @@ class _Survey:
             bank_max_rad=limits.bank_max_rad,
             pitch_min_rad=limits.pitch_min_rad,
             pitch_max_rad=limits.pitch_max_rad,
-            drag_n=tunnel.mass_kg * _G_M_S2 * math.sin(-glide.climb_angle_rad),
+            drag_n=tunnel.mass_kg * GRAVITY_M_S2 * math.sin(-glide.climb_angle_rad),
             **self.response(model, level),
         )
 
@@ -173,8 +172,8 @@ class _Survey:
         tunnel = self.tunnel
         speed = self.limits.airspeed_trim_m_s
         if speed is None:  # a lift coefficient of 0.5 is within any wing's reach
-            weight_n = tunnel.mass_kg * _G_M_S2
-            speed = math.sqrt(weight_n / (0.5 * _SEA_LEVEL_KG_M3 * tunnel.wing_area_m2 * 0.5))
+            weight_n = tunnel.mass_kg * GRAVITY_M_S2
+            speed = math.sqrt(weight_n / (0.5 * SEA_LEVEL_DENSITY_KG_M3 * tunnel.wing_area_m2 * 0.5))
         try:
             flies = self.glide(speed)
         except TrimError as error:
@@ -246,7 +245,7 @@ class _Survey:
             "roll_time_constant_s": model.roll.time_constant_s,
             "pitch_acceleration_per_elevator_rad_s2": float(b[Q, 1]),
             "pitch_rate_per_elevator_rad_s": float(pitch[1]),
-            "load_factor_per_elevator": float(pitch[1]) * speed / _G_M_S2,
+            "load_factor_per_elevator": float(pitch[1]) * speed / GRAVITY_M_S2,
             "short_period_frequency_rad_s": model.short_period.frequency_rad_s,
             "short_period_damping": model.short_period.damping,
             "yaw_acceleration_per_rudder_rad_s2": float(b[R, 3]),

@@ -2,10 +2,9 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final, Self
+from typing import Self
 
-_WGS84_A_M: Final = 6378137.0
-_WGS84_E2: Final = 6.69437999014e-3
+from flightsim.foundation.geodesy import curvature_radii_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,12 +53,9 @@ class Home:
     def offset(self, north_m: float, east_m: float) -> tuple[float, float]:
         """(latitude deg, longitude deg) of a point on the ground near home.
 
-        Uses the ellipsoid's radii of curvature at home (NGA.STND.0036, section 4).
+        Uses the ellipsoid's radii of curvature at home.
         """
-        sin_lat = math.sin(math.radians(self.lat_deg))
-        w2 = 1.0 - _WGS84_E2 * sin_lat * sin_lat
-        normal_m = _WGS84_A_M / math.sqrt(w2)
-        meridian_m = normal_m * (1.0 - _WGS84_E2) / w2
+        meridian_m, normal_m = curvature_radii_m(self.lat_deg)
         parallel_m = (normal_m + self.alt_m) * math.cos(math.radians(self.lat_deg))
         return (
             self.lat_deg + math.degrees(north_m / (meridian_m + self.alt_m)),

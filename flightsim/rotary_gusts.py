@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.kernels import kernel
-from flightsim.foundation.rotations import rotate_inverse
+from flightsim.foundation.rotations import rotate_inverse, yaw_of
 
 Array = NDArray[np.float64]
 
@@ -61,8 +61,7 @@ def _advance(
     state[1] += gain_v * (gust_ned_m_s[0] - state[1])
     state[2] += gain_v * (gust_ned_m_s[1] - state[2])
     state[3] += gain_w * (gust_ned_m_s[2] - state[3])
-    w, x, y, z = q_ned_from_frd
-    heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    heading = yaw_of(q_ned_from_frd)
     c, s = math.cos(heading), math.sin(heading)
     p = state[0] * roll_gust_sigma_rad_s(scales[3], scales[1], span_m)
     q = -(gust_ned_m_s[2] - state[3]) / vertical_m

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightsim import truth as t
 from flightsim.airframe import AirframeError, AirframeKind, load_airframe
 from flightsim.environment import Environment
+from flightsim.foundation.geodesy import EARTH_RATE_RAD_S
 from flightsim.foundation.rotations import quaternion_from_euler, rotate_inverse
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, initialise
@@ -21,7 +22,6 @@ Array = NDArray[np.float64]
 _N_PER_LBF: Final = 4.4482216152605
 _NM_PER_LBF_FT: Final = 1.3558179483314004
 _KG_PER_SLUG: Final = 14.593902937206364
-_EARTH_RATE_RAD_S: Final = 7.292115e-5
 _FT: Final = 0.3048
 _SETTLE_STEPS: Final = 400
 _FORCES: Final = tuple(f"forces/fb{axis}-total-lbs" for axis in "xyz")
@@ -157,7 +157,7 @@ def _centrifugal_force_frd(fdm: jsbsim.FGFDMExec) -> Array:
     lat = fdm.get_property_value("position/lat-geod-rad")
     x, y = (fdm.get_property_value(f"position/ecef-{axis}-ft") * _FT for axis in "xy")
     mass_kg = fdm.get_property_value("inertia/mass-slugs") * _KG_PER_SLUG
-    outward_n = mass_kg * _EARTH_RATE_RAD_S**2 * math.hypot(x, y)
+    outward_n = mass_kg * EARTH_RATE_RAD_S**2 * math.hypot(x, y)
     q = np.empty(4)
     roll, pitch, yaw = (fdm.get_property_value(f"attitude/{angle}-rad") for angle in ("phi", "theta", "psi"))
     quaternion_from_euler(roll, pitch, yaw, q)

@@ -21,6 +21,7 @@ from flightsim.crash import (
     NEAR_M,
     Touches,
 )
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.foundation.rotations import quaternion_from_euler
 from flightsim.jsbsim_model import find_property
@@ -70,7 +71,7 @@ LOAD_FACTORS: Final = {
     f"accelerations/a-pilot-{axis}-ft_sec2": f"accelerations/N{axis}" for axis in ("x", "y", "z")
 }
 ACCEL_SCALE: Final = np.array([_FT, _FT, _FT])
-LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * 9.80665
+LOAD_FACTOR_SCALE: Final = np.array([1.0, 1.0, -1.0]) * GRAVITY_M_S2
 # Motion is read every step; the rest and the model's own properties may be slower.
 MOTION_SIZE: Final = STATE.index("atmosphere/P-psf")
 _MOTION_BYTES: Final = 8 * MOTION_SIZE

@@ -17,6 +17,7 @@ from flightsim import truth as t
 from flightsim.actuation import FixedWingActuators
 from flightsim.airframe import Airframe, AirframeError, AirframeKind, Role, load_airframe
 from flightsim.environment import Environment
+from flightsim.foundation.atmosphere import SEA_LEVEL_DENSITY_KG_M3
 from flightsim.foundation.rotations import quaternion_from_euler, rotate
 from flightsim.home import Home
 from flightsim.initial_state import InitialState, height_on_wheels_m, initialise
@@ -31,7 +32,6 @@ _FT: Final = 0.3048
 _N_PER_LBF: Final = 4.4482216152605
 _KG_M3_PER_SLUG_FT3: Final = 515.3788183931961
 _KG_PER_SLUG: Final = 14.593902937206364
-_SEA_LEVEL_KG_M3: Final = 1.225
 _BLOCK_S: Final = 0.4  # servos have followed by then
 _SETTLED: Final = 2e-5  # m/s2 and rad/s2 from block to block
 _LONGEST_S: Final = 20.0  # a jet needs that to spool up
@@ -168,7 +168,7 @@ class WindTunnel:
 
     def true_airspeed_m_s(self, equivalent_m_s: float) -> float:
         """True airspeed at the tunnel's density."""
-        return equivalent_m_s * math.sqrt(_SEA_LEVEL_KG_M3 / self.density_kg_m3)
+        return equivalent_m_s * math.sqrt(SEA_LEVEL_DENSITY_KG_M3 / self.density_kg_m3)
 
     def measure(self, state: FlightState, *, engines: bool = True) -> Reading:
         """Hold the aircraft in a state and read its accelerations.

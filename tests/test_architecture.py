@@ -18,6 +18,14 @@ GROUND_FLOOR = tuple(
     )
 )
 FOUNDATION = ("flightsim.foundation",)  # knows nothing of the world: all packages may import it
+EARTH_CONSTANTS = (
+    *(6378137.0, 6356752.3142, 6371000.0, 6371008.8, 298.257223563, 6.69437999014e-3, 7.292115e-5),
+    *(9.80665, 9.7803253359, 8.314462618, 287.05287, 288.15, 273.15, 101325.0, 1013.25, 1.225),
+)
+ANGLE_FUNCTIONS = (
+    *("wrap_pi", "wrap_180", "normalize_angle", "euler_of"),
+    *("quaternion_from_euler", "euler_from_quaternion", "from_euler", "rotate_inverse", "conjugate"),
+)
 # Where the wall clock, sockets and files may be met.
 CLOCK_AND_LINKS = ("autopilot_bridge.clock", "autopilot_bridge.links")
 SANS_IO_FORBIDDEN = ("socket", "select", "selectors", "serial", "asyncio", "threading", "subprocess", "time")
@@ -165,6 +173,52 @@ def test_only_the_command_line_knows_options(name):
 def test_the_test_sees_options():
     found = texts('"""--a"""\nf(f"give --b {x}", "c --- d")')
     assert [text for text in found if FLAG.search(text)] == ["give --b "]
+
+
+def earth_constants(source):
+    """Constants of WGS84 and of the standard atmosphere among the numbers of a source."""
+    return sorted(
+        {
+            node.value
+            for node in ast.walk(ast.parse(source))
+            if isinstance(node, ast.Constant) and isinstance(node.value, int | float)
+            for constant in EARTH_CONSTANTS
+            if abs(node.value - constant) < 1e-5 * constant
+        }
+    )
+
+
+def test_the_foundation_alone_defines_the_earth_and_the_atmosphere():
+    found = {name: earth_constants(path.read_text(encoding="utf-8")) for name, path in MODULES.items()}
+    assert {name for name, values in found.items() if values} == {
+        "flightsim.foundation.atmosphere",
+        "flightsim.foundation.geodesy",
+    }
+
+
+def test_one_module_wraps_angles_and_one_multiplies_quaternions():
+    """A function defined elsewhere under one of these names is a copy."""
+    defined = {
+        (node.name, name)
+        for name, path in MODULES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef) and node.name.strip("_") in ANGLE_FUNCTIONS
+    }
+    assert {module.rpartition(".")[0] for _, module in defined} == {"flightsim.foundation"}
+
+
+@pytest.mark.parametrize(
+    ("source", "constants"),
+    [
+        ("R = 6378137", [6378137]),
+        ("R_M = 6_371e3", [6_371e3]),
+        ("def f():\n    return 1 / 298.257223563", [298.257223563]),
+        ("p = {'g': 9.80665, 'i': 9.81}", [9.80665]),
+        ("x = [1.0, True, '9.80665']", []),
+    ],
+)
+def test_the_test_sees_constants(source, constants):
+    assert earth_constants(source) == constants
 
 
 @pytest.mark.parametrize(

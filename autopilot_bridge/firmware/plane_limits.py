@@ -13,6 +13,7 @@ from autopilot_bridge.control.fixed_wing.parameters import FixedWingParameters
 from autopilot_bridge.firmware.mapping import FieldMap, clamp
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from flightsim.flight_envelope import FlightEnvelope
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 _STALL_MARGIN: Final = 1.05  # least airspeed over the stall speed
 _LEAST_ROOM: Final = 1.05  # highest over least airspeed
@@ -127,7 +128,7 @@ def flight_values(
 
 def flyable_radius(radius_m: float, values: Mapping[str, Any]) -> float:
     """A circle's radius with its sign, no smaller than the bank limit allows at the trim airspeed."""
-    least = values["airspeed_trim_m_s"] ** 2 / (9.80665 * math.tan(values["bank_max_rad"]))
+    least = values["airspeed_trim_m_s"] ** 2 / (GRAVITY_M_S2 * math.tan(values["bank_max_rad"]))
     return math.copysign(max(abs(radius_m), least), radius_m)
 
 

@@ -8,10 +8,10 @@ from typing import Final
 import numpy as np
 
 from autopilot_bridge.flight.context import Array, FlightContext
-from autopilot_bridge.flight.multicopter.yaw import wrap_pi
 from autopilot_bridge.flight.plan_reading import Command, target_of
 from autopilot_bridge.mission_plan import MissionItem
 from autopilot_bridge.navigation import layout as nav_layout
+from flightsim.foundation.vectors import wrap_pi
 
 _NEAREST_M: Final = 0.5  # within this distance, right above or below it, the heading is not defined
 

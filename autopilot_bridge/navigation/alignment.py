@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from autopilot_bridge.navigation.earth import STANDARD_GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, SensorReadings
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class Alignment:
         if imu.fresh:
             accel = imu.values[IMU_ACCEL_FRD_M_S2]
             gyro = imu.values[IMU_GYRO_FRD_RAD_S]
-            force = math.hypot(*accel) / STANDARD_GRAVITY_M_S2
+            force = math.hypot(*accel) / GRAVITY_M_S2
             if not (abs(force - 1.0) <= _MAX_FORCE_ERROR and math.hypot(*gyro) <= _MAX_RATE_RAD_S):
                 self.restart()
                 return

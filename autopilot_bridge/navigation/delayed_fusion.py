@@ -31,6 +31,7 @@ from autopilot_bridge.navigation.states import (
     R,
 )
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import body_axis
 
 Array = NDArray[np.float64]
 
@@ -44,11 +45,7 @@ def body_axis_in_ned(history: Array, row: int, axis: int) -> tuple[float, float,
         history[row, HISTORY_Q + 2],
         history[row, HISTORY_Q + 3],
     )
-    if axis == 0:
-        return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
-    if axis == 1:
-        return 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
-    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+    return body_axis(w, x, y, z, axis)
 
 
 @kernel

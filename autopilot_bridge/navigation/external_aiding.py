@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import external_fusion as e
 from autopilot_bridge.navigation.aiding_parts import AidingParts
+from autopilot_bridge.navigation.delayed_fusion import body_axis_in_ned
 from autopilot_bridge.navigation.external import (
     POSITION_M,
     Q_LOCAL_FROM_FRD,
@@ -28,7 +29,7 @@ from autopilot_bridge.navigation.external_heading import ExternalHeading
 from autopilot_bridge.navigation.external_parameters import ExternalParameters
 from autopilot_bridge.navigation.health import NavigationHealth
 from autopilot_bridge.navigation.solution import UNKNOWN_VELOCITY_M_S
-from autopilot_bridge.navigation.states import GYRO, HISTORY_Q, X_GYRO_BIAS
+from autopilot_bridge.navigation.states import GYRO, X_GYRO_BIAS
 from flightsim.foundation.vectors import yaw_of
 
 Array = NDArray[np.float64]
@@ -331,14 +332,7 @@ class ExternalAiding:
 
     def _rotation(self, row: int) -> Array:
         """r_ned_from_frd at a row of the history."""
-        w, x, y, z = self._solution.history[row, HISTORY_Q : HISTORY_Q + 4].tolist()
-        return np.array(
-            (
-                (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
-                (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
-                (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-            )
-        )
+        return np.column_stack([body_axis_in_ned(self._solution.history, row, axis) for axis in range(3)])
 
 
 def _turned(x: float, y: float, z: float, angle_rad: float) -> tuple[float, float, float]:

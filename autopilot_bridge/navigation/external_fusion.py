@@ -66,7 +66,7 @@ def heading_ph(p: Array, work: Array, hn: float, he: float) -> float:
 
 @kernel
 def wrapped(angle: float) -> float:
-    """An angle within -pi..pi."""
+    """An angle within -pi..pi. Unlike `wrap_pi` it leaves one that is within exactly as it is."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation.parameters import NavigationParameters
+from flightsim.foundation.vectors import wrap_180
 from flightsim.interface import (
     GPS_ALT_M,
     GPS_EPH_M,
@@ -137,7 +138,7 @@ class GpsQuality:
         ):
             travelled[i] += half_s * (now + before)
         north_m = (values[GPS_LAT_DEG] - anchor[GPS_LAT_DEG]) * _M_PER_DEG
-        dlon = (values[GPS_LON_DEG] - anchor[GPS_LON_DEG] + 180.0) % 360.0 - 180.0
+        dlon = wrap_180(values[GPS_LON_DEG] - anchor[GPS_LON_DEG])
         east_m = dlon * _M_PER_DEG * math.cos(math.radians(values[GPS_LAT_DEG]))
         down_m = anchor[GPS_ALT_M] - values[GPS_ALT_M]
         north, east, down = travelled

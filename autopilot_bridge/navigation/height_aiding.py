@@ -5,11 +5,11 @@ from typing import Final
 
 from autopilot_bridge.navigation import fusion as f
 from autopilot_bridge.navigation.aiding_parts import AidingParts
-from autopilot_bridge.navigation.earth import pressure_altitude_m
 from autopilot_bridge.navigation.parameters import NavigationParameters
 from autopilot_bridge.navigation.pressure_scale import PressureScale
 from autopilot_bridge.navigation.states import X_BARO_OFFSET, X_POS, X_VEL
 from autopilot_bridge.navigation.terrain import TerrainEstimator
+from flightsim.foundation.atmosphere import pressure_altitude_m
 from flightsim.interface import BARO_PRESSURE_PA
 
 _GAP_US: Final = 2_000_000  # silence after which a sensor's refusal is counted from the beginning

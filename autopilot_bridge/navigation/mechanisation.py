@@ -51,6 +51,7 @@ from autopilot_bridge.navigation.states import (
     R,
 )
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import body_axis
 
 Array = NDArray[np.float64]
 
@@ -84,15 +85,8 @@ def take_sample(core: Array, imu: Array, gyro_range: float, accel_range: float) 
 def refresh_rotation(core: Array) -> None:
     """Rotation matrix in `core` from its quaternion."""
     w, x, y, z = core[Q], core[Q + 1], core[Q + 2], core[Q + 3]
-    core[R] = 1.0 - 2.0 * (y * y + z * z)
-    core[R + 1] = 2.0 * (x * y - w * z)
-    core[R + 2] = 2.0 * (x * z + w * y)
-    core[R + 3] = 2.0 * (x * y + w * z)
-    core[R + 4] = 1.0 - 2.0 * (x * x + z * z)
-    core[R + 5] = 2.0 * (y * z - w * x)
-    core[R + 6] = 2.0 * (x * z - w * y)
-    core[R + 7] = 2.0 * (y * z + w * x)
-    core[R + 8] = 1.0 - 2.0 * (x * x + y * y)
+    for axis in range(3):
+        core[R + axis], core[R + 3 + axis], core[R + 6 + axis] = body_axis(w, x, y, z, axis)
 
 
 @kernel

@@ -3,12 +3,14 @@
 import math
 from typing import Final
 
-from autopilot_bridge.navigation.earth import (
-    SEA_LEVEL_DENSITY_KG_M3,
+from autopilot_bridge.navigation.parameters import NavigationParameters
+from flightsim.foundation.atmosphere import (
+    ICE_POINT_K,
+    SEA_LEVEL_PRESSURE_PA,
+    SEA_LEVEL_TEMPERATURE_K,
     air_density_kg_m3,
     standard_temperature_k,
 )
-from autopilot_bridge.navigation.parameters import NavigationParameters
 from flightsim.interface import (
     AIRSPEED_DIFFERENTIAL_PRESSURE_PA,
     AIRSPEED_TEMPERATURE_C,
@@ -16,7 +18,7 @@ from flightsim.interface import (
     SensorReadings,
 )
 
-_KELVIN: Final = 273.15
+_SEA_LEVEL_KG_M3: Final = air_density_kg_m3(SEA_LEVEL_PRESSURE_PA, SEA_LEVEL_TEMPERATURE_K)
 _TEMPERATURE_C: Final = (-60.0, 80.0)  # plausible of the transducer
 _PRESSURE_PA: Final = (1.0e4, 1.2e5)
 _MAX_DIFFERENTIAL_PA: Final = 1.0e4
@@ -79,7 +81,7 @@ class Pitot:
             self._pressure_pa = pressure_pa
             self._changed_us = time_us
         scale = self._parameters.airspeed_scale
-        self.equivalent_m_s = scale * math.sqrt(2.0 * max(pressure_pa, 0.0) / SEA_LEVEL_DENSITY_KG_M3)
+        self.equivalent_m_s = scale * math.sqrt(2.0 * max(pressure_pa, 0.0) / _SEA_LEVEL_KG_M3)
 
     def alive(self, time_us: int) -> bool:
         """Samples come, and they vary."""
@@ -96,11 +98,11 @@ class Pitot:
             return
         sensed_c = float(self._readings.airspeed.values[AIRSPEED_TEMPERATURE_C])
         if believed and _TEMPERATURE_C[0] <= sensed_c <= _TEMPERATURE_C[1]:
-            temperature_k = sensed_c + _KELVIN - self._parameters.airspeed_sensor_heating_k
+            temperature_k = sensed_c + ICE_POINT_K - self._parameters.airspeed_sensor_heating_k
         else:
             temperature_k = standard_temperature_k(static_pa)
         density = air_density_kg_m3(static_pa, temperature_k)
-        self.true_per_equivalent = math.sqrt(SEA_LEVEL_DENSITY_KG_M3 / density)
+        self.true_per_equivalent = math.sqrt(_SEA_LEVEL_KG_M3 / density)
 
 
 class AirspeedCheck:

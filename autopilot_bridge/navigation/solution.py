@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import covariance as cov
-from autopilot_bridge.navigation.earth import STANDARD_GRAVITY_M_S2, earth_rate_ned_rad_s, normal_gravity_m_s2
 from autopilot_bridge.navigation.fusion import OBS_SIZE
 from autopilot_bridge.navigation.mechanisation import refresh_rotation
 from autopilot_bridge.navigation.parameters import NavigationParameters
@@ -43,6 +42,8 @@ from autopilot_bridge.navigation.states import (
     Q,
     R,
 )
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.geodesy import earth_rate_ned_rad_s, normal_gravity_m_s2
 from flightsim.foundation.rotations import multiply, quaternion_from_euler
 
 Array = NDArray[np.float64]
@@ -93,7 +94,7 @@ class Solution:
         self.work: Array = np.zeros(WORK_SIZE)
         self.obs: Array = np.zeros(OBS_SIZE)
         self.process: Array = process_from(parameters)
-        self.core[GRAVITY] = STANDARD_GRAVITY_M_S2
+        self.core[GRAVITY] = GRAVITY_M_S2
         horizontal, vertical = parameters.gps_position_walk_m
         self.gps_error_var = (horizontal**2, horizontal**2, vertical**2)
         self.clear()

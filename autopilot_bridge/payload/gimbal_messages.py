@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from autopilot_bridge.mavlink import dialect as mavlink
 from autopilot_bridge.payload.component import fixed_text
-from flightsim.foundation.vectors import yaw_of
+from flightsim.foundation.vectors import euler_of, yaw_of
 from flightsim.payload import Gimbal, GimbalFlags
 
 GIMBAL_COMPONENT: Final = int(mavlink.MAV_COMP_ID_GIMBAL)
@@ -66,12 +66,10 @@ def attitude_status(gimbal: Gimbal) -> Any:
 
 def mount_orientation(gimbal: Gimbal, time_ms: int) -> Any:
     """MOUNT_ORIENTATION, of the protocol's first version: roll and pitch against the horizon, degrees."""
-    w, x, y, z = gimbal.measured_q_heading_from_gimbal.tolist()
+    angles = euler_of(gimbal.measured_q_heading_from_gimbal.tolist())
     return mavlink.MAVLink_mount_orientation_message(
         time_ms,
-        math.degrees(math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))),
-        math.degrees(math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))),
-        math.degrees(yaw_of((w, x, y, z))),
+        *map(math.degrees, angles),
         math.degrees(yaw_of(gimbal.measured_q_ned_from_gimbal.tolist())) % 360.0,
     )
 

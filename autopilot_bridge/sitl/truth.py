@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.mavlink import FrameEncoder
 from autopilot_bridge.mavlink.definitions import definition
 from autopilot_bridge.telemetry.records import record_type, whole
+from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
 from flightsim.foundation.kernels import bound, kernel
 from flightsim.home import Home
 from flightsim.payload import GroundTargets
@@ -42,10 +43,12 @@ def _fill(truth: NDArray[np.float64], out: NDArray[np.void], time_us: int) -> No
     r.vy = whole(truth[4] * 100.0, 32767.0)
     r.vz = whole(truth[5] * 100.0, 32767.0)
     r.true_airspeed = whole(truth[26] * 100.0, 32767.0)
-    r.ind_airspeed = whole(truth[26] * 100.0 * math.sqrt(max(0.0, truth[18]) / 1.225), 32767.0)
-    r.xacc = whole(truth[13] * (1000.0 / 9.80665), 32767.0)
-    r.yacc = whole(truth[14] * (1000.0 / 9.80665), 32767.0)
-    r.zacc = whole(truth[15] * (1000.0 / 9.80665), 32767.0)
+    r.ind_airspeed = whole(
+        truth[26] * 100.0 * math.sqrt(max(0.0, truth[18]) / SEA_LEVEL_DENSITY_KG_M3), 32767.0
+    )
+    r.xacc = whole(truth[13] * (1000.0 / GRAVITY_M_S2), 32767.0)
+    r.yacc = whole(truth[14] * (1000.0 / GRAVITY_M_S2), 32767.0)
+    r.zacc = whole(truth[15] * (1000.0 / GRAVITY_M_S2), 32767.0)
 
 
 class TruthEncoder:

@@ -15,6 +15,7 @@ from autopilot_bridge.telemetry.motion import MotionMessages
 from autopilot_bridge.telemetry.streams import Builder, Values
 from autopilot_bridge.telemetry.view import UINT16_UNKNOWN, TelemetryView
 from flightsim import interface
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.interface import SensorReadings
 
 NAN: Final = math.nan
@@ -262,7 +263,7 @@ class CommonMessages:
         imu = self.view.imu()
         if not math.isfinite(imu[0]):
             return None
-        milli_g = [round(value * (1000.0 / 9.80665)) for value in imu[interface.IMU_ACCEL_FRD_M_S2]]
+        milli_g = [round(value * (1000.0 / GRAVITY_M_S2)) for value in imu[interface.IMU_ACCEL_FRD_M_S2]]
         mrad = [round(value * 1000.0) for value in imu[interface.IMU_GYRO_FRD_RAD_S]]
         mgauss = [round(value * 1000.0) for value in self.view.magnetometer_gauss()]
         return (*milli_g, *mrad, *mgauss)

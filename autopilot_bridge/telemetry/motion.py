@@ -20,8 +20,9 @@ from autopilot_bridge.mavlink.frame import OVERHEAD_V2
 from autopilot_bridge.navigation import NavigationFilter
 from autopilot_bridge.telemetry.records import record_type, whole
 from autopilot_bridge.telemetry.streams import Builder
-from autopilot_bridge.telemetry.view import TelemetryView
+from autopilot_bridge.telemetry.view import TelemetryView, pressure_altitude_m
 from flightsim.foundation.kernels import bound, kernel
+from flightsim.foundation.rotations import wrap_180
 from flightsim.interface import SensorReadings
 
 Array = NDArray[np.float64]
@@ -41,6 +42,7 @@ _PLACE_SIZE: Final = 5
 _NEED_ATTITUDE: Final = 0b100011  # bits of MESSAGES
 _NEED_FRAME: Final = 0b001000
 _NEED_SENSORS: Final = 0b010000
+_pressure_altitude_m = kernel(pressure_altitude_m)
 
 
 @kernel
@@ -73,7 +75,7 @@ def _fill(
     r.local_position_ned__vx, r.local_position_ned__vy, r.local_position_ned__vz = nav[7], nav[8], nav[9]
 
     r.global_position_int__time_boot_ms = time_ms
-    longitude = (place[1] + nav[11] / place[4] + 180.0) % 360.0 - 180.0
+    longitude = wrap_180(place[1] + nav[11] / place[4])
     r.global_position_int__lat = whole((place[0] + nav[10] / place[3]) * 1e7, 1.8e9)
     r.global_position_int__lon = whole(longitude * 1e7, 1.8e9)
     r.global_position_int__alt = whole((place[2] - nav[12]) * 1e3, 2e9)
@@ -92,7 +94,7 @@ def _fill(
     r.highres_imu__ymag = mag[1] if field_known else 0.0
     r.highres_imu__zmag = mag[2] if field_known else 0.0
     r.highres_imu__abs_pressure = baro[0] * 0.01
-    r.highres_imu__pressure_alt = 44330.769 * (1.0 - (max(0.0, baro[0]) / 101325.0) ** 0.190263)
+    r.highres_imu__pressure_alt = _pressure_altitude_m(max(0.0, baro[0]))
     r.highres_imu__temperature = imu[6]
 
     r.odometry__time_usec = time_us

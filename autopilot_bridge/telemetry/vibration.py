@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import bound, kernel
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ class VibrationMeter:
         self._level = np.zeros(3)
         blend_slow = min(1.0, 2.0 * math.pi * 5.0 / rate_hz)
         blend_level = min(1.0, 2.0 * math.pi * 2.0 / rate_hz)
-        slow = np.array([0.0, 0.0, -9.80665])
+        slow = np.array([0.0, 0.0, -GRAVITY_M_S2])
         self.update: Callable[[], None] = bound(
             _update, accel_frd_m_s2, slow, self._level, blend_slow, blend_level
         )

@@ -10,6 +10,7 @@ from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.navigation import layout as nav
 from autopilot_bridge.telemetry.vibration import VibrationMeter
 from flightsim import interface
+from flightsim.foundation.atmosphere import SEA_LEVEL_PRESSURE_PA
 from flightsim.interface import SensorReadings
 
 UINT16_UNKNOWN: Final = 65535
@@ -122,5 +123,5 @@ class TelemetryView:
 
 
 def pressure_altitude_m(pressure_pa: float) -> float:
-    """Height in the ICAO standard atmosphere (doc 7488, troposphere) of a static pressure."""
-    return 44330.769 * (1.0 - (pressure_pa / 101325.0) ** 0.190263)
+    """Height in the standard atmosphere of a static pressure, with the rounded constants of ICAO doc 7488."""
+    return 44330.769 * (1.0 - (pressure_pa / SEA_LEVEL_PRESSURE_PA) ** 0.190263)

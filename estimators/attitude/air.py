@@ -4,13 +4,12 @@ from math import isfinite, sqrt
 from typing import Final
 
 from estimators.attitude.parameters import AirspeedSource
+from flightsim.foundation.atmosphere import SEA_LEVEL_DENSITY_KG_M3, SEA_LEVEL_PRESSURE_PA
 
 __all__ = ["AirData", "pressure_pa", "true_over_equivalent"]
 
-SEA_LEVEL_PA: Final = 101_325.0
-SEA_LEVEL_DENSITY_KG_M3: Final = 1.225
 _DENSITY_EXPONENT: Final = 1.0 - 1.0 / 5.25588
-"""Density by pressure in the troposphere of the standard atmosphere (ISO 2533)."""
+"""Density by pressure in the standard atmosphere, rounded: stored estimates are compared to the bit."""
 _HECTOPASCAL_MAX: Final = 1200.0
 _LEAST_PA: Final = 20_000.0
 _AIRSPEED_MAX_M_S: Final = 400.0
@@ -22,12 +21,12 @@ def pressure_pa(value: float) -> float | None:
     pressure.
     """
     pascal = value * _HPA if value <= _HECTOPASCAL_MAX else value
-    return pascal if _LEAST_PA <= pascal <= 1.2 * SEA_LEVEL_PA else None
+    return pascal if _LEAST_PA <= pascal <= 1.2 * SEA_LEVEL_PRESSURE_PA else None
 
 
 def true_over_equivalent(static_pa: float) -> float:
     """Ratio of true to equivalent airspeed in the standard atmosphere."""
-    return float((static_pa / SEA_LEVEL_PA) ** (-0.5 * _DENSITY_EXPONENT))
+    return float((static_pa / SEA_LEVEL_PRESSURE_PA) ** (-0.5 * _DENSITY_EXPONENT))
 
 
 class AirData:

@@ -13,14 +13,14 @@ from typing import Final
 from autopilot_bridge.mavlink import definition
 from estimators.attitude.parameters import ImuSource
 from estimators.messages import Message, message_class
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 __all__ = ["DIFFERENTIAL_PRESSURE", "INERTIAL_FIELDS", "SAMPLES", "Sample"]
 
 Sample = tuple[float, float, float, float, float, float]
 """Specific force in m/s^2 and angular rate in rad/s, FRD."""
 
-STANDARD_GRAVITY_M_S2: Final = 9.80665
-_MILLI_G: Final = 1e-3 * STANDARD_GRAVITY_M_S2
+_MILLI_G: Final = 1e-3 * GRAVITY_M_S2
 _MILLI: Final = 1e-3
 INERTIAL_FIELDS: Final = 0b111111
 """Rates and forces in HIGHRES_IMU.fields_updated."""

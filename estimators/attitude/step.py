@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from estimators.attitude import layout as at
 from estimators.attitude import parameters as par
 from estimators.attitude import rotor, tilt, uncertainty, wing
-from estimators.attitude.tilt import GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]

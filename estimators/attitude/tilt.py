@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from estimators.attitude import layout as at
 from estimators.attitude import parameters as par
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
 
-GRAVITY_M_S2 = 9.80665
 _LENGTH_MEAN_S = 0.3
 _SLOW_S = 0.5
 _AGREEMENT_RAD = 0.03

@@ -14,6 +14,7 @@ from autopilot_bridge.mavlink import dialect
 from estimators.logs.ardupilot_firmware import Firmware
 from estimators.logs.dataflash_state import firmware, state_parts, throttle
 from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, value_at
+from flightsim.foundation.vectors import wrap_pi
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
 _HOME: Final = 1  # ORGN.Type
@@ -85,7 +86,7 @@ def _attitude(tables: Mapping[str, Records]) -> list[Part]:
                 "ATTITUDE",
                 times,
                 **{axis: np.radians(attitude.columns[axis.capitalize()]) for axis in ("roll", "pitch")},
-                yaw=_wrapped(np.radians(attitude.columns["Yaw"])),
+                yaw=wrap_pi(np.radians(attitude.columns["Yaw"])),
                 rollspeed=np.radians(value_at(rates, "R", times)),
                 pitchspeed=np.radians(value_at(rates, "P", times)),
                 yawspeed=np.radians(value_at(rates, "Y", times)),
@@ -99,7 +100,7 @@ def _attitude(tables: Mapping[str, Records]) -> list[Part]:
                 truth.time_us,
                 roll=np.radians(truth.columns["Roll"]),
                 pitch=np.radians(truth.columns["Pitch"]),
-                yaw=_wrapped(np.radians(truth.columns["Yaw"])),
+                yaw=wrap_pi(np.radians(truth.columns["Yaw"])),
                 lat=truth.columns["Lat"] * 1e7,
                 lng=truth.columns["Lng"] * 1e7,
             )
@@ -297,8 +298,3 @@ def _gps(tables: Mapping[str, Records]) -> list[Part]:
 
 def _first(table: Records | None, field: str = "I") -> Records | None:
     return None if table is None else table.instance(field, 0)
-
-
-def _wrapped(angles_rad: Array) -> Array:
-    wrapped: Array = np.mod(angles_rad + np.pi, 2.0 * np.pi) - np.pi
-    return wrapped

@@ -20,9 +20,9 @@ from estimators.logs.log import Log
 from estimators.logs.raw_records import Record, positions, read_records, record_times_us
 from estimators.logs.source import Stream
 from estimators.logs.units import to_si
+from flightsim.foundation.geodesy import MEAN_RADIUS_M
 
 _SPIKE_SHARE: Final = 0.01
-_EARTH_RADIUS_M: Final = 6_371_000.0
 _GLOBAL: Final = frozenset({"lat", "lon"})
 
 Rows = NDArray[np.int64]
@@ -179,7 +179,7 @@ def _changed(
 
 def _wire_per_metre(field: str, records: NDArray[np.void]) -> float:
     """Wire value (degE7) of one metre to the north or the east."""
-    per_metre = math.degrees(1.0 / _EARTH_RADIUS_M) * 1e7
+    per_metre = math.degrees(1.0 / MEAN_RADIUS_M) * 1e7
     if field == "lon":
         per_metre /= max(0.01, math.cos(math.radians(float(records["lat"][0]) * 1e-7)))
     return per_metre

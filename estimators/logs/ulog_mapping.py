@@ -11,7 +11,7 @@ import numpy as np
 
 from autopilot_bridge.mavlink import dialect
 from estimators.logs.mapped import Array, Part, Records, each_second, mavlink_part, newest, value_at
-from flightsim.foundation.euler import euler_from_quaternions
+from flightsim.foundation.vectors import euler_from_quaternions
 
 _ACCELEROMETER_AND_GYRO: Final = 0b111111
 _TYPE_OF_CLASS: Final = {  # VEHICLE_TYPE of vehicle_status

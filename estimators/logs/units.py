@@ -8,8 +8,7 @@ import math
 from types import MappingProxyType
 from typing import Final
 
-STANDARD_GRAVITY_M_S2: Final = 9.80665
-"""ISO 80000-3. MAVLink's "mG" are thousandths of it."""
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 _DEGREE: Final = math.pi / 180.0
 
@@ -55,7 +54,7 @@ SI: Final = MappingProxyType(
         "mm/s": (1e-3, "m/s"),
         "m/s/s": (1.0, "m/s^2"),
         "m/s^2": (1.0, "m/s^2"),
-        "mG": (STANDARD_GRAVITY_M_S2 / 1e3, "m/s^2"),
+        "mG": (GRAVITY_M_S2 / 1e3, "m/s^2"),  # thousandths of standard gravity
         # mass, force, energy, pressure
         "kg": (1.0, "kg"),
         "g": (1e-3, "kg"),

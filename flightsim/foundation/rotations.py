@@ -1,13 +1,18 @@
-"""Quaternion and rotation kernels (compiled, allocation-free). Quaternions are Hamilton, w x y z."""
+"""Angle, quaternion and rotation kernels (compiled, allocation-free). Quaternions are Hamilton, w x y z."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation import vectors
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]
+
+wrap_pi = kernel(vectors.wrap_pi)
+wrap_180 = kernel(vectors.wrap_180)
+yaw_of = kernel(vectors.yaw_of)
 
 
 @kernel
@@ -32,6 +37,16 @@ def rotate_inverse(q: Array, v: Array, out: Array) -> None:
     out[0] = v[0] + w * tx + y * tz - z * ty
     out[1] = v[1] + w * ty + z * tx - x * tz
     out[2] = v[2] + w * tz + x * ty - y * tx
+
+
+@kernel
+def body_axis(w: float, x: float, y: float, z: float, axis: int) -> tuple[float, float, float]:
+    """Column `axis` of R(q): with q_a_from_b, that axis of b in a."""
+    if axis == 0:
+        return 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
+    if axis == 1:
+        return 2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)
+    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
 
 
 @kernel
@@ -84,9 +99,3 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float, out: Array) -> 
     out[1] = sr * cp * cy - cr * sp * sy
     out[2] = cr * sp * cy + sr * cp * sy
     out[3] = cr * cp * sy - sr * sp * cy
-
-
-@kernel
-def wrap_pi(angle: float) -> float:
-    """Angle in rad wrapped to [-pi, pi)."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi

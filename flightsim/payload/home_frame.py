@@ -1,18 +1,16 @@
 """Where a vehicle is in the world's own frame: local NED, metres, origin on the ground at home."""
 
 import math
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
+from flightsim.foundation.geodesy import curvature_radii_m
+from flightsim.foundation.vectors import wrap_180
 from flightsim.home import Home
 
 Array = NDArray[np.float64]
-
-_WGS84_A_M: Final = 6378137.0
-_WGS84_E2: Final = 6.69437999014e-3
 
 
 class HomeFrame:
@@ -27,15 +25,13 @@ class HomeFrame:
 
     def __init__(self, home: Home) -> None:
         self.home = home
-        sin_lat = math.sin(math.radians(home.lat_deg))
-        w2 = 1.0 - _WGS84_E2 * sin_lat * sin_lat
-        normal_m = _WGS84_A_M / math.sqrt(w2)
-        self._m_per_rad_lat = normal_m * (1.0 - _WGS84_E2) / w2 + home.alt_m
+        meridian_m, normal_m = curvature_radii_m(home.lat_deg)
+        self._m_per_rad_lat = meridian_m + home.alt_m
         self._m_per_rad_lon = (normal_m + home.alt_m) * math.cos(math.radians(home.lat_deg))
 
     def north_east_m(self, lat_deg: float, lon_deg: float) -> tuple[float, float]:
         """(north, east) in metres of a place, WGS84."""
-        dlon_deg = (lon_deg - self.home.lon_deg + 180.0) % 360.0 - 180.0
+        dlon_deg = wrap_180(lon_deg - self.home.lon_deg)
         return (
             math.radians(lat_deg - self.home.lat_deg) * self._m_per_rad_lat,
             math.radians(dlon_deg) * self._m_per_rad_lon,

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
+from flightsim.foundation.atmosphere import ICE_POINT_K
 from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import AIRSPEED_DIFFERENTIAL_PRESSURE_PA, AIRSPEED_SIZE, AIRSPEED_TEMPERATURE_C
@@ -26,7 +27,6 @@ from flightsim.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-_KELVIN: Final = 273.15
 _GAMMA: Final = 1.4
 
 _NOISE: Final = 0
@@ -182,7 +182,7 @@ def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: 
         saturate(value_pa, constants[_LIMIT]), constants[_QUANTUM]
     )
     out[AIRSPEED_TEMPERATURE_C] = quantise(
-        truth[t.TEMPERATURE_K] - _KELVIN + constants[_RISE_K], constants[_TEMPERATURE_QUANTUM]
+        truth[t.TEMPERATURE_K] - ICE_POINT_K + constants[_RISE_K], constants[_TEMPERATURE_QUANTUM]
     )
     state[_DRIFT] = constants[_DECAY] * state[_DRIFT] + constants[_DRIVE] * normals[row, 1]
     return True

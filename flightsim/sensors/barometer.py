@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
+from flightsim.foundation.atmosphere import ICE_POINT_K
 from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import BARO_PRESSURE_PA, BARO_SIZE, BARO_TEMPERATURE_C
@@ -17,7 +18,6 @@ from flightsim.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
 
-_KELVIN: Final = 273.15
 
 _NOISE: Final = 0
 _BIAS: Final = 1
@@ -120,7 +120,7 @@ def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: 
         constants[_QUANTUM],
     )
     out[BARO_TEMPERATURE_C] = quantise(
-        truth[t.TEMPERATURE_K] - _KELVIN + constants[_RISE_K], constants[_TEMPERATURE_QUANTUM]
+        truth[t.TEMPERATURE_K] - ICE_POINT_K + constants[_RISE_K], constants[_TEMPERATURE_QUANTUM]
     )
     state[_DRIFT] = constants[_DECAY] * state[_DRIFT] + constants[_DRIVE] * normals[row, 1]
     return True

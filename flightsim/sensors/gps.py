@@ -10,16 +10,14 @@ from numpy.typing import NDArray
 from flightsim import interface as i
 from flightsim import truth as t
 from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
+from flightsim.foundation.geodesy import curvature_radii_m
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import wrap_180
 from flightsim.sensors.fault_kinds import FaultTarget, SensorUnit
 from flightsim.sensors.kernels import gauss_markov, quantise
 from flightsim.sensors.sensor import SensorModel
 
 Array = NDArray[np.float64]
-
-# WGS84 (NGA.STND.0036)
-_A_M: Final = 6378137.0
-_E2: Final = 6.69437999014e-3
 
 # UBX-NAV-PVT resolution
 _ANGLE_QUANTUM_DEG: Final = 1e-7
@@ -240,14 +238,14 @@ def add_local_bias(values: Array, bias: Array) -> None:
     values[i.GPS_LON_DEG] += bias[1] / per_lon_deg - bias[1]
 
 
+_curvature_radii_m = kernel(curvature_radii_m)
+
+
 @kernel
 def _metres_per_degree(lat_deg: float, alt_m: float) -> tuple[float, float]:
-    sin_lat = math.sin(math.radians(lat_deg))
     # At the poles a degree of longitude has no length; the floor keeps the division finite.
     cos_lat = max(1e-6, math.cos(math.radians(lat_deg)))
-    w2 = 1.0 - _E2 * sin_lat * sin_lat
-    normal_m = _A_M / math.sqrt(w2)
-    meridian_m = normal_m * (1.0 - _E2) / w2
+    meridian_m, normal_m = _curvature_radii_m(lat_deg)
     return math.radians(meridian_m + alt_m), math.radians((normal_m + alt_m) * cos_lat)
 
 
@@ -295,8 +293,7 @@ def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: 
     lat_deg = math.degrees(truth[t.LAT_RAD])
     alt_m = truth[t.ALT_M]
     per_lat_deg, per_lon_deg = _metres_per_degree(lat_deg, alt_m)
-    lon_deg = math.degrees(truth[t.LON_RAD]) + scale * east_m / per_lon_deg
-    lon_deg = (lon_deg + 180.0) % 360.0 - 180.0
+    lon_deg = wrap_180(math.degrees(truth[t.LON_RAD]) + scale * east_m / per_lon_deg)
     out[i.GPS_LAT_DEG] = quantise(lat_deg + scale * north_m / per_lat_deg, _ANGLE_QUANTUM_DEG)
     out[i.GPS_LON_DEG] = quantise(lon_deg, _ANGLE_QUANTUM_DEG)
     out[i.GPS_ALT_M] = quantise(alt_m + scale * up_m, _LENGTH_QUANTUM_M)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim import truth as t
+from flightsim.foundation.atmosphere import GRAVITY_M_S2, ICE_POINT_K
 from flightsim.foundation.checks import require_not_negative, require_positive, require_rate
 from flightsim.foundation.kernels import kernel
 from flightsim.interface import IMU_ACCEL_FRD_M_S2, IMU_GYRO_FRD_RAD_S, IMU_SIZE, IMU_TEMPERATURE_C
@@ -23,9 +24,7 @@ from flightsim.sensors.vibration import CONSTANTS, ROTORS, RotorVibrationParamet
 
 Array = NDArray[np.float64]
 
-STANDARD_GRAVITY_M_S2: Final = 9.80665
 _DEG: Final = math.pi / 180.0
-_KELVIN: Final = 273.15
 
 # Each triad has the same constants, accelerometer after gyro.
 _MATRIX: Final = 0  # 9 numbers: what the axes read of a vector in FRD
@@ -89,14 +88,14 @@ class ImuParameters:
     gyro_cross_axis_error: float = 0.001
     gyro_range_rad_s: float = 2000.0 * _DEG
     gyro_quantum_rad_s: float = 2000.0 * _DEG / 32768.0
-    accel_noise_density_m_s2_sqrt_hz: float = 175e-6 * STANDARD_GRAVITY_M_S2
-    accel_bias_instability_m_s2: float = 0.2e-3 * STANDARD_GRAVITY_M_S2
+    accel_noise_density_m_s2_sqrt_hz: float = 175e-6 * GRAVITY_M_S2
+    accel_bias_instability_m_s2: float = 0.2e-3 * GRAVITY_M_S2
     accel_bias_time_constant_s: float = 300.0
     accel_turn_on_bias_m_s2: float = 0.02
     accel_scale_error: float = 0.001
     accel_cross_axis_error: float = 0.001
-    accel_range_m_s2: float = 24.0 * STANDARD_GRAVITY_M_S2
-    accel_quantum_m_s2: float = 24.0 * STANDARD_GRAVITY_M_S2 / 32768.0
+    accel_range_m_s2: float = 24.0 * GRAVITY_M_S2
+    accel_quantum_m_s2: float = 24.0 * GRAVITY_M_S2 / 32768.0
     self_heating_k: float = 15.0
     warm_up_s: float = 300.0
     temperature_quantum_k: float = 0.125
@@ -230,7 +229,7 @@ def _measure(truth: Array, constants: Array, state: Array, normals: Array, row: 
             state[wander] = (
                 constants[c + _DECAY] * state[wander] + constants[c + _DRIVE] * normals[row, 6 + wander]
             )
-    air_c = truth[t.TEMPERATURE_K] - _KELVIN
+    air_c = truth[t.TEMPERATURE_K] - ICE_POINT_K
     out[IMU_TEMPERATURE_C] = quantise(
         air_c + constants[_RISE_K] * (1.0 - state[_WARMUP]), constants[_TEMPERATURE_QUANTUM]
     )

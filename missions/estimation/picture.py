@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from estimators.comparison import Comparison
 from estimators.references import AUTOPILOT, TRUTH, quantity_of
+from flightsim.foundation.vectors import wrap_pi
 from missions.runs.picture import tidy
 
 __all__ = ["draw_errors"]
@@ -184,7 +185,7 @@ def _parted(values: NDArray[np.float64], breaks: NDArray[np.bool_], column: str)
     """Values with NaN where the line is interrupted: at gaps, and at angles that wrap around."""
     wrapped = values
     if column.endswith("_rad"):
-        wrapped = np.remainder(values + math.pi, 2.0 * math.pi) - math.pi
+        wrapped = wrap_pi(values)
         with np.errstate(invalid="ignore"):
             jumps = np.append(np.abs(np.diff(wrapped)) > math.pi, False)
         return np.where(breaks | jumps, np.nan, wrapped)

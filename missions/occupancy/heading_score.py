@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from flightsim.foundation.vectors import wrap_pi
 from missions.occupancy.pilot import HeadingCommand
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ def settled_errors(
         kept = (time_s >= max(start_s, settled_from_s)) & (time_s < stop_s)
         difference = yaw_rad[kept] - command.heading_rad
         times.append(time_s[kept])
-        errors.append(np.remainder(difference + math.pi, math.tau) - math.pi)
+        errors.append(wrap_pi(difference))
     if not times:
         return np.zeros(0), np.zeros(0)
     return np.concatenate(times), np.concatenate(errors)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
-from flightsim.foundation.euler import euler_from_quaternions
+from flightsim.foundation.vectors import euler_from_quaternions, quaternions_from_euler
 from missions.notes import PATTERN, FlightNotes
 from missions.runs.records import FlightRecords
 from missions.runs.waypoint_passes import waypoint_misses_m
@@ -247,16 +247,7 @@ def _airborne(times_s: Array, track: Track | None) -> NDArray[np.bool_]:
 
 def _quaternions(attitude: NDArray[np.void]) -> Array:
     """q_ned_from_frd (n, 4) of ATTITUDE messages."""
-    halves = [0.5 * attitude[name].astype(np.float64) for name in ("roll", "pitch", "yaw")]
-    (cr, cp, cy), (sr, sp, sy) = map(np.cos, halves), map(np.sin, halves)
-    return np.column_stack(
-        (
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        )
-    )
+    return quaternions_from_euler(*(attitude[name].astype(np.float64) for name in ("roll", "pitch", "yaw")))
 
 
 def _largest_angle_deg(

@@ -8,8 +8,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from autopilot_bridge.flight.multicopter.trajectory import TrajectoryGenerator, braking_speed
-from autopilot_bridge.flight.multicopter.yaw import YawSteering, wrap_pi
+from autopilot_bridge.flight.multicopter.yaw import YawSteering
 from autopilot_bridge.flight.parameters import FlightParameters
+from flightsim.foundation.vectors import wrap_pi
 
 DT_S = 0.02
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.navigation import layout, mechanisation
 from autopilot_bridge.navigation import states as s
-from autopilot_bridge.navigation.earth import earth_rate_ned_rad_s
 from flightsim import truth as t
+from flightsim.foundation.geodesy import earth_rate_ned_rad_s
 from tests.navigation.bench import attitude_error
 from tests.navigation.kinematic_flight import GRAVITY_M_S2, HOME, Lissajous, fly
 

@@ -8,29 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from autopilot_bridge.navigation import NavigationParameters
-from autopilot_bridge.navigation.earth import (
-    air_density_kg_m3,
-    pressure_altitude_m,
-    standard_temperature_k,
-)
 from autopilot_bridge.navigation.pitot import AirspeedCheck, GustVariance, Pitot
 from flightsim.foundation.random_streams import RandomStreams
 from flightsim.interface import SensorReadings
 from tests.navigation.matched import MATCHED
 
 PARAMETERS = NavigationParameters(fixed_wing=True, **MATCHED)
-
-
-@pytest.mark.parametrize(
-    ("height_m", "pressure_pa", "density"),
-    [(0.0, 101325.0, 1.225), (1000.0, 89874.6, 1.1117), (5000.0, 54019.9, 0.7361)],
-)
-def test_standard_atmosphere(height_m: float, pressure_pa: float, density: float) -> None:
-    """ISO 2533, table 1."""
-    assert pressure_altitude_m(pressure_pa) == pytest.approx(height_m, abs=0.5)
-    temperature_k = standard_temperature_k(pressure_pa)
-    assert temperature_k == pytest.approx(288.15 - 0.0065 * height_m, abs=0.01)
-    assert air_density_kg_m3(pressure_pa, temperature_k) == pytest.approx(density, abs=1e-4)
 
 
 def pitot_at(pressure_pa: float, static_pa: float, temperature_c: float, **changes: float) -> Pitot:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import body_axis
 
 Array = NDArray[np.float64]
 
@@ -38,8 +39,7 @@ def acceleration_along_flow(nav: Array) -> float:
         down -= nav[_NAV_WIND + 2]
     speed = math.sqrt(north * north + east * east + down * down)
     if not speed > _DIRECTION_SPEED_M_S:  # true for NaN
-        w, x, y, z = nav[0], nav[1], nav[2], nav[3]
-        north, east, down = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
+        north, east, down = body_axis(nav[0], nav[1], nav[2], nav[3], 0)
         speed = 1.0
     return (north * nav[_NAV_ACC] + east * nav[_NAV_ACC + 1] + down * nav[_NAV_ACC + 2]) / speed
 

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
-from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, ROLL_MAX_RAD, stall_speed
+from autopilot_bridge.control.fixed_wing.lateral import ROLL_MAX_RAD, stall_speed
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_pi
 

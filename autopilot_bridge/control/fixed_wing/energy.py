@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from autopilot_bridge.control.fixed_wing import layout as c
 from autopilot_bridge.control.fixed_wing.air import acceleration_along_flow
 from autopilot_bridge.control.fixed_wing.height import follow_height, reset_height
-from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, stall_speed
+from autopilot_bridge.control.fixed_wing.lateral import stall_speed
 from autopilot_bridge.control.fixed_wing.vertical_speed import pitch_for_climb
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]

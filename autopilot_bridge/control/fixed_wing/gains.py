@@ -11,8 +11,8 @@ import math
 from typing import Final
 
 from flightsim.flight_envelope import FlightEnvelope
+from flightsim.foundation.atmosphere import GRAVITY_M_S2, SEA_LEVEL_DENSITY_KG_M3
 
-_G: Final = 9.80665
 _ROLL_BANDWIDTH: Final = 4.0  # of the roll rate, in bandwidths of the roll angle
 _ROLL_RATE_RAD_S: Final = 2.6  # of a wing of 1 m; large aircraft roll with less haste
 _HEADING_P_1_S: Final = 0.8885  # of PX4
@@ -103,7 +103,7 @@ def _rate_gains(envelope: FlightEnvelope, values: dict[str, float | bool]) -> fl
     values["rate_yaw_p"] = yaw_p
     values["rate_yaw_i"] = 2.0 * yaw_p
     values["rate_yaw_integral_max"] = 0.4
-    pressure_pa = 0.5 * 1.225 * envelope.airspeed_trim_m_s**2
+    pressure_pa = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * envelope.airspeed_trim_m_s**2
     side_m_s2_per_rad = pressure_pa * envelope.wing_area_m2 * _SIDE_FORCE_SLOPE_PER_RAD / envelope.mass_kg
     side_per_rudder_m_s2 = side_m_s2_per_rad * max(0.05, abs(envelope.sideslip_per_rudder_rad))
     values["sideslip_gain_rad_s_per_m_s2"] = _SIDESLIP_BANDWIDTH_RAD_S / (2.0 * yaw_p * side_per_rudder_m_s2)
@@ -127,8 +127,8 @@ def _energy_gains(envelope: FlightEnvelope, values: dict[str, float | bool], pit
     values["climb_rate_target_m_s"] = 0.6 * climb_max
     values["sink_rate_target_m_s"] = min(0.6 * sink_max, 0.8 * climb_max) if envelope.powered else sink_min
 
-    pressure_pa = 0.5 * 1.225 * envelope.airspeed_trim_m_s**2
-    lift = envelope.mass_kg * _G / (pressure_pa * envelope.wing_area_m2)
+    pressure_pa = 0.5 * SEA_LEVEL_DENSITY_KG_M3 * envelope.airspeed_trim_m_s**2
+    lift = envelope.mass_kg * GRAVITY_M_S2 / (pressure_pa * envelope.wing_area_m2)
     values["trim_pitch_rad"] = envelope.trim_pitch_rad
     values["lift_angle_rad"] = lift / envelope.lift_slope_per_rad
 
@@ -146,5 +146,5 @@ def _energy_gains(envelope: FlightEnvelope, values: dict[str, float | bool], pit
     values["airspeed_rate_process_noise_m_s2"] = 0.7
     # induced drag grows with the square of the load factor, n^2 - 1 = 2.2 (n - 1) about n = 1.2
     aspect_ratio = envelope.wing_span_m**2 / envelope.wing_area_m2
-    induced_m_s2 = _G * lift / (math.pi * _OSWALD_FACTOR * aspect_ratio)
+    induced_m_s2 = GRAVITY_M_S2 * lift / (math.pi * _OSWALD_FACTOR * aspect_ratio)
     values["turn_energy_rate_m2_s3"] = 2.2 * induced_m_s2 * envelope.airspeed_trim_m_s

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 from flightsim.foundation.rotations import wrap_pi
 
 Array = NDArray[np.float64]
 
-GRAVITY_M_S2: Final = 9.80665
 _COURSE: Final = 0  # setpoint slots, as in control.fixed_wing_setpoint
 _HEADING: Final = 1
 _ACCELERATION: Final = 2

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from autopilot_bridge.control.fixed_wing import layout as c
-from autopilot_bridge.control.fixed_wing.lateral import GRAVITY_M_S2, stall_speed
+from autopilot_bridge.control.fixed_wing.lateral import stall_speed
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.multicopter import layout as c
 from flightsim.foundation.kernels import kernel
-from flightsim.foundation.rotations import multiply
+from flightsim.foundation.rotations import body_axis, multiply
 
 Array = NDArray[np.float64]
 
@@ -22,11 +22,7 @@ _INTEGRAL_FADE_RAD_S: Final = math.radians(400.0)  # the integrator rests during
 @kernel
 def body_z_of(q: Array) -> tuple[float, float, float]:
     """Third column of R(q): the body's down axis in NED."""
-    return (
-        2.0 * (q[1] * q[3] + q[0] * q[2]),
-        2.0 * (q[2] * q[3] - q[0] * q[1]),
-        1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]),
-    )
+    return body_axis(q[0], q[1], q[2], q[3], 2)
 
 
 @kernel

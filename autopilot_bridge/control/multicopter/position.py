@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from autopilot_bridge.control.multicopter import layout as c
 from autopilot_bridge.control.multicopter.attitude import body_z_of, quaternion_from_thrust_axis
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.kernels import kernel
+from flightsim.foundation.rotations import body_axis
 
 Array = NDArray[np.float64]
 
-GRAVITY_M_S2: Final = 9.80665
 _POS: Final = 0  # setpoint slots, as in control.setpoint
 _VEL: Final = 3
 _ACC: Final = 6
@@ -110,10 +111,10 @@ def update_filters(nav: Array, p: Array, s: Array, dt: float) -> None:
         s[c.DRAG] = 0.0
         s[c.DRAG + 1] = 0.0
         return
-    w, x, y, z = nav[0], nav[1], nav[2], nav[3]
+    x_north, x_east, _ = body_axis(nav[0], nav[1], nav[2], nav[3], 0)
+    y_north, y_east, _ = body_axis(nav[0], nav[1], nav[2], nav[3], 1)
     fx, fy = nav[_NAV_FORCE], nav[_NAV_FORCE + 1]
-    north = (1.0 - 2.0 * (y * y + z * z)) * fx + 2.0 * (x * y - w * z) * fy
-    east = 2.0 * (x * y + w * z) * fx + (1.0 - 2.0 * (x * x + z * z)) * fy
+    north, east = x_north * fx + y_north * fy, x_east * fx + y_east * fy
     if s[c.GROUND_CONTACT] != 0.0:
         # a sideways force of the ground is no drag: tilting against it would overturn the vehicle
         north, east = 0.0, 0.0

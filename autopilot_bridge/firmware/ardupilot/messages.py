@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from autopilot_bridge.navigation import NavigationHealth
 from autopilot_bridge.telemetry.common import NAN, CommonMessages
 from autopilot_bridge.telemetry.streams import Builder, Values
+from flightsim.foundation.vectors import euler_of
 
 _M = mavlink
 
@@ -138,9 +139,7 @@ class ArdupilotMessages(CommonMessages):
 
     def nav_controller_output(self) -> Values | None:
         """NAV_CONTROLLER_OUTPUT (62)."""
-        q_w, q_x, q_y, q_z = self.sources.controller.attitude_setpoint.tolist()
-        roll = math.atan2(2.0 * (q_w * q_x + q_y * q_z), 1.0 - 2.0 * (q_x * q_x + q_y * q_y))
-        pitch = math.asin(max(-1.0, min(1.0, 2.0 * (q_w * q_y - q_z * q_x))))
+        roll, pitch, _ = euler_of(self.sources.controller.attitude_setpoint.tolist())
         v = self.view.refreshed()
         bearing_deg, distance_m, alt_error_m = 0, 0.0, 0.0
         target = self.trajectory_setpoint()

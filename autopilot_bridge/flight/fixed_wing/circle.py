@@ -5,17 +5,13 @@ from typing import Final
 
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from flightsim.foundation.vectors import wrap_pi
 
 _TANGENT_BEYOND: Final = 1.3  # radii: closer than this the circle is captured without a tangent leg
 _NEAR_CIRCLE: Final = 0.15  # of the radius: the circle counts as captured
 _NEAR_CIRCLE_MIN_M: Final = 10.0
 _ALONG_CIRCLE_RAD: Final = math.radians(35.0)
 _RETANGENT: Final = 1.8  # radii: blown this far off the circle, fly back along a tangent
-
-
-def wrap_pi(angle_rad: float) -> float:
-    """Angle wrapped to [-pi, pi)."""
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 class Circle:

@@ -4,17 +4,17 @@ import math
 from typing import Final
 
 from autopilot_bridge.flight.context import Array, FlightContext
-from autopilot_bridge.flight.fixed_wing.circle import wrap_pi
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 from autopilot_bridge.flight.plan_reading import Command
 from autopilot_bridge.mission_plan import MissionItem
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.vectors import wrap_pi
 
 _ALIGNED_RAD: Final = math.radians(8.0)
 _PATIENCE_TURNS: Final = 1.25  # the course to the next place is waited for no longer
 _AT_HEIGHT_M: Final = 10.0
-_GRAVITY_M_S2: Final = 9.80665
 
 
 class CircleItem:
@@ -79,7 +79,7 @@ class CircleItem:
         if task.turns_done - self._done_at_turns > _PATIENCE_TURNS:
             return True
         # where the course will be when the wings are level again
-        rate = _GRAVITY_M_S2 * math.tan(state.roll_rad) / max(state.ground_speed_m_s, 1.0)
+        rate = GRAVITY_M_S2 * math.tan(state.roll_rad) / max(state.ground_speed_m_s, 1.0)
         course = state.course_rad + rate * ctx.fixed_wing.roll_time_constant_s
         north, east = float(next_place[0]) - state.north_m, float(next_place[1]) - state.east_m
         return abs(wrap_pi(math.atan2(east, north) - course)) < _ALIGNED_RAD

@@ -15,8 +15,8 @@ from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.multicopter.guided import GuidedKind
 from autopilot_bridge.flight.multicopter.offboard import Vector
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
-_GRAVITY_M_S2: Final = 9.80665
 _NEVER: Final = math.inf
 
 
@@ -105,7 +105,7 @@ class GuidedTask(AircraftTask):
         """
         self._heading_rad = heading_rad
         self._course = course
-        self._bank_limit_rad = math.atan(max(0.0, acceleration_m_s2) / _GRAVITY_M_S2)
+        self._bank_limit_rad = math.atan(max(0.0, acceleration_m_s2) / GRAVITY_M_S2)
         self.kind = GuidedKind.HEADING
 
     def set_altitude(self, ctx: FlightContext, down_m: float, rate_m_s: float) -> None:

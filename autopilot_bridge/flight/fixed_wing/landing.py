@@ -10,7 +10,7 @@ from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TouchedDown
 from autopilot_bridge.flight.fixed_wing.approach import Approach, approach_along_leg, approach_into_wind
 from autopilot_bridge.flight.fixed_wing.base import AircraftTask, GuidedPath
-from autopilot_bridge.flight.fixed_wing.circle import Circle, wrap_pi
+from autopilot_bridge.flight.fixed_wing.circle import Circle
 from autopilot_bridge.flight.fixed_wing.descend import DescendTask
 from autopilot_bridge.flight.fixed_wing.flare import Flare
 from autopilot_bridge.flight.fixed_wing.line import Line
@@ -18,6 +18,7 @@ from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParamet
 from autopilot_bridge.flight.fixed_wing.power_check import PowerCheck
 from autopilot_bridge.flight.fixed_wing.surface_wind import SurfaceWind
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
+from flightsim.foundation.vectors import wrap_pi
 
 _ENTRY_HEIGHT_M: Final = 4.0  # the circle is left this close to its height
 _ENTRY_COURSE_RAD: Final = math.radians(20.0)

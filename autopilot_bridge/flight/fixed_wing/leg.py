@@ -3,14 +3,14 @@
 import math
 from typing import Final
 
-from autopilot_bridge.flight.fixed_wing.circle import wrap_pi
 from autopilot_bridge.flight.fixed_wing.command import FlightCommand
 from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, TurnInRule
 from autopilot_bridge.flight.fixed_wing.path_guidance import PathGuidance
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
+from flightsim.foundation.vectors import wrap_pi
 
-_GRAVITY_M_S2: Final = 9.80665
 _TURN_BANK_RAD: Final = math.radians(30.0)  # of the turn towards a waypoint beside the aircraft
 _RIGHT_ANGLE_RAD: Final = 0.5 * math.pi
 _SAME_PLACE_M: Final = 1.0
@@ -124,7 +124,7 @@ class Leg:
         """The waypoint is so near and so far aside that no turn from here leads over it."""
         north, east = self.target[0] - state.north_m, self.target[1] - state.east_m
         speed = state.ground_speed_m_s
-        turn_m = speed * speed / (_GRAVITY_M_S2 * math.tan(_TURN_BANK_RAD))
+        turn_m = speed * speed / (GRAVITY_M_S2 * math.tan(_TURN_BANK_RAD))
         if north * north + east * east > 4.0 * turn_m * turn_m or speed < 1.0:
             return False
         right = (state.vel_north_m_s * east - state.vel_east_m_s * north) / speed

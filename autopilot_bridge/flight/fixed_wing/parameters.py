@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from autopilot_bridge.control.fixed_wing.gains import gains_for
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
 
 if TYPE_CHECKING:  # its module brings scipy
@@ -182,11 +183,11 @@ class FixedWingFlightParameters:
         gains = gains_for(e)
         bank = min(e.bank_max_rad, math.radians(45.0))
         # a circle flown at two thirds of the bank limit's turn rate leaves room for wind
-        radius = e.airspeed_trim_m_s**2 / (9.80665 * math.tan(0.6 * bank))
+        radius = e.airspeed_trim_m_s**2 / (GRAVITY_M_S2 * math.tan(0.6 * bank))
         climb = max(0.3, 0.6 * e.climb_max_m_s)
         # the guidance asks for no turn faster than the aircraft can roll into and fly: else it swings to and
         # fro between its bank limits
-        turn_s = e.airspeed_trim_m_s / (9.80665 * math.tan(bank))
+        turn_s = e.airspeed_trim_m_s / (GRAVITY_M_S2 * math.tan(bank))
         reversal_s = 2.0 * bank / float(gains["roll_slew_rad_s"])
         # at a flare's lowest pitch it must come down: a nose that is held too high floats on and on
         slower = (e.airspeed_trim_m_s / approach) ** 2 - 1.0

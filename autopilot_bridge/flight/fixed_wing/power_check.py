@@ -4,7 +4,7 @@ import math
 from typing import Final
 
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
-from autopilot_bridge.navigation.earth import STANDARD_GRAVITY_M_S2
+from flightsim.foundation.atmosphere import GRAVITY_M_S2
 
 _SPUN_UP_S: Final = 1.0  # an engine that idled brings nothing before
 _STRETCH_S: Final = 1.5  # one gust doesn't outweigh it
@@ -45,4 +45,4 @@ class PowerCheck:
 
 def _energy_height_m(state: AircraftState) -> float:
     speed_squared = state.ground_speed_m_s**2 + state.vel_down_m_s**2
-    return speed_squared / (2.0 * STANDARD_GRAVITY_M_S2) - state.down_m
+    return speed_squared / (2.0 * GRAVITY_M_S2) - state.down_m

@@ -7,9 +7,10 @@ import numpy as np
 from autopilot_bridge.flight.context import Array, FlightContext, FlightPhase, TaskFinished
 from autopilot_bridge.flight.multicopter.ground import TakeoffRamp
 from autopilot_bridge.flight.multicopter.motion import SmoothMotion
-from autopilot_bridge.flight.multicopter.yaw import Turn, wrap_pi
+from autopilot_bridge.flight.multicopter.yaw import Turn
 from autopilot_bridge.flight.task import SpeedKind, TaskStatus
 from autopilot_bridge.navigation import layout as nav_layout
+from flightsim.foundation.vectors import wrap_pi
 
 _WANTS_UP_M = 0.3
 

@@ -19,7 +19,7 @@ from autopilot_bridge.flight.multicopter.return_home import ReturnTask
 from autopilot_bridge.flight.multicopter.spline import SplineCurve, SplineFlight
 from autopilot_bridge.flight.multicopter.takeoff import TakeoffTask
 from autopilot_bridge.flight.multicopter.trajectory import SPEED
-from autopilot_bridge.flight.multicopter.yaw import Turn, wrap_pi
+from autopilot_bridge.flight.multicopter.yaw import Turn
 from autopilot_bridge.flight.parameters import YawBehaviour
 from autopilot_bridge.flight.plan_reading import (
     JUMPS,
@@ -36,6 +36,7 @@ from autopilot_bridge.flight.region_of_interest import heading_to
 from autopilot_bridge.flight.task import FlightTask, SpeedKind, SpeedTask, TaskStatus
 from autopilot_bridge.mission_plan import MissionItem, MissionStore
 from autopilot_bridge.navigation import layout as nav_layout
+from flightsim.foundation.vectors import wrap_pi
 
 _LOOK_AHEAD_ITEMS: Final = 40
 _LOOK_AHEAD_M: Final = 150.0

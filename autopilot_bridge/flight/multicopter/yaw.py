@@ -3,14 +3,10 @@
 import math
 
 from autopilot_bridge.flight.parameters import FlightParameters
+from flightsim.foundation.vectors import wrap_pi
 
 _GAIN_1_S = 2.0
 _TURNED_RAD = math.radians(1.0)
-
-
-def wrap_pi(angle_rad: float) -> float:
-    """Angle wrapped to [-pi, pi)."""
-    return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 class Turn:

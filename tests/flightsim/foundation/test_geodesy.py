@@ -1,11 +1,16 @@
-"""Local frames against pymap3d's exact conversion on WGS84."""
+"""Local frames against pymap3d's exact conversion on WGS84; gravity and rotation against published values."""
 
 import math
 
 import pymap3d
 import pytest
 
-from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from flightsim.foundation.geodesy import (
+    GeodeticPosition,
+    LocalFrame,
+    earth_rate_ned_rad_s,
+    normal_gravity_m_s2,
+)
 
 ORIGINS = [
     GeodeticPosition(lat_deg=47.397742, lon_deg=8.545594, alt_m=488.0),
@@ -68,3 +73,25 @@ def test_altitude_scales_the_frame():
 def test_impossible_positions_are_named(values, complaint):
     with pytest.raises(ValueError, match=complaint):
         GeodeticPosition(lat_deg=values[0], lon_deg=values[1], alt_m=values[2])
+
+
+@pytest.mark.parametrize(
+    ("lat_deg", "gravity"), [(0.0, 9.7803253359), (90.0, 9.8321849378), (45.0, 9.8061977694)]
+)
+def test_gravity_on_the_ellipsoid(lat_deg, gravity):
+    # NGA.STND.0036, table 3.4 (equator, pole); 45 deg from the closed formula of the same standard
+    assert normal_gravity_m_s2(lat_deg, 0.0) == pytest.approx(gravity, abs=2e-7)
+
+
+def test_gravity_falls_with_height():
+    # free-air gradient, 3.086e-6 1/s^2
+    assert normal_gravity_m_s2(45.0, 0.0) - normal_gravity_m_s2(45.0, 1000.0) == pytest.approx(
+        3.086e-3, rel=2e-3
+    )
+
+
+def test_earth_rate_points_to_the_north_pole():
+    north, east, down = earth_rate_ned_rad_s(30.0)
+    assert math.hypot(north, down) == pytest.approx(7.292115e-5)
+    assert east == 0.0
+    assert math.degrees(math.atan2(-down, north)) == pytest.approx(30.0)

@@ -14,7 +14,7 @@ import pytest
 from flightsim.foundation.kernels import bound, compiled_for, kernel, source_stamp
 from flightsim.foundation.rotations import quaternion_from_euler
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 SOURCES = {
     "layout": "FACTOR = 2.0\nPLACE = slice(1, 3)\nTABLE = (1, (2.0, 'a'))\n",
