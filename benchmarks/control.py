@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.control.fixed_wing import FixedWingController
 from autopilot_bridge.control.fixed_wing import setpoint as fixed_wing_sp
@@ -96,7 +97,7 @@ def main() -> None:
     assert ctx.frame is not None
     lat, lon, _ = ctx.frame.geodetic_from_ned(500.0, 0.0, 0.0)
     store = MissionStore()
-    store.replace((MissionItem(command=16, x=lat, y=lon, z=10.0),), 1)
+    store.replace((MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0),), 1)
     offboard = OffboardTask()
     offboard.set_trajectory((0.0, 0.0, -1.0))
     tasks = {

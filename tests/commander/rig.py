@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.commander import Commander
 from autopilot_bridge.commander.events import Event
@@ -163,7 +164,11 @@ class Rig:
         assert commander.airborne
 
     def waypoint(
-        self, north_m: float, east_m: float, height_m: float = 10.0, command: int = 16
+        self,
+        north_m: float,
+        east_m: float,
+        height_m: float = 10.0,
+        command: int = mavlink.MAV_CMD_NAV_WAYPOINT,
     ) -> MissionItem:
         assert self.context.frame is not None
         lat, lon, _ = self.context.frame.geodetic_from_ned(north_m, east_m, 0.0)

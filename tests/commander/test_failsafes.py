@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import (
     BatteryLevel,
@@ -365,7 +366,11 @@ def test_ardupilot_fence_from_the_plan() -> None:
     items = []
     for north, east in corners:
         lat, lon, _ = rig.context.frame.geodetic_from_ned(north, east, 0.0)
-        items.append(MissionItem(command=5001, frame=5, param1=4.0, x=lat, y=lon))
+        items.append(
+            MissionItem(
+                command=mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, frame=5, param1=4.0, x=lat, y=lon
+            )
+        )
     rig.fence.replace(tuple(items), 7)
     rig.run(0.2)
     assert rig.commander.mode is FlightMode.GUIDED

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import (
     Armed,
@@ -71,11 +72,11 @@ def test_mission_from_the_ground(flavour: str) -> None:
     rig = Rig(flavour)
     commander = rig.commander
     rig.upload(
-        MissionItem(command=22, frame=6, z=10.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=10.0),
         rig.waypoint(10.0, 0.0),
-        MissionItem(command=178, frame=2, param1=1.0, param2=4.0),
+        MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED, frame=2, param1=1.0, param2=4.0),
         rig.waypoint(10.0, 10.0),
-        MissionItem(command=20, frame=2),
+        MissionItem(command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2),
     )
     if flavour == "px4":
         assert commander.set_mode(FlightMode.MISSION).accepted
@@ -101,7 +102,10 @@ def test_mission_from_the_ground(flavour: str) -> None:
 
 def test_a_px4_mission_that_lands_leaves_hold_behind() -> None:
     rig = Rig("px4")
-    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 0.0, command=21))
+    rig.upload(
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=5.0),
+        rig.waypoint(5.0, 0.0, 0.0, command=mavlink.MAV_CMD_NAV_LAND),
+    )
     rig.commander.set_mode(FlightMode.MISSION)
     rig.commander.arm()
     rig.run_until(lambda: rig.commander.airborne, 10.0)
@@ -115,7 +119,11 @@ def test_a_px4_mission_that_lands_leaves_hold_behind() -> None:
 
 def test_copter_s_mission_begins_again_at_every_disarm() -> None:
     rig = Rig("ardupilot")
-    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0), rig.waypoint(9.0, 0.0))
+    rig.upload(
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=5.0),
+        rig.waypoint(5.0, 0.0),
+        rig.waypoint(9.0, 0.0),
+    )
     rig.commander.set_mode(FlightMode.GUIDED)
     assert rig.commander.arm().accepted
     rig.missions.current = 2
@@ -125,7 +133,7 @@ def test_copter_s_mission_begins_again_at_every_disarm() -> None:
 
 def test_the_end_of_a_mission_without_return_holds() -> None:
     rig = Rig("px4")
-    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 5.0))
+    rig.upload(MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 5.0))
     rig.commander.set_mode(FlightMode.MISSION)
     rig.commander.arm()
     rig.run_until(lambda: rig.happened(MissionFinished), 60.0)
@@ -136,8 +144,10 @@ def test_the_end_of_a_mission_without_return_holds() -> None:
 def test_px4_reports_the_last_item_reached_whatever_it_is() -> None:
     """MAVSDK takes the mission for finished when the last item, often a change of speed, was reached."""
     rig = Rig("px4")
-    speed = MissionItem(command=178, frame=2, param1=1.0, param2=4.0)
-    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 5.0), speed)
+    speed = MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED, frame=2, param1=1.0, param2=4.0)
+    rig.upload(
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=5.0), rig.waypoint(5.0, 0.0, 5.0), speed
+    )
     rig.commander.set_mode(FlightMode.MISSION)
     rig.commander.arm()
     rig.run_until(lambda: rig.happened(MissionFinished), 60.0)
@@ -192,7 +202,7 @@ def test_an_armed_vehicle_that_stays_on_the_ground_is_disarmed(flavour: str, sec
 def test_pause_and_resume_a_mission() -> None:
     rig = Rig("ardupilot")
     commander = rig.commander
-    rig.upload(MissionItem(command=22, frame=6, z=10.0), rig.waypoint(100.0, 0.0))
+    rig.upload(MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=10.0), rig.waypoint(100.0, 0.0))
     commander.set_mode(FlightMode.GUIDED)
     commander.arm()
     commander.guidance.start_mission()

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.commander.events import FailsafeKind, FenceBreached, FenceSwitched
 from autopilot_bridge.commander.fence_return import place_ahead
@@ -139,7 +140,7 @@ def test_the_distance_outside_is_measured_from_home(bearing_rad: float) -> None:
 
 def test_return_point() -> None:
     lat, lon, _ = FRAME.geodetic_from_ned(7.0, 8.0, 0.0)
-    given = MissionItem(command=5000, frame=3, x=lat, y=lon)
+    given = MissionItem(command=mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, frame=3, x=lat, y=lon)
     assert Geofence(store_of(given, *square(0, 0, 9))).return_point(FRAME) == pytest.approx(
         (7.0, 8.0), abs=0.01
     )
@@ -472,7 +473,13 @@ def test_a_plane_keeps_to_its_recovery() -> None:
 def test_a_plane_goes_to_its_return_point(parameters: dict, height_m: float) -> None:
     rig = plane(FENCE_ACTION=6, **{"FENCE_TYPE": 7, "FENCE_ALT_MAX": 100.0, **parameters})
     lat, lon, _ = FRAME.geodetic_from_ned(50.0, -60.0, 0.0)
-    rig.fence.replace((MissionItem(command=5000, frame=3, x=lat, y=lon), *square(0.0, 0.0, 200.0)), 3)
+    rig.fence.replace(
+        (
+            MissionItem(command=mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT, frame=3, x=lat, y=lon),
+            *square(0.0, 0.0, 200.0),
+        ),
+        3,
+    )
     put(rig, 250.0, 90.0)
     assert rig.commander.mode is FlightMode.GUIDED
     north, east, down = rig.centre().tolist()
@@ -483,7 +490,9 @@ def test_a_plane_goes_to_its_return_point(parameters: dict, height_m: float) -> 
 def test_a_plane_returns_to_a_rally_point() -> None:
     rig = plane(FENCE_ACTION=6, FENCE_RET_RALLY=1)
     lat, lon, _ = FRAME.geodetic_from_ned(120.0, 30.0, 0.0)
-    rig.context.rally = store_of(MissionItem(command=5100, frame=3, x=lat, y=lon, z=70.0))
+    rig.context.rally = store_of(
+        MissionItem(command=mavlink.MAV_CMD_NAV_RALLY_POINT, frame=3, x=lat, y=lon, z=70.0)
+    )
     put(rig, 400.0, 100.0)
     assert rig.centre() == pytest.approx(np.array([120.0, 30.0, -70.0]), abs=0.2)
 

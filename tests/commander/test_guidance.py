@@ -94,7 +94,11 @@ def test_system_status_is_mavlinks() -> None:
 def test_the_distance_of_a_reached_waypoint_is_reported(flavour: str) -> None:
     """Horizontal, from the waypoint; none for an item without a place."""
     rig = Rig(flavour, kind=AirframeKind.FIXED_WING)
-    rig.upload(rig.waypoint(300.0, 400.0), MissionItem(command=178), rig.waypoint(500.0, 0.0))
+    rig.upload(
+        rig.waypoint(300.0, 400.0),
+        MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED),
+        rig.waypoint(500.0, 0.0),
+    )
     first = int(rig.flavour.policy.mission_first_item)
     rig.context.nav[nav.POS_NED_M] = (297.0, 396.0, -50.0)
     for seq in (first, first + 1):

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.control.multicopter import setpoint as sp
 from autopilot_bridge.flight.context import (
@@ -177,7 +178,7 @@ def test_speed_home_and_equipment_items() -> None:
         do(Command.DO_CHANGE_SPEED, param1=1.0, param2=2.0),
         place(20.0, 0.0),
         do(Command.DO_CHANGE_SPEED, param1=1.0, param2=-2.0),
-        do(183, param1=9.0, param2=1500.0),
+        do(mavlink.MAV_CMD_DO_SET_SERVO, param1=9.0, param2=1500.0),
         MissionItem(command=Command.DO_SET_HOME, frame=1, x=4.0, y=5.0, z=-6.0),
         place(60.0, 0.0),
     )
@@ -197,7 +198,7 @@ def test_condition_delay_holds_items_up_beside_the_flight() -> None:
     items = (
         place(2.0, 0.0),
         do(Command.CONDITION_DELAY, param1=3.0),
-        do(183),
+        do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(40.0, 0.0),
     )
     beside = Flight(*items, habits=ARDUCOPTER_PLANS)
@@ -212,7 +213,7 @@ def test_a_condition_that_is_overtaken_drops_what_waits_for_it() -> None:
     flight = Flight(
         place(2.0, 0.0),
         do(Command.CONDITION_DELAY, param1=60.0),
-        do(183),
+        do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(10.0, 0.0),
         place(12.0, 0.0),
         habits=ARDUCOPTER_PLANS,
@@ -226,7 +227,7 @@ def test_condition_distance() -> None:
     flight = Flight(
         place(1.0, 0.0),
         do(Command.CONDITION_DISTANCE, param1=10.0),
-        do(183),
+        do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(30.0, 0.0),
         habits=ARDUCOPTER_PLANS,
     )
@@ -239,7 +240,7 @@ def test_condition_yaw_turns_the_nose_on_the_way(relative: float, wanted_deg: fl
     flight = Flight(
         place(1.0, 0.0),
         do(Command.CONDITION_YAW, param1=90.0, param3=1.0, param4=relative),
-        do(183),
+        do(mavlink.MAV_CMD_DO_SET_SERVO),
         place(40.0, 0.0),
         place(80.0, 0.0),
         habits=ARDUCOPTER_PLANS,

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import MissionFinished, MissionModeRequested, WaypointReached
 from autopilot_bridge.flight.multicopter import MissionTask, TaskStatus
@@ -19,7 +20,9 @@ def waypoint(
     rig: Rig, north_m: float, east_m: float, height_m: float = HEIGHT_M, **fields: float
 ) -> MissionItem:
     lat, lon, _ = rig.frame.geodetic_from_ned(north_m, east_m, -height_m)
-    return MissionItem(command=16, frame=6, x=lat, y=lon, z=height_m, param4=math.nan, **fields)
+    return MissionItem(
+        command=mavlink.MAV_CMD_NAV_WAYPOINT, frame=6, x=lat, y=lon, z=height_m, param4=math.nan, **fields
+    )
 
 
 def store_of(*items: MissionItem) -> MissionStore:
@@ -60,12 +63,12 @@ def test_lissajous_waypoints_are_passed_without_stopping() -> None:
 def test_square_with_takeoff_hold_and_return_lands_at_home() -> None:
     rig = Rig(parameters=FlightParameters(return_altitude_m=8.0, return_descend_altitude_m=4.0))
     store = store_of(
-        MissionItem(command=22, frame=6, z=6.0, param4=math.nan),
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=6.0, param4=math.nan),
         waypoint(rig, 15.0, 0.0, 6.0),
         waypoint(rig, 15.0, 10.0, 6.0, param1=2.0),
-        MissionItem(command=178, frame=2, param1=1.0, param2=3.0),
+        MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED, frame=2, param1=1.0, param2=3.0),
         waypoint(rig, 0.0, 10.0, 8.0),
-        MissionItem(command=20, frame=2),
+        MissionItem(command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2),
     )
     rig.fly(MissionTask(store))
     log = rig.run(85.0)
@@ -97,8 +100,8 @@ def test_jump_repeats_and_unknown_items_are_passed_over() -> None:
     store = store_of(
         waypoint(rig, 4.0, 0.0),
         waypoint(rig, 0.0, 0.0),
-        MissionItem(command=2000, frame=2),
-        MissionItem(command=177, frame=2, param1=0.0, param2=1.0),
+        MissionItem(command=mavlink.MAV_CMD_IMAGE_START_CAPTURE, frame=2),
+        MissionItem(command=mavlink.MAV_CMD_DO_JUMP, frame=2, param1=0.0, param2=1.0),
     )
     task = MissionTask(store)
     rig.fly(task)
@@ -113,8 +116,8 @@ def test_endless_jump_over_nothing_ends_in_a_hold() -> None:
     rig.fly(
         MissionTask(
             store_of(
-                MissionItem(command=203, frame=2),
-                MissionItem(command=177, frame=2, param1=0.0, param2=-1.0),
+                MissionItem(command=mavlink.MAV_CMD_DO_DIGICAM_CONTROL, frame=2),
+                MissionItem(command=mavlink.MAV_CMD_DO_JUMP, frame=2, param1=0.0, param2=-1.0),
             )
         )
     )
@@ -123,7 +126,13 @@ def test_endless_jump_over_nothing_ends_in_a_hold() -> None:
     assert np.abs(velocities(rig.run(1.0))).max() < 0.3
 
 
-@pytest.mark.parametrize("item", [MissionItem(command=16, frame=99), MissionItem(command=16, x=200.0, y=0.5)])
+@pytest.mark.parametrize(
+    "item",
+    [
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, frame=99),
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=200.0, y=0.5),
+    ],
+)
 def test_items_without_a_place_are_skipped(item: MissionItem) -> None:
     rig = Rig(height_m=HEIGHT_M)
     rig.fly(MissionTask(store_of(item, waypoint(rig, 3.0, 0.0))))

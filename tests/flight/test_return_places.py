@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightContext, MissionFinished, TouchedDown, WaypointReached
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters
@@ -29,7 +30,7 @@ def rally_at(frame: LocalFrame, *points: tuple[float, float, float]) -> MissionS
     items = []
     for north, east, height in points:
         lat, lon, _ = frame.geodetic_from_ned(north, east, 0.0)
-        items.append(MissionItem(command=5100, frame=3, x=lat, y=lon, z=height))
+        items.append(MissionItem(command=mavlink.MAV_CMD_NAV_RALLY_POINT, frame=3, x=lat, y=lon, z=height))
     store = MissionStore()
     store.replace(tuple(items), 1)
     return store
@@ -41,7 +42,13 @@ def plan(*items: MissionItem) -> MissionStore:
     return store
 
 
-def place(north: float, east: float, command: int = 16, height: float = 20.0, **params: float) -> MissionItem:
+def place(
+    north: float,
+    east: float,
+    command: int = mavlink.MAV_CMD_NAV_WAYPOINT,
+    height: float = 20.0,
+    **params: float,
+) -> MissionItem:
     return MissionItem(command=command, frame=1, x=north, y=east, z=-height, **{"param4": math.nan, **params})
 
 
@@ -122,7 +129,10 @@ def test_landing_or_rally(destination: ReturnDestination, here: float, landing: 
     assert ctx.frame is not None
     ctx.rally = rally_at(ctx.frame, (500.0, 0.0, 0.0))
     store = plan(
-        place(200.0, 50.0), MissionItem(command=189, frame=2), place(250.0, 0.0), place(300.0, 0.0, 21)
+        place(200.0, 50.0),
+        MissionItem(command=mavlink.MAV_CMD_DO_LAND_START, frame=2),
+        place(250.0, 0.0),
+        place(300.0, 0.0, 21),
     )
     chosen = choose_return(ctx, PX4, destination, plan_landing(store), store)
     assert chosen is not None
@@ -182,7 +192,7 @@ def test_a_copter_lands_by_its_plan() -> None:
     rig = Rig(height_m=8.0, parameters=px4_returns(return_destination=ReturnDestination.LANDING_OR_RALLY))
     store = plan(
         place(80.0, 0.0),
-        MissionItem(command=189, frame=2),
+        MissionItem(command=mavlink.MAV_CMD_DO_LAND_START, frame=2),
         place(15.0, 15.0, height=10.0),
         place(0.0, 15.0, Command.NAV_LAND, 0.0),
     )

@@ -28,7 +28,11 @@ def test_all_three_plans_as_a_ground_station_sends_and_reads_them(flavour: str, 
     """QGroundControl's order: mission, fence, rally points, each written and read."""
     flight = Flight(flavour)
     flight.fly(3.0)
-    mission = [at(flight, 22, 5.0, 5.0, 10.0), at(flight, 16, 30.0, 0.0, 12.0), do(20)]
+    mission = [
+        at(flight, 22, 5.0, 5.0, 10.0),
+        at(flight, 16, 30.0, 0.0, 12.0),
+        do(m.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    ]
     fence = [*square(flight, 80.0), at(flight, 5004, 20.0, 20.0, 0.0, 5.0, frame=0)]
     rally = [at(flight, 5100, 15.0, -15.0, 20.0, frame=3), at(flight, 5100, -15.0, 15.0, 20.0, frame=3)]
     for kind, items in ((MISSION, mission), (FENCE, fence), (RALLY, rally)):
@@ -73,14 +77,14 @@ def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
     flight.take_off(15.0)
     plan = [
         at(flight, 16, 3.0, 0.0, 15.0),
-        do(205, -60.0, 0.0, 0.0, 0.0, z=2.0),  # DO_MOUNT_CONTROL
-        do(2000, 0.0, 0.0, 1.0, 1.0),  # IMAGE_START_CAPTURE: one
+        do(m.MAV_CMD_DO_MOUNT_CONTROL, -60.0, 0.0, 0.0, 0.0, z=2.0),  # DO_MOUNT_CONTROL
+        do(m.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0, 1.0),  # IMAGE_START_CAPTURE: one
         at(flight, 16, 8.0, 0.0, 15.0),
-        do(206, 5.0),  # DO_SET_CAM_TRIGG_DIST
+        do(m.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 5.0),  # DO_SET_CAM_TRIGG_DIST
         at(flight, 16, 40.0, 0.0, 15.0),
-        do(206, 0.0),
-        do(1000, -20.0, 0.0, NAN, NAN, x=12),  # DO_GIMBAL_MANAGER_PITCHYAW
-        do(203, x=1),  # DO_DIGICAM_CONTROL: one more
+        do(m.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
+        do(m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, 0.0, NAN, NAN, x=12),  # DO_GIMBAL_MANAGER_PITCHYAW
+        do(m.MAV_CMD_DO_DIGICAM_CONTROL, x=1),  # DO_DIGICAM_CONTROL: one more
         at(flight, 16, 46.0, 0.0, 15.0),
     ]
     assert upload(flight, plan) == 0, flight.texts
@@ -151,7 +155,12 @@ def test_items_that_are_commands_are_carried_out() -> None:
     """DO_FENCE_ENABLE, DO_SET_SERVO and DO_GRIPPER of a plan, as ArduPilot has them."""
     flight = Flight("ardupilot", parameters={"GRIP_ENABLE": 1})
     flight.take_off(8.0)
-    plan = [at(flight, 16, 2.0, 0.0, 8.0), do(207, 1.0), do(183, 9.0, 1600.0), do(211, 1.0, 0.0)]
+    plan = [
+        at(flight, 16, 2.0, 0.0, 8.0),
+        do(m.MAV_CMD_DO_FENCE_ENABLE, 1.0),
+        do(m.MAV_CMD_DO_SET_SERVO, 9.0, 1600.0),
+        do(m.MAV_CMD_DO_GRIPPER, 1.0, 0.0),
+    ]
     assert upload(flight, [*plan, at(flight, 16, 4.0, 0.0, 8.0)]) == 0
     start_mission(flight)
     flight.fly_until(lambda: flight.text_time("Reached command #5") < math.inf, 30.0, "the end")

@@ -2,6 +2,7 @@
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
@@ -147,7 +148,10 @@ def test_an_endless_mission_goes_round_and_does_not_finish() -> None:
 
 
 def test_a_place_to_circle_for_ever_is_reached_when_the_vehicle_is_there() -> None:
-    items = [waypoint(1), MissionItem(command=17, param3=50.0, x=47.0, y=8.0, z=20.0)]
+    items = [
+        waypoint(1),
+        MissionItem(command=mavlink.MAV_CMD_NAV_LOITER_UNLIM, param3=50.0, x=47.0, y=8.0, z=20.0),
+    ]
     tracker = tracker_of(items)
     tracker.on_reached(0, 0)
     for time_us, north_m in enumerate((300.0, 150.0, 90.0)):

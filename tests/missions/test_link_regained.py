@@ -5,6 +5,7 @@ import math
 from itertools import pairwise
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import LocalFrame
@@ -36,8 +37,10 @@ def leg_items(autopilot, *norths_m):
     frame = LocalFrame(autopilot.home)
     places = [frame.geodetic_from_ned(north, 0.0, 0.0)[:2] for north in norths_m]
     return [
-        MissionItem(command=22, x=autopilot.home.lat_deg, y=autopilot.home.lon_deg, z=10.0),
-        *(MissionItem(command=16, x=lat, y=lon, z=10.0) for lat, lon in places),
+        MissionItem(
+            command=mavlink.MAV_CMD_NAV_TAKEOFF, x=autopilot.home.lat_deg, y=autopilot.home.lon_deg, z=10.0
+        ),
+        *(MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0) for lat, lon in places),
     ]
 
 

@@ -3,6 +3,7 @@
 import asyncio
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.clock import LoopClock, run
 from autopilot_bridge.mission_plan import MissionItem
@@ -94,7 +95,9 @@ def test_an_uploaded_mission_begins_anew(flown, flavour) -> None:
     async def script(vehicle, autopilot):
         autopilot.current = 52
         home = vehicle.home
-        items = [MissionItem(command=16, x=home.lat_deg, y=home.lon_deg, z=10.0)] * 3
+        items = [
+            MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=home.lat_deg, y=home.lon_deg, z=10.0)
+        ] * 3
         await vehicle.upload_mission(items)
         return autopilot.current, vehicle.notes.warnings
 

@@ -184,8 +184,11 @@ def test_mission_upload_download_clear_and_flight(flown, flavour):
         home = vehicle.home
         points = [(home.lat_deg + 2e-4, home.lon_deg), (home.lat_deg + 2e-4, home.lon_deg + 3e-4)]
         items = [vehicle.adapter.takeoff_item(home, 10.0)]
-        items += [MissionItem(command=16, x=lat, y=lon, z=10.0, param2=2.0) for lat, lon in points]
-        items.append(MissionItem(command=20, frame=2))
+        items += [
+            MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, x=lat, y=lon, z=10.0, param2=2.0)
+            for lat, lon in points
+        ]
+        items.append(MissionItem(command=dialect.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2))
         first = await vehicle.upload_mission(items)
         assert first == (1 if flavour == "ardupilot" else 0)
         back = await vehicle.download_mission()
@@ -204,7 +207,7 @@ def test_mission_upload_download_clear_and_flight(flown, flavour):
 
 def test_refused_mission_names_the_item(flown):
     async def script(vehicle, autopilot):
-        items = [MissionItem(command=16, x=47.0, y=8.0, z=10.0)] * 4
+        items = [MissionItem(command=dialect.MAV_CMD_NAV_WAYPOINT, x=47.0, y=8.0, z=10.0)] * 4
         with pytest.raises(CommandRejected, match=r"at item 3 \(NAV_WAYPOINT\): UNSUPPORTED"):
             await vehicle.upload_mission(items)
 
@@ -266,7 +269,7 @@ async def interrupted_after_arming(vehicle, autopilot, delay_s):
 
     async def fly():
         async with vehicle.safe_on_exit(Mode.RETURN):
-            await vehicle.command(400, 1.0)
+            await vehicle.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
             await asyncio.sleep(100.0)
 
     autopilot.due["HEARTBEAT"] = 10**12
@@ -305,7 +308,7 @@ def test_a_refused_arming_leaves_nothing_in_doubt(flown):
     async def script(vehicle, autopilot):
         autopilot.arm_refusals = 1000
         with pytest.raises(CommandRejected):
-            await vehicle.command(400, 1.0)
+            await vehicle.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         return vehicle.may_be_armed
 
     assert flown(script) is False
@@ -313,7 +316,7 @@ def test_a_refused_arming_leaves_nothing_in_doubt(flown):
 
 def test_a_disarmed_heartbeat_long_after_arming_is_believed(flown):
     async def script(vehicle, autopilot):
-        await vehicle.command(400, 1.0)
+        await vehicle.command(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         autopilot.armed = False
         doubts = [vehicle.may_be_armed]
         await asyncio.sleep(2.0)

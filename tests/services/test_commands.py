@@ -186,19 +186,21 @@ def test_ardupilot_results(command: int, parameters: tuple[float, ...], state: s
 )
 def test_ardupilot_reposition(frame: int, latitude: int, flags: int, state: str, acks: list[int]) -> None:
     rig = rig_of("ardupilot", state)
-    assert rig.int(192, -1, flags, 0, 0, latitude, HERE[1], 20.0, frame=frame) == acks
+    assert (
+        rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, flags, 0, 0, latitude, HERE[1], 20.0, frame=frame) == acks
+    )
     if frame == 1:
         assert rig.channel.texts() == []  # nobody greeted this channel
     rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-    rig.int(192, -1, 1, 0, 0, latitude, HERE[1], 20.0, frame=1)
+    rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, 0, latitude, HERE[1], 20.0, frame=1)
     assert rig.channel.texts() == ["Unknown mavlink coordinate frame 1"]
 
 
 def test_ardupilot_reposition_needs_the_flag_in_other_modes() -> None:
     rig = rig_of("ardupilot", "flying")
     rig.commander.set_mode(FlightMode.HOLD)
-    assert rig.int(192, -1, 0, 0, 0, *HERE, 20.0, frame=6) == [2]
-    assert rig.int(192, -1, 1, 0, 0, *HERE, 20.0, frame=6) == [0]
+    assert rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 0, 0, 0, *HERE, 20.0, frame=6) == [2]
+    assert rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, 0, *HERE, 20.0, frame=6) == [0]
     assert rig.commander.mode is FlightMode.GUIDED
 
 
@@ -207,14 +209,24 @@ def test_px4_reposition_flies_there(frame: int) -> None:
     rig = rig_of("px4", "flying")
     lat, lon, _ = rig.context.frame.geodetic_from_ned(12.0, 7.0, 0.0)  # type: ignore[union-attr]
     altitude_m = 489.0 + 15.0  # over the sea in every frame: PX4 doesn't look at it
-    assert rig.int(192, -1, 1, 0, NAN, round(lat * 1e7), round(lon * 1e7), altitude_m, frame=frame) == [0]
+    assert rig.int(
+        mavlink.MAV_CMD_DO_REPOSITION,
+        -1,
+        1,
+        0,
+        NAN,
+        round(lat * 1e7),
+        round(lon * 1e7),
+        altitude_m,
+        frame=frame,
+    ) == [0]
     rig.run(20.0)
     assert rig.context.nav[10:13] == pytest.approx((12.0, 7.0, -15.0), abs=0.1)
 
 
 def test_px4_reposition_takes_off_when_armed_on_the_ground() -> None:
     rig = rig_of("px4", "armed")
-    assert rig.int(192, -1, 1, 0, NAN, *HERE, 489.0 + 10.0, frame=6) == [0]
+    assert rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, NAN, *HERE, 489.0 + 10.0, frame=6) == [0]
     rig.run(20.0)
     assert rig.height_m == pytest.approx(10.0, abs=0.2)
 
@@ -238,13 +250,13 @@ def test_px4_takeoff_without_altitude_uses_the_parameter() -> None:
 
 def test_px4_mission_start_changes_the_mode_and_arms() -> None:
     rig = rig_of("px4", "ready")
-    assert rig.long(300, 0, 0) == [2]
+    assert rig.long(mavlink.MAV_CMD_MISSION_START, 0, 0) == [2]
     assert "Mission start denied! No valid mission\t" in rig.channel.texts()
-    rig.upload(MissionItem(command=22, frame=6, z=5.0), rig.waypoint(5.0, 0.0))
+    rig.upload(MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, frame=6, z=5.0), rig.waypoint(5.0, 0.0))
     rig.tick()
-    assert rig.long(300, NAN) == [2]
-    assert rig.long(300, 7) == [2]
-    assert rig.long(300, 0) == [0]
+    assert rig.long(mavlink.MAV_CMD_MISSION_START, NAN) == [2]
+    assert rig.long(mavlink.MAV_CMD_MISSION_START, 7) == [2]
+    assert rig.long(mavlink.MAV_CMD_MISSION_START, 0) == [0]
     assert rig.commander.armed
     assert rig.commander.mode is FlightMode.MISSION
 
@@ -270,7 +282,7 @@ def test_targets(flavour: str, system: int, component: int, answered: bool) -> N
 
 def test_the_acknowledgement_names_its_receiver() -> None:
     rig = rig_of("px4", "ready")
-    rig.long(401)
+    rig.long(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
     ack = next(message for message in rig.channel.sent if message.get_msgId() == 77)
     assert (ack.command, ack.result, ack.target_system, ack.target_component) == (401, 0, 255, 190)
 
@@ -315,17 +327,17 @@ def test_ardupilot_pause_outside_guided_and_auto() -> None:
     rig = rig_of("ardupilot", "flying")
     rig.handle(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
     rig.commander.set_mode(FlightMode.HOLD)
-    assert rig.long(193, 0) == [4]
+    assert rig.long(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0) == [4]
     assert "Failed to pause" in rig.channel.texts()
 
 
 def test_ardupilot_yaw_turns_and_the_place_stays() -> None:
     rig = rig_of("ardupilot", "flying")
     rig.run(1.0)
-    assert rig.long(115, 90, 30, 1, 0) == [0]
+    assert rig.long(mavlink.MAV_CMD_CONDITION_YAW, 90, 30, 1, 0) == [0]
     rig.run(8.0)
     assert rig.context.nav[27] == pytest.approx(math.pi / 2, abs=0.02)
-    assert rig.long(115, 45, 30, -1, 1) == [0]
+    assert rig.long(mavlink.MAV_CMD_CONDITION_YAW, 45, 30, -1, 1) == [0]
     rig.run(8.0)
     assert rig.context.nav[27] == pytest.approx(math.pi / 4, abs=0.02)
     assert rig.context.nav[10:12] == pytest.approx((0.0, 0.0), abs=0.1)
@@ -340,7 +352,7 @@ def test_ardupilot_turns_at_the_rate_and_in_the_direction_of_the_command(
 ) -> None:
     rig = rig_of("ardupilot", "flying")
     rig.run(1.0)
-    assert rig.long(115, *parameters) == [0]
+    assert rig.long(mavlink.MAV_CMD_CONDITION_YAW, *parameters) == [0]
     yaws = []
     for _ in range(40 * 50):
         rig.tick()
@@ -367,7 +379,9 @@ def test_ardupilot_position_setpoints_turn_at_their_yaw_rate() -> None:
 
 def test_ardupilot_starts_its_mission_when_the_throttle_is_raised() -> None:
     rig = ServiceRig("ardupilot")
-    rig.upload(rig.waypoint(0.0, 0.0, 10.0, command=22), rig.waypoint(20.0, 0.0, 10.0))
+    rig.upload(
+        rig.waypoint(0.0, 0.0, 10.0, command=mavlink.MAV_CMD_NAV_TAKEOFF), rig.waypoint(20.0, 0.0, 10.0)
+    )
     rig.commander.set_mode(FlightMode.GUIDED)
     assert rig.commander.arm().accepted
     rig.commander.set_mode(FlightMode.MISSION)
@@ -388,7 +402,7 @@ def test_ardupilot_starts_its_mission_when_the_throttle_is_raised() -> None:
 
 def test_change_speed_lasts_until_the_next_mode() -> None:
     rig = rig_of("px4", "flying")
-    rig.long(178, 1, 2.5, -1)
+    rig.long(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 2.5, -1)
     assert rig.context.parameters.cruise_speed_m_s == 2.5
     rig.commander.set_mode(FlightMode.RETURN)
     assert rig.context.parameters.cruise_speed_m_s == 5.0
@@ -396,19 +410,19 @@ def test_change_speed_lasts_until_the_next_mode() -> None:
 
 def test_fence_switch_sets_the_parameter() -> None:
     rig = rig_of("ardupilot", "ready")
-    assert rig.long(207, 1) == [0]
+    assert rig.long(mavlink.MAV_CMD_DO_FENCE_ENABLE, 1) == [0]
     assert rig.store.get("FENCE_ENABLE") == 1
 
 
 def test_failures_reach_the_hook() -> None:
     rig = rig_of("px4", "ready")
-    rig.long(420, 4, 1, 0)
+    rig.long(mavlink.MAV_CMD_INJECT_FAILURE, 4, 1, 0)
     assert rig.failures == [(4, 1, 0)]
 
 
 def test_ardupilot_has_no_command_for_failures() -> None:
     rig = rig_of("ardupilot", "ready")
-    assert rig.long(420, 4, 1, 0) == [3]
+    assert rig.long(mavlink.MAV_CMD_INJECT_FAILURE, 4, 1, 0) == [3]
     assert rig.failures == []
 
 

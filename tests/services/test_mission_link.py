@@ -136,7 +136,7 @@ def test_never_half_a_plan_and_always_an_end(
 
     stores = new_stores()
     store = stores[MissionType.MISSION]
-    old = tuple(MissionItem(command=16, x=47.0, y=8.0, z=5.0) for _ in range(4))
+    old = tuple(MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=47.0, y=8.0, z=5.0) for _ in range(4))
     store.replace(old, 1)
     service = MissionService(
         POLICIES[flavour], stores, Links(), lambda severity, text: None, home=lambda: None

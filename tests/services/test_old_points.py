@@ -105,7 +105,9 @@ def test_an_open_or_incomplete_fence_is_not_stored() -> None:
 
 def test_a_fence_that_the_messages_can_not_carry() -> None:
     vehicle = Vehicle()
-    circle = MissionItem(command=5003, frame=0, param1=50.0, x=47.0, y=8.0)
+    circle = MissionItem(
+        command=mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, frame=0, param1=50.0, x=47.0, y=8.0
+    )
     vehicle.stores[MissionType.FENCE].replace((circle,), 1)
     assert old_fence((circle,)) is None
     assert vehicle.tell(mavlink.MAVLink_fence_fetch_point_message(1, 1, 0)) == []

@@ -173,7 +173,9 @@ def test_aircraft_follow_nobody() -> None:
 )
 def test_arduplane_reposition_takes_radius_and_direction(radius_m: float, yaw: float, flown_m: float) -> None:
     rig = rig_of("ardupilot", "flying")
-    assert rig.int(192, -1, 1, radius_m, yaw, *rig.place(400.0, 300.0), 120.0, frame=6) == [0]
+    assert rig.int(
+        mavlink.MAV_CMD_DO_REPOSITION, -1, 1, radius_m, yaw, *rig.place(400.0, 300.0), 120.0, frame=6
+    ) == [0]
     rig.tick()
     circle = rig.commander.tasks.task.circle
     assert circle.radius_m == pytest.approx(flown_m)
@@ -184,10 +186,10 @@ def test_arduplane_reposition_changes_the_mode_only_when_told() -> None:
     rig = rig_of("ardupilot", "flying")
     rig.commander.set_mode(FlightMode.HOLD)
     place = rig.place(400.0, 0.0)
-    assert rig.int(192, -1, 0, 0, 0, *place, 120.0, frame=6) == [4]
-    assert rig.int(192, -1, 1, 0, 0, *place, 120.0, frame=1) == [2]
+    assert rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 0, 0, 0, *place, 120.0, frame=6) == [4]
+    assert rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, 0, *place, 120.0, frame=1) == [2]
     assert rig.channel.texts() == ["Unknown mavlink coordinate frame 1"]
-    assert rig.int(192, -1, 1, 0, 0, *place, 120.0, frame=6) == [0]
+    assert rig.int(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, 0, *place, 120.0, frame=6) == [0]
     assert rig.commander.mode is FlightMode.GUIDED
 
 
@@ -196,7 +198,9 @@ def test_px4_reposition_does_not_read_a_radius(radius_m: float) -> None:
     rig = rig_of("px4", "flying")
     altitude_m = 489.0 + 150.0  # over the sea in every frame: PX4 doesn't look at it
     place = rig.place(0.0, 500.0)
-    assert rig.int(192, -1, 1, radius_m, math.radians(90.0), *place, altitude_m, frame=6) == [0]
+    assert rig.int(
+        mavlink.MAV_CMD_DO_REPOSITION, -1, 1, radius_m, math.radians(90.0), *place, altitude_m, frame=6
+    ) == [0]
     rig.tick()
     task = rig.commander.tasks.task
     assert task.radius_m == pytest.approx(rig.context.fixed_wing.loiter_radius_m)
@@ -207,7 +211,9 @@ def test_px4_reposition_does_not_read_a_radius(radius_m: float) -> None:
 def test_px4_orbit_stays_in_hold(radius_m: float) -> None:
     rig = rig_of("px4", "flying")
     # MAVSDK sends the altitude over the sea in a frame of heights over home, which PX4 doesn't look at
-    assert rig.int(34, radius_m, NAN, 0, NAN, *rig.place(300.0, 0.0), 489.0 + 110.0, frame=6) == [0]
+    assert rig.int(
+        mavlink.MAV_CMD_DO_ORBIT, radius_m, NAN, 0, NAN, *rig.place(300.0, 0.0), 489.0 + 110.0, frame=6
+    ) == [0]
     rig.tick()
     assert rig.commander.mode is FlightMode.HOLD
     assert rig.commander.tasks.task.radius_m == radius_m
@@ -225,15 +231,15 @@ def test_px4_takeoff_goes_to_the_place_given() -> None:
 
 def test_arduplane_change_speed_is_told() -> None:
     rig = rig_of("ardupilot", "flying")
-    assert rig.long(178, 0, 30, 0) == [0]
+    assert rig.long(mavlink.MAV_CMD_DO_CHANGE_SPEED, 0, 30, 0) == [0]
     assert rig.channel.texts() == ["Set airspeed 30 m/s"]
     assert rig.context.fixed_wing.airspeed_trim_m_s == 30.0
-    assert rig.long(178, 1, 12, 0) == [0]
+    assert rig.long(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 12, 0) == [0]
     assert rig.store.get("MIN_GROUNDSPEED") == 12.0
-    assert rig.long(178, 9, 0, 60) == [0]
+    assert rig.long(mavlink.MAV_CMD_DO_CHANGE_SPEED, 9, 0, 60) == [0]
     assert rig.store.get("TRIM_THROTTLE") == 60
     rig.commander.set_mode(FlightMode.HOLD)
-    assert rig.long(178, 0, 30, 0) == [4]
+    assert rig.long(mavlink.MAV_CMD_DO_CHANGE_SPEED, 0, 30, 0) == [4]
 
 
 def test_arduplane_heading_altitude_and_airspeed_are_flown() -> None:
@@ -326,16 +332,18 @@ def test_land_start_goes_to_the_landing_sequence(flavour: str) -> None:
 
 def test_auto_without_a_mission_gives_up() -> None:
     rig = rig_of("ardupilot", "ready")
-    assert rig.long(300, 0, 0) == [0]
+    assert rig.long(mavlink.MAV_CMD_MISSION_START, 0, 0) == [0]
     assert rig.channel.texts() == ["Mission complete, changing mode to RTL"]
     assert rig.commander.mode is FlightMode.RETURN
 
 
 def test_a_fence_can_be_switched_on_when_there_is_one() -> None:
     rig = rig_of("ardupilot", "ready")
-    assert rig.long(207, 1) == [4]
-    rig.fence.replace((MissionItem(command=5001, frame=0, param1=3.0),) * 3, 1)
-    assert rig.long(207, 1) == [0]
+    assert rig.long(mavlink.MAV_CMD_DO_FENCE_ENABLE, 1) == [4]
+    rig.fence.replace(
+        (MissionItem(command=mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, frame=0, param1=3.0),) * 3, 1
+    )
+    assert rig.long(mavlink.MAV_CMD_DO_FENCE_ENABLE, 1) == [0]
     assert rig.store.get("FENCE_ENABLE") == 1
 
 

@@ -178,6 +178,6 @@ def test_px4_counts_positions_global_places_attitudes_and_rates(make, kind: Offb
     rig.handle(make())
     assert rig.commander.setpoints.offboard.kind is kind
     assert rig.commander.setpoints.age_s(rig.time_us) < 0.1
-    assert rig.long(176, 1, 6) == [0, 0]
+    assert rig.long(mavlink.MAV_CMD_DO_SET_MODE, 1, 6) == [0, 0]
     rig.tick()
     assert rig.commander.mode is FlightMode.OFFBOARD

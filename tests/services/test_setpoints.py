@@ -269,7 +269,7 @@ def test_a_guided_target_takes_over_from_the_takeoff() -> None:
     rig = ServiceRig("ardupilot")
     rig.commander.set_mode(FlightMode.GUIDED)
     rig.commander.arm()
-    assert rig.long(22, 0, 0, 0, 0, 0, 0, 10) == [0]
+    assert rig.long(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 10) == [0]
     rig.run_until(lambda: rig.height_m > 5.0, 20.0)
     rig.handle(local(1, POSITION_ONLY, pos=(20.0, 0.0, -8.0)))
     rig.run(15.0)

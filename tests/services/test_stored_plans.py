@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.mission_plan import MissionItem, MissionStore, MissionType
@@ -18,15 +19,18 @@ FOLDER = ("plans",)
 FILES = {kind: (*FOLDER, f"{kind.name.lower()}.dat") for kind in MissionType}
 PLANS: dict[MissionType, tuple[MissionItem, ...]] = {
     MissionType.MISSION: (
-        MissionItem(command=16, frame=0, x=47.4, y=8.5, z=489.0),
-        MissionItem(command=22, z=10.0, param4=math.nan),
-        MissionItem(command=16, x=47.398, y=8.546, z=10.0, param1=2.0, autocontinue=False),
-        MissionItem(command=20, frame=2),
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, frame=0, x=47.4, y=8.5, z=489.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, z=10.0, param4=math.nan),
+        MissionItem(
+            command=mavlink.MAV_CMD_NAV_WAYPOINT, x=47.398, y=8.546, z=10.0, param1=2.0, autocontinue=False
+        ),
+        MissionItem(command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2),
     ),
     MissionType.FENCE: tuple(
-        MissionItem(command=5001, param1=3.0, x=x, y=y) for x, y in ((47.3, 8.5), (47.5, 8.5), (47.5, 8.6))
+        MissionItem(command=mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, param1=3.0, x=x, y=y)
+        for x, y in ((47.3, 8.5), (47.5, 8.5), (47.5, 8.6))
     ),
-    MissionType.RALLY: (MissionItem(command=5100, x=47.398, y=8.546, z=20.0),),
+    MissionType.RALLY: (MissionItem(command=mavlink.MAV_CMD_NAV_RALLY_POINT, x=47.398, y=8.546, z=20.0),),
 }
 
 numbers = st.floats(width=32)
@@ -110,8 +114,8 @@ def test_plans_are_there_at_the_next_boot(flavour: str) -> None:
     assert Vehicle(files, flavour).plan(MissionType.MISSION) == ((), 0)
 
 
-FAR = MissionItem(command=16, x=95.0, y=8.0, z=5.0)
-HUGE = MissionItem(command=178, frame=2, param2=1e300)
+FAR = MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=95.0, y=8.0, z=5.0)
+HUGE = MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED, frame=2, param2=1e300)
 NO_COMMAND = MissionItem(command=9999, x=47.0, y=8.0, z=5.0)
 
 

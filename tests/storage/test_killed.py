@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.autopilot.firmware import FIRMWARES
 from autopilot_bridge.firmware.card_layout import CARD_LAYOUTS
@@ -139,12 +140,17 @@ def test_stored_plans_are_the_old_or_the_new(tmp_path: Path, steps: int) -> None
     texts: list[str] = []
 
     def items(count: int) -> tuple[MissionItem, ...]:
-        return tuple(MissionItem(command=16, x=47.398, y=8.546, z=10.0 + k) for k in range(count))
+        return tuple(
+            MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=47.398, y=8.546, z=10.0 + k)
+            for k in range(count)
+        )
 
     def upload(card: FolderStore, count: int) -> None:
         stores, service = plans(card, texts)
         stores[MissionType.MISSION].replace(items(count), count)
-        stores[MissionType.RALLY].replace((MissionItem(command=5100, x=47.4, y=8.5, z=20.0),), count)
+        stores[MissionType.RALLY].replace(
+            (MissionItem(command=mavlink.MAV_CMD_NAV_RALLY_POINT, x=47.4, y=8.5, z=20.0),), count
+        )
         service.tick(1)
 
     assert not until_killed(tmp_path, 100, lambda card: upload(card, 40))

@@ -35,7 +35,11 @@ def read(client: Client, name: str) -> float:
 def test_mis_total_follows_the_stored_mission() -> None:
     client = connected()
     assert read(client, "MIS_TOTAL") == 0.0
-    items = (MissionItem(command=16), MissionItem(command=22, z=5.0), MissionItem(command=20))
+    items = (
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT),
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, z=5.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH),
+    )
     client.sitl.vehicles[0].autopilot.missions.stores[MissionType.MISSION].replace(items, 7)
     assert announced(client.run(0.5), "MIS_TOTAL") == [3.0]  # home is counted
     client.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 0))

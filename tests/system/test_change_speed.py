@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.firmware import FLAVOUR_NAMES
 from autopilot_bridge.mission_plan import MissionItem
@@ -60,7 +61,9 @@ def test_in_a_mission(flavour: str, leg_m: float) -> None:
         items = [vehicle.adapter.takeoff_item(vehicle.home, 10.0)]
         for i in range(1, round(400.0 / leg_m) + 1):
             there = place(vehicle, i * leg_m)
-            items.append(MissionItem(command=16, x=there.lat_deg, y=there.lon_deg, z=10.0))
+            items.append(
+                MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=there.lat_deg, y=there.lon_deg, z=10.0)
+            )
         await vehicle.upload_mission(items)
         await vehicle.start_mission()
         await vehicle.clock.sleep(12.0)

@@ -75,7 +75,7 @@ def test_arducopter_turns_its_nose_in_guided(guided: Looking) -> None:
     assert guided.look(OLD_ROI, -EAST_DEG) == 0
     guided.flying.step(8.0)
     assert guided.to_the_east() > 90.0
-    assert guided.command(115, 10.0, 30.0, 1.0, 0.0) == 0  # CONDITION_YAW is newer
+    assert guided.command(mavlink.MAV_CMD_CONDITION_YAW, 10.0, 30.0, 1.0, 0.0) == 0  # CONDITION_YAW is newer
     guided.flying.step(10.0)
     assert guided.yaw_deg == pytest.approx(10.0, abs=4.0)
 
@@ -104,8 +104,15 @@ def test_px4_turns_its_nose_in_a_mission_only() -> None:
     looking.flying.step(4.0)
     assert looking.yaw_deg == pytest.approx(before, abs=4.0)
     there = [
-        MissionItem(command=22, x=looking.place.lat_deg, y=looking.place.lon_deg, z=10.0),
-        MissionItem(command=16, x=looking.place.lat_deg + 1e-3, y=looking.place.lon_deg, z=10.0),
+        MissionItem(
+            command=mavlink.MAV_CMD_NAV_TAKEOFF, x=looking.place.lat_deg, y=looking.place.lon_deg, z=10.0
+        ),
+        MissionItem(
+            command=mavlink.MAV_CMD_NAV_WAYPOINT,
+            x=looking.place.lat_deg + 1e-3,
+            y=looking.place.lon_deg,
+            z=10.0,
+        ),
     ]
     autopilot = looking.flying.autopilot
     autopilot.missions._stores[MissionType.MISSION].replace(tuple(there), 1)

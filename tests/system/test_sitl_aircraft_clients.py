@@ -7,6 +7,7 @@ import struct
 
 import pytest
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import all as mavlink
 
 from tests.clients.sitl_process import free_port, running_sitl
 from tests.system.runs import wait_until
@@ -69,8 +70,8 @@ def test_clients_come_and_go(flavour: str) -> None:
     with running_sitl(flavour, [f"tcpin:127.0.0.1:{port}"], speedup=SPEEDUP, options=options) as sitl:
         first = Client(port)
         main, sub = TAKEOFF_MODE[flavour]
-        first.insists("COMMAND_ACK", 176, (1, main, sub), command=176, result=0)
-        first.insists("COMMAND_ACK", 400, (1,), command=400, result=0)
+        first.insists("COMMAND_ACK", 176, (1, main, sub), command=mavlink.MAV_CMD_DO_SET_MODE, result=0)
+        first.insists("COMMAND_ACK", 400, (1,), command=mavlink.MAV_CMD_COMPONENT_ARM_DISARM, result=0)
         first.climbs_above(15.0)
         first.leave()
         for _ in range(20):

@@ -222,8 +222,11 @@ def test_plans_outlive_runs(flavour: str, tmp_path: Path) -> None:
     client = Client(flavour, MemoryCard(files=store))
     client.run(3.0)
     places = ((47.3, 8.4), (47.3, 8.7), (47.5, 8.55))
-    fence = [MissionItem(command=5001, frame=3, param1=3.0, x=x, y=y) for x, y in places]
-    rally = [MissionItem(command=5100, frame=3, x=47.398, y=8.546, z=20.0)]
+    fence = [
+        MissionItem(command=mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, frame=3, param1=3.0, x=x, y=y)
+        for x, y in places
+    ]
+    rally = [MissionItem(command=mavlink.MAV_CMD_NAV_RALLY_POINT, frame=3, x=47.398, y=8.546, z=20.0)]
     client.upload(MissionType.FENCE, fence)
     client.upload(MissionType.RALLY, rally)
     kept = client.vehicle.autopilot.missions._stores
@@ -287,7 +290,10 @@ def test_reboot_starts_again_from_zero(flavour: str) -> None:
     client = Client(flavour, card())
     client.fly()
     plans = client.vehicle.autopilot.missions._stores
-    plan = (MissionItem(command=22, z=5.0), MissionItem(command=16, x=47.0, y=8.0, z=5.0))
+    plan = (
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, z=5.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=47.0, y=8.0, z=5.0),
+    )
     plans[MissionType.MISSION].replace(plan, 77)
     client.set(name, value)
     before = client.vehicle.autopilot
@@ -303,7 +309,7 @@ def test_reboot_starts_again_from_zero(flavour: str) -> None:
     assert client.get(name) == value
     kept = after.missions._stores[MissionType.MISSION]
     assert (kept.items, kept.plan_id) == (plan, 77)
-    client.command(512, 2)
+    client.command(mavlink.MAV_CMD_REQUEST_MESSAGE, 2)
     times = [message.time_boot_ms for message in client.all("SYSTEM_TIME")]
     assert times and max(times) < 5000
     client.fly()  # and it is as good as new
@@ -367,7 +373,10 @@ def test_packed_parameters_as_pymavlink_reads_them() -> None:
 
 
 def test_mission_file_is_made_of_items_as_on_the_wire() -> None:
-    items = (MissionItem(command=16, x=-35.0, y=149.0, z=5.0), MissionItem(command=20, param1=float("nan")))
+    items = (
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=-35.0, y=149.0, z=5.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, param1=float("nan")),
+    )
     data = mission_files.packed(items, MissionType.MISSION)
     size = mavlink.MAVLink_mission_item_int_message.unpacker.size
     assert struct.unpack("<HHHHH", data[:10]) == (0x763D, 0, 0, 0, 2)

@@ -229,9 +229,11 @@ def test_the_leg_of_a_plan() -> None:
 
     def waypoint(north_m: float, east_m: float) -> MissionItem:
         lat, lon, _ = frame.geodetic_from_ned(north_m, east_m, 0.0)
-        return MissionItem(command=16, frame=6, x=lat, y=lon, z=100.0)
+        return MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, frame=6, x=lat, y=lon, z=100.0)
 
-    aircraft.missions.replace((waypoint(0.0, 0.0), MissionItem(command=178), waypoint(600.0, 0.0)), 1)
+    aircraft.missions.replace(
+        (waypoint(0.0, 0.0), MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED), waypoint(600.0, 0.0)), 1
+    )
     aircraft.missions.current = 2
     path = flight_path(MissionTask(aircraft.missions), aircraft.context, aircraft.missions)
     assert path is not None

@@ -14,23 +14,13 @@ from autopilot_bridge.flight.context import FlightContext, LandedState
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters
 from autopilot_bridge.flight.task import FlightTask
 from autopilot_bridge.navigation import layout as n
-from autopilot_bridge.navigation.health import NavigationHealth
 from flightsim.foundation.geodesy import GeodeticPosition, LocalFrame
+from tests.closed_loop import healthy
 
 Array = NDArray[np.float64]
 
 GRAVITY_M_S2 = 9.80665
 DT_S = 0.02
-
-
-def healthy() -> NavigationHealth:
-    """A filter that knows everything."""
-    health = NavigationHealth()
-    health.uninitialised = False
-    health.attitude = health.velocity_horizontal = health.velocity_vertical = True
-    health.position_horizontal_relative = health.position_horizontal_absolute = True
-    health.position_vertical_absolute = True
-    return health
 
 
 def wrap(angle: float) -> float:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import (
@@ -215,7 +216,7 @@ def test_speed_jump_and_unknown_items() -> None:
     store = store_of(
         do(Command.DO_CHANGE_SPEED, param1=0.0, param2=30.0, param3=-1.0),
         item((300.0, 0.0, 100.0)),
-        do(203),  # a camera it doesn't have
+        do(mavlink.MAV_CMD_DO_DIGICAM_CONTROL),  # a camera it doesn't have
         item((600.0, 300.0, 100.0)),
         do(Command.DO_JUMP, param1=1.0, param2=1.0),
         do(Command.DO_CHANGE_SPEED, param1=0.0, param2=-2.0),

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.flight.context import FlightEvent, ItemCommanded, WaypointReached
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LoiterTask, MissionTask, TurnInRule
@@ -78,9 +79,9 @@ def test_conditions_hold_items_up_beside_the_leg() -> None:
     flight = Flight(
         place(200.0, 0.0),
         do(Command.CONDITION_DELAY, param1=5.0),
-        do(183),
+        do(mavlink.MAV_CMD_DO_SET_SERVO),
         do(Command.CONDITION_DISTANCE, param1=300.0),
-        do(206, param1=20.0),
+        do(mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, param1=20.0),
         place(1200.0, 0.0),
     )
     flight.run(flight.has_reached(1))
@@ -92,7 +93,12 @@ def test_conditions_hold_items_up_beside_the_leg() -> None:
 
 
 def test_condition_yaw_is_passed_over() -> None:
-    flight = Flight(place(100.0, 0.0), do(Command.CONDITION_YAW, param1=90.0), do(183), place(500.0, 0.0))
+    flight = Flight(
+        place(100.0, 0.0),
+        do(Command.CONDITION_YAW, param1=90.0),
+        do(mavlink.MAV_CMD_DO_SET_SERVO),
+        place(500.0, 0.0),
+    )
     flight.run(lambda: bool(flight.commanded), limit_s=30.0)
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
 from missions.errors import MissionError
@@ -24,14 +25,14 @@ LOST = {
 def document(*, lands: bool = True) -> MissionDocument:
     lat, lon = HOME.lat_deg, HOME.lon_deg
     items = [
-        MissionItem(command=22, x=lat, y=lon, z=10.0),
-        MissionItem(command=16, x=lat + 4e-4, y=lon, z=10.0),
-        MissionItem(command=178, frame=2, param1=1.0, param2=4.0, param3=-1.0),
-        MissionItem(command=16, x=lat + 4e-4, y=lon + 4e-4, z=10.0),
-        MissionItem(command=178, frame=2, param1=1.0, param2=6.0, param3=-1.0),
-        MissionItem(command=16, x=lat + 1e-4, y=lon + 4e-4, z=10.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, x=lat, y=lon, z=10.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat + 4e-4, y=lon, z=10.0),
+        MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED, frame=2, param1=1.0, param2=4.0, param3=-1.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat + 4e-4, y=lon + 4e-4, z=10.0),
+        MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED, frame=2, param1=1.0, param2=6.0, param3=-1.0),
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=lat + 1e-4, y=lon + 4e-4, z=10.0),
     ]
-    items += [MissionItem(command=20, frame=2)] if lands else []
+    items += [MissionItem(command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2)] if lands else []
     return MissionDocument(path=Path("a.plan"), items=tuple(items))
 
 
@@ -93,7 +94,9 @@ def test_a_mission_that_is_left_on_the_way_fails(flown, flavour) -> None:
 
 def test_a_vehicle_that_holds_on_the_ground_before_it_disarms_has_landed(flown) -> None:
     """PX4 1.16.1: the mission is over at the touch-down, disarmed some seconds later."""
-    land = replace(document().items[-1], command=21, frame=6, x=HOME.lat_deg, y=HOME.lon_deg)
+    land = replace(
+        document().items[-1], command=mavlink.MAV_CMD_NAV_LAND, frame=6, x=HOME.lat_deg, y=HOME.lon_deg
+    )
     landing = replace(document(), items=(*document().items[:-1], land))
 
     async def script(vehicle, autopilot):

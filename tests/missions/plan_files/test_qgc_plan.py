@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -123,7 +124,7 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
     path = write(tmp_path)
     before = path.read_bytes()
-    item = MissionItem(command=16, x=LAT, y=LON, z=10.0)
+    item = MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=LAT, y=LON, z=10.0)
     home = GeodeticPosition(lat_deg=LAT, lon_deg=LON, alt_m=ALT)
     with pytest.raises(PlanError, match="nothing is overwritten"):
         write_mission_file(path, (item,), home, firmware="px4", kind=VehicleKind.MULTICOPTER, speed_m_s=5.0)

@@ -5,6 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -20,20 +21,24 @@ def document(*items: MissionItem) -> MissionDocument:
     return MissionDocument(path=Path("a.plan"), items=items, home=HOME)
 
 
-def at(north: float, height_m: float = 10.0, command: int = 16, **more: float) -> MissionItem:
+def at(
+    north: float, height_m: float = 10.0, command: int = mavlink.MAV_CMD_NAV_WAYPOINT, **more: float
+) -> MissionItem:
     return MissionItem(command=command, x=LAT + north, y=LON, z=height_m, **more)
 
 
 def test_jumps_are_followed_as_often_as_they_say() -> None:
-    jump = MissionItem(command=177, frame=2, param1=1.0, param2=2.0)
-    route = route_of(document(at(0.0, command=22), at(1e-4), at(2e-4), jump, at(3e-4)), HOME)
+    jump = MissionItem(command=mavlink.MAV_CMD_DO_JUMP, frame=2, param1=1.0, param2=2.0)
+    route = route_of(
+        document(at(0.0, command=mavlink.MAV_CMD_NAV_TAKEOFF), at(1e-4), at(2e-4), jump, at(3e-4)), HOME
+    )
     assert [stop.index for stop in route.stops] == [0, 1, 2, 1, 2, 1, 2, 4]
     assert not route.endless
 
 
 @pytest.mark.parametrize("repeats", [-1, 30000])
 def test_a_jump_for_ever_has_no_end(repeats: int) -> None:
-    jump = MissionItem(command=177, frame=2, param1=0.0, param2=float(repeats))
+    jump = MissionItem(command=mavlink.MAV_CMD_DO_JUMP, frame=2, param1=0.0, param2=float(repeats))
     assert route_of(document(at(1e-4), jump), HOME).endless
 
 
@@ -44,7 +49,7 @@ def test_heights_count_from_home_in_every_frame() -> None:
 
 
 def test_speed_and_stays_make_the_duration() -> None:
-    speed = MissionItem(command=178, frame=2, param1=1.0, param2=10.0)
+    speed = MissionItem(command=mavlink.MAV_CMD_DO_CHANGE_SPEED, frame=2, param1=1.0, param2=10.0)
     route = route_of(document(at(0.0), speed, at(9e-4, param1=7.0)), HOME)
     north_m = route.stops[1].position_ned_m[0]
     assert north_m == pytest.approx(100.0, rel=0.01)
@@ -53,7 +58,11 @@ def test_speed_and_stays_make_the_duration() -> None:
 
 
 def test_here_is_where_the_vehicle_was_before() -> None:
-    items = (MissionItem(command=22, z=10.0), at(1e-4), MissionItem(command=21, x=NAN, y=NAN, param4=NAN))
+    items = (
+        MissionItem(command=mavlink.MAV_CMD_NAV_TAKEOFF, z=10.0),
+        at(1e-4),
+        MissionItem(command=mavlink.MAV_CMD_NAV_LAND, x=NAN, y=NAN, param4=NAN),
+    )
     takeoff, _, land = placed(items, HOME, 0.0)
     assert (takeoff.x, takeoff.y) == (LAT, LON)
     assert (land.x, land.y, land.param4) == (LAT + 1e-4, LON, 0.0)
@@ -63,12 +72,22 @@ def test_here_is_where_the_vehicle_was_before() -> None:
 def test_a_route_ends_with_its_landing_or_return() -> None:
     landing = route_of(document(at(1e-4), at(0.0, 0.0, 21), at(9e-4)), HOME)
     assert [stop.index for stop in landing.stops] == [0, 1]
-    back = route_of(document(at(1e-4), MissionItem(command=20, frame=2), at(9e-4)), HOME)
+    back = route_of(
+        document(at(1e-4), MissionItem(command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, frame=2), at(9e-4)), HOME
+    )
     assert [stop.index for stop in back.stops] == [0]
 
 
 def test_what_is_scored() -> None:
-    route = route_of(document(at(0.0, command=22), at(1e-4), at(2e-4, command=19), at(0.0, 0.0, 21)), HOME)
+    route = route_of(
+        document(
+            at(0.0, command=mavlink.MAV_CMD_NAV_TAKEOFF),
+            at(1e-4),
+            at(2e-4, command=mavlink.MAV_CMD_NAV_LOITER_TIME),
+            at(0.0, 0.0, 21),
+        ),
+        HOME,
+    )
     assert [s.command for s in scored_stops(route, with_takeoff=True)] == [22, 16, 19]
     wings = scored_stops(route, with_takeoff=False)
     assert [s.command for s in wings] == [16, 19]
@@ -77,7 +96,9 @@ def test_what_is_scored() -> None:
 
 
 def test_splines_are_no_lines() -> None:
-    line, spline, after = route_of(document(at(0.0), at(1e-4, command=82), at(2e-4)), HOME).stops
+    line, spline, after = route_of(
+        document(at(0.0), at(1e-4, command=mavlink.MAV_CMD_NAV_SPLINE_WAYPOINT), at(2e-4)), HOME
+    ).stops
     assert not straight(line, spline)
     assert straight(spline, after)
     assert has_curves((line, spline, after))

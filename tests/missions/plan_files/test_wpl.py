@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink import mavwp
+from pymavlink.dialects.v20 import all as mavlink
 
 from autopilot_bridge.mission_plan import MissionItem
 from flightsim.foundation.geodesy import GeodeticPosition
@@ -74,9 +75,11 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
 
 def test_pymavlink_reads_what_is_written(tmp_path: Path) -> None:
     items = [
-        MissionItem(command=22, x=HOME.lat_deg, y=HOME.lon_deg, z=12.0, param4=float("nan")),
-        MissionItem(command=16, x=-35.3628, y=149.1652, z=12.5),
-        MissionItem(command=177, frame=2, param1=1.0, param2=3.0),
+        MissionItem(
+            command=mavlink.MAV_CMD_NAV_TAKEOFF, x=HOME.lat_deg, y=HOME.lon_deg, z=12.0, param4=float("nan")
+        ),
+        MissionItem(command=mavlink.MAV_CMD_NAV_WAYPOINT, x=-35.3628, y=149.1652, z=12.5),
+        MissionItem(command=mavlink.MAV_CMD_DO_JUMP, frame=2, param1=1.0, param2=3.0),
     ]
     loader = mavwp.MAVWPLoader()
     loader.load(str(written(tmp_path, format_wpl(items, HOME))))
