@@ -77,14 +77,14 @@ def test_a_survey_with_camera_and_gimbal(flavour: str) -> None:
     flight.take_off(15.0)
     plan = [
         at(flight, 16, 3.0, 0.0, 15.0),
-        do(m.MAV_CMD_DO_MOUNT_CONTROL, -60.0, 0.0, 0.0, 0.0, z=2.0),  # DO_MOUNT_CONTROL
-        do(m.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0, 1.0),  # IMAGE_START_CAPTURE: one
+        do(m.MAV_CMD_DO_MOUNT_CONTROL, -60.0, 0.0, 0.0, 0.0, z=2.0),
+        do(m.MAV_CMD_IMAGE_START_CAPTURE, 0.0, 0.0, 1.0, 1.0),  # one
         at(flight, 16, 8.0, 0.0, 15.0),
-        do(m.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 5.0),  # DO_SET_CAM_TRIGG_DIST
+        do(m.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 5.0),
         at(flight, 16, 40.0, 0.0, 15.0),
         do(m.MAV_CMD_DO_SET_CAM_TRIGG_DIST, 0.0),
-        do(m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, 0.0, NAN, NAN, x=12),  # DO_GIMBAL_MANAGER_PITCHYAW
-        do(m.MAV_CMD_DO_DIGICAM_CONTROL, x=1),  # DO_DIGICAM_CONTROL: one more
+        do(m.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW, -20.0, 0.0, NAN, NAN, x=12),
+        do(m.MAV_CMD_DO_DIGICAM_CONTROL, x=1),  # one more
         at(flight, 16, 46.0, 0.0, 15.0),
     ]
     assert upload(flight, plan) == 0, flight.texts
