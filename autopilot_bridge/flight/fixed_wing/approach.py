@@ -2,17 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.fixed_wing.flare import flare_time
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
-
-_CALM_M_S: Final = 1.0  # less wind doesn't choose the direction
-_RUNWAY_NEAR_HOME_M: Final = 300.0
-_SHALLOW: Final = 0.5  # of the landing angle: a leg shallower than this is flown level until the slope
-_SHORTEST_LEG_M: Final = 30.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,10 +69,10 @@ def approach_along_leg(
     north, east = place_ned_m[0] - start_ned_m[0], place_ned_m[1] - start_ned_m[1]
     length = math.hypot(north, east)
     height = place_ned_m[2] - start_ned_m[2]
-    if length < _SHORTEST_LEG_M or height <= 0.0:
+    if length < p.landing.shortest_leg_m or height <= 0.0:
         return None
     slope = height / length
-    if slope < _SHALLOW * math.tan(p.landing_angle_rad):
+    if slope < p.landing.shallow_share * math.tan(p.landing_angle_rad):
         slope = math.tan(p.landing_angle_rad)
     return Approach(
         north_m=place_ned_m[0],
@@ -98,8 +92,8 @@ def approach_into_wind(
     p = ctx.fixed_wing
     wind = math.hypot(state.wind_north_m_s, state.wind_east_m_s)
     home_n, home_e = float(ctx.home_ned_m[0]), float(ctx.home_ned_m[1])
-    near_home = math.hypot(place_ned_m[0] - home_n, place_ned_m[1] - home_e) < _RUNWAY_NEAR_HOME_M
-    if wind > _CALM_M_S:
+    near_home = math.hypot(place_ned_m[0] - home_n, place_ned_m[1] - home_e) < p.landing.runway_near_home_m
+    if wind > p.landing.calm_m_s:
         course = math.atan2(-state.wind_east_m_s, -state.wind_north_m_s)
     elif near_home and math.isfinite(ctx.home_yaw_rad):
         course = ctx.home_yaw_rad

@@ -2,7 +2,7 @@
 
 import math
 from enum import IntEnum
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,31 +19,6 @@ from autopilot_bridge.flight.fixed_wing.power_check import PowerCheck
 from autopilot_bridge.flight.fixed_wing.surface_wind import SurfaceWind
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
 from flightsim.foundation.vectors import wrap_pi
-
-_ENTRY_HEIGHT_M: Final = 4.0  # the circle is left this close to its height
-_ENTRY_COURSE_RAD: Final = math.radians(20.0)
-_ENTRY_WITHIN: Final = 0.4  # radii around the entry
-_BEFORE_ENTRY: Final = 1.5  # radii: a leg is taken up from here
-_ALONG_LEG: Final = 0.3  # of its length
-_TOO_HIGH_M: Final = 25.0  # over its entry: circle down first
-_BLIND_M: Final = 30.0  # over the ground: without a position straight on, to the ground
-_FREE_BANK_M: Final = 15.0  # over the ground the bank is no longer limited for the wing tips
-_LOW_M: Final = 2.0
-_SHORT_FINAL_M: Final = 12.0  # over the ground: from here on pitch flies the path, throttle the airspeed
-_MISSED_M: Final = 40.0  # beyond the place, too high: go around
-_ASIDE_M: Final = 20.0  # so far beside the runway on short final: go around
-_BEYOND_S: Final = 0.75  # of the approach's airspeed: it goes around where the touch would be beyond, ...
-_DECIDED_M: Final = 0.12  # ... above this height over the ground, ...
-_GO_AROUNDS: Final = 3  # ... so often; then it lands where it lands
-_SLOPE_GAIN: Final = 0.4
-_DIVE_FREE_M: Final = 25.0  # over the ground the nose may go down as far as anywhere; lower, ever less
-_DIVE_LOW_RAD: Final = math.radians(-1.0)
-_LATEST_FLARE: Final = 0.6  # of the flare's time, before the ground at the present sink
-_STANDING_M_S: Final = 1.5
-_BRAKE_AFTER_S: Final = 1.5
-_NOSE_DOWN_S: Final = 1.0
-_BOUNCED_M: Final = 0.3  # over the ground again, so soon after the touch: it still flies
-_BOUNCE_S: Final = 3.0
 
 
 class LandPhase(IntEnum):
@@ -129,18 +104,18 @@ class LandTask(AircraftTask):
         self.approach = approach_into_wind(ctx, state, place) if leg is None else leg
         self._line.set(self.approach.north_m, self.approach.east_m, self.approach.course_rad)
         if leg is not None and self._on_leg(ctx, leg):
-            self._enter_approach(leg)
+            self._enter_approach(ctx, leg)
         else:
             self._enter_circle(ctx)
 
     def _on_leg(self, ctx: FlightContext, leg: Approach) -> bool:
         """The aircraft is where the leg begins, so that it needs no circle to get there."""
-        state, radius = self._state, abs(ctx.fixed_wing.loiter_radius_m)
+        state, p, radius = self._state, ctx.fixed_wing.landing, abs(ctx.fixed_wing.loiter_radius_m)
         past_entry = self._line.along_m(state) + leg.length_m
         return (
-            -_BEFORE_ENTRY * radius < past_entry < _ALONG_LEG * leg.length_m
+            -p.before_entry_radii * radius < past_entry < p.along_leg_share * leg.length_m
             and abs(self._line.offset_m(state)) < radius
-            and leg.entry_down_m - state.down_m < _TOO_HIGH_M
+            and leg.entry_down_m - state.down_m < p.too_high_m
         )
 
     def _place(self, ctx: FlightContext) -> tuple[float, float, float]:
@@ -194,7 +169,7 @@ class LandTask(AircraftTask):
         if ctx.on_ground or self.phase is LandPhase.LANDED or approach is None:
             return self._land(ctx)
         low = self.phase in (LandPhase.FLARE, LandPhase.ROLL_OUT) or (
-            self.phase is LandPhase.APPROACH and self._height(p, approach.down_m) < _BLIND_M
+            self.phase is LandPhase.APPROACH and self._height(p, approach.down_m) < p.landing.blind_m
         )
         if not ctx.position_valid and not low:
             return self._fly_blind(ctx)
@@ -222,7 +197,7 @@ class LandTask(AircraftTask):
             case _:
                 self._fly_roll_out(ctx, p)
         command.write(ctx)
-        if self.phase is LandPhase.ROLL_OUT and state.ground_speed_m_s < _STANDING_M_S:
+        if self.phase is LandPhase.ROLL_OUT and state.ground_speed_m_s < p.landing.standing_m_s:
             # the controls of a standing aircraft would follow every gust
             clear_setpoint(ctx.setpoint, sp.SURFACES_DIRECT)
             ctx.setpoint[sp.BRAKE] = p.brake
@@ -245,20 +220,20 @@ class LandTask(AircraftTask):
         command.course_rad = guidance.course_rad
         command.lateral_acceleration_m_s2 = guidance.lateral_acceleration_m_s2
         command.down_m = approach.entry_down_m
-        at_height = abs(state.down_m - approach.entry_down_m) < _ENTRY_HEIGHT_M
+        at_height = abs(state.down_m - approach.entry_down_m) < p.landing.entry_height_m
         command.airspeed_m_s = p.landing_airspeed_m_s if at_height else math.nan
         past_entry = self._line.along_m(state) + approach.length_m
         if (
             circle.circling
             and at_height
-            and abs(past_entry) < _ENTRY_WITHIN * circle.radius_m
-            and abs(wrap_pi(state.course_rad - approach.course_rad)) < _ENTRY_COURSE_RAD
+            and abs(past_entry) < p.landing.entry_share * circle.radius_m
+            and abs(wrap_pi(state.course_rad - approach.course_rad)) < p.landing.entry_course_rad
         ):
-            self._enter_approach(approach)
+            self._enter_approach(ctx, approach)
 
-    def _enter_approach(self, approach: Approach) -> None:
+    def _enter_approach(self, ctx: FlightContext, approach: Approach) -> None:
         self.phase = LandPhase.APPROACH
-        self._wind.reset(approach.down_m - approach.entry_down_m)
+        self._wind.reset(approach.down_m - approach.entry_down_m, ctx.fixed_wing.surface_wind)
 
     def _height(self, p: FixedWingFlightParameters, down_m: float) -> float:
         """Over the ground, as far as it is known."""
@@ -268,7 +243,7 @@ class LandTask(AircraftTask):
         return down_m - self._state.down_m
 
     def _limit_bank(self, p: FixedWingFlightParameters, height_m: float) -> None:
-        share = (height_m - _LOW_M) / (_FREE_BANK_M - _LOW_M)
+        share = (height_m - p.landing.low_m) / (p.landing.free_bank_m - p.landing.low_m)
         if share < 1.0:
             share = max(0.0, share)
             self._command.roll_limit_rad = (
@@ -286,9 +261,11 @@ class LandTask(AircraftTask):
         height = self._height(p, approach.down_m)
         self._follow_wind(ctx, height)
         self._limit_bank(p, height)
-        share = (height - _LOW_M) / (_DIVE_FREE_M - _LOW_M)
+        share = (height - p.landing.low_m) / (p.landing.dive_free_m - p.landing.low_m)
         if share < 1.0:
-            command.pitch_min_rad = _DIVE_LOW_RAD + (p.pitch_min_rad - _DIVE_LOW_RAD) * max(0.0, share)
+            command.pitch_min_rad = p.landing.dive_low_rad + (p.pitch_min_rad - p.landing.dive_low_rad) * max(
+                0.0, share
+            )
         sink = state.ground_speed_m_s * approach.slope
         past_place = -math.inf
         flare_height = max(p.flare_height_m, p.flare_time_s * sink)
@@ -300,24 +277,28 @@ class LandTask(AircraftTask):
             command.down_m = max(approach.entry_down_m, slope_down)
             if slope_down > approach.entry_down_m:
                 # the slope is held more tightly than heights elsewhere (PX4: FW_LND_THRTC_SC)
-                command.down_m += _SLOPE_GAIN * (slope_down - state.down_m)
+                command.down_m += p.landing.slope_gain * (slope_down - state.down_m)
                 command.height_rate_m_s = -sink
-            if height < _SHORT_FINAL_M and p.trim_throttle > 0.0 and state.airspeed_m_s == state.airspeed_m_s:
+            if (
+                height < p.landing.short_final_m
+                and p.trim_throttle > 0.0
+                and state.airspeed_m_s == state.airspeed_m_s
+            ):
                 self._flare.fly_slope(
                     state, height, -past_place, (flare_height, sink), self._wind, p, command
                 )
         else:
             command.heading_rad = approach.course_rad
             command.height_rate_m_s = -sink
-        if height <= max(flare_height, _LATEST_FLARE * p.flare_time_s * state.vel_down_m_s):
+        if height <= max(flare_height, p.landing.latest_flare_share * p.flare_time_s * state.vel_down_m_s):
             self.phase = LandPhase.FLARE
             self._flare.begin(state, flare_height, sink, p)
-        elif past_place > _MISSED_M or (height < _SHORT_FINAL_M and self._aside(ctx)):
+        elif past_place > p.landing.missed_m or (height < p.landing.short_final_m and self._aside(ctx)):
             self._begin_go_around()
 
     def _aside(self, ctx: FlightContext) -> bool:
         """Too far beside the runway to land."""
-        return ctx.position_valid and abs(self._line.offset_m(self._state)) > _ASIDE_M
+        return ctx.position_valid and abs(self._line.offset_m(self._state)) > ctx.fixed_wing.landing.aside_m
 
     def _fly_flare(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
         state, command, approach = self._state, self._command, self.approach
@@ -333,7 +314,11 @@ class LandTask(AircraftTask):
         if ctx.position_valid:
             to_go = -self._line.along_m(state)
             beyond = self._flare.touch_beyond_m(state, height, to_go, p)
-            if beyond > _BEYOND_S * p.landing_airspeed_m_s and height > _DECIDED_M and self._may_go_around(p):
+            if (
+                beyond > p.landing.beyond_s * p.landing_airspeed_m_s
+                and height > p.landing.decided_m
+                and self._may_go_around(p)
+            ):
                 self._go_arounds += 1
                 self._begin_go_around()
                 self._fly_go_around(ctx, p, approach)
@@ -348,15 +333,15 @@ class LandTask(AircraftTask):
 
     def _may_go_around(self, p: FixedWingFlightParameters) -> bool:
         """A gust that carries it too far is luck; an aircraft that floats every time has to come down."""
-        return self._go_arounds < _GO_AROUNDS and p.trim_throttle > 0.0
+        return self._go_arounds < p.landing.go_arounds and p.trim_throttle > 0.0
 
     def _bounced(self, p: FixedWingFlightParameters) -> bool:
         """In the air again: a gust or the springs have lifted it; the flare sets it down once more."""
         measured = self._state.height_above_ground_m
         return (
             p.rangefinder_landing
-            and self._rolled_s < _BOUNCE_S
-            and measured > p.standing_height_m + _BOUNCED_M  # false for NaN
+            and self._rolled_s < p.landing.bounce_s
+            and measured > p.standing_height_m + p.landing.bounced_m  # false for NaN
         )
 
     def _fly_roll_out(self, ctx: FlightContext, p: FixedWingFlightParameters) -> None:
@@ -364,13 +349,13 @@ class LandTask(AircraftTask):
         self._rolled_s += ctx.dt_s
         command.roll_rad = 0.0
         # the nose comes down gently
-        share = max(0.0, 1.0 - self._rolled_s / _NOSE_DOWN_S)
+        share = max(0.0, 1.0 - self._rolled_s / p.landing.nose_down_s)
         command.pitch_rad = p.takeoff_roll_pitch_rad + share * (
             self._touch_pitch_rad - p.takeoff_roll_pitch_rad
         )
         command.throttle = 0.0
         command.steering_heading_rad = self._line.steering_heading(state, ctx.position_valid)
-        if self._rolled_s > _BRAKE_AFTER_S:
+        if self._rolled_s > p.landing.brake_after_s:
             command.brake = p.brake
 
     def abort_climb_m(self, p: FixedWingFlightParameters) -> float:
@@ -381,8 +366,8 @@ class LandTask(AircraftTask):
         """Straight up along the runway, then back to where the approach begins; without power down ahead."""
         state, command = self._state, self._command
         height = self._height(p, approach.down_m)
-        if self._power.powerless(state, ctx.dt_s) and height < _SHORT_FINAL_M:
-            self._go_arounds = _GO_AROUNDS
+        if self._power.powerless(state, ctx.dt_s) and height < p.landing.short_final_m:
+            self._go_arounds = p.landing.go_arounds
             self.phase = LandPhase.FLARE
             ctx.phase = FlightPhase.LANDING
             self._flare.begin(state, height, state.ground_speed_m_s * approach.slope, p)

@@ -8,6 +8,12 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from autopilot_bridge.control.fixed_wing.gains import gains_for
+from autopilot_bridge.flight.fixed_wing.landing_parameters import (
+    ClimbOutParameters,
+    FlareParameters,
+    LandingParameters,
+    SurfaceWindParameters,
+)
 from autopilot_bridge.flight.return_rules import RallyRule, ReturnDestination
 from flightsim.foundation.atmosphere import GRAVITY_M_S2
 from flightsim.foundation.checks import check_fields, require_finite, require_not_negative, require_positive
@@ -147,6 +153,10 @@ class FixedWingFlightParameters:
     flaps_takeoff: float = 0.0  # FW_FLAPS_TO_SCL | TKOFF_FLAP_PCNT
     flaps_landing: float = 0.0  # FW_FLAPS_LND_SCL | LAND_FLAP_PERCNT
     brake: float = 0.5  # in the roll-out
+    climb_out: ClimbOutParameters = field(default_factory=ClimbOutParameters)
+    landing: LandingParameters = field(default_factory=LandingParameters)
+    flare: FlareParameters = field(default_factory=FlareParameters)
+    surface_wind: SurfaceWindParameters = field(default_factory=SurfaceWindParameters)
 
     return_altitude_m: float = 60.0  # RTL_RETURN_ALT | RTL_ALTITUDE
     return_descend_altitude_m: float = 60.0  # RTL_DESCEND_ALT; ArduPilot: RTL_ALTITUDE

@@ -11,24 +11,18 @@ fade.
 """
 
 import math
-from typing import Final
 
+from autopilot_bridge.flight.fixed_wing.landing_parameters import SurfaceWindParameters
 from autopilot_bridge.flight.fixed_wing.state import AircraftState
 
-_ROUGHNESS_M: Final = 0.05  # open country, grass; ten times that takes 0.16 off the share at 5 m
-_KNOWN_AT_M: Final = 30.0  # over the ground: the filter's wind is the one from there on up
-_LOWEST_KNOWN_M: Final = 5.0
-_AHEAD_S: Final = 1.5  # an engine's spin-up, and what the airspeed needs to follow
-_LOWEST_M: Final = 0.5  # power that is asked for lower than this comes after the touch
-_CORRECTED_S: Final = 6.0  # longer than gusts close to the ground, shorter than the last of the slope
 
-
-def wind_share(height_m: float, known_at_m: float = _KNOWN_AT_M) -> float:
+def wind_share(height_m: float, known_at_m: float, parameters: SurfaceWindParameters) -> float:
     """Wind at a height over the ground, over the wind at the height where it is known; 0 to 1."""
-    if height_m <= _ROUGHNESS_M:
+    roughness_m = parameters.roughness_m
+    if height_m <= roughness_m:
         return 0.0
-    known_at_m = max(known_at_m, _LOWEST_KNOWN_M)
-    return min(1.0, math.log(height_m / _ROUGHNESS_M) / math.log(known_at_m / _ROUGHNESS_M))
+    known_at_m = max(known_at_m, parameters.lowest_known_m)
+    return min(1.0, math.log(height_m / roughness_m) / math.log(known_at_m / roughness_m))
 
 
 class SurfaceWind:
@@ -40,14 +34,15 @@ class SurfaceWind:
         head_wind_m_s: from ahead just before the touch; negative: from behind; 0 while no wind is known.
     """
 
-    __slots__ = ("_correction_m_s", "_known_at_m", "airspeed_m_s", "head_wind_m_s")
+    __slots__ = ("_correction_m_s", "_known_at_m", "_p", "airspeed_m_s", "head_wind_m_s")
 
     def __init__(self) -> None:
-        self.reset(_KNOWN_AT_M)
+        self.reset(math.inf, SurfaceWindParameters())
 
-    def reset(self, known_at_m: float) -> None:
+    def reset(self, known_at_m: float, parameters: SurfaceWindParameters) -> None:
         """An approach begins at a height over the ground; the filter's wind is the one there."""
-        self._known_at_m = min(known_at_m, _KNOWN_AT_M)
+        self._p = parameters
+        self._known_at_m = min(known_at_m, parameters.known_at_m)
         self._correction_m_s = 0.0
         self.airspeed_m_s = math.nan
         self.head_wind_m_s = 0.0
@@ -68,10 +63,10 @@ class SurfaceWind:
             self.airspeed_m_s = state.airspeed_m_s
             self.head_wind_m_s = 0.0
             return
-        height_m = max(_LOWEST_M, height_m)
-        at_touch = self._share(_LOWEST_M + standing_height_m)
+        height_m = max(self._p.lowest_m, height_m)
+        at_touch = self._share(self._p.lowest_m + standing_height_m)
         here = self._airspeed(state, self._share(height_m + standing_height_m))
-        later_m = max(_LOWEST_M, height_m - _AHEAD_S * max(0.0, state.vel_down_m_s))
+        later_m = max(self._p.lowest_m, height_m - self._p.ahead_s * max(0.0, state.vel_down_m_s))
         ahead = self._airspeed(state, self._share(later_m + standing_height_m))
         along_m_s = state.vel_north_m_s * state.wind_north_m_s + state.vel_east_m_s * state.wind_east_m_s
         self.head_wind_m_s = -at_touch * along_m_s / max(state.ground_speed_m_s, 1.0)
@@ -80,11 +75,11 @@ class SurfaceWind:
             self.airspeed_m_s = min(steady, ahead)
             return
         difference = state.airspeed_m_s - here - self._correction_m_s
-        self._correction_m_s += min(1.0, dt_s / _CORRECTED_S) * difference
+        self._correction_m_s += min(1.0, dt_s / self._p.corrected_s) * difference
         self.airspeed_m_s = min(state.airspeed_m_s + ahead - here, ahead + self._correction_m_s)
 
     def _share(self, height_m: float) -> float:
-        return wind_share(height_m, self._known_at_m)
+        return wind_share(height_m, self._known_at_m, self._p)
 
     @staticmethod
     def _airspeed(state: AircraftState, share: float) -> float:

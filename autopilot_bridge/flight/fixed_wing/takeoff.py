@@ -2,7 +2,7 @@
 
 import math
 from enum import IntEnum
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,13 +14,6 @@ from autopilot_bridge.flight.fixed_wing.line import Line
 from autopilot_bridge.flight.fixed_wing.loiter import LoiterTask
 from autopilot_bridge.flight.fixed_wing.parameters import FixedWingFlightParameters, LaunchKind
 from autopilot_bridge.flight.task import TaskStatus, clear_setpoint
-
-_REACHED_M: Final = 1.5  # below the height the take-off is done
-_CAPTURE_S: Final = 3.0  # of climb before the height: from climb rate to height control
-_CLIMB_SHARE: Final = 0.9  # of the greatest climb rate, so that the throttle isn't asked for the impossible
-_FAST: Final = 1.15  # over the climb's airspeed there is more power than the climb takes
-_LOW_M: Final = 2.0  # over the ground: wing tips
-_LEFT_GROUND_M: Final = 1.0
 
 
 class TakeoffPhase(IntEnum):
@@ -178,7 +171,7 @@ class TakeoffTask(AircraftTask):
             state, ctx.position_valid and self._runway.known
         )
         airspeed = state.airspeed_m_s if state.airspeed_m_s == state.airspeed_m_s else state.true_airspeed_m_s
-        off_ground = self._start_down_m - state.down_m > _LEFT_GROUND_M
+        off_ground = self._start_down_m - state.down_m > p.climb_out.left_ground_m
         if airspeed >= p.rotation_airspeed_m_s or off_ground:
             self.phase = TakeoffPhase.CLIMB_OUT
 
@@ -206,19 +199,21 @@ class TakeoffTask(AircraftTask):
         command.throttle_max = p.takeoff_throttle_max
         remaining = state.down_m - self._down_m
         self._climb_to_height(p, remaining)
-        low = climbed < _LOW_M
+        low = climbed < p.climb_out.low_m
         if ctx.position_valid:
             self._runway.follow(state, self._path.of(ctx), command)
         else:
             command.heading_rad = self._runway.heading_rad
-        share = min(1.0, max(0.0, (climbed - _LOW_M) / max(p.takeoff_clearance_m - _LOW_M, 1.0)))
+        share = min(
+            1.0, max(0.0, (climbed - p.climb_out.low_m) / max(p.takeoff_clearance_m - p.climb_out.low_m, 1.0))
+        )
         command.roll_limit_rad = (
             p.ground_bank_max_rad + (p.takeoff_bank_max_rad - p.ground_bank_max_rad) * share
         )
         if low and p.launch is LaunchKind.RUNWAY:
             command.steering_heading_rad = self._runway.heading_rad
         has_place = math.isfinite(float(self._place[0] + self._place[1]))
-        if remaining <= _REACHED_M or (climbed >= p.takeoff_clearance_m and has_place):
+        if remaining <= p.climb_out.reached_m or (climbed >= p.takeoff_clearance_m and has_place):
             self._climb_on(ctx)
 
     def _climb_on(self, ctx: FlightContext) -> None:
@@ -253,7 +248,7 @@ class TakeoffTask(AircraftTask):
             near = self._runway.along_m(state) > self._way_m - abs(ctx.fixed_wing.loiter_radius_m)
             if near or not ctx.position_valid:
                 self._circle(ctx)
-        if self.phase is TakeoffPhase.CLIMB and remaining <= _REACHED_M:
+        if self.phase is TakeoffPhase.CLIMB and remaining <= ctx.fixed_wing.climb_out.reached_m:
             self.phase = TakeoffPhase.REACHED
             ctx.phase = FlightPhase.CRUISE
             ctx.events.append(TaskFinished("takeoff"))
@@ -266,9 +261,9 @@ class TakeoffTask(AircraftTask):
         """
         state, command = self._state, self._command
         command.airspeed_m_s = p.takeoff_airspeed_m_s
-        climb = max(p.climb_rate_m_s, _CLIMB_SHARE * p.climb_max_m_s)
-        self._fast = self._fast or state.airspeed_m_s > _FAST * p.takeoff_airspeed_m_s
-        if remaining_m <= _CAPTURE_S * climb:
+        climb = max(p.climb_rate_m_s, p.climb_out.climb_share * p.climb_max_m_s)
+        self._fast = self._fast or state.airspeed_m_s > p.climb_out.fast_share * p.takeoff_airspeed_m_s
+        if remaining_m <= p.climb_out.capture_s * climb:
             command.down_m = self._down_m
         elif self._fast or state.airspeed_m_s != state.airspeed_m_s:
             command.height_rate_m_s = climb

@@ -8,6 +8,7 @@ import pytest
 from autopilot_bridge.control.fixed_wing import setpoint as sp
 from autopilot_bridge.flight.context import FlightContext
 from autopilot_bridge.flight.fixed_wing import FixedWingFlightParameters, LoiterTask
+from autopilot_bridge.flight.fixed_wing.landing_parameters import FlareParameters, LandingParameters
 from autopilot_bridge.flight.parameters import FlightParameters
 from autopilot_bridge.flight.task import FlightTask, SpeedTask
 from tests.control.fixed_wing.aerosonde import AEROSONDE
@@ -71,3 +72,11 @@ def test_parameters_may_change_in_flight() -> None:
     mass.ctx.parameters = replace(mass.parameters, guidance_period_s=20.0)
     mass.run(1.0)
     assert mass.ctx.setpoint[sp.LEVEL] == sp.FLY
+
+
+def test_the_values_of_a_landing_must_fit_each_other() -> None:
+    with pytest.raises(ValueError, match=r"low_m = 20\.0 is not below free_bank_m = 15\.0"):
+        LandingParameters(low_m=20.0)
+    with pytest.raises(ValueError, match=r"touch_s = 0\.0 is not accepted"):
+        FlareParameters(touch_s=0.0)
+    assert LandingParameters(dive_low_rad=0.0).dive_low_rad == 0.0
